@@ -89,6 +89,7 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     ),
     "evidence": busplan.evidence,
     "evidence can": lambda: busplan.evidence("can"),
+    "paper": lambda: busplan.evidence(paper=True),
     "calibrate paper-two-node table-1.csv --form linear --timing paper": lambda: busplan.calibrate(
         "paper-two-node", "table-1.csv", form="linear", timing_model="paper"
     ),

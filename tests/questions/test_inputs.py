@@ -159,7 +159,19 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "a transaction that is none": (
         lambda: busplan.timeline("paper-4ms", transaction=("read", 9)),
-        "read:9: no such transaction in this cycle",
+        "transaction read:9: expected read or write and a node from 1 to 2, as read:1 or write:2",
+    ),
+    "a transaction in other words": (
+        lambda: busplan.timeline("paper-4ms", transaction="both"),
+        "transaction both: expected read or write",
+    ),
+    "a kind beside the paper": (
+        lambda: busplan.evidence("can", paper=True),
+        "kind 'can': goes without paper=True",
+    ),
+    "a trace of every half step": (
+        lambda: busplan.circle_test("paper-4ms").trace_csv(every=0),
+        "every 0: expected a whole number from 1",
     ),
     "no paths": (lambda: busplan.check([]), "paths: no values; give at least one"),
     "paths that are none": (lambda: busplan.check(5), "paths 5: expected several values, as a list"),  # type: ignore[arg-type]
@@ -261,3 +273,9 @@ def test_a_profile_is_checked_as_the_file_that_would_be_written_of_it() -> None:
     answer = busplan.check([fast, "paper-1ms"], circle=False)
     assert (answer.passed, [one.path for one in answer.files]) == (False, ["paper-1ms.toml", "paper-4ms.toml"])
     assert "BP101" in [one.finding.code for one in busplan.check(fast, circle=False).findings]
+
+
+def test_a_transaction_is_a_pair_or_its_text() -> None:
+    wanted = busplan.timeline("paper-4ms", transaction=("read", 1))
+    assert busplan.timeline("paper-4ms", transaction="read:1") == wanted
+    assert wanted.events[0].node == 1

@@ -36,6 +36,19 @@ def test_a_file_has_the_bytes_that_the_command_writes(command: str, ending: str,
     assert ours.read_bytes() == theirs.read_bytes()
 
 
+def test_a_trace_has_the_bytes_that_the_command_writes(run: Run, tmp_path: Path) -> None:
+    run("circle-test", "paper-4ms", "--trace", "theirs.csv", "--every", "1000", cwd=tmp_path)
+    ours = "".join(busplan.circle_test("paper-4ms").trace_csv(every=1000))
+    assert ours.encode() == (tmp_path / "theirs.csv").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["timeline", "circle_test"])
+def test_a_note_stands_in_the_title_of_a_picture(name: str) -> None:
+    answer = getattr(busplan, name)("paper-4ms")
+    assert "With two hubs." not in answer.svg()
+    assert "With two hubs." in answer.svg(note="With two hubs.")
+
+
 def test_what_fails_leaves_the_old_file_whole_and_nothing_beside_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

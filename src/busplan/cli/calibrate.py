@@ -94,35 +94,31 @@ def calibrate_command(
         require_own_file(profile)
     files = chain(profile_files(profile), _measurements_file(measurements))
     with answer(format_, output, inputs=files, changes=changes, is_whole=all_) as give:
-        from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
+        from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES
         from busplan.profile.shipped import load, locate_measurements
         from busplan.profile.toml import read_bytes
-        from busplan.questions.calibrate import report as said
-        from busplan.questions.calibrate.calibration import calibrate
+        from busplan.questions.calibrate import calibrate
 
         loaded = load(profile)
         bench = changes.applied(loaded.profile)
         path, name, shipped = locate_measurements(measurements)
-        result = calibrate(
+        found = calibrate(
             bench,
-            parse_measurements(read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES), name=name),
-            source=name,
+            # Read here: Python reads no standard input, and takes a name of several lines for CSV text.
+            measurements if shipped else read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES),
+            form=form,
             group=group,
             timing_model=None if timing is None else timing_model(timing, bench),
-            form=form,
-            # The shipped example has published figures, so the result is derived.
-            grade="derived" if shipped else "measured",
+            source=name,
         )
         if apply:
-            note = said.provenance(result, source=Path(name).name)
-            found = said.execution_changes(result)
-            for one in changes.by_set:
-                for key in found:
-                    require_separate(one, key, typed="--apply")
-            apply_changes(loaded.document, found, notes={said.section(result): note})
+            for change in changes.by_set:
+                for key in found.edits:
+                    require_separate(change, key, typed="--apply")
+            apply_changes(loaded.document, found.edits, notes=found.notes)
             kept = "your comments are kept: see whether they hold of the new values"
-            say(f"wrote [{said.section(result)}] of {profile}; {kept}")
-        give(said.calibration_report(result, source=name, applied_to=profile if apply else None))
+            say(f"wrote [{' '.join(found.notes)}] of {profile}; {kept}")
+        give(found.report(applied_to=profile if apply else None))
 
 
 def _measurements_file(argument: str) -> Iterator[Path]:

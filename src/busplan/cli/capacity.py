@@ -46,17 +46,13 @@ def capacity_command(
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.questions.capacity.verdict import verdicts
-        from busplan.questions.fit.figures import capacity
+        from busplan.questions.capacity import capacity
 
         plan = load_changed(profile, changes)
-        result = capacity(plan, periods_us=periods_us(period, plan), timing_models=timing_models(timing, plan))
-        if sensitivity:
-            from busplan.questions.capacity.sensitivity import sensitivities
-            from busplan.questions.capacity.sensitivity_report import sensitivity_report
-
-            give(sensitivity_report(result, verdicts(result), sensitivities(result)))
-        else:
-            from busplan.questions.capacity.report import capacity_report
-
-            give(capacity_report(result, verdicts(result)))
+        found = capacity(
+            plan,
+            period_us=periods_us(period, plan),
+            timing_model=timing_models(timing, plan),
+            sensitivity=sensitivity,
+        )
+        give(found.report())

@@ -2,7 +2,7 @@
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, BinaryIO
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,7 +24,7 @@ from busplan.forms import Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.questions.circle.record import CircleTest
+    from busplan.questions.circle import CircleTestAnswer
 
 
 @takes_changes()
@@ -79,8 +79,7 @@ def circle_test_command(
     require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
     form = None if plot is None else plot_form(plot)
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.questions.circle.report import circle_report
-        from busplan.questions.circle.roundness import circle_test
+        from busplan.questions.circle import circle_test
 
         plan = load_changed(profile, changes)
         with ExitStack() as files:
@@ -90,29 +89,28 @@ def circle_test_command(
             with progress_bar("circle test") as progress:
                 test = circle_test(
                     plan,
-                    periods_us=periods_us(period, plan),
-                    with_contributions=contributions,
+                    period_us=periods_us(period, plan),
+                    contributions=contributions,
                     progress=progress,
                 )
             if trace_file is not None:
-                _write_trace(test, trace_file, every=every or 10)
+                trace_file.writelines(block.encode() for block in test.trace_csv(every=every or 10))
             if plot_file is not None and form is not None:
                 _draw(test, plot_file, changes, form)
-        _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
-        give(circle_report(test))
+        _say_written(trace, plot, drawn=any(test.runs))
+        give(test.report())
     if test.passed is False:
         raise PlanFailsError
 
 
-def _draw(test: "CircleTest", file: NewFile, changes: KeyChanges, form: Picture) -> None:
+def _draw(test: "CircleTestAnswer", file: NewFile, changes: KeyChanges, form: Picture) -> None:
     """Draw the simulated periods; without any, an old file stays unchanged."""
-    if all(run is None for run in test.runs):
+    if not any(test.runs):
         file.abandon()
         return
     from busplan.forms.raster import picture
-    from busplan.questions.circle.plot import circle_svg
 
-    file.write(document_bytes(picture(circle_svg(test, note=changes.words), form)))
+    file.write(document_bytes(picture(test.svg(note=changes.words), form)))
 
 
 def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
@@ -120,10 +118,3 @@ def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
         say(f"wrote {trace}")
     if plot is not None:
         say(f"wrote {plot}" if drawn else f"{plot}: not written, for no period fits the bus: nothing to draw")
-
-
-def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:
-    from busplan.forms.csv_rows import csv_blocks
-    from busplan.questions.circle.trace import TRACE_COLUMNS, trace_records
-
-    file.writelines(block.encode() for block in csv_blocks(trace_records(test, every=every), columns=TRACE_COLUMNS))

@@ -1,17 +1,12 @@
 """`busplan evidence`."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from busplan.cli.answering import answer
 from busplan.cli.options import AllOption, FormatOption, OutputOption
 from busplan.cli.progress import progress_bar
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from busplan.questions.circle.record import CircleFigures
 
 
 def complete_kind(incomplete: str) -> list[str]:
@@ -39,15 +34,8 @@ def evidence_command(
     Example: busplan evidence ieee1394
     """
     with answer(format_, output, is_whole=all_) as give:
-        from busplan.questions.evidence.figures import kind_evidence, known_kinds
-        from busplan.questions.evidence.report import evidence_report
+        from busplan.questions.evidence import evidence
 
-        give(evidence_report([kind_evidence(name, circles=shown_circles) for name in known_kinds(kind)]))
-
-
-def shown_circles() -> "Sequence[CircleFigures]":
-    """Run the circle tests of the paper with a progress bar."""
-    from busplan.questions.evidence.figures import paper_circles
-
-    with progress_bar("circle tests") as progress:
-        return paper_circles(progress=progress)
+        with progress_bar("circle tests") as progress:
+            found = evidence(kind, progress=progress)
+        give(found.report())

@@ -1,10 +1,10 @@
 """`busplan explain`."""
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from busplan.cli.answering import answer
+from busplan.cli.answering import answer, naming_option
 from busplan.cli.changes import PeriodsOption, load_changed, periods_us, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
@@ -15,26 +15,16 @@ from busplan.cli.options import (
     ProfileArgument,
     timing_models,
 )
+from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from busplan.forms.blocks import Report
-    from busplan.sections.profile import Profile
 
 
 def complete_figure(incomplete: str) -> list[str]:
     """Complete the name of a figure for the shell."""
-    from busplan.buses import kind_named, kind_names
-    from busplan.questions.explain.register import figures_of
+    from busplan.questions.explain import figure_names
 
-    registers = (figures_of(kind_named(kind)) for kind in kind_names())
-    names = (
-        name for one in registers for command, keys in one.items() for key in keys for name in (key, f"{command}.{key}")
-    )
-    return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
+    return [name for name in figure_names() if name.startswith(incomplete)]
 
 
 @takes_changes()
@@ -86,35 +76,19 @@ def explain_command(
     if figure is None:
         _refuse_without_figure({"--period": period, "--timing": timing, "--transaction": transaction})
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        plan = load_changed(profile, changes)
-        if figure is None:
-            give(_list(plan))
-            return
-        from busplan.cli.progress import progress_bar
-        from busplan.questions.explain.derivation import explain
-        from busplan.questions.explain.report import explain_report
+        from busplan.questions.explain import explain
 
-        with progress_bar("circle test") as progress:
+        plan = load_changed(profile, changes)
+        with progress_bar("circle test") as progress, naming_option("transaction"):
             found = explain(
                 plan,
                 figure,
-                periods_us=periods_us(period, plan),
-                timing_models=None if timing is None else timing_models(timing, plan),
-                transactions=_transactions(transaction, plan),
+                period_us=periods_us(period, plan),
+                timing_model=None if timing is None else timing_models(timing, plan),
+                transaction=None if transaction == ALL_MODELS else transaction,
                 progress=progress,
             )
-        give(explain_report(found))
-
-
-def _transactions(asked: str | None, profile: "Profile") -> "Sequence[str] | None":
-    if asked is None:
-        return None
-    from busplan.questions.explain.latency import latency_names
-
-    known = latency_names(profile)
-    if asked not in (*known, ALL_MODELS):
-        raise BusplanError(f"--transaction {asked}: expected {', '.join(known)} or both")
-    return known if asked == ALL_MODELS else (asked,)
+        give(found.report())
 
 
 def _refuse_without_figure(options: "dict[str, object]") -> None:
@@ -122,10 +96,3 @@ def _refuse_without_figure(options: "dict[str, object]") -> None:
     given = [name for name, value in options.items() if value]
     if given:
         raise BusplanError(f"{' and '.join(given)}: goes with a FIGURE, as in busplan explain PROFILE required_us")
-
-
-def _list(plan: "Profile") -> "Report":
-    from busplan.questions.explain.assumptions import assumptions_report
-    from busplan.questions.explain.derivation import assumptions
-
-    return assumptions_report(plan, assumptions(plan))

@@ -48,13 +48,12 @@ def latency_command(
     Example: busplan latency paper-two-node --payload 4,16,1024
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.questions.latency.figures import latency
-        from busplan.questions.latency.report import latency_report
+        from busplan.questions.latency import latency
 
         plan = load_changed(profile, changes)
-        result = latency(
+        found = latency(
             plan,
-            payloads_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
-            timing_models=timing_models(timing, plan),
+            payload_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
+            timing_model=timing_models(timing, plan),
         )
-        give(latency_report(result))
+        give(found.report())

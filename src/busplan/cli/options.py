@@ -98,7 +98,9 @@ def timing_models(timing: str, profile: "Profile") -> tuple[str, ...]:
     BusplanError
         The profile's kind of bus has no such model.
     """
-    return known_models(profile) if timing == ALL_MODELS else (timing_model(timing, profile),)
+    from busplan.questions.base.inputs import checked_models
+
+    return checked_models(None, profile) if timing == ALL_MODELS else (timing_model(timing, profile),)
 
 
 def timing_model(timing: str, profile: "Profile") -> str:
@@ -109,16 +111,9 @@ def timing_model(timing: str, profile: "Profile") -> str:
     BusplanError
         The profile's kind of bus has no such model, or the model cannot express the profile.
     """
-    from busplan.questions.fit.network import known_model
+    from busplan.questions.base.inputs import known_model
 
     return known_model(profile, timing, name="--timing")
-
-
-def known_models(profile: "Profile") -> tuple[str, ...]:
-    """Names of the timing models of a profile's kind of bus."""
-    from busplan.questions.fit.network import model_names
-
-    return model_names(profile)
 
 
 STANDARD_OUTPUT: Final = Path("-")

@@ -1,8 +1,8 @@
 """`busplan paper`."""
 
 from busplan.cli.answering import answer
-from busplan.cli.evidence import shown_circles
 from busplan.cli.options import AllOption, FormatOption, OutputOption
+from busplan.cli.progress import progress_bar
 
 
 def paper_command(all_: AllOption = False, format_: FormatOption = None, output: OutputOption = None) -> None:
@@ -17,7 +17,8 @@ def paper_command(all_: AllOption = False, format_: FormatOption = None, output:
     Example: busplan paper --format csv
     """
     with answer(format_, output, is_whole=all_) as give:
-        from busplan.questions.evidence.figures import paper_evidence
-        from busplan.questions.evidence.report import paper_report
+        from busplan.questions.evidence import evidence
 
-        give(paper_report(paper_evidence(circles=shown_circles)))
+        with progress_bar("circle tests") as progress:
+            found = evidence(paper=True, progress=progress)
+        give(found.report())

@@ -1,6 +1,5 @@
 """`busplan timeline`."""
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -8,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from busplan.cli.answering import answer, naming
+from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
-from busplan.cli.destinations import profile_files, require_apart
+from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     AllOption,
     ProfileArgument,
@@ -18,19 +17,17 @@ from busplan.cli.options import (
     time_us,
     timing_model,
 )
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
+from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, show_drawn
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.questions.timeline.events import Schedule
-    from busplan.sections.profile import Profile
+    from busplan.questions.timeline import TimelineAnswer
 
 TimelineForm = Literal[Form, Picture]
 
 _ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType({**ENDINGS, **PICTURES})
-_TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 
 @takes_changes(period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]")
@@ -103,43 +100,17 @@ def timeline_command(
     if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
 
-    def shown() -> "Schedule":
-        from busplan.questions.timeline.events import schedule, zoom
+    def find() -> "TimelineAnswer":
+        from busplan.questions.timeline import timeline
 
         plan = load_changed(profile, changes)
-        one = None if transaction is None else _transaction(transaction, plan)
-        model = None if timing is None else timing_model(timing, plan)
-        return zoom(schedule(plan, model=model), from_us=from_us, to_us=to_us, transaction=one)
+        with naming_option("transaction"):
+            return timeline(
+                plan,
+                timing_model=None if timing is None else timing_model(timing, plan),
+                from_us=from_us,
+                to_us=to_us,
+                transaction=transaction,
+            )
 
-    match chosen:
-        case "svg" | "png":
-            require_apart({"--output": output}, inputs=profile_files(profile))
-            with naming(changes):
-                write_picture(_svg(shown(), changes), chosen, output)
-        case _:
-            with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-                from busplan.questions.timeline.report import timeline_report
-
-                give(timeline_report(shown()))
-
-
-def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
-    from busplan.questions.fit.network import bus_of, network_of
-
-    match, nodes = _TRANSACTION.fullmatch(text), int(network_of(plan).nodes)
-    kinds = [one.key for one in bus_of(plan).stretch_kinds]
-    if match is None or match["kind"] not in kinds or not 1 <= int(match["node"]) <= nodes:
-        expected = (
-            f"{' or '.join(kinds)} and a node from 1 to {nodes}" if kinds else "none: this bus has no transactions"
-        )
-        example = f", as {kinds[0]}:1 or {kinds[-1]}:{nodes}" if kinds else ""
-        raise BusplanError(f"--transaction {text}: expected {expected}{example}")
-    return match["kind"], int(match["node"])
-
-
-def _svg(shown: "Schedule", changes: KeyChanges) -> str:
-    """The drawing as a file of its own."""
-    from busplan.questions.timeline.report import headline
-    from busplan.questions.timeline.svg import timeline_svg
-
-    return timeline_svg(shown, title=picture_title(headline(shown), changes))
+    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)

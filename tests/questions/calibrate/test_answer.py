@@ -53,6 +53,9 @@ def test_all_ways_to_give_measurements_are_the_same(given: Any, tmp_path: Path) 
     assert (found.execution, found.changes, found.payloads) == (wanted.execution, wanted.changes, wanted.payloads)
     assert (wanted.source, found.source) == (str(file), "measurements")
     assert busplan.calibrate("paper-two-node", str(file), form="linear") == wanted
+    read = busplan.calibrate("paper-two-node", TEXT.encode(), form="linear", source="bench 7")
+    assert (read.execution, read.source, read.to_dict()["source"]) == (wanted.execution, "bench 7", "bench 7")
+    assert wanted.notes == {"node.execution": read.notes["node.execution"].replace("bench 7", "bench.csv")}
 
 
 @pytest.mark.parametrize("form", ["linear", "table"])

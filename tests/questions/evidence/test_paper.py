@@ -39,7 +39,7 @@ def circles() -> list[CircleFigures]:
 
 @pytest.fixture(scope="module")
 def comparisons(circles: list[CircleFigures]) -> list[Comparison]:
-    return [one for section in paper_evidence(circles=lambda: circles) for one in section.comparisons]
+    return [one for section in paper_evidence(circles=lambda: circles).sections for one in section.comparisons]
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from busplan.errors import BusplanError
 from busplan.forms.numbers import listed
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.fit.network import bus_of, known_model, model_names
+from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
@@ -144,6 +144,37 @@ def checked_models(timing_model: Models | None, profile: Profile) -> tuple[str, 
             f"timing_model {timing_model!r}: expected {listed([*map(repr, names)], 'or')}, or a list of them, each once"
         )
     return tuple(known_model(profile, one, name="timing_model") for one in found)
+
+
+def known_model(profile: Profile, model: str, *, name: str) -> str:
+    """Check the name of a timing model.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    model
+        The name.
+    name
+        What messages call it.
+
+    Raises
+    ------
+    BusplanError
+        The profile's kind of bus has no such model, or the model cannot express the profile.
+    """
+    bus = bus_of(profile)
+    names = [one.name for one in bus.timing_models]
+    if model not in names:
+        raise BusplanError(
+            f"{name} {model}: no timing model of bus.kind {profile.bus.kind}; there are {', '.join(names)}"
+        )
+    keys = bus.cannot_express(network_of(profile), model=model)
+    if keys:
+        raise BusplanError(
+            f"{name} {model}: not applicable, the {model} model has no {', '.join(keys)}; use {bus.deciding_model}"
+        )
+    return model
 
 
 def finite(value: object, *, name: str) -> float:

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import Any, Literal, Protocol
 
 from busplan.errors import BusplanError
@@ -32,7 +33,7 @@ class Columns(Protocol):
     def __getitem__(self, name: Any, /) -> Any: ...
 
 
-Measurements = Path | Columns | Iterable[Mapping[str, Any]] | Iterable[Iterable[Any]]
+Measurements = Path | bytes | Columns | Iterable[Mapping[str, Any]] | Iterable[Iterable[Any]]
 """Measured latencies: a CSV file, CSV text, columns by name, or rows."""
 
 
@@ -78,17 +79,37 @@ class CalibrateAnswer(Answer):
 
         return {section(self.calibration): execution_section(self.calibration)}
 
+    @property
+    def edits(self) -> dict[str, object]:
+        """The changes that `--apply` makes in the file, by key; None removes a key of the old form."""
+        from busplan.questions.calibrate.report import execution_changes
+
+        return execution_changes(self.calibration)
+
+    @property
+    def notes(self) -> dict[str, str]:
+        """The comment that `--apply` writes above the section, by its key: where the execution time is from."""
+        from busplan.questions.calibrate.report import provenance, section
+
+        return {section(self.calibration): provenance(self.calibration, source=PurePath(self.source).name)}
+
     def _headline(self) -> str:
         from busplan.questions.calibrate.sentences import fit_sentences
 
         _, form, *_ = fit_sentences(self.calibration)
         return f"{self.profile.name}: {sentence_text(form)}"
 
-    def report(self) -> Report:
-        """The answer in blocks."""
+    def report(self, *, applied_to: str | None = None) -> Report:
+        """The answer in blocks.
+
+        Parameters
+        ----------
+        applied_to
+            The profile's file that the execution time was written into; by default none.
+        """
         from busplan.questions.calibrate.report import calibration_report
 
-        return calibration_report(self.calibration, source=self.source, applied_to=None)
+        return calibration_report(self.calibration, source=self.source, applied_to=applied_to)
 
 
 def calibrate(
@@ -98,6 +119,7 @@ def calibrate(
     form: Literal["table", "linear"] | None = None,
     group: str | None = None,
     timing_model: str | None = None,
+    source: str | None = None,
 ) -> CalibrateAnswer:
     """Find the execution time T_exec of a node from measured latencies.
 
@@ -106,16 +128,18 @@ def calibrate(
     profile
         The network that was measured: a `Profile`, a path or a shipped name. It is not changed.
     measurements
-        A CSV file, the shipped "table-1.csv", or CSV text of several lines; columns by name, as a mapping or a data
-        frame; or rows, each a mapping or values in the order of the columns. Columns, n values each: payload_bytes,
-        latency_us (T_lant [us]), and where known transaction ("read" or "write") and request_and_acknowledge_us
-        (T1+T2 [us]).
+        A CSV file, the shipped "table-1.csv", or CSV text of several lines or as bytes; columns by name, as a mapping
+        or a data frame; or rows, each a mapping or values in the order of the columns. Columns, n values each:
+        payload_bytes, latency_us (T_lant [us]), and where known transaction ("read" or "write") and
+        request_and_acknowledge_us (T1+T2 [us]).
     form
         Form of the execution time; by default the profile's node.execution.kind.
     group
         Name of the group of nodes that was measured; by default the one that the profile has.
     timing_model
         Name of the timing model that says what the packets take; by default the one that decides.
+    source
+        Name of measurements that are no file, in messages and documents; by default "measurements".
 
     Returns
     -------
@@ -144,24 +168,24 @@ def calibrate(
     network = load_profile(profile)
     if form not in (None, "table", "linear"):
         raise BusplanError(f"form {form!r}: expected 'table' or 'linear'")
-    found, source, shipped = _measured(measurements)
+    found, name, shipped = _measured(measurements, name=source or _IN_MEMORY)
     result = analysis.calibrate(
         network,
         found,
-        source=source,
+        source=name,
         group=group,
         timing_model=None if timing_model is None else checked_models(timing_model, network)[0],
         form=form,
         # The shipped example has published figures, so the result is derived.
         grade="derived" if shipped else "measured",
     )
-    return CalibrateAnswer(result, source)
+    return CalibrateAnswer(result, name)
 
 
-def _measured(given: Measurements) -> tuple[tuple[Measurement, ...], str, bool]:
+def _measured(given: Measurements, *, name: str) -> tuple[tuple[Measurement, ...], str, bool]:
     """Measurements, their name, and whether they are the shipped example."""
-    if isinstance(given, str) and "\n" in given:
-        return parse_measurements(given.encode(), name=_IN_MEMORY), _IN_MEMORY, False
+    if isinstance(given, bytes) or (isinstance(given, str) and "\n" in given):
+        return parse_measurements(given if isinstance(given, bytes) else given.encode(), name=name), name, False
     if isinstance(given, str | os.PathLike):
         text = os.fspath(given)
         if text == "-":
@@ -169,4 +193,4 @@ def _measured(given: Measurements) -> tuple[tuple[Measurement, ...], str, bool]:
         path, name, shipped = locate_measurements(text)
         content = read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES)
         return parse_measurements(content, name=name), name, shipped
-    return measurements_from(given, name=_IN_MEMORY), _IN_MEMORY, False
+    return measurements_from(given, name=name), name, False

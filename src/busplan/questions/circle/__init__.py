@@ -1,9 +1,12 @@
 """`busplan.circle_test`."""
 
+from collections.abc import Iterator
+
+from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Periods, ProfileLike, load_profile, one_or_several
+from busplan.questions.base.inputs import Periods, ProfileLike, load_profile, one_or_several, whole
 from busplan.questions.circle.record import CircleTest
 
 
@@ -24,10 +27,50 @@ class CircleTestAnswer(Answer, CircleTest):
 
         return circle_report(self)
 
-    def _repr_svg_(self) -> str | None:
+    def trace_csv(self, *, every: int = 10) -> Iterator[str]:
+        """The simulated steps of each period as CSV: time [us], positions and contour error [mm].
+
+        Parameters
+        ----------
+        every
+            One of so many steps is a row [1].
+
+        Returns
+        -------
+        Iterator of str
+            The file's text in blocks of many lines.
+
+        Raises
+        ------
+        BusplanError
+            `every` is no whole number from 1 on.
+        """
+        from busplan.forms.csv_rows import csv_blocks
+        from busplan.questions.circle.trace import TRACE_COLUMNS, trace_records
+
+        return csv_blocks(trace_records(self, every=whole(every, name="every")), columns=TRACE_COLUMNS)
+
+    def svg(self, *, note: str = "") -> str:
+        """The magnified circle, its error over time and the ranked error sources, as an SVG file.
+
+        Parameters
+        ----------
+        note
+            What the title says besides the profile's name.
+
+        Raises
+        ------
+        BusplanError
+            No period fits the bus, so nothing was simulated.
+        """
         from busplan.questions.circle.plot import circle_svg
 
-        return circle_svg(self) if any(self.runs) else None
+        if not any(self.runs):
+            raise BusplanError("there is nothing to draw: no period fits the bus")
+        return circle_svg(self, note=note)
+
+    def _repr_svg_(self) -> str | None:
+        return self.svg() if any(self.runs) else None
 
 
 def circle_test(

@@ -114,7 +114,7 @@ def kind_evidence(kind: str, *, circles: Callable[[], Sequence[CircleFigures]]) 
     return KindEvidence(bus.kind, bus.title, parts_tested(bus.evidence_data), found)
 
 
-def paper_evidence(*, circles: Callable[[], Sequence[CircleFigures]]) -> tuple[EvidenceSection, ...]:
+def paper_evidence(*, circles: Callable[[], Sequence[CircleFigures]]) -> KindEvidence:
     """The part of it that the paper publishes, in the order of the paper.
 
     Parameters
@@ -127,4 +127,4 @@ def paper_evidence(*, circles: Callable[[], Sequence[CircleFigures]]) -> tuple[E
     Paper, Tables I and II, sections IV-A and IV-B, equations (3)-(15), Figs. 9 and 10.
     """
     whole = kind_evidence(bus_of(load(BENCH_PROFILE).profile).kind, circles=circles)
-    return tuple(one for one in whole.sections if one.data == PAPER)
+    return whole._replace(sections=tuple(one for one in whole.sections if one.data == PAPER))

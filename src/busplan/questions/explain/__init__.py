@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from busplan.buses import kind_named, kind_names
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import plural
@@ -12,6 +13,7 @@ from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_
 from busplan.questions.explain import derivation as analysis
 from busplan.questions.explain.derivation import Derivation, Explanation
 from busplan.questions.explain.latency import latency_names
+from busplan.questions.explain.register import figures_of
 from busplan.sections.profile import Profile
 from busplan.sourced import Input
 
@@ -117,6 +119,19 @@ def explain(
         progress=progress,
     )
     return ExplainAnswer(network, found.derivations, ())
+
+
+def figure_names() -> list[str]:
+    """Names of the figures that `explain` takes, on all kinds of bus: each key, alone and behind its command."""
+    registers = (figures_of(kind_named(kind)) for kind in kind_names())
+    names = (
+        name
+        for register in registers
+        for command, figures in register.items()
+        for key in figures
+        for name in (key, f"{command}.{key}")
+    )
+    return list(dict.fromkeys(names))
 
 
 def _transactions(transaction: str | Iterable[str], profile: Profile) -> list[str]:

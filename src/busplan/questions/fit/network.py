@@ -7,7 +7,6 @@ from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, total
-from busplan.errors import BusplanError
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.base import Section
 from busplan.sections.profile import Profile
@@ -117,37 +116,6 @@ def leading_model(profile: Profile) -> str:
     """Name of the timing model whose figures lead: the profile's own, or the one that decides where that cannot."""
     own = profile.bus.timing_model
     return own if own in model_names(profile) else bus_of(profile).deciding_model
-
-
-def known_model(profile: Profile, model: str, *, name: str) -> str:
-    """Check the name of a timing model.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    model
-        The name.
-    name
-        What messages call it.
-
-    Raises
-    ------
-    BusplanError
-        The profile's kind of bus has no such model, or the model cannot express the profile.
-    """
-    bus = bus_of(profile)
-    names = [one.name for one in bus.timing_models]
-    if model not in names:
-        raise BusplanError(
-            f"{name} {model}: no timing model of bus.kind {profile.bus.kind}; there are {', '.join(names)}"
-        )
-    keys = bus.cannot_express(network_of(profile), model=model)
-    if keys:
-        raise BusplanError(
-            f"{name} {model}: not applicable, the {model} model has no {', '.join(keys)}; use {bus.deciding_model}"
-        )
-    return model
 
 
 def without_execution(network: Network) -> Network:

@@ -14,7 +14,8 @@ from busplan.profile.keys import named_tables
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override
 from busplan.profile.write import whole
-from busplan.questions.fit.network import known_model, model_names
+from busplan.questions.base.inputs import known_model
+from busplan.questions.fit.network import model_names
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 Array = NDArray[Any]

@@ -1,10 +1,18 @@
 """`busplan.timeline`."""
 
+import re
+from typing import Final
+
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
+from busplan.forms.columns import sentence_text
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole
+from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.timeline.events import Schedule, Total, schedule, totals, zoom
+from busplan.sections.profile import Profile
+
+_TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 
 class TimelineAnswer(Answer, Schedule):
@@ -23,10 +31,21 @@ class TimelineAnswer(Answer, Schedule):
 
         return timeline_report(self)
 
-    def _repr_svg_(self) -> str:
+    def svg(self, *, note: str = "") -> str:
+        """The cycle to scale, as an SVG file.
+
+        Parameters
+        ----------
+        note
+            What the title says behind the headline.
+        """
+        from busplan.questions.timeline.report import headline
         from busplan.questions.timeline.svg import timeline_svg
 
-        return timeline_svg(self, title=self._headline())
+        return timeline_svg(self, title=f"{sentence_text(headline(self))} {note}".rstrip())
+
+    def _repr_svg_(self) -> str:
+        return self.svg()
 
 
 def timeline(
@@ -35,7 +54,7 @@ def timeline(
     timing_model: str | None = None,
     from_us: float | None = None,
     to_us: float | None = None,
-    transaction: tuple[str, int] | None = None,
+    transaction: tuple[str, int] | str | None = None,
 ) -> TimelineAnswer:
     """Show one communication cycle as events, node by node.
 
@@ -48,7 +67,7 @@ def timeline(
     from_us, to_us
         Start and end of the window, from the start of the cycle [us]; by default the whole cycle.
     transaction
-        One transaction of one node with its gaps: ("read", 1).
+        One transaction of one node with its gaps: ("read", 1) or "read:1".
 
     Returns
     -------
@@ -58,7 +77,7 @@ def timeline(
     Raises
     ------
     BusplanError
-        Not a profile, too many nodes, an unknown timing model, or an empty window.
+        Not a profile, too many nodes, an unknown timing model, no such transaction, or an empty window.
 
     References
     ----------
@@ -72,19 +91,31 @@ def timeline(
     [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.733)]
     """
     network = load_profile(profile)
+    asked = None if transaction is None else _transaction(transaction, network)
     model = None if timing_model is None else checked_models([timing_model], network)[0]
-    plan = schedule(network, model=model)
     window = zoom(
-        plan,
+        schedule(network, model=model),
         from_us=None if from_us is None else finite(from_us, name="from_us"),
         to_us=None if to_us is None else finite(to_us, name="to_us"),
-        transaction=None if transaction is None else _one(transaction),
+        transaction=asked,
     )
     return TimelineAnswer(*window)
 
 
-def _one(transaction: object) -> tuple[str, int]:
-    match transaction:
-        case (str() as kind, node):
-            return kind, whole(node, name="transaction")
-    raise BusplanError(f'transaction {transaction!r}: expected one of one node, as ("read", 1)')
+def _transaction(asked: object, profile: Profile) -> tuple[str, int]:
+    """Kind and node of a transaction of the profile's bus."""
+    match asked:
+        case str():
+            text, written = asked, _TRANSACTION.fullmatch(asked)
+            kind, node = (written["kind"], int(written["node"])) if written else ("", 0)
+        case (str() as kind, number):
+            node = whole(number, name="transaction")
+            text = f"{kind}:{node}"
+        case _:
+            raise BusplanError(f'transaction {asked!r}: expected one of one node, as ("read", 1)')
+    kinds, nodes = [one.key for one in bus_of(profile).stretch_kinds], int(network_of(profile).nodes)
+    if kind in kinds and 1 <= node <= nodes:
+        return kind, node
+    expected = f"{' or '.join(kinds)} and a node from 1 to {nodes}" if kinds else "none: this bus has no transactions"
+    example = f", as {kinds[0]}:1 or {kinds[-1]}:{nodes}" if kinds else ""
+    raise BusplanError(f"transaction {text}: expected {expected}{example}")
