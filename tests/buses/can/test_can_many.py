@@ -14,10 +14,15 @@ import pytest
 
 import busplan
 from busplan.buses.can.constants import SATURATED
+from busplan.buses.can.cycle import WORST, CanCycle
+from busplan.buses.can.limits import LIMITS
 from busplan.buses.can.response import Sender, worst_response
 from busplan.buses.can.section import CanProfile
 from busplan.elementwise import pointwise
+from busplan.profile.toml import override
 from busplan.profile.write import profile_text
+from busplan.questions.fit.network import network_of
+from busplan.sections.base import with_unchecked
 
 Run = Callable[..., Any]
 MOST_S = 10.0
@@ -107,3 +112,39 @@ def test_groups_have_one_set_of_columns(run: Run, tmp_path: Path) -> None:
     rows = list(csv.DictReader(io.StringIO(run("latency", "two.toml", "--format", "csv", cwd=tmp_path).stdout)))
     assert {row["group"] for row in rows} == {"", "left", "right"}
     assert len({tuple(row) for row in rows}) == 1
+
+
+@pytest.mark.parametrize(
+    ("count", "load", "deadline_us"), [(3, 0.2, 4e3), (12, 0.6, 2e4), (60, 0.5, 4e4), (70, 0.8, 1e6)]
+)
+@pytest.mark.parametrize("most_steps", [2000, 12])
+def test_arrays_of_points_give_what_each_point_gives(
+    monkeypatch: pytest.MonkeyPatch, count: int, load: float, deadline_us: float, most_steps: int
+) -> None:
+    monkeypatch.setattr("busplan.buses.can.response.MOST_STEPS", most_steps)
+    sent = messages(count, load=load, slow=0.3, random=Random(count))
+    late = [{**one, "jitter_us": 10.0, "deadline_us": deadline_us} for one in sent]
+    profile = CanProfile.model_validate({**tomllib.loads(BASE), "message": late})
+    periods_us, nodes, write_bytes = (
+        np.array([700.0, 2500.0, 6000.0, 20000.0]).reshape(-1, 1, 1),
+        np.array([1, 2, 9, 40, 100]).reshape(-1, 1),
+        np.array([1, 8, 9, 24]),
+    )
+    keys = {"cycle.period_us": periods_us, "bus.nodes": nodes, "payload.write_bytes": write_bytes}
+    varied = profile
+    for key, values in keys.items():
+        varied = with_unchecked(varied, key, values.astype(float))
+    together = network_of(varied)
+    shape = (4, 5, 4)
+    cycle = CanCycle(together, WORST)
+    found: dict[str, Any] = {one.key: one.is_broken(together) for one in LIMITS}
+    found |= {"required": cycle.required_us, "longer": cycle.added_us(37.0)}
+    told = {key: np.broadcast_to(each, shape) for key, each in found.items()}
+    for place in np.ndindex(shape):
+        at = dict(zip(keys, (periods_us[place[0], 0, 0], nodes[place[1], 0], write_bytes[place[2]]), strict=True))
+        alone = network_of(override(profile, {key: value.item() for key, value in at.items()}))
+        own = CanCycle(alone, WORST)
+        expected = {one.key: one.is_broken(alone) for one in LIMITS}
+        expected |= {"required": own.required_us, "longer": own.added_us(37.0)}
+        assert {key: each[place] for key, each in told.items()} == expected, at
+    assert 0 < np.mean(told["deadline"]) < 1

@@ -227,3 +227,12 @@ def test_a_circle_without_a_tolerance_is_not_said_to_pass() -> None:
     assert sentence_text(said).endswith(", and its circle is not judged.")
     assert {option.circle_passed for option in plan_.options} == {None}
     assert {option["circle_passed"] for option in plan_report(plan_).document()["options"]} == {None}
+
+
+def test_a_margin_beyond_its_uncertainty_fails_in_no_row() -> None:
+    short = override(load("ethercat-servo-8").profile, {"cycle.period_us": 150.0, "servo.step_us": 75.0})
+    result = planned(short)
+    assert result.options[0].deciding.verdict != "fits"
+    assert result.options[0].held_by == "sync0"
+    first = rows(plan_report(result))[0]
+    assert all(cell.state != "fails" for cell in first.cells if isinstance(cell, ShownValue) and "margin" in cell.key)

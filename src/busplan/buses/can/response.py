@@ -225,7 +225,7 @@ class Arrivals:
 
             columns = []
             for column in zip(*self._senders, strict=True):
-                shape = np.broadcast_shapes((1,) * axes, *map(np.shape, column))
+                shape = np.broadcast_shapes((1,) * axes, *{getattr(one, "shape", ()) for one in column})
                 rows = np.empty((len(column), *shape))
                 for place, numbers in enumerate(column):
                     rows[place] = numbers

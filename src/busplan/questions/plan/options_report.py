@@ -16,7 +16,7 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.numbers import MISSING, period_value
-from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.certainty import FITS, limits_behind
 from busplan.questions.fit.network import bus_of
 from busplan.questions.plan.option import Option
 from busplan.questions.plan.planning import Plan
@@ -67,7 +67,11 @@ def option_margin(option: Option) -> tuple[ShownValue, ShownValue]:
         The option.
     """
     margin, doubt = (attribute_value(one, option.deciding) for one in (MARGIN_CORRECTED, UNCERTAINTY))
-    return margin._replace(state="neutral" if option.deciding.verdict == FITS else "fails"), doubt
+    one = option.deciding
+    # A margin beyond its uncertainty is none of the causes where limits of the bus are.
+    beyond_us = (one.margin_corrected_us or 0.0) - (one.uncertainty_us or 0.0)
+    is_enough = one.verdict == FITS or (beyond_us > 0 and limits_behind(one))
+    return margin._replace(state="neutral" if is_enough else "fails"), doubt
 
 
 _SHORT: Final = {
