@@ -3,6 +3,7 @@
 import pickle
 import re
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -120,6 +121,21 @@ def test_a_notebook_draws_a_map() -> None:
     assert "<b>" not in drawn
     assert found.own is not None
     assert (found.own.state, len(found.cells), found.regions[0].cells) == ("fits", 270, 104)
+
+
+def test_circles_of_a_map_run_on_any_executor_and_are_counted() -> None:
+    along: dict[str, Any] = {"x": {"axes": [4, 8]}, "y": {"cycle.period_us": [1000, 4000]}, "circle": True}
+    done: list[tuple[int, int]] = []
+    with ThreadPoolExecutor(2) as executor:
+        found = busplan.map_("paper-4ms", **along, executor=executor, progress=lambda *parts: done.append(parts))
+    assert found == busplan.map_("paper-4ms", **along)
+    assert done[-1] == (4, 4)
+
+
+def test_a_note_stands_behind_the_title_of_a_picture() -> None:
+    for found in (busplan.map_("paper-4ms", y={"cycle.period_us": [500]}), busplan.compare("paper-4ms", buses="can")):
+        title = found.svg().split("</title>", maxsplit=1)[0]
+        assert found.svg(note="With a note.").startswith(f"{title} With a note.</title>")
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,9 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     "plan paper-1ms --axes 15 --set limits.reserve=0.125 --free responses,gap_count --no-circle": lambda: busplan.plan(
         "paper-1ms", axes=15, reserve=0.125, free=["gap_count", "responses"], circle=False
     ),
+    "plan paper-1ms --axes 9 --set node.axes=3 --set bus.speed=S200 --no-circle": lambda: busplan.plan(
+        "paper-1ms", axes=9, wanted={"node.axes": 3, "bus.speed": "S200"}, circle=False
+    ),
     "timeline paper-1ms --timing standard --from 50us --to 0.1ms": lambda: busplan.timeline(
         "paper-1ms", timing_model="standard", from_us=50, to_us=100
     ),

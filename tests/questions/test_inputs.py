@@ -12,7 +12,7 @@ import pytest
 
 import busplan
 from busplan.gate.baseline import MODELS, Baseline, Record, write_baseline
-from busplan.profile.changes import KeyChanges, parse_set
+from busplan.profile.changes import NO_CHANGES, KeyChanges, parse_set
 from busplan.profile.shipped import load, shipped_folder
 
 TEXT = (shipped_folder() / "paper-4ms.toml").read_text(encoding="utf-8")
@@ -121,6 +121,30 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         "payload 100000 bytes: outside the execution table",
     ),
     "nodes and axes": (lambda: busplan.plan("paper-4ms", nodes=2, axes=8), "nodes 2 and axes 8: give one of them"),
+    "a goal twice": (
+        lambda: busplan.plan("paper-4ms", nodes=2, wanted={"bus.nodes": 3}),
+        "bus.nodes 2 and bus.nodes 3: both set bus.nodes; give one of them",
+    ),
+    "a goal without keys": (
+        lambda: busplan.plan("paper-4ms", wanted=["bus.nodes"]),  # type: ignore[arg-type]
+        "wanted ['bus.nodes']: expected new values by key",
+    ),
+    "too many axes": (
+        lambda: busplan.plan("paper-4ms", axes=4_000_000),
+        "axes 4000000: expected a whole number from 1 to 1,000,000",
+    ),
+    "an executor of no circles": (
+        lambda: busplan.map_("paper-4ms", executor=ThreadPoolExecutor()),
+        "executor: goes with circle=True",
+    ),
+    "an origin for another profile": (
+        lambda: busplan.report("paper-4ms", circle=False, origins=[("a", NO_CHANGES), ("b", NO_CHANGES)]),
+        "origins: 2 for 1 profile; expected one for each",
+    ),
+    "a model of two kinds of bus": (
+        lambda: busplan.diff("paper-4ms", "can-servo-8", timing_model="standard", circle=False),
+        "timing_model standard: the kinds of bus, ieee1394 and can, have no timing model in common; leave it out",
+    ),
     "no axes": (lambda: busplan.plan("paper-4ms", axes=0), "axes 0: expected a whole number from 1"),
     "no nodes": (lambda: busplan.plan("paper-4ms", nodes=0), "bus.nodes 0: must be 1 or more"),
     "one freedom": (

@@ -9,6 +9,7 @@ from xml.etree.ElementTree import fromstring
 import pytest
 
 import busplan
+from busplan.profile.changes import KeyChanges, parse_set
 from busplan.questions.base.answer import Answer
 
 
@@ -89,6 +90,21 @@ def test_every_row_of_a_sweep_is_saved(tmp_path: Path) -> None:
 def test_the_commands_of_a_page_give_its_profile(changes: dict[str, object], words: str) -> None:
     page = busplan.report(busplan.load_profile("sercos2-servo-8", changes=changes), circle=False)
     assert f"$ {words}\n" in str(page)
+
+
+def test_the_commands_of_a_page_give_the_origin_that_is_said() -> None:
+    profile = busplan.load_profile("sercos2-servo-8", changes={"bus.nodes": 3})
+    changes = KeyChanges(parse_set(["bus.nodes=3"]))
+    page = str(busplan.report(profile, circle=False, origins=[("line 1.toml", changes)]))
+    assert page.startswith("sercos2-servo-8\nWith --set bus.nodes=3.\n")
+    assert "$ busplan latency 'line 1.toml' --set bus.nodes=3 --format json\n" in page
+
+
+def test_a_difference_calls_its_sides_as_it_is_told() -> None:
+    found = busplan.diff("paper-optimal-gap", "paper-1ms", circle=False, arguments=("before", "after"))
+    assert [found.to_dict()[side]["argument"] for side in "ab"] == ["before", "after"]
+    assert found.regression_words(tolerance_percent=10).startswith("regression: B is worse by more than 10 % in ")
+    assert busplan.diff("paper-1ms", "paper-1ms", circle=False).regression_words() == ""
 
 
 def test_figures_that_are_worse_are_named_with_a_tolerance() -> None:

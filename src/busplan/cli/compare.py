@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from busplan.cli.answering import answer, naming
+from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
-from busplan.cli.destinations import profile_files, require_apart
+from busplan.cli.destinations import profile_files
 from busplan.cli.options import AllOption, ProfileArgument, output_option
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
+from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, show_drawn
+from busplan.cli.progress import progress_bar
 from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.questions.compare.kinds import KindComparison
+    from busplan.questions.compare import CompareAnswer
 
 CompareForm = Literal[Form, Picture]
 
@@ -77,32 +78,13 @@ def compare_command(
     Example: busplan compare gantry-24 --circle
     """
     chosen = picture_form(format_, output, forms=_ENDINGS)
-    match chosen:
-        case "svg" | "png":
-            require_apart({"--output": output}, inputs=profile_files(profile))
-            with naming(changes):
-                found = _found(profile, buses, changes, with_circle=circle)
-                write_picture(_svg(found, changes), chosen, output)
-        case _:
-            with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-                from busplan.questions.compare.report import compare_report
 
-                give(compare_report(_found(profile, buses, changes, with_circle=circle)))
+    def find() -> "CompareAnswer":
+        from busplan.questions.compare import compare
 
+        kinds = None if buses is None else [kind.strip() for kind in buses.split(",")]
+        plan = load_changed(profile, changes)
+        with progress_bar("circle tests") as progress, naming_option("buses"):
+            return compare(plan, buses=kinds, circle=circle, progress=progress)
 
-def _found(profile: str, buses: str | None, changes: KeyChanges, *, with_circle: bool) -> "KindComparison":
-    from busplan.cli.progress import progress_bar
-    from busplan.questions.compare.kinds import checked_kinds, compare
-
-    kinds = None if buses is None else checked_kinds([one.strip() for one in buses.split(",")], option="--buses")
-    with progress_bar("circle tests") as progress:
-        return compare(load_changed(profile, changes), kinds=kinds, with_circle=with_circle, progress=progress)
-
-
-def _svg(found: "KindComparison", changes: KeyChanges) -> str:
-    """The drawing as a file of its own."""
-    from busplan.questions.compare.report import headline, require_drawn
-    from busplan.questions.compare.svg import compare_svg
-
-    require_drawn(found)
-    return compare_svg(found, title=picture_title(headline(found), changes))
+    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)

@@ -1,11 +1,11 @@
 """`busplan diff`."""
 
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from busplan.cli.answering import answer
+from busplan.cli.answering import answer, naming_option
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
@@ -15,16 +15,13 @@ from busplan.cli.options import (
     OutputOption,
     TimingOption,
     complete_profile,
-    timing_models,
+    timing_model,
 )
 from busplan.cli.output import PlanFailsError, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
-
-if TYPE_CHECKING:
-    from busplan.sections.profile import Profile
 
 
 @takes_changes(words="Of both profiles.")
@@ -81,33 +78,26 @@ def diff_command(
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
     with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
         from busplan.profile.revision import load_revision
-        from busplan.questions.circle.circle_tests import circle_tests
-        from busplan.questions.diff.difference import difference
-        from busplan.questions.diff.headline import regression_words
-        from busplan.questions.diff.report import diff_report
+        from busplan.questions.diff import diff
 
         one, other = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
-        with progress_bar("circle tests") as progress:
-            test = circle_tests(progress) if circle else None
-            found = difference(one, other, timing_models=_models(timing, one, other), circle=test)
-        give(diff_report(found, arguments=(a, b)))
-    regressions = found.regressions(tolerance=allowed / 100)
+        if timing != ALL_MODELS and one.bus.kind == other.bus.kind:
+            for side in (other, one):
+                timing_model(timing, side)  # refuses it in the words of the option
+        with progress_bar("circle tests") as progress, naming_option("timing_model"):
+            found = diff(
+                one,
+                other,
+                timing_model=None if timing == ALL_MODELS else timing,
+                circle=circle,
+                progress=progress,
+                arguments=(a, b),
+            )
+        give(found.report())
+    regressions = found.regression_words(tolerance_percent=allowed)
     if fail_on_regression and regressions:
-        say(regression_words(found, regressions, tolerance=allowed))
+        say(regressions)
         raise PlanFailsError
-
-
-def _models(timing: str, one: "Profile", other: "Profile") -> "tuple[str, ...] | None":
-    """Timing models to compare; None for all, or for the deciding ones if the kinds of bus differ."""
-    if timing == ALL_MODELS:
-        return None
-    if one.bus.kind != other.bus.kind:
-        kinds = f"{one.bus.kind} and {other.bus.kind}"
-        raise BusplanError(
-            f"--timing {timing}: the kinds of bus, {kinds}, have no timing model in common; leave it out"
-        )
-    timing_models(timing, other)  # refuses a model that cannot express this one
-    return timing_models(timing, one)
 
 
 def _tolerance(percent: float | None, *, wanted: bool) -> float:

@@ -121,7 +121,7 @@ def init_command(
         text, taken = starter_text(source, name=path.stem), []
     write_file(path, text.encode(), overwrite=force)
     defaults = [f"not given, so taken: {' '.join(taken)}"] if taken else []
-    say(*defaults, f"wrote {path}", *_verdict(text), f"next: busplan capacity {shown}")
+    say(*defaults, f"wrote {path}", _verdict(text), f"next: busplan capacity {shown}")
 
 
 def _with_settings(text: str, *, name: str) -> str:
@@ -129,7 +129,7 @@ def _with_settings(text: str, *, name: str) -> str:
     from busplan.profile.edit import edited_file
     from busplan.profile.toml import decode, validate
     from busplan.profile.write import value_text
-    from busplan.questions.plan.settings import needed_settings
+    from busplan.questions.plan import needed_settings
 
     needed = needed_settings(validate(decode(text.encode(), name=name)))
     if not needed:
@@ -207,14 +207,10 @@ def _asked(words: str, default: _Answer) -> _Answer:
     return answer
 
 
-def _verdict(text: str) -> list[str]:
-    """The verdict of a new profile, in sentences."""
-    from busplan.forms.columns import sentence_text
+def _verdict(text: str) -> str:
+    """The verdict of a new profile, in a sentence."""
     from busplan.profile.toml import decode, validate
-    from busplan.questions.capacity.sentences import verdict_sentences
-    from busplan.questions.capacity.verdict import verdicts
-    from busplan.questions.fit.figures import capacity
+    from busplan.questions.capacity import capacity
 
-    profile = validate(decode(text.encode(), name="profile"))
-    headline, *_ = verdict_sentences(verdicts(capacity(profile))[0], profile)
-    return [sentence_text(headline)]
+    report = str(capacity(validate(decode(text.encode(), name="profile"))))
+    return report.partition("\n")[0]

@@ -1,33 +1,33 @@
 """`busplan map`."""
 
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from busplan.cli.answering import answer, naming
+from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
-from busplan.cli.destinations import profile_files, require_apart
+from busplan.cli.destinations import profile_files
 from busplan.cli.options import AllOption, ProfileArgument, output_option
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
+from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, show_drawn
+from busplan.cli.progress import progress_bar
 from busplan.cli.vary import VALUES_HELP, parse_axis
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.questions.map.direction import Direction
-    from busplan.questions.map.trade_off import TradeOff
-    from busplan.sections.profile import Profile
+    from busplan.questions.map import MapAnswer
 
 MapForm = Literal[Form, Picture]
 
 _ENDINGS: Final[Mapping[str, MapForm]] = MappingProxyType({**ENDINGS, **PICTURES})
 
 
-def _along(option: str, *, default: str) -> typer.models.OptionInfo:
+def _direction(option: str, *, default: str) -> typer.models.OptionInfo:
     help_ = (
         f"{'What lies across' if option == '--x' else 'What lies up'}: a key of the profile, or axes for the axes of "
         "all nodes (by their number; of groups, by that of the group with the most axes), and up to 64 values "
@@ -43,8 +43,8 @@ def _along(option: str, *, default: str) -> typer.models.OptionInfo:
 )
 def map_command(
     profile: ProfileArgument,
-    x: Annotated[str | None, _along("--x", default="axes about the most that fit")] = None,
-    y: Annotated[str | None, _along("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
+    x: Annotated[str | None, _direction("--x", default="axes about the most that fit")] = None,
+    y: Annotated[str | None, _direction("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
     changes: KeyChanges = NO_CHANGES,
     circle: Annotated[
         bool, typer.Option("--circle", help="Also run the circle test of every setting that fits, up to 1,000.")
@@ -83,45 +83,24 @@ def map_command(
         raise BusplanError("--jobs: goes with --circle")
     if jobs is not None and jobs < 1:
         raise BusplanError(f"--jobs {jobs}: must be 1 or more")
-    match chosen:
-        case "svg" | "png":
-            require_apart({"--output": output}, inputs=profile_files(profile))
-            with naming(changes):
-                found = _found(load_changed(profile, changes), x, y, jobs=jobs, with_circle=circle)
-                write_picture(_svg(found, changes), chosen, output)
-        case _:
-            with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-                from busplan.questions.map.report import map_report
 
-                give(map_report(_found(load_changed(profile, changes), x, y, jobs=jobs, with_circle=circle)))
+    def find() -> "MapAnswer":
+        from busplan.cli.workers import available_processors, executor
+        from busplan.questions.map import map_
 
+        plan = load_changed(profile, changes)
+        with ExitStack() as run, naming_option("x", "y", "circle"):
+            return map_(
+                plan,
+                x=_along(x, option="--x"),
+                y=_along(y, option="--y"),
+                circle=circle,
+                progress=run.enter_context(progress_bar("map")),
+                executor=run.enter_context(executor(jobs or available_processors())) if circle else None,
+            )
 
-def _found(plan: "Profile", x: str | None, y: str | None, *, jobs: int | None, with_circle: bool) -> "TradeOff":
-    from busplan.cli.progress import progress_bar
-    from busplan.cli.workers import available_processors, executor
-    from busplan.questions.map.trade_off import trade_off
-
-    across = _direction(x, plan, option="--x", with_circle=with_circle)
-    up = _direction(y, plan, option="--y", with_circle=with_circle)
-    with progress_bar("map") as progress, executor(jobs or available_processors() if with_circle else 1) as where:
-        return trade_off(plan, x=across, y=up, with_circle=with_circle, mapper=where.map, progress=progress)
+    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
 
 
-def _direction(text: str | None, plan: "Profile", *, option: str, with_circle: bool) -> "Direction | None":
-    from busplan.questions.map.direction import checked_direction
-    from busplan.questions.sweep import axis_values
-
-    if text is None:
-        return None
-    key, words = parse_axis(text, option=option)
-    values = axis_values(plan, key, words, name=option)
-    circle_option = None if with_circle else "--circle"
-    return checked_direction(plan, key, values, option=option, circle_option=circle_option)
-
-
-def _svg(found: "TradeOff", changes: KeyChanges) -> str:
-    """The drawing as a file of its own."""
-    from busplan.questions.map.report import headline
-    from busplan.questions.map.svg import map_svg
-
-    return map_svg(found, title=picture_title(headline(found), changes))
+def _along(text: str | None, *, option: str) -> dict[str, str] | None:
+    return None if text is None else dict([parse_axis(text, option=option)])

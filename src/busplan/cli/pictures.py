@@ -1,4 +1,4 @@
-"""The form of an answer that may also be a picture, and the title of that."""
+"""An answer that may also be a picture: its form, and how it is written."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -14,7 +14,7 @@ from busplan.forms import PICTURES, Form, Picture, ending_expected
 from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.forms.blocks import Report, Sentence
+    from busplan.forms.blocks import Report
 
 
 PICTURE_FORMAT_HELP: Final = (
@@ -65,19 +65,6 @@ def plot_form(path: Path) -> Picture:
     return PICTURES[ending]
 
 
-def write_picture(svg: str, form: Picture, output: Path | None) -> None:
-    """Write a drawing to a file or to standard output.
-
-    Raises
-    ------
-    BusplanError
-        It cannot be written.
-    """
-    from busplan.forms.raster import picture
-
-    write_document(picture(svg, form), output)
-
-
 class Drawn(Protocol):
     """An answer that has a picture."""
 
@@ -115,9 +102,11 @@ def show_drawn(
     """
     match form:
         case "svg" | "png":
+            from busplan.forms.raster import picture
+
             require_apart({"--output": output}, inputs=inputs)
             with naming(changes):
-                write_picture(find().svg(note=_changes_words(changes)), form, output)
+                write_document(picture(find().svg(note=_changes_words(changes)), form), output)
         case _:
             with answer(form, output, inputs=inputs, changes=changes, is_whole=is_whole) as give:
                 give(find().report())
@@ -129,11 +118,3 @@ def _changes_words(changes: KeyChanges) -> str:
     from busplan.questions.words.documents import changes_sentences
 
     return " ".join(map(sentence_text, changes_sentences(changes)))
-
-
-def picture_title(headline: "Sentence", changes: KeyChanges) -> str:
-    """Title of a picture that is a file of its own: the headline of its answer, and what was set."""
-    from busplan.forms.columns import sentence_text
-    from busplan.questions.words.documents import changes_sentences
-
-    return " ".join(map(sentence_text, (headline, *changes_sentences(changes))))

@@ -3,11 +3,11 @@
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from busplan.cli.answering import answer, report_with
+from busplan.cli.answering import answer, naming_option, report_with
 from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files, require_apart
@@ -22,8 +22,7 @@ from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 if TYPE_CHECKING:
     from busplan.forms.blocks import Report
     from busplan.profile.toml import LoadedProfile
-    from busplan.questions.plan.planning import Plan
-    from busplan.sections.profile import Profile
+    from busplan.questions.plan import PlanAnswer
 
 _PROFILE_ENDINGS = ("", ".toml")
 _MAX_AXES = 1_000_000
@@ -136,28 +135,25 @@ def plan_command(
     piped = new == STANDARD_OUTPUT
     require_apart({"--output": None if piped else new}, inputs=profile_files(profile), of_profiles=True)
     with answer(format_, report_file, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.profile.keys import flat
         from busplan.profile.shipped import load
-        from busplan.questions.circle.check import CircleCheck
-        from busplan.questions.plan.freedoms import freed
-        from busplan.questions.plan.planning import plan
-        from busplan.questions.plan.report import plan_report
+        from busplan.questions.plan import plan
 
         if apply:
             require_own_file(profile)
         loaded = load(profile)
-        wanted = _wanted(loaded.profile, changes, axes=axes)
-        goal = wanted.applied(loaded.profile)
-        with_circle = goal.asks_for_circle and circle
-        values: dict[str, Any] = wanted.values
-        names = _names(free)
-        freed(goal, names, asked=dict(flat(values)), option="--free")
         with ExitStack() as files:
             # Opened before the search, so that a path that cannot be written fails at once.
             file = files.enter_context(new_file(new, overwrite=force)) if new and not piped else None
-            with progress_bar("circle tests") as progress:
-                check = CircleCheck(progress=progress, expected=max_circles) if with_circle else None
-                result = plan(loaded.profile, wanted=values, free=names, circle=check, max_circles=max_circles)
+            with progress_bar("circle tests") as progress, naming_option("axes", "free"):
+                result = plan(
+                    loaded.profile,
+                    axes=axes,
+                    wanted=changes,
+                    free=None if free is None else [name.strip() for name in free.split(",")],
+                    circle=circle,
+                    max_circles=max_circles,
+                    progress=progress,
+                )
             if new is not None:
                 _write_profile(result, file)
         if result.recommended is None:
@@ -167,15 +163,9 @@ def plan_command(
             _apply(loaded, result)
         elif file is not None:
             say(f"wrote {new}")
-        report = plan_report(result)
-        (partial(_say_report, changes) if piped else give)(report)
+        (partial(_say_report, changes) if piped else give)(result.report())
     if result.recommended is None:
         raise PlanFailsError
-
-
-def _names(free: str | None) -> list[str] | None:
-    """The names of --free; an empty one is refused as unknown."""
-    return None if free is None else [name.strip() for name in free.split(",")]
 
 
 def _check_options(
@@ -195,36 +185,18 @@ def _check_options(
         raise BusplanError(*problems)
 
 
-def _wanted(profile: "Profile", changes: KeyChanges, *, axes: int | None) -> KeyChanges:
-    """The changes, with the nodes that --axes needs."""
-    if axes is None:
-        return changes
-    from busplan.questions.plan.machine import nodes_for_axes
-
-    of_nodes = KeyChanges(tuple(one for one in changes.each if one.key in ("node", "node.axes")))
-    nodes = nodes_for_axes(of_nodes.applied(profile), axes)
-    return KeyChanges((KeyChange("bus.nodes", nodes, "--axes", str(axes), f", nodes {nodes}"), *changes.each))
-
-
-def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
+def _apply(loaded: "LoadedProfile", result: "PlanAnswer") -> None:
     """Write the recommended values into the profile's file."""
-    from busplan.profile.keys import flat
     from busplan.profile.write import whole
-    from busplan.questions.plan.report import settings
 
-    if result.recommended is None:
-        return
-    changes = result.all_changes(result.recommended)
-    if not changes:
+    if not result.recommended_changes:
         say(f"{loaded.document.name}: nothing to change, left as it is")
         return
-    values = {key: whole(value) for key, value in changes.items()}
-    apply_changes(loaded.document, values)
-    written: dict[str, Any] = dict(flat(values))
-    say(f"changed {loaded.document.name}: {settings(loaded.profile, written)}")
+    apply_changes(loaded.document, {key: whole(value) for key, value in result.recommended_changes.items()})
+    say(f"changed {loaded.document.name}: {result.recommended_words}")
 
 
-def _write_profile(result: "Plan", file: NewFile | None) -> None:
+def _write_profile(result: "PlanAnswer", file: NewFile | None) -> None:
     """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged."""
     if result.recommended is not None:
         from busplan.profile.write import profile_text

@@ -1,11 +1,11 @@
 """`busplan report`."""
 
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import typer
 
-from busplan.cli.answering import answer
+from busplan.cli.answering import answer, naming
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import OutputOption, complete_profile, format_option
@@ -14,12 +14,6 @@ from busplan.cli.several import load_each
 from busplan.errors import BusplanError
 from busplan.forms import Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from busplan.forms.blocks import Report
-    from busplan.sections.profile import Profile
 
 _REFUSED: Final[dict[Form, str]] = {
     "csv": "a page holds many tables; each names its command, and that command's --format csv has its rows"
@@ -70,18 +64,17 @@ def report_command(
     if title is not None and (has_controls(title) or not title.strip()):
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
     files = profile_files(*profiles)
-    with answer(format_, output, inputs=files, changes=changes, default="html", refused=_REFUSED) as give:
+    # The answer names the changes itself, for they stand in the commands of the page, too.
+    with answer(format_, output, inputs=files, default="html", refused=_REFUSED) as give, naming(changes):
+        from busplan.questions.report import report
+
         plans = load_each(profiles, partial(load_changed, changes=changes))
-        give(_page(profiles, plans, title, changes=changes, circle=circle))
-
-
-def _page(
-    arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, changes: KeyChanges, circle: bool
-) -> "Report":
-    from busplan.questions.report.all_answers import answers_of_each
-    from busplan.questions.report.page import ReportedProfile, page_report
-
-    with progress_bar("circle tests") as progress:
-        found = answers_of_each(plans, with_circle=circle, progress=progress)
-    subjects = [ReportedProfile(argument, one, changes) for argument, one in zip(arguments, found, strict=True)]
-    return page_report(subjects, title=title)
+        with progress_bar("circle tests") as progress:
+            found = report(
+                plans,
+                title=title,
+                circle=circle,
+                progress=progress,
+                origins=[(argument, changes) for argument in profiles],
+            )
+        give(found.report())

@@ -56,16 +56,25 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     >>> busplan.load_profile("paper-4ms", changes={"bus.nodes": 3, "cycle.nonperiodic_us": 2}).bus.nodes
     3
     """
-    if not isinstance(changes, Mapping | None):
-        raise BusplanError(f'changes {changes!r}: expected new values by key, as {{"bus.nodes": 3}}')
+    new = values_by_key(changes, name="changes")
     found = profile if isinstance(profile, Profile) else load(argument(profile)).profile
-    return override(found, {_key(key): plain(value) for key, value in (changes or {}).items()})
+    return override(found, new)
 
 
-def _key(key: object) -> str:
-    if not isinstance(key, str):
-        raise BusplanError(f"changes {key!r}: expected a dotted key of the profile, as bus.nodes")
-    return key
+def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str, object]:
+    """New values by dotted key, converted from NumPy.
+
+    Raises
+    ------
+    BusplanError
+        Not a mapping, or a key that is no text.
+    """
+    if not isinstance(values, Mapping | None):
+        raise BusplanError(f'{name} {values!r}: expected new values by key, as {{"bus.nodes": 3}}')
+    for key in values or {}:
+        if not isinstance(key, str):
+            raise BusplanError(f"{name} {key!r}: expected a dotted key of the profile, as bus.nodes")
+    return {key: plain(value) for key, value in (values or {}).items()}
 
 
 def argument(path: Path) -> str:

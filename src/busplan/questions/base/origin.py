@@ -10,8 +10,11 @@ from busplan.profile.write import value_text
 from busplan.questions.base.inputs import plain
 from busplan.sections.profile import Profile
 
+Origin = tuple[str, KeyChanges]
+"""A PROFILE argument, and the changes of that profile by options."""
 
-def origin_of(profile: Profile) -> tuple[str, KeyChanges]:
+
+def origin_of(profile: Profile) -> Origin:
     """Tell a PROFILE argument and the `--set` options that give a profile.
 
     Parameters

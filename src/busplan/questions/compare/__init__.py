@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 
+from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.progress import Progress
@@ -30,15 +31,31 @@ class CompareAnswer(Answer, KindComparison):
         """
         return {one.kind if isinstance(one, NotOnKind) else one.figures.kind: one for one in self.kinds}[kind]
 
-    def _svg(self) -> str:
-        from busplan.questions.compare.report import headline, require_drawn
+    def svg(self, *, note: str = "") -> str:
+        """Draw the most axes over the period, a line for each kind of bus, as an SVG file.
+
+        Parameters
+        ----------
+        note
+            Words behind the title.
+
+        Raises
+        ------
+        BusplanError
+            No kind of bus can have the machine.
+        """
+        from busplan.questions.compare.report import headline
         from busplan.questions.compare.svg import compare_svg
 
-        require_drawn(self)
-        return compare_svg(self, title=sentence_text(headline(self)))
+        if not self.compared:
+            raise BusplanError("there is nothing to draw: no kind of bus that was asked for can have this machine")
+        return compare_svg(self, title=f"{sentence_text(headline(self))} {note}".rstrip())
+
+    def _svg(self) -> str:
+        return self.svg()
 
     def _repr_svg_(self) -> str | None:
-        return self._svg() if self.compared else None
+        return self.svg() if self.compared else None
 
     def report(self) -> Report:
         """The answer in blocks."""

@@ -6,7 +6,6 @@ from typing import Final
 
 from busplan.buses import kind_named
 from busplan.buses.figure import SAFE_AXES, VERDICT
-from busplan.errors import BusplanError
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -204,18 +203,6 @@ def compare_chart(found: KindComparison) -> Chart:
     caption = "Most axes that are shown to fit over the period, both logarithmic"
     svg = partial(compare_svg, found, title=sentence_text(headline(found)), inline=True)
     return Chart(OwnPicture(svg, partial(compare_lines, found), stylesheet=STYLE), Sentence((caption,)))
-
-
-def require_drawn(found: KindComparison) -> None:
-    """Refuse a picture without a line.
-
-    Raises
-    ------
-    BusplanError
-        No kind of bus that was asked for can have the machine.
-    """
-    if not found.compared:
-        raise BusplanError("there is nothing to draw: no kind of bus that was asked for can have this machine")
 
 
 def assumed_table(found: KindComparison) -> Table:

@@ -30,7 +30,7 @@ class DiffAnswer(Answer):
     circles
         Circle tests of A and B; None if neither asks for one, or none was to be run.
     arguments
-        A and B as they were given; the name of a `Profile`.
+        What the report calls A and B: as they were given, and the name of a `Profile`.
     """
 
     a: Profile
@@ -63,6 +63,24 @@ class DiffAnswer(Answer):
             raise BusplanError(f"tolerance_percent {allowed:g}: must be 0 or more")
         return tuple(self._found.regressions(tolerance=allowed / 100))
 
+    def regression_words(self, *, tolerance_percent: float = 0.0) -> str:
+        """Name the figures of B that are worse, in a sentence; empty if there are none.
+
+        Parameters
+        ----------
+        tolerance_percent
+            As for `regressions` [%].
+
+        Raises
+        ------
+        BusplanError
+            As for `regressions`.
+        """
+        from busplan.questions.diff.headline import regression_words
+
+        worse = self.regressions(tolerance_percent=tolerance_percent)
+        return regression_words(self._found, worse, tolerance=tolerance_percent) if worse else ""
+
     def report(self) -> Report:
         """The answer in blocks."""
         from busplan.questions.diff.report import diff_report
@@ -81,6 +99,7 @@ def diff(
     timing_model: Models | None = None,
     circle: bool = True,
     progress: Progress | None = None,
+    arguments: tuple[str, str] | None = None,
 ) -> DiffAnswer:
     """Tell what changed between two profiles, and what that does to every figure.
 
@@ -96,6 +115,8 @@ def diff(
         Run both circle tests if either profile asks for one.
     progress
         Called from time to time with the steps simulated and the steps known to be needed.
+    arguments
+        What the report calls A and B; by default as they are given, and the name of a `Profile`.
 
     Returns
     -------
@@ -125,7 +146,7 @@ def diff(
         timing_models=None if timing_model is None else _models(timing_model, one, other),
         circle=circle_tests(progress) if circle else None,
     )
-    return DiffAnswer(*found, arguments=(given_a, given_b))
+    return DiffAnswer(*found, arguments=arguments or (given_a, given_b))
 
 
 def _given(side: ProfileLike) -> tuple[str, Profile]:
@@ -139,7 +160,7 @@ def _given(side: ProfileLike) -> tuple[str, Profile]:
 def _models(timing_model: Models, one: Profile, other: Profile) -> tuple[str, ...]:
     if one.bus.kind != other.bus.kind:
         raise BusplanError(
-            f"timing_model {timing_model!r}: the kinds of bus, {one.bus.kind} and {other.bus.kind}, have no timing "
+            f"timing_model {timing_model}: the kinds of bus, {one.bus.kind} and {other.bus.kind}, have no timing "
             "model in common; leave it out"
         )
     checked_models(timing_model, other)  # refuses a model that cannot express this one

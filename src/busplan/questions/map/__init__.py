@@ -1,16 +1,19 @@
 """`busplan.map_`."""
 
 from collections.abc import Iterable, Mapping
+from concurrent.futures import Executor
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
+from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile
 from busplan.questions.map import trade_off as analysis
 from busplan.questions.map.direction import Direction, checked_direction
 from busplan.questions.map.trade_off import TradeOff
 from busplan.questions.sweep import axis_values
+from busplan.questions.sweep.execution import require_executor
 from busplan.sections.profile import Profile
 
 Along = Mapping[str, str | Iterable[object]]
@@ -21,11 +24,21 @@ class MapAnswer(Answer, TradeOff):
 
     __slots__ = ()
 
-    def _repr_svg_(self) -> str:
+    def svg(self, *, note: str = "") -> str:
+        """Draw the map as an SVG file.
+
+        Parameters
+        ----------
+        note
+            Words behind the title.
+        """
         from busplan.questions.map.report import headline
         from busplan.questions.map.svg import map_svg
 
-        return map_svg(self, title=sentence_text(headline(self)))
+        return map_svg(self, title=f"{sentence_text(headline(self))} {note}".rstrip())
+
+    def _repr_svg_(self) -> str:
+        return self.svg()
 
     def report(self) -> Report:
         """The answer in blocks."""
@@ -40,6 +53,8 @@ def map_(
     x: Along | None = None,
     y: Along | None = None,
     circle: bool = False,
+    progress: Progress | None = None,
+    executor: Executor | None = None,
 ) -> MapAnswer:
     """Tell where over two keys a design fits, and what limits it elsewhere: `busplan map`.
 
@@ -53,6 +68,11 @@ def map_(
         [us].
     circle
         Also run the circle test of every setting that fits, up to 1,000.
+    progress
+        With `circle`: called now and then with the circle tests that are done, and all of them [1].
+    executor
+        With `circle`: where the tests run; by default in this thread. Any `concurrent.futures.Executor` gives the same
+        answer, and is not shut down. Worker processes must have this version of busplan.
 
     Returns
     -------
@@ -63,6 +83,8 @@ def map_(
     ------
     BusplanError
         Not a profile, an invalid key or values, no setting that can exist, or too many circle tests.
+    Exception
+        What `executor` raises.
 
     Examples
     --------
@@ -71,6 +93,7 @@ def map_(
     >>> [[cell.state for cell in row] for row in answer.rows]
     [['fits', 'does not fit', 'does not fit'], ['fits', 'fits', 'fits']]
     """
+    require_executor(executor, circle=circle)
     network = load_profile(profile)
     return MapAnswer(
         *analysis.trade_off(
@@ -78,6 +101,8 @@ def map_(
             x=_direction(network, x, name="x", with_circle=circle),
             y=_direction(network, y, name="y", with_circle=circle),
             with_circle=circle,
+            mapper=map if executor is None else executor.map,
+            progress=progress,
         )
     )
 

@@ -1,7 +1,7 @@
 """Find what to set for a goal: the steps of the search, what the machine could reach, and what stands in the way."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from busplan.buses.parts import Value
 from busplan.profile.keys import flat
@@ -60,7 +60,7 @@ class Plan(NamedTuple):
 def plan(
     profile: Profile,
     *,
-    wanted: Mapping[str, Value] | None = None,
+    wanted: Mapping[str, Any] | None = None,
     free: Sequence[str] | None = None,
     circle: FindCircleFailures | None = None,
     max_circles: int = MAX_CIRCLES,

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
+from busplan.forms.numbers import plural
 from busplan.printable import has_controls
 from busplan.profile.changes import NO_CHANGES
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several
-from busplan.questions.base.origin import origin_of
+from busplan.questions.base.origin import Origin, origin_of
 from busplan.questions.report.all_answers import AllAnswers, answers_of_each
 from busplan.questions.report.page import ReportedProfile, page_report
 from busplan.questions.words.documents import changed_report
@@ -54,6 +55,7 @@ def report(
     title: str | None = None,
     circle: bool = True,
     progress: Progress | None = None,
+    origins: Iterable[Origin] | None = None,
 ) -> ReportAnswer:
     """Put all that busplan says of one or several profiles on one page.
 
@@ -68,6 +70,9 @@ def report(
         Run the circle test of profiles that ask for one.
     progress
         Called from time to time with the steps simulated and the steps known to be needed.
+    origins
+        How the page's commands give each profile, if not as above: a PROFILE argument, and the changes by options that
+        the profile has already.
 
     Returns
     -------
@@ -78,7 +83,7 @@ def report(
     Raises
     ------
     BusplanError
-        Not a profile, or a title that is no words in one line.
+        Not a profile, a title that is no words in one line, or not an origin for each profile.
 
     Examples
     --------
@@ -94,9 +99,13 @@ def report(
     # A profile is iterable, too: over its sections.
     given = [profiles] if isinstance(profiles, Profile) else one_or_several(profiles, name="profiles")
     loaded = [load_profile(one) for one in given]
-    origins = [origin_of(one) if isinstance(one, Profile) else (os.fspath(one), NO_CHANGES) for one in given]
+    if origins is None:
+        origins = [origin_of(one) if isinstance(one, Profile) else (os.fspath(one), NO_CHANGES) for one in given]
+    named = list(origins)
+    if len(named) != len(given):
+        raise BusplanError(f"origins: {len(named)} for {plural(len(given), 'profile')}; expected one for each")
     found = answers_of_each(loaded, with_circle=circle, progress=progress)
     return ReportAnswer(
-        tuple(ReportedProfile(argument, one, changes) for (argument, changes), one in zip(origins, found, strict=True)),
+        tuple(ReportedProfile(argument, one, changes) for (argument, changes), one in zip(named, found, strict=True)),
         title,
     )

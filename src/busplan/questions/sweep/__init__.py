@@ -22,7 +22,7 @@ from busplan.questions.base.inputs import Models, ProfileLike, checked_models, l
 from busplan.questions.sweep.asked import Sweep, checked_sweep
 from busplan.questions.sweep.blocks import Column, SweepBlock
 from busplan.questions.sweep.circle_run import sweep_blocks
-from busplan.questions.sweep.execution import Here, Work
+from busplan.questions.sweep.execution import Here, Work, require_executor
 from busplan.questions.sweep.grid import Array, Grid
 from busplan.questions.sweep.plot import FigureData
 from busplan.questions.sweep.top import Digest, default_columns
@@ -207,9 +207,7 @@ def sweep(
     >>> answer["limited_by"].tolist(), len(answer)
     (['time', 'time', 'time'], 3)
     """
-    if executor is not None and not (circle and isinstance(executor, Executor)):
-        wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": goes with circle=True"
-        raise BusplanError(f"executor{wrong}")
+    require_executor(executor, circle=circle)
     network = load_profile(profile)
     models = None if timing_model is None else checked_models(timing_model, network)
     if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):

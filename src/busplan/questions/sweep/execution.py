@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, contextmanager
 from itertools import islice
 from typing import Final, NamedTuple, Protocol, TypeVar
 
+from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.questions.sweep.grid import Array
 
@@ -38,6 +39,19 @@ class Here(Executor):
         except Exception as error:  # noqa: BLE001 - who asks for the result gets it
             future.set_exception(error)
         return future
+
+
+def require_executor(executor: object, *, circle: bool) -> None:
+    """Refuse an executor that is none, or that has no circle tests to run.
+
+    Raises
+    ------
+    BusplanError
+        Not a `concurrent.futures.Executor`, or given without circle tests.
+    """
+    if executor is not None and not (circle and isinstance(executor, Executor)):
+        wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": goes with circle=True"
+        raise BusplanError(f"executor{wrong}")
 
 
 def unknown(_task: object) -> None:
