@@ -41,7 +41,7 @@ class Finding(NamedTuple):
     """How it is mended, as lines of TOML: key = value."""
 
 
-class PlacedProblem(NamedTuple):
+class Violation(NamedTuple):
     """A problem at its place, of which nobody knows yet whether a comment suppresses it."""
 
     rule: Rule

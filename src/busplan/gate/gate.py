@@ -8,7 +8,7 @@ from busplan.errors import BusplanError, PlacedError
 from busplan.gate import circle
 from busplan.gate.baseline import Record, figures_of, keys_of
 from busplan.gate.file import BY_KIND
-from busplan.gate.finding import Finding, PlacedProblem, Subject, finding_of
+from busplan.gate.finding import Finding, Subject, Violation, finding_of
 from busplan.gate.registry import BASELINE, all_rules, cycle_rules
 from busplan.gate.regression import regression
 from busplan.gate.suppression import suppress
@@ -187,13 +187,13 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
         yield finding_of(rule, RuleProblem(one.key, words), spot, words=words)
 
 
-def _placed(document: Document, rule: Rule, problem: RuleProblem) -> PlacedProblem:
+def _placed(document: Document, rule: Rule, problem: RuleProblem) -> Violation:
     """Find the line of a problem's key, or of the table that should have it."""
     spot = document.spot(path_of(document.data() if problem.key.count(".") > 1 else {}, problem.key))
-    return PlacedProblem(rule, problem, spot)
+    return Violation(rule, problem, spot)
 
 
-def _said(placed: PlacedProblem, subject: Subject) -> Finding:
+def _said(placed: Violation, subject: Subject) -> Finding:
     rule, problem, spot = placed
     message = problem.message if isinstance(problem.message, str) else problem.message()
     return finding_of(rule, problem, spot, words=f"{problem.key}: {message}{subject.origin}")

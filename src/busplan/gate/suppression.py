@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from typing import Final, NamedTuple
 
 from busplan.buses.rule import Rule, RuleProblem
-from busplan.gate.finding import Finding, PlacedProblem, finding_of
+from busplan.gate.finding import Finding, Violation, finding_of
 from busplan.gate.registry import NEVER_SUPPRESSED, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON, all_rules
 from busplan.profile.document import Document, Spot
 
@@ -43,9 +43,7 @@ def suppressions(document: Document) -> Iterator[Suppression]:
         yield Suppression(codes, match["reason"].strip(), spot, line + 1 if alone else line)
 
 
-def suppress(
-    found: Iterable[PlacedProblem], document: Document, *, ran: set[str]
-) -> tuple[list[PlacedProblem], list[Finding]]:
+def suppress(found: Iterable[Violation], document: Document, *, ran: set[str]) -> tuple[list[Violation], list[Finding]]:
     """Remove suppressed problems, and find what is wrong with the suppressions themselves.
 
     Parameters

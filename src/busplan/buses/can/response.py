@@ -98,7 +98,7 @@ def worst_instance(
     TooManyStepsError
         It takes over `MOST_STEPS` to find, at all points together.
     """
-    before = Arrivals(higher)
+    before = Demand(higher)
     is_over = before.load + own.load >= SATURATED
     if is_everywhere(is_over):
         return None
@@ -115,7 +115,7 @@ def worst_instance(
                 return worst
             if instance == 1:
                 from_us = ahead_us + own.frames_us + before.frames_us
-                busy_us = Arrivals((own, *higher)).settled_us(ahead_us, steps, from_us=from_us, is_settled=is_over)
+                busy_us = Demand((own, *higher)).settled_us(ahead_us, steps, from_us=from_us, is_settled=is_over)
             is_over = is_over | (instance * own.period_us >= busy_us + own.jitter_us)
             if is_everywhere(is_over):
                 return worst
@@ -153,14 +153,14 @@ def settled_us(
     >>> settled_us(900.0, [Sender(100, 500)])
     1200.0
     """
-    arrivals = Arrivals(senders)
-    is_full = arrivals.load > _NEARLY_FULL
+    demand = Demand(senders)
+    is_full = demand.load > _NEARLY_FULL
     if is_full is False:
-        return arrivals.settled_us(others_us, repeat(0), more_us=more_us)
-    bound_us = arrivals.bound_us(others_us + more_us(inf))
+        return demand.settled_us(others_us, repeat(0), more_us=more_us)
+    bound_us = demand.bound_us(others_us + more_us(inf))
     if is_full is True:
         return bound_us
-    return choose(is_full, bound_us, arrivals.settled_us(others_us, repeat(0), more_us=more_us, is_settled=is_full))
+    return choose(is_full, bound_us, demand.settled_us(others_us, repeat(0), more_us=more_us, is_settled=is_full))
 
 
 _NEARLY_FULL = 0.99
@@ -179,7 +179,7 @@ class TooManyStepsError(Exception):
     """A span takes too many steps to find."""
 
 
-class Arrivals:
+class Demand:
     """What several senders put on the bus.
 
     Parameters

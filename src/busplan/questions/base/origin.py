@@ -7,7 +7,7 @@ from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.write import value_text
-from busplan.questions.base.inputs import plain
+from busplan.questions.base.inputs import values_by_key
 from busplan.sections.profile import Profile
 
 Origin = tuple[str, KeyChanges]
@@ -47,9 +47,7 @@ def key_changes(values: Mapping[str, object]) -> KeyChanges:
     BusplanError
         Not new values by key, two of them overlap, or a value that TOML has not.
     """
-    if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
-        raise BusplanError(f'changes {values!r}: expected new values by key, as {{"bus.nodes": 3}}')
-    return KeyChanges(tuple(_key_change(key, plain(value)) for key, value in values.items()))
+    return KeyChanges(tuple(_key_change(key, value) for key, value in values_by_key(values, name="changes").items()))
 
 
 def _key_change(key: str, value: object) -> KeyChange:
