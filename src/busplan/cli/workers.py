@@ -57,12 +57,11 @@ def workers(number: int) -> Iterator[Executor]:
     except BrokenProcessPool:
         raise WorkerLostError("a worker was killed (out of memory?)") from None
     finally:
-        crew.shutdown(wait=False, cancel_futures=True)
-        own = [process for process in active_children() if process not in others]
-        for process in own:
-            process.kill()
-        for process in own:
-            process.join()
+        for process in active_children():
+            if process not in others:
+                process.kill()
+        # The executor's own thread joins them: a second one that did would take their exit codes from it.
+        crew.shutdown(cancel_futures=True)
 
 
 class _Workers(ProcessPoolExecutor):
