@@ -26,10 +26,11 @@ from busplan.forms.inks import INKS
 from busplan.forms.signed_bar import signed_bar
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.base.shell import shell_word
 from busplan.questions.fit.figures import capacity
 from busplan.questions.fit.node_steps import node_steps, telling_periods
 from busplan.questions.report.all_answers import AllAnswers, all_answers
-from busplan.questions.report.commands import shell_word, sources
+from busplan.questions.report.commands import sources
 from busplan.questions.report.page import ReportedProfile, page_report
 from busplan.questions.words.axes import AxesDrawing
 from busplan.questions.words.terms import LEFT, TermsDrawing

@@ -35,6 +35,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import MISSING, plural
 from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.questions.base.shell import shell_word
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.circle.sentences import verdict_words
 from busplan.questions.explain.assumptions import assumptions_table
@@ -51,7 +52,7 @@ from busplan.questions.report.bus import (
     timeline_part,
 )
 from busplan.questions.report.circle import circle_part, circle_question, sources_part
-from busplan.questions.report.commands import Sources, shell_word, sources
+from busplan.questions.report.commands import Sources, sources
 from busplan.questions.words.documents import document
 
 _MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
