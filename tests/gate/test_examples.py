@@ -17,7 +17,7 @@ from busplan.gate.baseline import MODELS, read_baseline
 from busplan.gate.gate import FileResult, check_document, unreadable
 from busplan.gate.registry import all_rules
 from busplan.profile.toml import decode, override
-from busplan.questions.circle.record import CircleTest
+from busplan.questions.circle.figures import CircleTest
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.fit.circle_move import path_steps
 from busplan.sections.profile import Profile

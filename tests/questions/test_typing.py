@@ -11,7 +11,7 @@ from busplan.questions.diff.difference import KeyDifference
 from busplan.questions.explain.derivation import Step
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.map.cells import Cell
-from busplan.questions.plan.option import Option
+from busplan.questions.plan.options import Option
 
 
 def test_the_types_are_seen_through_the_lazy_names() -> None:

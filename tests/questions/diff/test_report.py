@@ -18,7 +18,7 @@ from busplan.forms.json_document import to_json
 from busplan.forms.terminal import block_lines
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.diff.changes import shown_value
 from busplan.questions.diff.difference import Difference, cycle_figures, difference, plan_figures

@@ -5,7 +5,7 @@ import pytest
 from busplan.buses.ieee1394 import table_1
 from busplan.buses.published import Comparison, published
 from busplan.profile.shipped import load
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.evidence.figures import kind_evidence, paper_evidence
 from busplan.questions.evidence.paper import BENCH_PROFILE, CIRCLE_PROFILES

@@ -20,7 +20,7 @@ from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.questions.capacity.report import capacity_document, capacity_records
 from busplan.questions.capacity.verdict import verdicts
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.explain.capacity import VERDICT_KEYS, capacity_figures
 from busplan.questions.explain.circle import circle_figures

@@ -25,7 +25,7 @@ from busplan.questions.fit.cycle import cycle_of, fits_in
 from busplan.questions.fit.figures import COUNTS, figures
 from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import bus_of, model_names, network_of
-from busplan.questions.plan.machine import nodes_for_axes, rooms
+from busplan.questions.plan.constraints import nodes_for_axes, rooms
 from busplan.questions.plan.planning import plan
 from busplan.questions.sweep.blocks import figure_names, sweep
 from busplan.questions.sweep.grid import checked_grid

@@ -22,8 +22,8 @@ from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
 from busplan.questions.fit.figures import capacity, figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import UNTESTED_CIRCLE, Change, cure
+from busplan.questions.plan.freedoms import MOST_RATIO
 from busplan.questions.plan.planning import plan
-from busplan.questions.plan.short_numbers import MOST_RATIO
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]

@@ -2,13 +2,17 @@
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Final
+from xml.etree.ElementTree import SubElement
 
-from busplan.buses.figure import MARGIN_CORRECTED, VERDICT, unit_of
+from busplan.buses.cycle import Term
+from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
+from busplan.forms.bars import ROW, SignedBar, draw_bars, draw_zero
 from busplan.forms.blocks import (
     Block,
     Cell,
     Chart,
+    Drawing,
     JsonDocument,
     Record,
     Report,
@@ -17,21 +21,179 @@ from busplan.forms.blocks import (
     Table,
     TableColumn,
     TableRow,
+    count_value,
     figure_value,
     joined,
     sentence,
 )
-from busplan.forms.numbers import listed, period_value
-from busplan.questions.capacity.drawing import SensitivityDrawing
-from busplan.questions.capacity.next_bottleneck import next_bottleneck_record, next_bottleneck_sentence
+from busplan.forms.columns import sentence_text
+from busplan.forms.lines import Line
+from busplan.forms.numbers import decimals_of, listed, nouns, period_value
+from busplan.forms.svg import Scale, drawing, markup
 from busplan.questions.capacity.report import capacity_document, capacity_report
-from busplan.questions.capacity.sensitivity import Effect, Sensitivity, Standing
+from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Sensitivity, Standing
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import FITS, limits_behind
 from busplan.questions.fit.figures import Capacity
 from busplan.questions.fit.network import bus_of
 from busplan.questions.words.documents import with_profile
 from busplan.sections.profile import Profile
+
+_DECIMALS: Final = 3
+_NARROWEST: Final = 10
+"""Least columns of the bars in characters."""
+_TAKES, _ADDS, _ZERO = "-", "+", "|"
+
+
+class SensitivityDrawing(Drawing):
+    """A bar for each change that can be made, on one scale.
+
+    Parameters
+    ----------
+    found
+        What moves the margin.
+    """
+
+    def __init__(self, found: Sensitivity) -> None:
+        self._bars = [
+            _bar(one.change, one.margin_change_us) for one in found.effects if one.margin_change_us is not None
+        ]
+        self._margin_us = found.now.margin_corrected_us
+        self._least_us = min((one.start_us for one in self._bars), default=0.0)
+        self._most_us = max((one.end_us for one in self._bars), default=0.0)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing moves the margin: then there is no bar to see."""
+        return self._least_us == self._most_us
+
+    @property
+    def shows_the_end(self) -> bool:
+        """Whether the scale reaches to where nothing is left of the margin."""
+        return self._least_us <= -self._margin_us < 0
+
+    def svg(self) -> str | None:
+        """Draw a bar below the name of each change."""
+        if self.is_empty:
+            return None
+        root = drawing("What each small change does to the corrected margin", css="chart sensitivity")
+        scale = Scale(self._least_us, self._most_us)
+        bottom = len(self._bars) * ROW
+        draw_zero(root, scale, top=0, bottom=bottom)
+        if self.shows_the_end:
+            draw_zero(root, scale, top=0, bottom=bottom, at=-self._margin_us, css="edge")
+        draw_bars(root, self._bars, scale, y=0)
+        root.set("height", str(scale.marks(SubElement(root, "g"), top=bottom, bottom=bottom)))
+        return markup(root)
+
+    def characters(self, width: int) -> list[Line] | None:
+        """Draw a row for each change: its name, its bar and its figure."""
+        return None if self.is_empty else [Line(one, "drawn") for one in self._rows(width)]
+
+    def _rows(self, width: int) -> Iterator[str]:
+        names = max(len(one.label) for one in self._bars)
+        figures = max(len(one.words) for one in self._bars)
+        columns = max(_NARROWEST, width - names - figures - 5)
+        left, right = _shared(columns, least=self._least_us, most=self._most_us)
+        for one in self._bars:
+            size = _columns(
+                one.value, self._least_us if one.value < 0 else self._most_us, left if one.value < 0 else right
+            )
+            takes, adds = (_TAKES * size, "") if one.value < 0 else ("", _ADDS * size)
+            bar = f"{takes.rjust(left)}{_ZERO}{adds.ljust(right)}"
+            yield f"{one.label.ljust(names)}  {bar}  {one.words.rjust(figures)}"
+
+
+def _bar(change: str, us: float) -> SignedBar:
+    return SignedBar(change, us, decimals_of(us, _DECIMALS, signed=True), "us", "takes" if us < 0 else "hides")
+
+
+def _shared(columns: int, *, least: float, most: float) -> tuple[int, int]:
+    """Share columns between the left and the right of zero; a side with a bar has one at least."""
+    left = round(columns * -least / (most - least))
+    left = max(left, 1) if least < 0 else 0
+    left = min(left, columns - 1) if most > 0 else columns
+    return left, columns - left
+
+
+def _columns(us: float, of_us: float, columns: int) -> int:
+    """Columns of a bar: none only for no change at all."""
+    return max(1, round(columns * us / of_us)) if us else 0
+
+
+def next_bottleneck_sentence(found: NextBottleneck, profile: Profile) -> Sentence:
+    """Say what binds once the largest term, or the limit of the nodes, is gone.
+
+    Parameters
+    ----------
+    found
+        The bottlenecks.
+    profile
+        The network.
+    """
+    term, behind = (_term(one, profile) for one in (found.binding_term, found.next_binding_term))
+    term_us, behind_us, margin_us = (
+        ShownValue(us, key, "us", 3)
+        for us, key in (
+            (found.binding_term.us, "binding_term_us"),
+            (found.next_binding_term.us, "next_binding_term_us"),
+            (found.next_margin_corrected_us, "next_margin_corrected_us"),
+        )
+    )
+    if found.is_gone:
+        text = f"Next bottleneck: without {term}, now {{}}, the largest term is {behind}, {{}}, and the margin {{}}"
+        of_term = sentence(text, term_us, behind_us, margin_us)
+    else:
+        text = f"Next bottleneck: behind {term}, {{}}, which no key takes away, comes {behind}, {{}}"
+        of_term = sentence(text, term_us, behind_us)
+    limits = map(_limit, found.limits)
+    return joined(joined(of_term, *limits, by="; "), Sentence((".",)), by="")
+
+
+def _limit(found: NextLimit) -> Sentence:
+    """Say what limits the nodes, or those of a group, now and next."""
+    of = f" of {found.group}" if found.group else ""
+    return sentence(
+        f"without the limit of {found.limited_by}, now at {{}} {nouns(found.safe_nodes, 'node')}{of}, the next limit "
+        f"is {found.next_limited_by}, at {{}} {nouns(found.next_safe_nodes, 'node')}",
+        count_value(found.safe_nodes, SAFE_NODES.key),
+        count_value(found.next_safe_nodes, "next_safe_nodes"),
+    )
+
+
+def _term(term: Term, profile: Profile) -> str:
+    return by_key(bus_of(profile).term_figures)[term.key].label
+
+
+def next_bottleneck_record(found: NextBottleneck, profile: Profile) -> Record:
+    """Of the document: what binds now and next, with the sentence that says it."""
+    return {
+        "binding_term": found.binding_term.name,
+        "binding_term_us": found.binding_term.us,
+        "next_binding_term": found.next_binding_term.name,
+        "next_binding_term_us": found.next_binding_term.us,
+        "next_margin_corrected_us": found.next_margin_corrected_us,
+        **_limits(found.limits),
+        "text": sentence_text(next_bottleneck_sentence(found, profile)),
+    }
+
+
+def _limits(found: Sequence[NextLimit]) -> Record:
+    """What limits the nodes; of groups a list, and nothing for the whole."""
+    each = [
+        {
+            "safe_limited_by": one.limited_by,
+            "safe_nodes": one.safe_nodes,
+            "next_safe_limited_by": one.next_limited_by,
+            "next_safe_nodes": one.next_safe_nodes,
+        }
+        for one in found
+    ]
+    if not found[0].group:
+        return each[0]
+    named = [{"name": one.group, **record} for one, record in zip(found, each, strict=True)]
+    return {**dict.fromkeys(each[0]), "groups": named}
+
 
 _DIGITS = 4
 """Digits of what changes: enough to see a tenth of it."""

@@ -9,15 +9,13 @@ from typing import Final
 
 from busplan.profile.toml import at_periods
 from busplan.progress import Progress
-from busplan.questions.circle.contributions import Contribution, Setup, contributions, sources
-from busplan.questions.circle.estimate import announce, estimate
 from busplan.questions.circle.failures import (
     bus_failures,
     circle_failures,
     tightest_margins,
 )
-from busplan.questions.circle.record import CircleFigures, CircleTest
-from busplan.questions.circle.setup import bus, setup
+from busplan.questions.circle.figures import CircleFigures, CircleTest
+from busplan.questions.circle.setup import Contribution, Setup, announce, bus, contributions, estimate, setup, sources
 from busplan.questions.fit.circle_move import loop_timing, path_setpoints
 from busplan.questions.fit.circle_refusal import require_circle
 from busplan.questions.fit.figures import CapacityFigures

@@ -10,7 +10,7 @@ from busplan.nearest import did_you_mean
 from busplan.profile.conversion import AssumedKey, converted
 from busplan.profile.toml import override
 from busplan.progress import Progress
-from busplan.questions.circle.circle_tests import ComputeCircleFigures, circle_tests
+from busplan.questions.circle.check import ComputeCircleFigures, circle_tests
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.circle_refusal import STEP
 from busplan.questions.fit.figures import CapacityFigures, after_reset, figures
@@ -18,14 +18,13 @@ from busplan.questions.fit.inputs import given
 from busplan.questions.fit.network import varied_nodes
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.questions.plan.freedoms import PERIOD
-from busplan.questions.plan.settings import needed_settings
-from busplan.questions.plan.smallest_period import SmallestPeriod, smallest_period
+from busplan.questions.plan.smallest_period import SmallestPeriod, needed_settings, smallest_period
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
 from busplan.servo.checks import dividing_step_us
 
 if TYPE_CHECKING:
-    from busplan.questions.circle.record import CircleFigures
+    from busplan.questions.circle.figures import CircleFigures
 
 _ROUND_US: Final = 1000.0
 """Periods of a curve are halves and doubles of it, which buses with some periods alone know, too [us]."""

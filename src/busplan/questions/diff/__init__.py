@@ -9,7 +9,7 @@ from busplan.profile.revision import load_revision
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, argument, checked_models, finite, load_profile
-from busplan.questions.circle.circle_tests import circle_tests
+from busplan.questions.circle.check import circle_tests
 from busplan.questions.diff import difference as analysis
 from busplan.questions.diff.difference import CircleSide, ComparedFigure, Difference, KeyDifference
 from busplan.sections.profile import Profile

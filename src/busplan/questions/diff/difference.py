@@ -12,7 +12,7 @@ from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.errors import BusplanError
 from busplan.profile.keys import KeyValue, dotted_keys
-from busplan.questions.circle.circle_tests import ComputeCircleFigures
+from busplan.questions.circle.check import ComputeCircleFigures
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.fit.certainty import FITS, VERDICTS
 from busplan.questions.fit.figures import CapacityFigures, figures
@@ -20,7 +20,7 @@ from busplan.questions.fit.network import bus_of, model_names
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
-    from busplan.questions.circle.record import CircleFigures
+    from busplan.questions.circle.figures import CircleFigures
 
 Judgement = Literal["better", "worse", "same", "neutral"]
 

@@ -13,7 +13,7 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.progress import Progress
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.evidence.paper import BENCH_PROFILE, CIRCLE_PROFILES, PAPER, circle_sections
 from busplan.questions.fit.figures import figures

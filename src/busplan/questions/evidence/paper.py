@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from busplan.buses.published import Comparison, EvidenceSection, Unit
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CircleFigures
 
 BENCH_PROFILE: Final = "paper-two-node"
 """Shipped profile of the bench that Tables I and II were measured on."""

@@ -9,8 +9,7 @@ from typing import Final
 
 from busplan.elementwise import Traced
 from busplan.progress import Progress
-from busplan.questions.circle.figures import CIRCLE_FIGURES, JITTER
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CIRCLE_FIGURES, JITTER, CircleFigures
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.explain.capacity import capacity_figures
 from busplan.questions.explain.latency import remembered

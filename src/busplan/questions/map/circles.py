@@ -5,9 +5,8 @@ from typing import Final, NamedTuple, Protocol, TypeVar
 
 from busplan.profile.toml import override
 from busplan.progress import Progress
-from busplan.questions.circle.estimate import NOTHING, announce, estimate
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.circle.setup import setup
+from busplan.questions.circle.setup import NOTHING, announce, estimate, setup
 from busplan.questions.fit.circle_refusal import refusals
 from busplan.questions.map.cells import Cell, MapPoint
 from busplan.sections.profile import Profile

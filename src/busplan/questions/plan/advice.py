@@ -7,8 +7,8 @@ from busplan.profile.toml import override
 from busplan.questions.circle.check import failures_within, rests_on
 from busplan.questions.fit.figures import CapacityFigures, figures
 from busplan.questions.fit.network import bus_of
+from busplan.questions.plan.constraints import with_nodes
 from busplan.questions.plan.freedoms import freed
-from busplan.questions.plan.machine import with_nodes
 from busplan.questions.plan.search import Search
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile

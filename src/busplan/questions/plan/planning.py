@@ -8,9 +8,7 @@ from busplan.profile.keys import flat
 from busplan.profile.toml import override
 from busplan.questions.plan.constraints import Need
 from busplan.questions.plan.freedoms import PERIOD, Freedom, freed
-from busplan.questions.plan.frontier import frontier
-from busplan.questions.plan.option import Impossible, Option, option
-from busplan.questions.plan.relaxations import Relaxation, relaxations
+from busplan.questions.plan.options import Impossible, Option, Relaxation, frontier, option, relaxations
 from busplan.questions.plan.search import MAX_CIRCLES, FindCircleFailures, Search
 from busplan.sections.profile import Profile
 

@@ -12,10 +12,8 @@ from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.questions.fit.circle_refusal import STEP
 from busplan.questions.fit.network import network_of
-from busplan.questions.plan.constraints import CIRCLE, Need, keeps_limits, most_asking, needs, refused_period
-from busplan.questions.plan.freedoms import PERIOD, RATIO, Freedom, longest_period_us
-from busplan.questions.plan.machine import Changes
-from busplan.questions.plan.short_numbers import MOST_RATIO
+from busplan.questions.plan.constraints import CIRCLE, Changes, Need, keeps_limits, most_asking, needs, refused_period
+from busplan.questions.plan.freedoms import MOST_RATIO, PERIOD, RATIO, Freedom, longest_period_us
 from busplan.sections.profile import Profile
 
 FindCircleFailures = Callable[[Profile], tuple[str, ...]]

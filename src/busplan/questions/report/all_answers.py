@@ -7,8 +7,8 @@ from busplan.errors import BusplanError
 from busplan.progress import Progress, part_of
 from busplan.questions.capacity.sensitivity import Sensitivity, sensitivity
 from busplan.questions.capacity.verdict import Verdict, verdicts
-from busplan.questions.circle.contour_profile import ContourProfile, drawn_profile
-from busplan.questions.circle.record import CircleFigures, CircleTest
+from busplan.questions.circle.contour import ContourProfile, drawn_profile
+from busplan.questions.circle.figures import CircleFigures, CircleTest
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.explain.derivation import assumptions
 from busplan.questions.fit.circle_refusal import circle_refusals

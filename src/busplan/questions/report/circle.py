@@ -5,8 +5,16 @@ from typing import Final
 
 from busplan.forms.blocks import Block, Chapter, Facts, Question, Sentence, Words, attribute_value
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
-from busplan.questions.circle.report import ACT_TOGETHER, NO_SOURCES, circle_drawing, circle_table, contributions_table
-from busplan.questions.circle.sentences import circle_sentences, servo_sentence, verdict_words
+from busplan.questions.circle.report import (
+    ACT_TOGETHER,
+    NO_SOURCES,
+    circle_drawing,
+    circle_sentences,
+    circle_table,
+    contributions_table,
+    servo_sentence,
+    verdict_words,
+)
 from busplan.questions.report.all_answers import AllAnswers
 from busplan.questions.report.commands import Sources
 

@@ -36,7 +36,7 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import MISSING, plural
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
-from busplan.questions.circle.sentences import verdict_words
+from busplan.questions.circle.report import verdict_words
 from busplan.questions.explain.assumptions import assumptions_table
 from busplan.questions.fit.assumed import heavy_assumptions
 from busplan.questions.fit.network import bus_of

@@ -1,10 +1,12 @@
-"""Contour error around the circle, condensed for drawing."""
+"""What drawings and files take from a simulation: the error around the circle, and every step."""
 
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from busplan.forms.blocks import Record
+from busplan.questions.circle.figures import CircleTest
 from busplan.servo.circle import CircleRun
 from busplan.servo.contour import blocks, contour_error
 
@@ -76,3 +78,46 @@ def drawn_profile(run: CircleRun | None) -> ContourProfile | None:
         The simulation.
     """
     return None if run is None or run.diverged else contour_profile(run)
+
+
+TRACE_COLUMNS: Final = (
+    "period_us",
+    "time_us",
+    "command_x_mm",
+    "command_y_mm",
+    "x_mm",
+    "y_mm",
+    "contour_error_mm",
+)
+
+_BLOCK: Final = 4096
+"""Rows converted to Python numbers at a time."""
+
+
+def trace_records(test: CircleTest, *, every: int) -> Iterator[Record]:
+    """One row for every n-th step of each simulated period.
+
+    Parameters
+    ----------
+    test
+        The circle test.
+    every
+        n, 1 or more [1].
+    """
+    for result, run in zip(test.results, test.runs, strict=True):
+        if run is None:
+            continue
+        trace = run.trace(every=every)
+        columns = (
+            trace.time_us,
+            trace.command_x_mm,
+            trace.command_y_mm,
+            trace.x_mm,
+            trace.y_mm,
+            trace.contour_error_mm,
+        )
+        for start in range(0, len(trace.time_us), _BLOCK):
+            # Python floats take four times the memory of numpy floats.
+            block = [column[start : start + _BLOCK].tolist() for column in columns]
+            for values in zip(*block, strict=True):
+                yield dict(zip(TRACE_COLUMNS, (result.period_us, *values), strict=True))
