@@ -28,7 +28,7 @@ from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, plain, rounded_up, total
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.fit.certainty import cycle_of, fits_in
 from busplan.questions.fit.node_limit import largest_nodes
 from busplan.sections.base import Section
 from busplan.sections.cycle import BusSection

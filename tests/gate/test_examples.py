@@ -15,7 +15,7 @@ import pytest
 from busplan.errors import PlacedError
 from busplan.gate.baseline import MODELS, read_baseline
 from busplan.gate.gate import FileResult, check_document, unreadable
-from busplan.gate.registry import all_rules
+from busplan.gate.rules import all_rules
 from busplan.profile.toml import decode, override
 from busplan.questions.circle.figures import CircleTest
 from busplan.questions.circle.roundness import circle_test

@@ -8,8 +8,7 @@ import pytest
 from busplan.cli.profiles_report import profiles_report
 from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, ShownValue, Snippet, Table
-from busplan.gate.registry import NEVER_SUPPRESSED, all_rules
-from busplan.gate.rules_report import rule_report, rules_report
+from busplan.gate.rules import NEVER_SUPPRESSED, all_rules, rule_report, rules_report
 from busplan.profile.shipped import load, shipped_names
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.evidence.figures import kind_evidence, paper_evidence

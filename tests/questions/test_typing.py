@@ -10,7 +10,7 @@ from busplan.questions.compare.kinds import MachineOnKind, NotOnKind
 from busplan.questions.diff.difference import KeyDifference
 from busplan.questions.explain.derivation import Step
 from busplan.questions.fit.figures import CapacityFigures
-from busplan.questions.map.cells import Cell
+from busplan.questions.map.trade_off import Cell
 from busplan.questions.plan.options import Option
 
 

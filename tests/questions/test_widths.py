@@ -19,9 +19,8 @@ from busplan.questions.compare.kinds import compare
 from busplan.questions.compare.report import compare_report
 from busplan.questions.diff.difference import difference
 from busplan.questions.diff.report import diff_report
-from busplan.questions.explain.assumptions import assumptions_report
 from busplan.questions.explain.derivation import assumptions, explain
-from busplan.questions.explain.report import explain_report
+from busplan.questions.explain.report import assumptions_report, explain_report
 from busplan.questions.fit.figures import capacity
 from busplan.questions.fit.network import model_names
 from busplan.questions.latency.figures import latency

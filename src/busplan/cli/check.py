@@ -13,7 +13,7 @@ from busplan.cli.options import complete_profile, output_option
 from busplan.cli.output import PlanFailsError, emit_text, is_styled, is_terminal, say, write_document
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
-from busplan.gate.formats import FORMATS, gate_format
+from busplan.gate.formats import FORMATS
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
@@ -149,7 +149,7 @@ def check_command(
     if update_baseline and baseline is not None:
         _update_baseline(baseline, report, quiet=quiet)
     if not quiet:
-        from busplan.forms.columns import sentence_text
+        from busplan.forms.numbers import sentence_text
         from busplan.questions.words.documents import changes_sentences
 
         say(*map(sentence_text, changes_sentences(changes)), answer.headline)
@@ -215,11 +215,10 @@ def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
 def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -> None:
     """Write the report; without a format, as a person at a terminal or a program behind a pipe reads it best."""
     name = format_ or ("full" if output is None and is_terminal() else "concise")
-    chosen = gate_format(name)
-    if output is not None or FORMATS[name].reader != "people":
+    chosen = FORMATS[name]
+    if output is not None or chosen.reader != "people":
         write_document(chosen.write(report), output, quiet=True)
-    elif is_styled():
-        emit_text(chosen.on_terminal(report, width=columns()))
     else:
-        emit_text(chosen.write(report))
-    say(*chosen.log(report))
+        emit_text(chosen.write(report, width=columns() if is_styled() else None))
+    if chosen.repeats:
+        say(*FORMATS["concise"].write(report).splitlines())

@@ -114,7 +114,7 @@ def show_drawn(
 
 def _changes_words(changes: KeyChanges) -> str:
     """What was set, in the title of a picture that is a file of its own."""
-    from busplan.forms.columns import sentence_text
+    from busplan.forms.numbers import sentence_text
     from busplan.questions.words.documents import changes_sentences
 
     return " ".join(map(sentence_text, changes_sentences(changes)))

@@ -70,7 +70,7 @@ def run_sweep(job: SweepJob) -> None:
     StoppedError
         Ctrl-C, SIGTERM, SIGHUP or a lost worker. The partial output is valid and marked as partial.
     """
-    from busplan.forms.columns import sentence_text
+    from busplan.forms.numbers import sentence_text
     from busplan.questions.sweep import Digest
     from busplan.questions.words.documents import changes_sentences
 

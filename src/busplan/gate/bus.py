@@ -6,8 +6,7 @@ from typing import Any, Final
 from busplan.buses.node_time import NODE, busy_words, slow_groups
 from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
 from busplan.questions.fit.assumed import heavy_assumptions
-from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, limits_behind
-from busplan.questions.fit.cycle import TIME, fits_in
+from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME, fits_in, limits_behind
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.execution import TableExecution
 

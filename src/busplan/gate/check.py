@@ -9,18 +9,16 @@ from pathlib import Path
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.columns import sentence_text
-from busplan.gate.answer import check_report, summary_sentence
+from busplan.forms.numbers import sentence_text
 from busplan.gate.baseline import Baseline, Record, load_baseline
 from busplan.gate.gate import FileResult, check_document, check_source
-from busplan.gate.report import CheckReport, Located, Summary
+from busplan.gate.report import CheckReport, Located, Summary, check_report, summary_sentence
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.collect import Collection, collect
 from busplan.profile.document import Document
 from busplan.profile.write import profile_text
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, argument, items
-from busplan.questions.base.origin import key_changes
+from busplan.questions.base.inputs import ProfileLike, argument, items, key_changes
 from busplan.questions.circle.check import MOST_STEPS
 from busplan.sections.profile import Profile
 

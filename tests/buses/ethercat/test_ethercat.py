@@ -19,7 +19,7 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.evidence.figures import bus_evidence
-from busplan.questions.fit.cycle import cycle_of, limits_with_time
+from busplan.questions.fit.certainty import cycle_of, limits_with_time
 from busplan.questions.fit.loop_delays import loop_delays_us, skew_us
 from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile

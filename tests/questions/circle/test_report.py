@@ -9,9 +9,8 @@ import pytest
 
 from busplan.forms import render
 from busplan.forms.blocks import Bar, Chart, Report, Sentence, ShownValue, Table
-from busplan.forms.columns import sentence_text
-from busplan.forms.json_document import to_json
-from busplan.forms.numbers import figure_text
+from busplan.forms.numbers import figure_text, sentence_text
+from busplan.printable import to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.circle.contour import TRACE_COLUMNS, trace_records

@@ -15,8 +15,7 @@ from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.table_1 import TABLE_1, residual
 from busplan.buses.parts import Limit, share_limit
 from busplan.profile.toml import override
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS
-from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS, cycle_of
 from busplan.questions.fit.figures import CapacityFigures, figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.fit.node_limit import most_nodes

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from busplan.buses import kind_names
 from busplan.elementwise import Traced
 from busplan.profile.toml import override
-from busplan.questions.fit.certainty import FITS, certainty, limits_to_be_safe
-from busplan.questions.fit.cycle import cycle_of, limits_with_time
+from busplan.questions.fit.certainty import FITS, certainty, cycle_of, limits_to_be_safe, limits_with_time
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.fit.node_limit import most_nodes, safe_nodes

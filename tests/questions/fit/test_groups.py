@@ -19,9 +19,8 @@ from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load
 from busplan.profile.toml import decode, override, validate
 from busplan.profile.write import profile_text
-from busplan.questions.explain.capacity import capacity_figures
-from busplan.questions.fit.certainty import certainty
-from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.explain.bus import capacity_figures
+from busplan.questions.fit.certainty import certainty, cycle_of, fits_in
 from busplan.questions.fit.figures import COUNTS, figures
 from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import bus_of, model_names, network_of

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.gate.gate import check_document
 from busplan.profile.document import Document
 from busplan.profile.shipped import load, shipped_names

@@ -18,8 +18,7 @@ from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import decode, override
 from busplan.profile.write import profile_text
 from busplan.questions.circle.check import CircleCheck
-from busplan.questions.fit.certainty import FITS, certainty
-from busplan.questions.fit.cycle import available_us, cycle_of
+from busplan.questions.fit.certainty import FITS, available_us, certainty, cycle_of
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import cure

@@ -11,9 +11,9 @@ import pytest
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.forms import RowsForm, html, markdown, terminal
 from busplan.forms.blocks import Report, ShownValue, Table
-from busplan.forms.columns import sentence_text
 from busplan.forms.csv_rows import to_csv
-from busplan.forms.json_document import to_json
+from busplan.forms.numbers import sentence_text
+from busplan.printable import to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.capacity.report import capacity_records

@@ -20,12 +20,11 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns, plural, with_unit
+from busplan.forms.numbers import nouns, plural, sentence_text, with_unit
 from busplan.profile.write import value_text
 from busplan.questions.calibrate.calibration import Calibration, PayloadFit
 from busplan.questions.calibrate.sentences import fit_sentences, slow_and_fast, time_value, warning_sentences
-from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.fit.network import bus_of
 from busplan.questions.words.documents import document, with_profile
 from busplan.sections.execution import LinearExecution, TableExecution

@@ -24,16 +24,13 @@ from busplan.forms.blocks import (
     sentence,
     state_of,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns, period
+from busplan.forms.numbers import nouns, period, sentence_text
 from busplan.questions.capacity.sentences import uncertainty_parts, verdict_sentences
 from busplan.questions.capacity.verdict import Verdict
-from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS, Capacity, CapacityFigures
 from busplan.questions.fit.network import bus_of, leading_model, network_of
-from busplan.questions.words.documents import document, with_profile
-from busplan.questions.words.figure_tables import Owner, figure_table
+from busplan.questions.words.documents import Owner, document, figure_table, with_profile
 from busplan.questions.words.sentences import safety_record, warnings
 
 

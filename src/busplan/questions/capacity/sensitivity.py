@@ -9,8 +9,17 @@ from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Perturbation
 from busplan.elementwise import existing, plain
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
-from busplan.questions.fit.certainty import VERDICTS, VerdictWord, certainty, limit_codes, time_code, verdict_code
-from busplan.questions.fit.cycle import TIME, available_us, fits_in
+from busplan.questions.fit.certainty import (
+    TIME,
+    VERDICTS,
+    VerdictWord,
+    available_us,
+    certainty,
+    fits_in,
+    limit_codes,
+    time_code,
+    verdict_code,
+)
 from busplan.questions.fit.figures import Capacity
 from busplan.questions.fit.network import bus_of, network_of, with_execution, with_payloads, without_execution
 from busplan.questions.fit.node_limit import safe_nodes

@@ -26,9 +26,8 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.columns import sentence_text
 from busplan.forms.lines import Line
-from busplan.forms.numbers import decimals_of, listed, nouns, period_value
+from busplan.forms.numbers import decimals_of, listed, nouns, period_value, sentence_text
 from busplan.forms.svg import Scale, drawing, markup
 from busplan.questions.capacity.report import capacity_document, capacity_report
 from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Sensitivity, Standing

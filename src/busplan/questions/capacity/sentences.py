@@ -37,7 +37,6 @@ from busplan.questions.fit.figures import CapacityFigures, GroupCapacity
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import UNTESTED_CIRCLE, changeable
 from busplan.questions.plan.freedoms import PERIOD
-from busplan.questions.words.key_values import settings_sentence
 from busplan.questions.words.sentences import (
     broken_limits,
     evidence_sentence,
@@ -47,6 +46,7 @@ from busplan.questions.words.sentences import (
     not_applicable,
     refused_circle,
     reset_sentence,
+    settings_sentence,
     warning_sentences,
 )
 from busplan.sections.profile import Profile

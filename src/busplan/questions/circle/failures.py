@@ -6,8 +6,7 @@ from string import Formatter
 from typing import Any, Final, NamedTuple
 
 from busplan.elementwise import existing
-from busplan.questions.fit.certainty import FITS, limits_behind
-from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.certainty import FITS, TIME, limits_behind
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.machine import CONTOUR_MEASURES

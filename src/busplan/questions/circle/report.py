@@ -30,8 +30,7 @@ from busplan.questions.circle.drawing import CircleDrawing
 from busplan.questions.circle.failures import MARGINS, Stated
 from busplan.questions.circle.figures import CIRCLE_BY_KEY, JITTER, CircleFigures, CircleTest
 from busplan.questions.circle.roundness import failed_measure, to_attack
-from busplan.questions.words.documents import document, with_profile
-from busplan.questions.words.figure_tables import Owner, figure_table
+from busplan.questions.words.documents import Owner, document, figure_table, with_profile
 from busplan.sections.profile import Profile
 
 

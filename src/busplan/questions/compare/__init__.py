@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several
@@ -44,8 +44,8 @@ class CompareAnswer(Answer, KindComparison):
         BusplanError
             No kind of bus can have the machine.
         """
+        from busplan.questions.compare.drawing import compare_svg
         from busplan.questions.compare.report import headline
-        from busplan.questions.compare.svg import compare_svg
 
         if not self.compared:
             raise BusplanError("there is nothing to draw: no kind of bus that was asked for can have this machine")

@@ -1,16 +1,21 @@
-"""Answer of `busplan compare`."""
+"""Answer of `busplan compare`: its blocks, and its document."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from busplan.buses import kind_named
+from busplan.buses.bus import Bus
 from busplan.buses.figure import SAFE_AXES, VERDICT
+from busplan.buses.published import parts_tested
+from busplan.elementwise import plain
 from busplan.forms.blocks import (
     Block,
     Cell,
     Chart,
     Code,
+    JsonDocument,
+    Record,
     Report,
     Sentence,
     ShownValue,
@@ -19,22 +24,187 @@ from busplan.forms.blocks import (
     TableRow,
     Words,
     count_value,
+    joined,
     sentence,
     state_of,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import listed, nouns, period_value
+from busplan.forms.numbers import listed, nouns, period, period_value, sentence_text
 from busplan.profile.conversion import AssumedKey
 from busplan.profile.write import short_text
-from busplan.questions.compare.characters import compare_lines
-from busplan.questions.compare.document import compare_document, compare_records
-from busplan.questions.compare.kinds import KindComparison, MachineOnKind, NotOnKind, fitting
-from busplan.questions.compare.notes import notes
-from busplan.questions.compare.svg import STYLE, compare_svg
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
-from busplan.questions.fit.network import bus_of
+from busplan.questions.compare.drawing import STYLE, compare_lines, compare_svg
+from busplan.questions.compare.kinds import (
+    CircleAtSmallest,
+    KindComparison,
+    MachineOnKind,
+    NotOnKind,
+    SafeAxes,
+    fitting,
+)
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.words.documents import document, parts_by, with_profile
 from busplan.questions.words.own_picture import OwnPicture
-from busplan.questions.words.sentences import execution_sentence, refused_circle
+from busplan.questions.words.sentences import evidence_sentence, execution_sentence, refused_circle, reset_sentence
+from busplan.sections.profile import Profile
+
+_FIGURES = (
+    *("timing_model", "verdict", "safe", "exceeded", "not_shown", "circle_refused_by", "available_us", "required_us"),
+    *("bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
+)
+_SAFE = ("safe_nodes", "safe_axes", "safe_limited_by")
+_MEASURES = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
+
+
+def compare_document(found: KindComparison) -> JsonDocument:
+    """Document of `busplan compare --format json`."""
+    network = network_of(found.profile)
+    return document(
+        "compare",
+        profile=found.profile.name,
+        kind=found.profile.bus.kind,
+        period_us=found.profile.cycle.period_us,
+        nodes=int(plain(network.nodes)),
+        axes=int(plain(network.axes)),
+        counted_group=found.counted or None,
+        with_circle=found.with_circle,
+        buses=[_bus_record(one) for one in found.kinds],
+    )
+
+
+def compare_records(found: KindComparison) -> list[Record]:
+    """One row for each kind, for CSV: of the lists the keys, of the circle what was decided."""
+    return with_profile(found.profile.name, [_flat(record) for record in map(_bus_record, found.kinds)])
+
+
+def _flat(record: Record) -> Record:
+    circle = record["circle"] or {"passed": None, "step_us": None}
+    flat = {key: value for key, value in record.items() if key not in {"circle", "curve", "assumed"}}
+    return {
+        **flat,
+        **{key: [one["part"] for one in record[key]] for key in ("set_by", "tested")},
+        "assumed": [one["key"] for one in record["assumed"]],
+        "circle_passed": circle["passed"],
+        "circle_step_us": circle["step_us"],
+    }
+
+
+def _bus_record(one: MachineOnKind | NotOnKind) -> Record:
+    """A kind of bus as plain data; what a kind that cannot have the machine lacks is null."""
+    if isinstance(one, NotOnKind):
+        empty: Record = dict.fromkeys(
+            (*_FIGURES, "verdict_after_reset", *_SAFE, "smallest_period_us", "no_period", "circle")
+        )
+        lists: Record = {"assumed": [], "assumed_host": [], "left_out": [], "curve": []}
+        return {**_head(one.kind, is_own=False, why_not=list(one.why)), **empty, **lists}
+    bus = bus_of(one.profile)
+    return {
+        **_head(bus.kind, is_own=one.is_own, why_not=[]),
+        **{key: _plain(getattr(one.figures, key)) for key in _FIGURES},
+        "verdict_after_reset": None if one.after_reset is None else one.after_reset.verdict,
+        **_safe_record(one.safe),
+        "smallest_period_us": one.smallest.us,
+        "no_period": one.smallest.why or None,
+        "circle": None if one.circle is None else _circle_record(one.circle),
+        "assumed": [{**each._asdict(), "value": _plain(each.value)} for each in one.assumed],
+        "assumed_host": [each.key for each in one.assumed_host],
+        "left_out": list(one.left_out),
+        "curve": [{"period_us": each.period_us, **_safe_record(each)} for each in one.curve],
+    }
+
+
+def tested_record(bus: Bus) -> Record:
+    """Which parts of a kind figures of others set, which they test, and which they do not test."""
+    found = parts_tested(bus.evidence_data)
+    set_by, tested = map(parts_by, (found.set_by, found.parts))
+    return {"set_by": set_by, "tested": tested, "not_tested": list(found.untested)}
+
+
+def _head(kind: str, *, is_own: bool, why_not: list[str]) -> Record:
+    bus = kind_named(kind)
+    return {"kind": kind, "title": bus.title, "is_own": is_own, "why_not": why_not, **tested_record(bus)}
+
+
+def _safe_record(safe: SafeAxes) -> Record:
+    return dict(zip(_SAFE, (safe.nodes, safe.axes, safe.limited_by), strict=True))
+
+
+def _circle_record(circle: CircleAtSmallest) -> Record:
+    figures = circle.figures
+    return {
+        "step_us": circle.step_us,
+        "passed": False if figures is None else figures.passed,
+        **{key: None if figures is None else getattr(figures, key) for key in _MEASURES},
+        "problems": list(circle.problems),
+    }
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def notes(found: KindComparison) -> Iterator[Sentence]:
+    """Say of each kind what stands in the way and what nobody has tested, and what of the profile is left out.
+
+    Parameters
+    ----------
+    found
+        The comparison.
+    """
+    for one in found.kinds:
+        if isinstance(one, NotOnKind):
+            why = "; ".join(one.why)
+            yield Sentence((f"{kind_named(one.kind).title} cannot have this machine: {why}.",), "warns")
+        else:
+            said = [*_obstacles(one), *reset_sentence(one.after_reset, one.profile), *_circle_problems(one)]
+            said += _execution(one, found.profile)
+            said += evidence_sentence(bus_of(one.profile))
+            if said:
+                yield joined(Sentence((f"{bus_of(one.profile).title}:",)), *said)
+    yield from _left_out(found)
+
+
+def _left_out(found: KindComparison) -> Iterator[Sentence]:
+    """What of the profile is left out, once for the kinds that leave out the same."""
+    titles: dict[tuple[str, ...], list[str]] = {}
+    for one in found.compared:
+        if one.left_out:
+            titles.setdefault(one.left_out, []).append(bus_of(one.profile).title)
+    for left_out, names in titles.items():
+        keys = joined(*(Sentence((Code(key),)) for key in left_out), by=", ")
+        yield Sentence((f"Left out on {listed(names, 'and')}: ", *keys.parts, "."))
+
+
+def _obstacles(one: MachineOnKind) -> Iterator[Sentence]:
+    """The limits that are broken, and why no period is shown to fit."""
+    bus, network = bus_of(one.profile), network_of(one.profile)
+    broken = [limit.words(network) for limit in map(bus.limit, limits_behind(one.figures)) if limit]
+    if broken:
+        yield Sentence((f"At {period(one.figures.period_us)} {'; '.join(broken)}.",))
+    if one.smallest.us is None:
+        yield Sentence((f"No period is shown to fit: {one.smallest.why}.",))
+
+
+def _circle_problems(one: MachineOnKind) -> Iterator[Sentence]:
+    """Why the circle fails or cannot be run."""
+    if one.circle is not None and one.circle.problems:
+        at = f"{one.smallest.us:.3f} us"
+        yield Sentence((f"The circle at {at}: {', and '.join(one.circle.problems)}.",))
+
+
+def _execution(one: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
+    """What the execution times of the profile stand for."""
+    bus, own = bus_of(one.profile), bus_of(profile)
+    owns_any = own.has_execution(network_of(profile))
+    if one.is_own:
+        return
+    if not bus.has_execution(network_of(one.profile)):
+        if owns_any:
+            yield Sentence(("No execution time is in its cycle.",))
+        return
+    said = f"Execution times are assumed to be as long as on {own.title}; here they are: {bus.starter.base}"
+    none = "" if owns_any else f"; no execution time is in the cycle of {own.title} as this profile sets it"
+    yield Sentence((f"{said}{none}.",))
+
 
 _COLUMNS: Final = (
     TableColumn("bus", kind="words", wraps=True),

@@ -76,7 +76,7 @@ class DiffAnswer(Answer):
         BusplanError
             As for `regressions`.
         """
-        from busplan.questions.diff.headline import regression_words
+        from busplan.questions.diff.report import regression_words
 
         worse = self.regressions(tolerance_percent=tolerance_percent)
         return regression_words(self._found, worse, tolerance=tolerance_percent) if worse else ""

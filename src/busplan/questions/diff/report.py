@@ -1,18 +1,22 @@
-"""Answer of `busplan diff`."""
+"""Answer of `busplan diff`: its headline, keys and figures that differ, and its document."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
+from itertools import takewhile
+from operator import eq
 from typing import Final
 
 from busplan.buses.figure import PERIOD, TIMING_MODEL
 from busplan.forms.blocks import (
     Block,
+    Cell,
     Code,
     JsonDocument,
     Record,
     Report,
     Sentence,
     ShownValue,
+    State,
     Table,
     TableColumn,
     TableRow,
@@ -22,15 +26,215 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns
-from busplan.questions.diff.changes import change_document, change_table
-from busplan.questions.diff.difference import CircleSide, ComparedFigure, Difference
-from busplan.questions.diff.headline import STATES, headline, named
+from busplan.forms.numbers import MISSING, figure_text, nouns, plural, sentence_text
+from busplan.printable import json_text
+from busplan.profile.keys import KeyValue
+from busplan.profile.write import value_text
+from busplan.questions.diff.difference import CircleSide, ComparedFigure, Difference, Judgement, KeyDifference
 from busplan.questions.fit.circle_refusal import circle_refusals
+from busplan.questions.fit.network import bus_of, model_names
 from busplan.questions.words.documents import document
 from busplan.questions.words.sentences import execution_grades, not_applicable, refused_circle
 from busplan.sections.profile import Profile
+
+_COLUMNS: Final = (
+    TableColumn("key", kind="words", wraps=True),
+    *(TableColumn(heading, kind="words", wraps=True) for heading in ("A", "B")),
+)
+_ALL_DIGITS: Final = 17
+"""Digits that distinguish any two floats."""
+_MOST_ITEMS: Final = 8
+"""Longest list shown in full."""
+_MOST_CHARACTERS: Final = 40
+"""Longest text shown in full."""
+_CONTEXT: Final = 8
+"""Characters shown before the first one that differs."""
+
+
+def change_table(keys: Iterable[KeyDifference]) -> Table:
+    """One row for each key: its values in A and B, with a note if a value is a default."""
+    rows = ((Code(one.key), _cell(one.key, one.a, one.b), _cell(one.key, one.b, one.a)) for one in keys)
+    return Table(_COLUMNS, tuple(map(TableRow, rows)))
+
+
+def _cell(key: str, value: KeyValue | None, other: KeyValue | None) -> Cell:
+    """One side of a difference; the other side decides which part or how many digits of a long value are shown."""
+    if value is None:
+        return MISSING
+    own, beside = value.value, None if other is None else other.value
+    shown: ShownValue | Code
+    if isinstance(own, int | float) and not isinstance(own, bool):
+        shown = ShownValue(own, key)
+        if (
+            own != beside
+            and isinstance(beside, int | float)
+            and figure_text(shown) == figure_text(shown._replace(value=beside))
+        ):
+            shown = shown._replace(digits=_ALL_DIGITS)
+    else:
+        shown = Code(shown_value(own, beside))
+    return shown if value.source == "file" else Sentence((shown, " (default)"))
+
+
+def shown_value(value: object, other: object = None) -> str:
+    """Write a value as TOML; of a long one, only the part that differs from the other.
+
+    Examples
+    --------
+    >>> shown_value(4000.0), shown_value(None), shown_value("S400"), shown_value(False), shown_value(["sdo"])
+    ('4000', 'none', '"S400"', 'false', '["sdo"]')
+    >>> shown_value((1, 2, 3, 4, 5, 6, 7, 8, 10), (1, 2, 3, 4, 5, 6, 7, 9, 10))
+    '[7 alike, 8, 1 alike]'
+    """
+    match value:
+        case None:
+            return "none"
+        case str():
+            return _text(value, other if isinstance(other, str) else "")
+        case tuple() | list():
+            return _list(tuple(value), tuple(other) if isinstance(other, tuple | list) else ())
+        case bool():
+            return value_text(value)
+        case float():
+            return repr(value).removesuffix(".0")
+    return str(value)
+
+
+def _alike(one: Sequence[object], other: Sequence[object]) -> int:
+    """Length of the common beginning of two sequences."""
+    return sum(takewhile(bool, map(eq, one, other)))
+
+
+def _list(items: tuple[object, ...], other: tuple[object, ...]) -> str:
+    if len(items) <= _MOST_ITEMS:
+        return f"[{', '.join(map(shown_value, items))}]"
+    before = _alike(items, other)
+    after = _alike(items[before:][::-1], other[before:][::-1])
+    middle = items[before : len(items) - after]
+    more = len(middle) - _MOST_ITEMS
+    parts = (
+        *([f"{before} alike"] if before else []),
+        *map(shown_value, middle[:_MOST_ITEMS]),
+        *([f"{more} more"] if more > 0 else []),
+        *([f"{after} alike"] if after else []),
+    )
+    return f"[{', '.join(parts)}]"
+
+
+def _text(text: str, other: str) -> str:
+    if len(text) <= _MOST_CHARACTERS:
+        return json_text(text)
+    start = max(0, _alike(text, other) - _CONTEXT)
+    end = start + _MOST_CHARACTERS
+    piece = json_text(text[start:end])
+    return f"{'..' if start else ''}{piece}{'..' if end < len(text) else ''}"
+
+
+def change_document(one: KeyDifference) -> JsonDocument:
+    """A difference as plain data, both values in full."""
+    return {
+        "key": one.key,
+        "a": one.a and one.a.value,
+        "a_source": "absent" if one.a is None else one.a.source,
+        "b": one.b and one.b.value,
+        "b_source": "absent" if one.b is None else one.b.source,
+    }
+
+
+STATES: Final[dict[Judgement, State]] = {
+    "worse": "fails",
+    "better": "passes",
+    "same": "neutral",
+    "neutral": "neutral",
+}
+"""State of a judgement on B."""
+_SHOWN: Final[dict[Judgement, str]] = {
+    "worse": "B is not shown to fit where A is",
+    "better": "B is shown to fit where A is not",
+}
+_FITS: Final[dict[Judgement, str]] = {"worse": "B does not fit where A does", "better": "B fits where A does not"}
+_PASSES: Final[dict[Judgement, str]] = {
+    "worse": "B does not pass the circle where A does",
+    "better": "B passes the circle where A does not",
+}
+_MOST_NAMED: Final = 4
+"""Most figures that a headline names."""
+
+
+def headline(found: Difference) -> Sentence:
+    """The verdict: where B is worse, and where it is better."""
+    if not found.keys:
+        return sentence("A and B are the same profile: every key has the same value.")
+    verdicts = [
+        one for judgement in ("worse", "better") for one in (*_loud(found, judgement), *_counted(found, judgement))
+    ]
+    if verdicts:
+        said = joined(*verdicts, by="; ")
+        return said._replace(parts=(*said.parts, "."))
+    keys = len(found.keys)
+    figures = "and only figures that are neither" if found.judged("neutral") else "and no figure"
+    return sentence(
+        f"B is neither better nor worse: {{}} {nouns(keys, 'key')} {'differs' if keys == 1 else 'differ'}, {figures}.",
+        count_value(keys),
+    )
+
+
+def _loud_figures(found: Difference) -> dict[str, dict[Judgement, str]]:
+    """Sentences for the figures that have their own, apart from whether the cycle fits."""
+    loud: dict[str, dict[Judgement, str]] = {}
+    for bus in (bus_of(found.a), bus_of(found.b)):
+        if bus.safety_figure is not None:
+            loud[bus.safety_figure.key] = {
+                "worse": f"B has an unsafe {bus.safety} where A has a safe one",
+                "better": f"B has a safe {bus.safety} where A has an unsafe one",
+            }
+    return {**loud, "passed": _PASSES}
+
+
+def _loud(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
+    figures = found.judged(judgement)
+    judged = {one.figure.key for one in figures}
+    models = " and ".join(one.part for one in figures if one.figure.key == "fits")
+    state = STATES[judgement]
+    if "shown_to_fit" in judged:
+        yield sentence(_SHOWN[judgement], state=state)
+    elif models:
+        form = f"{_FITS[judgement]} by the closed form of {models}, which does not change the verdict"
+        yield sentence(form, state=state)
+    for key, words in _loud_figures(found).items():
+        if key in judged:
+            yield sentence(words[judgement], state=state)
+
+
+def _counted(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
+    told = {"shown_to_fit", "verdict", "fits", *_loud_figures(found)}
+    names = named([one for one in found.judged(judgement) if one.figure.key not in told], found)
+    if not names:
+        return
+    said = sentence(
+        f"B is {judgement} in {{}} {nouns(len(names), 'figure')}: {', '.join(names[:_MOST_NAMED])}",
+        count_value(len(names)),
+        state=STATES[judgement],
+    )
+    hidden = len(names) - _MOST_NAMED
+    yield joined(said, sentence("and {} more", count_value(hidden))) if hidden > 0 else said
+
+
+def named(figures: Sequence[ComparedFigure], found: Difference) -> list[str]:
+    """Names of figures, each once, with the timing model if only one judges it so."""
+    models = {*model_names(found.a), *model_names(found.b)}
+    parts: dict[str, list[str]] = {}
+    for one in figures:
+        parts.setdefault(one.figure.label, []).append(one.part)
+    return [f"{label} ({of[0]})" if len(of) == 1 and of[0] in models else label for label, of in parts.items()]
+
+
+def regression_words(found: Difference, regressions: Sequence[ComparedFigure], *, tolerance: float) -> str:
+    """Message that lists the regressions."""
+    by = f" by more than {tolerance:.12g} %" if tolerance else ""
+    names = named(regressions, found)
+    return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}"
+
 
 Arguments = tuple[str, str]
 """A and B as they were typed."""

@@ -11,9 +11,8 @@ from busplan.elementwise import Traced
 from busplan.progress import Progress
 from busplan.questions.circle.figures import CIRCLE_FIGURES, JITTER, CircleFigures
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.explain.capacity import capacity_figures
-from busplan.questions.explain.latency import remembered
-from busplan.questions.explain.trace import found
+from busplan.questions.explain.bus import capacity_figures, remembered
+from busplan.questions.explain.formulas import found
 from busplan.questions.fit.inputs import traced, traced_profile
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.machine import CONTOUR_MEASURES, AxisKeys

@@ -1,13 +1,15 @@
-"""Answer of `busplan explain PROFILE FIGURE`: every step to a figure, and its inputs."""
+"""Answer of `busplan explain`: every step to a figure and its inputs; without one, assumptions and all figures."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
+from busplan.buses.bus import Bus
 from busplan.forms import blocks
 from busplan.forms.blocks import (
     Block,
     Calculation,
+    Cell,
     Chapter,
     Code,
     JsonDocument,
@@ -28,12 +30,122 @@ from busplan.questions.capacity.report import capacity_document
 from busplan.questions.capacity.sensitivity import sensitivities
 from busplan.questions.capacity.sensitivity_report import sensitivity_document
 from busplan.questions.capacity.verdict import verdicts
-from busplan.questions.explain.assumptions import INPUT_COLUMNS, input_cells
-from busplan.questions.explain.capacity import OF_DOCUMENT, OF_SENSITIVITY
-from busplan.questions.explain.derivation import Derivation, Explanation, Step
+from busplan.questions.explain.bus import OF_DOCUMENT, OF_SENSITIVITY
+from busplan.questions.explain.derivation import Derivation, Explanation, Step, explained_figures
+from busplan.questions.explain.formulas import formula_of
 from busplan.questions.fit.figures import capacity
+from busplan.questions.fit.network import bus_of
 from busplan.questions.words.documents import document, with_profile
-from busplan.sourced import DIGITS, short
+from busplan.sections.profile import Profile
+from busplan.sourced import DIGITS, EQUATIONS, Input, short
+
+_MEANING: Final = TableColumn("meaning", kind="words", rank=4, leaves="below", wraps=True)
+INPUT_COLUMNS: Final = (
+    TableColumn("name", kind="words", wraps=True),
+    TableColumn("value"),
+    TableColumn("unit", kind="words", rank=1, leaves="below", wraps=True),
+    TableColumn("grade", kind="words", rank=2, leaves="below"),
+    TableColumn("source", kind="words", rank=3, leaves="below", wraps=True),
+)
+"""Columns of an input: what it is, and how well it is known."""
+_FIGURES: Final = (
+    *(TableColumn(heading, kind="words") for heading in ("command", "figure")),
+    TableColumn("eq", kind="words", rank=2),
+    TableColumn("unit", kind="words", rank=1),
+    TableColumn("what it is", kind="words", wraps=True),
+)
+
+
+def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report:
+    """Report of `explain PROFILE`: the assumptions behind its figures, and all figures that can be explained.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    assumptions
+        The inputs of its figures.
+    """
+    caption = Sentence(("What the figures of ", Code(profile.name), " rest on, the least well known first"))
+    return Report(
+        Sentence(("The figures of ", Code(profile.name))),
+        lambda: (
+            assumptions_table(assumptions)._replace(caption=caption),
+            _figure_table(profile),
+        ),
+        partial(assumptions_document, profile, assumptions),
+        lambda: figure_rows(profile),
+    )
+
+
+def assumptions_table(assumptions: Sequence[Input]) -> Table:
+    """Table of inputs, one row each.
+
+    Parameters
+    ----------
+    assumptions
+        The inputs.
+    """
+    rows = (TableRow((*input_cells(one), one.meaning)) for one in assumptions)
+    return Table((*INPUT_COLUMNS, _MEANING), tuple(rows), stacks=True)
+
+
+def figure_rows(profile: Profile) -> list[Record]:
+    """One row for each figure that can be explained."""
+    return [
+        {"command": command, "figure": one.key, "symbol": one.symbol, "unit": one.unit}
+        | {"reference": one.reference, "meaning": one.meaning}
+        for command, one in explained_figures(profile)
+    ]
+
+
+def equation_rows() -> list[Record]:
+    """One row for each equation: numbers, formula, function and source."""
+    return [
+        {
+            "reference": one.reference,
+            "formula": f"{one.symbol} = {formula_of(one)}",
+            "function": name,
+            "source": one.source,
+        }
+        for name, one in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
+    ]
+
+
+def constant_rows(bus: Bus) -> list[Record]:
+    """One row for each constant: value, unit, grade and source."""
+    return [
+        {"name": name, "value": float(one), "unit": one.unit}
+        | {"grade": one.grade, "source": one.source, "meaning": one.meaning}
+        for name, one in bus.constants.items()
+    ]
+
+
+def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> JsonDocument:
+    """Document of `busplan explain PROFILE --format json`: the inputs of the figures, and the whole registry."""
+    return document(
+        "explain",
+        profile=profile.name,
+        assumptions=[one._asdict() for one in assumptions],
+        figures=figure_rows(profile),
+        equations=equation_rows(),
+        constants=constant_rows(bus_of(profile)),
+    )
+
+
+def input_cells(one: Input) -> tuple[Cell, ...]:
+    """Cells of one input."""
+    value = ShownValue(one.value, "value", one.unit, digits=DIGITS)
+    return Code(one.name), value, one.unit, one.grade, one.source
+
+
+def _figure_table(profile: Profile) -> Table:
+    rows = (
+        TableRow((command, Code(one.key), one.reference, one.unit, one.meaning))
+        for command, one in explained_figures(profile)
+    )
+    return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
+
 
 _NONE: Final = Words("none")
 _NAMING: Final = ("name", "source", "input", "change")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from math import inf
 from typing import Any, Final, Literal
 
-from busplan.questions.fit.cycle import available_us, cycle_of, fits_in
+from busplan.questions.fit.certainty import available_us, cycle_of, fits_in
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us, skew_us
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.base import Section, value_at

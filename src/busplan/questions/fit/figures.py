@@ -16,16 +16,18 @@ from busplan.elementwise import Number, choose, existing, larger, plain
 from busplan.profile.toml import at_periods, override
 from busplan.questions.fit.certainty import (
     FITS,
+    TIME,
     VERDICTS,
     Certainty,
     VerdictWord,
+    available_us,
     certainty,
+    fits_in,
     limit_codes,
     time_code,
     verdict_code,
 )
 from busplan.questions.fit.circle_refusal import circle_refusals
-from busplan.questions.fit.cycle import TIME, available_us, fits_in
 from busplan.questions.fit.figure_values import FigureValues
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.fit.node_limit import largest_nodes, safe_nodes

@@ -2,7 +2,7 @@
 
 from busplan.buses.cycle import BusCycle
 from busplan.elementwise import plain
-from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 

@@ -6,8 +6,7 @@ from typing import Final, NamedTuple
 from busplan.buses.network import Network
 from busplan.buses.parts import Limit
 from busplan.elementwise import Number, choose, larger, plain, rounded_up, smaller, total
-from busplan.questions.fit.certainty import limits_to_be_safe
-from busplan.questions.fit.cycle import limits_with_time
+from busplan.questions.fit.certainty import limits_to_be_safe, limits_with_time
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile

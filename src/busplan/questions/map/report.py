@@ -20,14 +20,20 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns
+from busplan.forms.numbers import nouns, sentence_text
 from busplan.questions.fit.network import bus_of
-from busplan.questions.map.cells import Cell, Region
-from busplan.questions.map.characters import map_lines
-from busplan.questions.map.labels import LOOKS, limit_words, looks_of, map_title, setting_words, state_words
-from busplan.questions.map.svg import STYLE, map_svg
-from busplan.questions.map.trade_off import TradeOff
+from busplan.questions.map.drawing import (
+    LOOKS,
+    STYLE,
+    limit_words,
+    looks_of,
+    map_lines,
+    map_svg,
+    map_title,
+    setting_words,
+    state_words,
+)
+from busplan.questions.map.trade_off import Cell, Region, TradeOff
 from busplan.questions.sweep.top import payload_sentences
 from busplan.questions.words.documents import document, with_profile
 from busplan.questions.words.own_picture import OwnPicture

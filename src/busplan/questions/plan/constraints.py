@@ -9,9 +9,8 @@ from busplan.buses.network import Network
 from busplan.buses.parts import Value
 from busplan.elementwise import within
 from busplan.errors import BusplanError
-from busplan.questions.fit.certainty import certainty
+from busplan.questions.fit.certainty import TIME, certainty
 from busplan.questions.fit.circle_refusal import circle_refusals, step_refusals
-from busplan.questions.fit.cycle import TIME
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.base import MIN_STEP_US

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 from busplan.buses.parts import Cost
 from busplan.elementwise import FIT_ROUNDING, plain, within
 from busplan.errors import BusplanError
+from busplan.questions.fit.certainty import fits_in
 from busplan.questions.fit.circle_refusal import STEP
-from busplan.questions.fit.cycle import fits_in
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.constraints import (
     NODES_KEY,

@@ -25,8 +25,7 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import MISSING, listed, nouns, period_value
+from busplan.forms.numbers import MISSING, listed, nouns, period_value, sentence_text
 from busplan.profile.keys import flat
 from busplan.questions.fit.certainty import FITS, limits_behind
 from busplan.questions.fit.figures import after_reset
@@ -36,8 +35,14 @@ from busplan.questions.plan.freedoms import PERIOD, freedoms
 from busplan.questions.plan.options import Option, Relaxation
 from busplan.questions.plan.planning import Plan
 from busplan.questions.words.documents import document, with_profile
-from busplan.questions.words.key_values import NewValues, key_value, settings_sentence
-from busplan.questions.words.sentences import margin_parts, reset_sentence, warning_sentences
+from busplan.questions.words.sentences import (
+    NewValues,
+    key_value,
+    margin_parts,
+    reset_sentence,
+    settings_sentence,
+    warning_sentences,
+)
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
 

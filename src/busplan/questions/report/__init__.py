@@ -11,8 +11,7 @@ from busplan.printable import has_controls
 from busplan.profile.changes import NO_CHANGES
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several
-from busplan.questions.base.origin import Origin, origin_of
+from busplan.questions.base.inputs import Origin, ProfileLike, load_profile, one_or_several, origin_of
 from busplan.questions.report.all_answers import AllAnswers, answers_of_each
 from busplan.questions.report.page import ReportedProfile, page_report
 from busplan.questions.words.documents import changed_report

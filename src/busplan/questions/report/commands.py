@@ -12,7 +12,7 @@ from busplan.questions.capacity.report import capacity_document
 from busplan.questions.capacity.sensitivity_report import sensitivity_document
 from busplan.questions.capacity.verdict import verdicts
 from busplan.questions.circle.report import circle_document
-from busplan.questions.explain.assumptions import assumptions_document
+from busplan.questions.explain.report import assumptions_document
 from busplan.questions.latency.report import latency_document
 from busplan.questions.map.report import map_document
 from busplan.questions.report.all_answers import AllAnswers

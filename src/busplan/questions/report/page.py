@@ -37,21 +37,23 @@ from busplan.forms.numbers import MISSING, plural
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.circle.report import verdict_words
-from busplan.questions.explain.assumptions import assumptions_table
+from busplan.questions.explain.report import assumptions_table
 from busplan.questions.fit.assumed import heavy_assumptions
 from busplan.questions.fit.network import bus_of
 from busplan.questions.report.all_answers import AllAnswers
-from busplan.questions.report.bus import (
+from busplan.questions.report.commands import Sources, shell_word, sources
+from busplan.questions.report.parts import (
     axes_part,
     bus_question,
+    circle_part,
+    circle_question,
     map_part,
     models_part,
     sensitivity_part,
+    sources_part,
     terms_part,
     timeline_part,
 )
-from busplan.questions.report.circle import circle_part, circle_question, sources_part
-from busplan.questions.report.commands import Sources, shell_word, sources
 from busplan.questions.words.documents import document
 
 _MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")

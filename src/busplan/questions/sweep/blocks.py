@@ -16,15 +16,17 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Limit, Value
 from busplan.elementwise import Number
 from busplan.questions.fit.certainty import (
+    TIME,
     VERDICTS,
     certainty,
+    fits_in,
     limit_codes,
     limits_to_be_safe,
+    limits_with_time,
     time_code,
     verdict_code,
 )
 from busplan.questions.fit.circle_refusal import loop_refusals, run_refusals
-from busplan.questions.fit.cycle import TIME, fits_in, limits_with_time
 from busplan.questions.fit.figures import COUNTS, certainty_numbers, numeric_figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.fit.node_limit import most_nodes

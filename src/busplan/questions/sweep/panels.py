@@ -13,7 +13,7 @@ from busplan.forms.svg import LINE, PHONE, drawing, inside, markup, paragraph, t
 from busplan.questions.sweep.grid import Array
 from busplan.questions.sweep.scales import PlotScale
 from busplan.questions.sweep.words import Panel, Plotted, caption
-from busplan.questions.words.axes import CURVES, draw_mark
+from busplan.questions.words.drawings import CURVES, draw_mark
 
 _CURVES: Final = 300
 """Height of curves, in px."""

@@ -5,7 +5,7 @@ from typing import Final
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole
 from busplan.questions.fit.network import bus_of, network_of

@@ -4,8 +4,7 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from busplan.buses.parts import IDLE
-from busplan.forms.legend import legend_lines
-from busplan.forms.lines import BLANK, Line
+from busplan.forms.lines import BLANK, Line, legend_lines
 from busplan.forms.scale import ticks
 from busplan.questions.fit.network import bus_of
 from busplan.questions.timeline.events import Event, Schedule

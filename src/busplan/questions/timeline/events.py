@@ -13,7 +13,7 @@ from busplan.buses.cycle import BusEvent
 from busplan.buses.figure import Figure
 from busplan.buses.parts import IDLE
 from busplan.errors import BusplanError
-from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.fit.certainty import cycle_of, fits_in
 from busplan.questions.fit.figures import CapacityFigures, figures
 from busplan.questions.fit.network import bus_of, leading_model, network_of
 from busplan.sections.profile import Profile

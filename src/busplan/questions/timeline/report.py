@@ -26,8 +26,7 @@ from busplan.forms.blocks import (
     sentence,
     state_of,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import period_value
+from busplan.forms.numbers import period_value, sentence_text
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.network import bus_of
 from busplan.questions.timeline.characters import timeline_lines

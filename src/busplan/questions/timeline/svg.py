@@ -5,8 +5,7 @@ from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.forms.blocks import figure_value
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import figure_text
+from busplan.forms.numbers import figure_text, sentence_text
 from busplan.forms.picture import styled
 from busplan.forms.svg import LINE, PHONE, Scale, drawing, inside, markup, paragraph, text_at
 from busplan.questions.timeline.events import SHARE, Event, Schedule, totals

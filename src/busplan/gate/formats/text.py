@@ -1,4 +1,4 @@
-"""Findings with their line of the file, the value underlined, and the cure on a line of its own."""
+"""Findings as lines for people, editors and build logs: concise, or with the line of the file and the cure."""
 
 import re
 from collections.abc import Iterator
@@ -6,11 +6,29 @@ from textwrap import wrap
 from typing import Final, NamedTuple
 from unicodedata import category, east_asian_width
 
-from busplan.forms.lines import BLANK, Line, Mark, plain_text, styled_text
-from busplan.gate.formats import GateFormat
-from busplan.gate.formats.plain import TONES, finding_parts, marked_line
+from busplan.buses.rule import Severity
+from busplan.forms.lines import BLANK, Line, Mark, Tone, plain_text, styled_text
+from busplan.gate.finding import Finding, finding_line, finding_parts
 from busplan.gate.report import CheckReport, Located
 from busplan.printable import printable
+
+TONES: Final[dict[Severity, Tone]] = {"error": "fails", "warning": "warns"}
+"""Colour of each severity, which is always said in a word, too."""
+
+
+def marked_line(text: str, path: str, finding: Finding) -> Line:
+    """Mark the place, the code and the severity of a line that begins with them."""
+    place, words = finding_parts(path, finding)
+    start = len(printable(place)) + 1
+    said = Mark(start, start + words.index(": "), TONES[finding.severity])
+    return Line(text, "drawn", (Mark(0, start, "title"), said))
+
+
+def concise(report: CheckReport, *, width: int | None = None) -> str:
+    """One line for each finding; in colours if there is a width, at which the terminal breaks the lines itself."""
+    lines = [marked_line(finding_line(one.path, one.finding), one.path, one.finding) for one in report.located]
+    return plain_text(lines) if width is None else styled_text(lines)
+
 
 WIDTH: Final = 100
 """Widest line, in columns: of sentences, which are wrapped, and of source lines, which are cut."""
@@ -21,16 +39,9 @@ _UNBROKEN: Final = "\xa0"
 _NUMBER_AND_WORD: Final = re.compile(r"(?<=[0-9]) (?=[a-z])")
 
 
-class Full(GateFormat):
-    """Each finding with its line of the file."""
-
-    def write(self, report: CheckReport) -> str:
-        """Write the lines of each finding."""
-        return plain_text(_lines(report, WIDTH))
-
-    def on_terminal(self, report: CheckReport, *, width: int) -> str:
-        """Write the lines of each finding in colours."""
-        return styled_text(_lines(report, min(width, WIDTH)))
+def full(report: CheckReport, *, width: int | None = None) -> str:
+    """Each finding with its line of the file; in colours if there is the width of a terminal, in columns."""
+    return plain_text(_lines(report, WIDTH)) if width is None else styled_text(_lines(report, min(width, WIDTH)))
 
 
 def _lines(report: CheckReport, width: int) -> Iterator[Line]:

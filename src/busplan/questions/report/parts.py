@@ -1,4 +1,4 @@
-"""Parts of a page on the bus: verdict, timing models, timeline, terms, axes over the period."""
+"""Parts of a page: verdicts, timing models, timeline, terms, axes over the period, map, and the circle."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -42,6 +42,17 @@ from busplan.forms.numbers import nouns, period_value
 from busplan.questions.capacity.report import capacity_table, groups_table
 from busplan.questions.capacity.sensitivity_report import sensitivity_blocks
 from busplan.questions.capacity.sentences import verdict_sentences
+from busplan.questions.circle.figures import CIRCLE_BY_KEY
+from busplan.questions.circle.report import (
+    ACT_TOGETHER,
+    NO_SOURCES,
+    circle_drawing,
+    circle_sentences,
+    circle_table,
+    contributions_table,
+    servo_sentence,
+    verdict_words,
+)
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.latency.report import latency_tables
@@ -49,8 +60,7 @@ from busplan.questions.map.report import headline, map_chart, regions_table
 from busplan.questions.report.all_answers import AllAnswers
 from busplan.questions.report.commands import Sources
 from busplan.questions.timeline.report import timeline_chart, totals_table
-from busplan.questions.words.axes import AxesDrawing
-from busplan.questions.words.terms import LEFT, TermsDrawing
+from busplan.questions.words.drawings import LEFT, AxesDrawing, TermsDrawing
 
 _ORDER: Final = "The terms stand in the order of the table, and what they leave comes last."
 _OVER_PERIOD: Final = (SAFE_NODES, SAFE_AXES, SAFE_LIMITED_BY)
@@ -235,3 +245,64 @@ def _curves(answer: AllAnswers) -> str:
     marks = ("solid with a square", "dashed with a diamond")
     curves = (f"{name}: {mark}" for name, mark in zip(names, marks, strict=False))
     return f"The axes that a period carries, {'; '.join(curves)}; the point is this profile's own."
+
+
+_QUESTION: Final = "Is the circle still round?"
+_KEYS: Final = (
+    *("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm"),
+    *("phase_margin_deg", "gain_margin_db"),
+)
+
+
+def circle_question(answer: AllAnswers) -> Question:
+    """The question whether the circle is round, with its verdict."""
+    result = answer.circle_figures
+    if result is None:
+        return Question(
+            _QUESTION,
+            Words("CANNOT BE RUN", "fails") if answer.no_circle else Words("NOT RUN", "neutral"),
+            tuple(Sentence((why,)) for why in _why_not(answer)),
+            Facts(()),
+        )
+    known = (key for key in _KEYS if getattr(result, key) is not None)
+    facts = ((CIRCLE_BY_KEY[key].label, attribute_value(CIRCLE_BY_KEY[key], result)) for key in known)
+    return Question(
+        _QUESTION,
+        verdict_words(result),
+        (*circle_sentences(answer.profile, result), *servo_sentence(answer.profile, result)),
+        Facts(tuple(facts)),
+    )
+
+
+def _why_not(answer: AllAnswers) -> tuple[str, ...]:
+    if answer.no_circle:
+        return tuple(f"The circle test cannot be run: {why}." for why in answer.no_circle)
+    if answer.profile.asks_for_circle:
+        return ("The circle test was left out (--no-circle).",)
+    return ("The profile has no section for a circle test, so none was run.",)
+
+
+def circle_part(answer: AllAnswers, sources: Sources) -> Chapter:
+    """The magnified circle and its figures."""
+    return Chapter(Sentence(("The circle",)), tuple(_circle(answer, sources)), "circle")
+
+
+def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
+    result = answer.circle_figures
+    if result is None:
+        yield from (Sentence((why,)) for why in _why_not(answer))
+        return
+    yield circle_drawing(answer.contour, result, answer.profile)
+    yield circle_table((result,))
+    yield sources["circle"].line
+
+
+def sources_part(answer: AllAnswers, sources: Sources) -> Chapter | None:
+    """The ranked error sources; None without a simulation."""
+    result = answer.circle_figures
+    if result is None or result.contributions is None:
+        return None
+    title = Sentence(("What to attack",))
+    if not result.contributions:
+        return Chapter(title, (NO_SOURCES,), "sources")
+    return Chapter(title, (contributions_table(result), ACT_TOGETHER, sources["circle"].line), "sources")
