@@ -17,6 +17,7 @@ from busplan.cli.options import (
     FormatOption,
     OutputOption,
     ProfileArgument,
+    option,
     timing_model,
 )
 from busplan.cli.output import say
@@ -45,21 +46,13 @@ def calibrate_command(
     ] = None,
     group: Annotated[
         str | None,
-        typer.Option(
-            "--group",
-            metavar="NAME",
-            help="The group of nodes that was measured, of a profile with groups.  [default: its one group]",
-            show_default=False,
+        option(
+            "--group NAME", "The group of nodes that was measured, of a profile with groups.  [default: its one group]"
         ),
     ] = None,
     timing: Annotated[
         str | None,
-        typer.Option(
-            "--timing",
-            metavar="MODEL",
-            help="Timing model that says what the packets take.  [default: the one that decides]",
-            show_default=False,
-        ),
+        option("--timing MODEL", "Timing model that says what the packets take.  [default: the one that decides]"),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[

@@ -9,7 +9,7 @@ import typer
 from busplan.cli.answering import columns
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import require_apart
-from busplan.cli.options import complete_profile, output_option
+from busplan.cli.options import complete_profile, option, output_option
 from busplan.cli.output import PlanFailsError, emit_text, is_styled, is_terminal, say, write_document
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
@@ -50,13 +50,12 @@ def check_command(
     changes: KeyChanges = NO_CHANGES,
     format_: Annotated[
         FormatName | None,
-        typer.Option(
-            "--format",
-            envvar="BUSPLAN_FORMAT",
-            metavar="FORM",
-            help="Form of the report: concise is one line a finding, full shows the line of the file with the value "
+        option(
+            "--format FORM",
+            "Form of the report: concise is one line a finding, full shows the line of the file with the value "
             f"underlined, json is the document of all; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are "
             "for the build service.  [default: full on a terminal, otherwise concise]",
+            envvar="BUSPLAN_FORMAT",
         ),
     ] = None,
     output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
@@ -70,28 +69,22 @@ def check_command(
     ] = True,
     circle_steps: Annotated[
         int | None,
-        typer.Option(
-            "--circle-steps",
-            metavar="N",
-            min=1,
-            help="Most simulated steps of each axis of a circle; a longer one is not run, which BP204 warns of.  "
+        option(
+            "--circle-steps N",
+            "Most simulated steps of each axis of a circle; a longer one is not run, which BP204 warns of.  "
             "[default: 10000000]",
+            min=1,
         ),
     ] = None,
     baseline: Annotated[
         Path | None,
-        typer.Option(
-            "--baseline",
-            metavar="FILE",
-            help="Record that no profile may lose axes or margin against.  [default: no record]",
-        ),
+        option("--baseline FILE", "Record that no profile may lose axes or margin against.  [default: no record]"),
     ] = None,
     update_baseline: Annotated[
         bool, typer.Option("--update-baseline", help="Record what the profiles carry now in the --baseline file.")
     ] = False,
     skip_others: Annotated[
-        bool,
-        typer.Option("--skip-others", help="Skip named files that claim no `schema_version`, and count them."),
+        bool, typer.Option("--skip-others", help="Skip named files that claim no `schema_version`, and count them.")
     ] = False,
     jobs: Annotated[
         int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Number of processes to check with.")

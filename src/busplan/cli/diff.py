@@ -15,6 +15,7 @@ from busplan.cli.options import (
     OutputOption,
     TimingOption,
     complete_profile,
+    option,
     timing_model,
 )
 from busplan.cli.output import PlanFailsError, say
@@ -45,18 +46,16 @@ def diff_command(
     changes: KeyChanges = NO_CHANGES,
     timing: TimingOption = "both",
     circle: Annotated[
-        bool,
-        typer.Option("--circle/--no-circle", help="Run both circle tests when either profile asks for one."),
+        bool, typer.Option("--circle/--no-circle", help="Run both circle tests when either profile asks for one.")
     ] = True,
     fail_on_regression: Annotated[
         bool, typer.Option("--fail-on-regression", help="Exit 1 when a figure of B is worse.")
     ] = False,
     tolerance: Annotated[
         float | None,
-        typer.Option(
-            "--tolerance",
-            metavar="PERCENT",
-            help="With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
+        option(
+            "--tolerance PERCENT",
+            "With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
         ),
     ] = None,
     all_: AllOption = False,

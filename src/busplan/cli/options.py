@@ -116,6 +116,22 @@ def timing_model(timing: str, profile: "Profile") -> str:
     return known_model(profile, timing, name="--timing")
 
 
+def option(usage: str, words: str, **settings: Any) -> Any:
+    """Make an option whose default is said in its help, for it is None.
+
+    Parameters
+    ----------
+    usage
+        Name and value as in the help: "--jobs N".
+    words
+        Its help, with the default in brackets at the end.
+    settings
+        Further settings of typer's option.
+    """
+    name, _, value = usage.partition(" ")
+    return typer.Option(name, metavar=value, help=words, show_default=False, **settings)
+
+
 STANDARD_OUTPUT: Final = Path("-")
 
 
@@ -151,6 +167,9 @@ AllOption = Annotated[
     bool, typer.Option("--all", help="Show everything: every row, and every column on a narrow terminal, too.")
 ]
 FormatOption = Annotated[Form | None, format_option("table")]
+JobsOption = Annotated[
+    int | None, option("--jobs N", "Number of processes for --circle.  [default: one for each processor]")
+]
 OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(ENDINGS)}")]
 
 
