@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
@@ -21,6 +20,7 @@ from busplan.cli.options import (
     timing_model,
 )
 from busplan.cli.output import say
+from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from busplan.cli.answering import answer, naming_option
-from busplan.cli.changes import takes_changes
+from busplan.cli.changes import load_each, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
@@ -20,7 +20,6 @@ from busplan.cli.options import (
 )
 from busplan.cli.output import PlanFailsError, say
 from busplan.cli.progress import progress_bar
-from busplan.cli.several import load_each
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 

@@ -8,10 +8,9 @@ import typer
 from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
-from busplan.cli.options import AllOption, JobsOption, ProfileArgument
+from busplan.cli.options import VALUES_HELP, AllOption, JobsOption, ProfileArgument, parse_axis
 from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, show_drawn
 from busplan.cli.progress import progress_bar
-from busplan.cli.vary import VALUES_HELP, parse_axis
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 

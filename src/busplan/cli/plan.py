@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.answering import answer, naming_option, report_with
-from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument, option
 from busplan.cli.output import PlanFailsError, emit_document, say
 from busplan.cli.progress import progress_bar
+from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.errors import BusplanError
 from busplan.files import NewFile, new_file
 from busplan.forms import ENDINGS, Form

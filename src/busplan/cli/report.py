@@ -6,11 +6,10 @@ from typing import Annotated, Final
 import typer
 
 from busplan.cli.answering import answer, naming
-from busplan.cli.changes import load_changed, takes_changes
+from busplan.cli.changes import load_changed, load_each, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import OutputOption, complete_profile, format_option, option
 from busplan.cli.progress import progress_bar
-from busplan.cli.several import load_each
 from busplan.errors import BusplanError
 from busplan.forms import Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges

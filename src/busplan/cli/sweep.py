@@ -12,6 +12,7 @@ from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     ALL_MODELS,
+    VALUES_HELP,
     AllOption,
     JobsOption,
     ProfileArgument,
@@ -19,11 +20,11 @@ from busplan.cli.options import (
     form_of_file,
     option,
     output_option,
+    parse_axes,
 )
 from busplan.cli.output import refuse_terminal
 from busplan.cli.pictures import plot_form
 from busplan.cli.sweep_run import TOP_FORMS, SweepForm, SweepJob, run_sweep
-from busplan.cli.vary import VALUES_HELP, parse_axes
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
 from busplan.files import partial_path

@@ -23,7 +23,7 @@ from busplan.forms.blocks import (
 )
 from busplan.gate import bus, circle
 from busplan.nearest import did_you_mean
-from busplan.questions.words.documents import document
+from busplan.questions.words.documents import document, fields
 
 BY_KIND: Final[Mapping[ProblemKind, Rule]] = {
     "syntax": Rule(
@@ -219,12 +219,5 @@ def _rules_document(rules: Sequence[Rule]) -> JsonDocument:
 
 def _rules_records(rules: Sequence[Rule]) -> list[Record]:
     return [
-        {
-            "code": rule.code,
-            "rule": rule.name,
-            "severity": rule.severity,
-            "summary": rule.summary,
-            "explanation": rule.explanation,
-        }
-        for rule in rules
+        {"code": rule.code, "rule": rule.name, **fields(rule, "severity", "summary", "explanation")} for rule in rules
     ]

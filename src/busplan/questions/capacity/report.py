@@ -30,7 +30,7 @@ from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS, Capacity, CapacityFigures
 from busplan.questions.fit.network import bus_of, leading_model, network_of
-from busplan.questions.words.documents import Owner, document, figure_table, with_profile
+from busplan.questions.words.documents import Owner, document, fields, figure_table, with_profile
 from busplan.questions.words.sentences import safety_record, warnings
 
 
@@ -212,17 +212,12 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
     unable = {model.name: bus.cannot_express(network, model=model.name) for model in bus.timing_models}
     return {
         "period_us": verdict.period_us,
-        "timing_model": figures.timing_model,
-        "verdict": figures.verdict,
-        "fits": figures.fits,
-        "circle_refused_by": list(figures.circle_refused_by),
+        **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
         "missed_limits": [need.key for need in verdict.missed_limits],
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **safety_record(figures, result.profile),
-        "available_us": figures.available_us,
-        "required_us": figures.required_us,
-        "margin_us": figures.margin_us,
+        **fields(figures, "available_us", "required_us", "margin_us"),
         **certainty_record(figures),
         "uncertainty_parts": uncertainty_parts(figures),
         "reserve": result.profile.limits.reserve,
@@ -232,11 +227,7 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
         and {
             "changes": change.changes,
             "nodes": change.nodes,
-            "fits": change.figures.fits,
-            "margin_us": change.figures.margin_us,
-            "verdict": change.figures.verdict,
-            "margin_corrected_us": change.figures.margin_corrected_us,
-            "uncertainty_us": change.figures.uncertainty_us,
+            **fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
             "circle_is_untested": change.circle_is_untested,
         },
         "warnings": warnings(result.profile, nodes=figures.nodes, most=figures.safe_nodes or 0),
@@ -246,4 +237,4 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
 
 def certainty_record(figures: CapacityFigures) -> Record:
     """Figures of how sure the verdict is, without its word."""
-    return {one.key: getattr(figures, one.key) for one in figure.CERTAINTY if one is not figure.VERDICT}
+    return fields(figures, *(one.key for one in figure.CERTAINTY if one is not figure.VERDICT))

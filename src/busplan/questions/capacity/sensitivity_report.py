@@ -35,7 +35,7 @@ from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import FITS, limits_behind
 from busplan.questions.fit.figures import Capacity
 from busplan.questions.fit.network import bus_of
-from busplan.questions.words.documents import with_profile
+from busplan.questions.words.documents import fields, with_profile
 from busplan.sections.profile import Profile
 
 _DECIMALS: Final = 3
@@ -363,11 +363,7 @@ def _record(one: Effect, profile: Profile) -> Record:
         "from": one.before,
         "to": one.after,
         "margin_change_us": one.margin_change_us,
-        "margin_corrected_us": None if then is None else then.margin_corrected_us,
-        "uncertainty_us": None if then is None else then.uncertainty_us,
-        "verdict": None if then is None else then.verdict,
-        "exceeded": None if then is None else list(then.exceeded),
-        "not_shown": None if then is None else list(then.not_shown),
+        **fields(then, "margin_corrected_us", "uncertainty_us", "verdict", "exceeded", "not_shown"),
         **own,
         "note": one.note or None,
     }

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
@@ -42,7 +42,7 @@ from busplan.questions.compare.kinds import (
 )
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
 from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.words.documents import document, parts_by, with_profile
+from busplan.questions.words.documents import document, fields, parts_by, with_profile
 from busplan.questions.words.own_picture import OwnPicture
 from busplan.questions.words.sentences import evidence_sentence, execution_sentence, refused_circle, reset_sentence
 from busplan.sections.profile import Profile
@@ -99,13 +99,13 @@ def _bus_record(one: MachineOnKind | NotOnKind) -> Record:
     bus = bus_of(one.profile)
     return {
         **_head(bus.kind, is_own=one.is_own, why_not=[]),
-        **{key: _plain(getattr(one.figures, key)) for key in _FIGURES},
+        **fields(one.figures, *_FIGURES),
         "verdict_after_reset": None if one.after_reset is None else one.after_reset.verdict,
         **_safe_record(one.safe),
         "smallest_period_us": one.smallest.us,
         "no_period": one.smallest.why or None,
         "circle": None if one.circle is None else _circle_record(one.circle),
-        "assumed": [{**each._asdict(), "value": _plain(each.value)} for each in one.assumed],
+        "assumed": [fields(assumed, *assumed._fields) for assumed in one.assumed],
         "assumed_host": [each.key for each in one.assumed_host],
         "left_out": list(one.left_out),
         "curve": [{"period_us": each.period_us, **_safe_record(each)} for each in one.curve],
@@ -133,13 +133,9 @@ def _circle_record(circle: CircleAtSmallest) -> Record:
     return {
         "step_us": circle.step_us,
         "passed": False if figures is None else figures.passed,
-        **{key: None if figures is None else getattr(figures, key) for key in _MEASURES},
+        **fields(figures, *_MEASURES),
         "problems": list(circle.problems),
     }
-
-
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
 
 
 def notes(found: KindComparison) -> Iterator[Sentence]:

@@ -33,7 +33,7 @@ from busplan.profile.write import value_text
 from busplan.questions.diff.difference import CircleSide, ComparedFigure, Difference, Judgement, KeyDifference
 from busplan.questions.fit.circle_refusal import circle_refusals
 from busplan.questions.fit.network import bus_of, model_names
-from busplan.questions.words.documents import document
+from busplan.questions.words.documents import document, fields
 from busplan.questions.words.sentences import execution_grades, not_applicable, refused_circle
 from busplan.sections.profile import Profile
 
@@ -402,9 +402,5 @@ def _figure_record(one: ComparedFigure) -> Record:
         "part": one.part,
         "figure": one.figure.key,
         "better": one.figure.better,
-        "a": one.a,
-        "b": one.b,
-        "difference": one.difference,
-        "relative_difference": one.relative_difference,
-        "judgement": one.judgement,
+        **fields(one, "a", "b", "difference", "relative_difference", "judgement"),
     }

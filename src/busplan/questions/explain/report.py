@@ -35,7 +35,7 @@ from busplan.questions.explain.derivation import Derivation, Explanation, Step, 
 from busplan.questions.explain.formulas import formula_of
 from busplan.questions.fit.figures import capacity
 from busplan.questions.fit.network import bus_of
-from busplan.questions.words.documents import document, with_profile
+from busplan.questions.words.documents import document, fields, with_profile
 from busplan.sections.profile import Profile
 from busplan.sourced import DIGITS, EQUATIONS, Input, short
 
@@ -93,8 +93,7 @@ def assumptions_table(assumptions: Sequence[Input]) -> Table:
 def figure_rows(profile: Profile) -> list[Record]:
     """One row for each figure that can be explained."""
     return [
-        {"command": command, "figure": one.key, "symbol": one.symbol, "unit": one.unit}
-        | {"reference": one.reference, "meaning": one.meaning}
+        {"command": command, "figure": one.key, **fields(one, "symbol", "unit", "reference", "meaning")}
         for command, one in explained_figures(profile)
     ]
 
@@ -115,8 +114,7 @@ def equation_rows() -> list[Record]:
 def constant_rows(bus: Bus) -> list[Record]:
     """One row for each constant: value, unit, grade and source."""
     return [
-        {"name": name, "value": float(one), "unit": one.unit}
-        | {"grade": one.grade, "source": one.source, "meaning": one.meaning}
+        {"name": name, "value": float(one), **fields(one, "unit", "grade", "source", "meaning")}
         for name, one in bus.constants.items()
     ]
 
@@ -202,15 +200,8 @@ def _derivation(one: Derivation) -> JsonDocument:
     return {
         "command": one.command,
         "figure": one.figure.key,
-        "symbol": one.figure.symbol,
-        "unit": one.figure.unit,
-        "reference": one.figure.reference,
-        "meaning": one.figure.meaning,
-        "timing_model": one.timing_model,
-        "transaction": one.transaction,
-        "period_us": one.period_us,
-        "value": one.value,
-        "weakest_grade": one.weakest_grade,
+        **fields(one.figure, "symbol", "unit", "reference", "meaning"),
+        **fields(one, "timing_model", "transaction", "period_us", "value", "weakest_grade"),
         "steps": [step._asdict() for step in one.steps],
         "inputs": [input_._asdict() for input_ in one.inputs],
     }
@@ -224,14 +215,9 @@ def _step_records(one: Derivation) -> Iterator[Record]:
         yield {
             "command": one.command,
             "figure": figure.key,
-            "timing_model": one.timing_model,
-            "transaction": one.transaction,
-            "period_us": one.period_us,
+            **fields(one, "timing_model", "transaction", "period_us"),
             "step": number,
-            "reference": step.reference,
-            "symbol": step.symbol,
-            "formula": step.formula,
-            "numbers": step.numbers,
+            **fields(step, "reference", "symbol", "formula", "numbers"),
             "value": json_text(step.value) if _has_names(step.value) else step.value,
             "unit": step.unit,
         }

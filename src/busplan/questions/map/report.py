@@ -35,7 +35,7 @@ from busplan.questions.map.drawing import (
 )
 from busplan.questions.map.trade_off import Cell, Region, TradeOff
 from busplan.questions.sweep.top import payload_sentences
-from busplan.questions.words.documents import document, with_profile
+from busplan.questions.words.documents import document, fields, with_profile
 from busplan.questions.words.own_picture import OwnPicture
 from busplan.questions.words.sentences import refused_circle
 
@@ -130,7 +130,7 @@ def map_document(found: TradeOff) -> JsonDocument:
         y={"key": found.y.key, "values": list(found.y.values)},
         with_circle=found.with_circle,
         design=None if found.own is None else _record(found, found.own),
-        regions=[{**one._asdict(), "limited_by": list(one.limited_by)} for one in found.regions],
+        regions=[fields(region, *region._fields) for region in found.regions],
         cells=[_record(found, cell) for cell in found.cells],
         not_drawn=[{found.x.key: one.x, found.y.key: one.y, "reason": one.reason} for one in found.not_drawn],
     )
@@ -142,15 +142,8 @@ def _record(found: TradeOff, cell: Cell) -> Record:
     return {
         found.x.key: cell.x,
         found.y.key: cell.y,
-        "nodes": cell.nodes,
-        "axes": cell.axes,
-        "state": cell.state,
-        "limited_by": list(cell.limited_by),
-        "binding_term": cell.binding_term,
-        "verdict": cell.verdict,
-        "margin_corrected_us": cell.margin_corrected_us,
-        "uncertainty_us": cell.uncertainty_us,
+        **fields(cell, "nodes", "axes", "state", "limited_by", "binding_term", "verdict"),
+        **fields(cell, "margin_corrected_us", "uncertainty_us"),
         **({} if safety is None else {safety.key: cell.is_safe}),
-        "circle_refused_by": list(cell.circle_refused_by),
-        "circle_passed": cell.circle_passed,
+        **fields(cell, "circle_refused_by", "circle_passed"),
     }

@@ -28,13 +28,13 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import MISSING, listed, nouns, period_value, sentence_text
 from busplan.profile.keys import flat
 from busplan.questions.fit.certainty import FITS, limits_behind
-from busplan.questions.fit.figures import after_reset
+from busplan.questions.fit.figures import COUNTS, after_reset
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.constraints import CIRCLE
 from busplan.questions.plan.freedoms import PERIOD, freedoms
 from busplan.questions.plan.options import Option, Relaxation
 from busplan.questions.plan.planning import Plan
-from busplan.questions.words.documents import document, with_profile
+from busplan.questions.words.documents import document, fields, with_profile
 from busplan.questions.words.sentences import (
     NewValues,
     key_value,
@@ -164,39 +164,21 @@ def _options(plan: Plan) -> list[Record]:
 
 
 def _record(plan: Plan, option: Option) -> Record:
-    one, profile = option.deciding, option.profile
-    others = option.others
+    figures, profile, others = option.deciding, option.profile, option.others
     return {
         "title": option.title,
         "changes": plan.all_changes(option),
         "recommended": option.recommended,
-        "timing_model": one.timing_model,
-        "verdict": one.verdict,
-        "fits": one.fits,
-        "circle_refused_by": list(one.circle_refused_by),
+        **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
         "fits_other_model": all(other.fits for other in others) if others else None,
-        "margin_us": one.margin_us,
+        "margin_us": figures.margin_us,
         "margin_other_model_us": min((other.margin_us for other in others), default=None),
-        "bias_us": one.bias_us,
-        "margin_corrected_us": one.margin_corrected_us,
-        "uncertainty_us": one.uncertainty_us,
-        "binding_term": one.binding_term,
-        "passes": option.passes,
-        "held_by": option.held_by,
-        "proven": option.proven,
-        "circle_passed": option.circle_passed,
+        **fields(figures, "bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
+        **fields(option, "passes", "held_by", "proven", "circle_passed"),
         "circle_failures": list(option.circle_failures or ()),
-        "nodes": one.nodes,
-        "axes": one.axes,
-        "max_nodes": one.max_nodes,
-        "max_axes": one.max_axes,
-        "limited_by": one.limited_by,
-        "safe_nodes": one.safe_nodes,
-        "safe_axes": one.safe_axes,
-        "safe_limited_by": one.safe_limited_by,
-        "period_us": one.period_us,
+        **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
         "slice_ratio": profile.cycle.slice_ratio,
-        **{key: getattr(one, key) for key in bus_of(profile).planned_figures},
+        **fields(figures, *bus_of(profile).planned_figures),
         **{f"{kind}_bytes": int(getattr(network_of(profile).groups[0], f"{kind}_bytes")) for kind in TRANSACTION_KINDS},
     }
 

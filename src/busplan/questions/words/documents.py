@@ -28,6 +28,12 @@ def document(command: str, **content: object) -> JsonDocument:
     return {"schema": JSON_SCHEMA, "command": command, **content}
 
 
+def fields(owner: object, *names: str) -> Record:
+    """Attributes by name as plain data: a tuple becomes a list, and all are None where there is no owner."""
+    values = {name: getattr(owner, name) if owner is not None else None for name in names}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+
 def with_profile(name: str, records: Sequence[Record]) -> list[Record]:
     """Rows for CSV with the profile's name in front, so that tables of several runs can be joined."""
     return [{"profile": name, **record} for record in records]
