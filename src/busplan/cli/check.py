@@ -123,7 +123,7 @@ def check_command(
             "record them again with --update-baseline"
         )
     with _executor(min(jobs, len(collection.sources))) as where:
-        answer = check(
+        report = check(
             collection,
             circle=circle,
             changes=changes,
@@ -133,7 +133,6 @@ def check_command(
             executor=where,
             **({} if circle_steps is None else {"circle_steps": circle_steps}),
         )
-    report = answer.found
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
     if verbose:
@@ -145,7 +144,7 @@ def check_command(
         from busplan.forms.numbers import sentence_text
         from busplan.questions.words.documents import changes_sentences
 
-        say(*map(sentence_text, changes_sentences(changes)), answer.headline)
+        say(*map(sentence_text, changes_sentences(changes)), report.headline)
     if report.failed:
         raise typer.Exit(2)
     if not exit_zero and report.has_findings(fail_on):

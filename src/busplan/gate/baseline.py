@@ -56,6 +56,11 @@ def keys_of(profile: Profile) -> dict[str, object]:
     return {key: value for key, value in said if key not in _WORDS}
 
 
+def record_of(name: str, recorded: Mapping[str, Record] | None) -> Record | None:
+    """Record of a file in a baseline: an empty one where it has none; None without a baseline."""
+    return None if recorded is None else recorded.get(name, Record({}))
+
+
 class Baseline(NamedTuple):
     """A recorded baseline."""
 

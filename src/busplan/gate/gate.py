@@ -2,12 +2,12 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
 from busplan.gate import circle
-from busplan.gate.baseline import Record, figures_of, keys_of, regression
+from busplan.gate.baseline import Record, figures_of, keys_of, record_of, regression
 from busplan.gate.finding import Finding, Subject, Violation, finding_of
 from busplan.gate.rules import (
     BASELINE,
@@ -138,31 +138,17 @@ class FileResult(NamedTuple):
         return "findings" if self.findings else "ok"
 
 
-def check_source(
-    source: ProfileSource,
-    *,
-    with_circle: bool = True,
-    circle_steps: int = MOST_STEPS,
-    changes: KeyChanges = NO_CHANGES,
-    recorded: Mapping[str, Record] | None = None,
-    record: bool = False,
-) -> FileResult:
+def check_source(source: ProfileSource, *, recorded: Mapping[str, Record] | None = None, **options: Any) -> FileResult:
     """Read one file and check it against all rules.
 
     Parameters
     ----------
     source
         The file; if it cannot be read, the result has a failure.
-    with_circle
-        Whether to run the circle test of profiles that ask for one.
-    circle_steps
-        Most simulated steps of each axis of a circle: a longer one is not run.
-    changes
-        Changes of the profile; if its schema refuses them, the result has a failure.
     recorded
         Records of a baseline by file name; None for no baseline.
-    record
-        Whether to give the figures that a baseline records.
+    options
+        As of `check_document`.
     """
     if source.failure is not None:
         return FileResult(source.name, None, (), {}, failure=source.failure)
@@ -174,15 +160,7 @@ def check_source(
         document = decode(content, name=source.name)
     except PlacedError as error:
         return unreadable(source.name, error, content)
-    before = None if recorded is None else recorded.get(source.name, Record({}))
-    return check_document(
-        document,
-        with_circle=with_circle,
-        circle_steps=circle_steps,
-        changes=changes,
-        baseline=before,
-        record=record,
-    )
+    return check_document(document, baseline=record_of(document.name, recorded), **options)
 
 
 def check_document(

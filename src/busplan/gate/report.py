@@ -1,7 +1,7 @@
 """Answer of `busplan check`: its findings and their summary, as sentences and as JSON."""
 
 from collections.abc import Iterator
-from functools import cached_property, partial
+from functools import partial
 from hashlib import sha256
 from typing import NamedTuple
 
@@ -31,16 +31,17 @@ class Located(NamedTuple):
     fingerprint: str
 
 
-class CheckReport:
+class CheckReport(NamedTuple):
     """Result of one run of the gate."""
 
-    def __init__(self, files: tuple[FileResult, ...], changes: KeyChanges = NO_CHANGES, *, others: int = 0) -> None:
-        self.files = files
-        self.changes = changes
-        self.others = others
-        """How many files were skipped because they are no profiles."""
+    files: tuple[FileResult, ...]
+    """Each file with its `status`, its `findings` and, if it could not be checked, its `failure`."""
+    changes: KeyChanges = NO_CHANGES
+    """What was changed in every file."""
+    others: int = 0
+    """Number of files that were skipped because they are no profiles."""
 
-    @cached_property
+    @property
     def summary(self) -> Summary:
         """Number of files, errors and warnings."""
         severities = [finding.severity for file in self.files for finding in file.findings]
@@ -55,7 +56,7 @@ class CheckReport:
         """Whether there are findings at or above a severity."""
         return self.summary.errors > 0 or (least == "warning" and self.summary.warnings > 0)
 
-    @cached_property
+    @property
     def located(self) -> tuple[Located, ...]:
         """All findings by file and place."""
         found = []

@@ -1,7 +1,9 @@
 """All rules of the gate by code, and the answer of `busplan rule`. A dropped code is never used again."""
 
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, partial
+from importlib.resources import files
 from types import MappingProxyType
 from typing import Final
 
@@ -21,101 +23,35 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
 )
-from busplan.gate import bus, circle
+from busplan.gate import bus
 from busplan.nearest import did_you_mean
 from busplan.questions.words.documents import document, fields
 
-BY_KIND: Final[Mapping[ProblemKind, Rule]] = {
-    "syntax": Rule(
-        "BP001",
-        "syntax",
-        "error",
-        "the file is no TOML",
-        "A profile is TOML 1.0 in UTF-8, at most 100,000 bytes long. Nothing else of the file can be checked "
-        "before it is.",
-    ),
-    "unknown-key": Rule(
-        "BP002",
-        "unknown-key",
-        "error",
-        "the profile has no such key",
-        "A key that busplan does not know is most often a typing error, and the value it should have set "
-        "is then missing or a default. `busplan schema` lists all keys for editors that complete and check while "
-        "you type.",
-    ),
-    "missing-key": Rule(
-        "BP003",
-        "missing-key",
-        "error",
-        "a key without a default is not there",
-        "The bus, its speed and nodes, the period, the payloads, the axes and the execution time have no default: "
-        "no plan can be made without them. `busplan init` writes a profile that has them all.",
-    ),
-    "wrong-type": Rule(
-        "BP004",
-        "wrong-type",
-        "error",
-        "the value is of the wrong type",
-        "Types are strict: no text stands for a number, no fraction for a count, no true for 1. Times and lengths "
-        "may be whole numbers or fractions.",
-    ),
-    "out-of-range": Rule(
-        "BP005",
-        "out-of-range",
-        "error",
-        "the value is outside its range",
-        "Every quantity has a range in which it means something; `busplan manual profile` and `busplan schema` list "
-        "them. What only the bus standard forbids has rules of its own.",
-    ),
-    "inconsistent": Rule(
-        "BP006",
-        "inconsistent",
-        "error",
-        "two values do not go together",
-        "The lists of an execution table must be of one length and its payloads must ascend; a value "
-        "that busplan finds for you needs a bus that it can be found for.",
-    ),
-    "execution-unknown": Rule(
-        "BP007",
-        "execution-extrapolated",
-        "error",
-        "the execution time of the payload is not known",
-        "The payload lies outside the measured table, and busplan extrapolates nothing in silence. Measure the "
-        'payload and add it to node.execution, or state an assumption with kind = "linear" and grade = "assumed".',
-    ),
+
+def _read() -> Iterator[Rule]:
+    """Rules of the gate's own file; a line break in an explanation is a space."""
+    text = (files("busplan.gate") / "rules.toml").read_text(encoding="utf-8")
+    for code, rule in tomllib.loads(text).items():
+        words = " ".join(rule.pop("explanation").split())
+        yield Rule(code, **rule, explanation=words, check=bus.CHECKS.get(code))
+
+
+OWN: Final[Mapping[str, Rule]] = MappingProxyType({rule.code: rule for rule in _read()})
+"""Rules that are of no kind of bus, by code."""
+_FILE_CODES: Final[Mapping[ProblemKind, str]] = {
+    "syntax": "BP001",
+    "unknown-key": "BP002",
+    "missing-key": "BP003",
+    "wrong-type": "BP004",
+    "out-of-range": "BP005",
+    "inconsistent": "BP006",
+    "execution-unknown": "BP007",
 }
-
-BASELINE: Final = Rule(
-    "BP301",
-    "baseline-regression",
-    "error",
-    "the profile lost axes or margin against the baseline",
-    "`--baseline FILE` holds what each profile could carry when it was recorded, axes and margin under every timing "
-    "model, and the keys that its file said. The finding is at the changed key that costs some of it; a baseline "
-    "without keys has it at the name. A change that costs must be meant: record it with `--update-baseline`, so that "
-    "the review sees it.",
-)
-SUPPRESSION_WITHOUT_REASON: Final = Rule(
-    "BP901",
-    "suppression-without-reason",
-    "warning",
-    "a suppression says no reason",
-    "`# busplan: ignore[CODE] reason` needs its reason: the next reader must be able to judge whether it still holds.",
-)
-SUPPRESSION_WITHOUT_EFFECT: Final = Rule(
-    "BP902",
-    "suppression-without-effect",
-    "warning",
-    "a suppression suppresses nothing",
-    "No finding of that code stands on its line, or on the line below when the comment stands alone. What it was "
-    "for has been mended or has moved: remove it, so that it hides nothing new. A code that does not exist has no "
-    "effect either.",
-)
-
-NEVER_SUPPRESSED: Final = frozenset(
-    rule.code for rule in (*BY_KIND.values(), SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT)
-)
-"""Rules that cannot be suppressed: those of the file format and of suppressions."""
+BY_KIND: Final = {kind: OWN[code] for kind, code in _FILE_CODES.items()}
+"""Rules of the file format, by what reading a profile finds."""
+BASELINE, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT = (OWN[code] for code in ("BP301", "BP901", "BP902"))
+NEVER_SUPPRESSED: Final = frozenset((*_FILE_CODES.values(), "BP901", "BP902"))
+"""Codes that cannot be suppressed: those of the file format and of suppressions."""
 
 
 def all_rules() -> Mapping[str, Rule]:
@@ -125,15 +61,13 @@ def all_rules() -> Mapping[str, Rule]:
 
 @cache
 def _by_code(kinds: tuple[Bus, ...]) -> Mapping[str, Rule]:
-    own = (rule for kind in kinds for rule in kind.rules)
-    others = (*BY_KIND.values(), BASELINE, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT)
-    found = (*bus.RULES, *own, *circle.RULES, *others)
+    found = (*OWN.values(), *(rule for kind in kinds for rule in kind.rules))
     return MappingProxyType({rule.code: rule for rule in sorted(found, key=lambda rule: rule.code)})
 
 
 def cycle_rules(kind: str) -> tuple[Rule, ...]:
     """Rules for profiles of a kind of bus, sorted by code."""
-    return tuple(sorted((*bus.RULES, *kind_named(kind).rules), key=lambda rule: rule.code))
+    return tuple(sorted((*map(OWN.__getitem__, bus.CHECKS), *kind_named(kind).rules), key=lambda rule: rule.code))
 
 
 _COLUMNS: Final = (
