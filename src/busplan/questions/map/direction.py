@@ -1,11 +1,12 @@
 """A direction of a map: a key and its values, given or chosen about what fits."""
 
-from math import ceil, floor, log10
+from math import ceil
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.parts import Value
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
+from busplan.forms.scale import round_numbers
 from busplan.profile.write import whole
 from busplan.questions.fit.circle_refusal import step_refusals
 from busplan.questions.fit.network import bus_of, network_of, varied_nodes
@@ -140,7 +141,9 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
     own_us = own_value(PERIOD, profile)
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
     known = [one for one in bus_of(profile).periods.us if least_us <= one <= most_us]
-    periods_us = _thinned(known) if known else _round_numbers(least_us, most_us)
+    periods_us = (
+        known[:: ceil(len(known) / _MOST)] if known else round_numbers(least_us, most_us, most=_MOST, decades=_FACTORS)
+    )
     if with_circle or profile.asks_for_circle:
         # Periods whose circle can be run; all, where the step goes with none.
         periods_us = [one for one in periods_us if not any(step_refusals(profile, one))] or periods_us
@@ -152,20 +155,3 @@ def _nodes(steps: NodeSteps, to_us: float) -> tuple[int, ...]:
     last = min(max(steps.own_nodes + 1, steps.max_nodes(to_us) + _BEYOND), MAX_COUNT)
     step = next(one for one in (f * 10**p for p in range(7) for f in (1, 2, 5)) if last <= _MOST * one)
     return tuple(sorted({1, steps.own_nodes, *range(step, min(last + step, MAX_COUNT + 1), step)}))
-
-
-def _round_numbers(least: float, most: float) -> list[float]:
-    """Round numbers between two, as many as are drawn."""
-    powers = range(floor(log10(least)), ceil(log10(most)) + 1)
-    found: list[float] = []
-    for factors in _FACTORS:
-        numbers = [float(f"{factor}e{power}") for power in powers for factor in factors]
-        found = [one for one in numbers if least <= one <= most]
-        if len(found) <= _MOST:
-            break
-    return _thinned(found)
-
-
-def _thinned(numbers: list[float]) -> list[float]:
-    """As many of some numbers as are drawn, evenly."""
-    return numbers[:: ceil(len(numbers) / _MOST) or 1]
