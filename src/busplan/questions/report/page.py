@@ -43,16 +43,10 @@ from busplan.questions.fit.network import bus_of
 from busplan.questions.report.all_answers import AllAnswers
 from busplan.questions.report.commands import Sources, shell_word, sources
 from busplan.questions.report.parts import (
-    axes_part,
     bus_question,
-    circle_part,
     circle_question,
-    map_part,
-    models_part,
-    sensitivity_part,
-    sources_part,
-    terms_part,
-    timeline_part,
+    part,
+    parts,
 )
 from busplan.questions.words.documents import document
 
@@ -141,19 +135,10 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     if answer.no_circle:
         questions = questions[::-1]  # the cause first
     lines = (found[name].line for name in ("capacity", "circle") if name in found)
-    yield Chapter(Sentence(("Verdict",)), (*_assumed(answer), *questions, *lines), "verdict")
-    yield models_part(answer, found)
-    yield timeline_part(answer, found)
-    yield terms_part(answer, found)
-    yield sensitivity_part(answer, found)
-    yield axes_part(answer, found)
-    yield map_part(answer, found)
-    yield circle_part(answer, found)
-    ranked = sources_part(answer, found)
-    if ranked is not None:
-        yield ranked
+    yield part("verdict", "Verdict", (*_assumed(answer), *questions, *lines))
+    yield from parts(answer, found)
     assumptions = (assumptions_table(answer.assumptions), found["explain"].line)
-    yield Chapter(Sentence(("What it rests on",)), assumptions, "assumptions")
+    yield part("assumptions", "What it rests on", assumptions)
     yield _commands(found)
 
 
@@ -199,7 +184,7 @@ def _commands(found: Sources) -> Chapter:
     rows = tuple(TableRow((source.command.purpose, source.command)) for source in found.values())
     line = "The JSON document of one of these commands has each figure above, with all its digits."
     table = Table(columns, rows, Sentence(("Commands",)), stacks=True)
-    return Chapter(Sentence(("How to get every figure again",)), (Sentence((line,)), table), "commands")
+    return part("commands", "How to get every figure again", (Sentence((line,)), table))
 
 
 def _comparison(subjects: Sequence[_Subject]) -> Table:

@@ -1,6 +1,6 @@
 """Parts of a page: verdicts, timing models, timeline, terms, axes over the period, map, and the circle."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Final
 
 from busplan.buses.figure import (
@@ -27,7 +27,6 @@ from busplan.forms.blocks import (
     Facts,
     Question,
     Sentence,
-    ShownValue,
     Swatch,
     Table,
     TableColumn,
@@ -42,7 +41,7 @@ from busplan.forms.numbers import nouns, period_value
 from busplan.questions.capacity.report import capacity_table, groups_table
 from busplan.questions.capacity.sensitivity_report import sensitivity_blocks
 from busplan.questions.capacity.sentences import verdict_sentences
-from busplan.questions.circle.figures import CIRCLE_BY_KEY
+from busplan.questions.circle.figures import CIRCLE_BY_KEY, CircleFigures
 from busplan.questions.circle.report import (
     ACT_TOGETHER,
     NO_SOURCES,
@@ -54,6 +53,7 @@ from busplan.questions.circle.report import (
     verdict_words,
 )
 from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.latency.report import latency_tables
 from busplan.questions.map.report import headline, map_chart, regions_table
@@ -88,32 +88,45 @@ def bus_question(answer: AllAnswers) -> Question:
     )
 
 
-def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """Capacity and latencies, the timing models side by side."""
+def part(kind: str, title: str, blocks: Iterable[Block]) -> Chapter:
+    """A part of a page; `kind` is its name for the style sheet."""
+    return Chapter(Sentence((title,)), tuple(blocks), kind)
+
+
+def parts(answer: AllAnswers, sources: Sources) -> Iterator[Chapter]:
+    """What a page says of a profile, below its verdict."""
     several = len(bus_of(answer.profile).timing_models) > 1
-    return Chapter(
-        Sentence(("The timing models, side by side" if several else "The timing model",)),
-        (
-            capacity_table(answer.capacity),
-            *([groups_table(answer.capacity)] if answer.profile.group else []),
-            *latency_tables(answer.latency),
-            sources["capacity"].line,
-            sources["latency"].line,
-        ),
-        "models",
-    )
+    by_groups = bool(answer.profile.group)
+    yield part("models", f"The timing model{'s, side by side' if several else ''}", _models(answer, sources))
+    yield part("timeline", "The cycle to scale", _timeline(answer, sources))
+    yield part("terms", "Where the microseconds go", _terms(answer, sources))
+    moves = (*sensitivity_blocks(answer.sensitivity), sources["capacity"].line)
+    yield part("sensitivity", "What moves the margin", moves)
+    axes = _groups if by_groups else _axes
+    yield part("axes", f"{'Nodes' if by_groups else 'Axes'} against period", axes(answer, sources))
+    fits = answer.trade_off
+    drawn = (headline(fits), map_chart(fits), regions_table(fits), sources["map"].line)
+    yield part("map", "What fits, and what limits it", drawn)
+    yield part("circle", "The circle", _circle(answer, sources))
+    if answer.circle_figures is not None and answer.circle_figures.contributions is not None:
+        yield part("sources", "What to attack", _error_sources(answer.circle_figures, sources))
 
 
-def timeline_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """The timeline, and the total of each kind of event."""
-    return Chapter(Sentence(("The cycle to scale",)), tuple(_timeline(answer, sources)), "timeline")
+def _models(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
+    """Capacity and latencies, the timing models side by side."""
+    yield capacity_table(answer.capacity)
+    if answer.profile.group:
+        yield groups_table(answer.capacity)
+    yield from latency_tables(answer.latency)
+    yield from (sources["capacity"].line, sources["latency"].line)
 
 
 def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
+    """The timeline, and the total of each kind of event."""
     if answer.schedule is None:
         yield from (Sentence((f"Not drawn: {why}.",)) for why in answer.no_schedule)
         return
-    source, network = sources["timeline"], network_of(answer.profile)
+    network = network_of(answer.profile)
     limit = bus_of(answer.profile).limit("nodes")
     # More nodes than a bus may have would make a huge drawing; the table has their figures.
     if limit is not None and limit.is_broken(network):
@@ -121,24 +134,21 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     else:
         yield timeline_chart(answer.schedule)
     yield totals_table(answer.schedule)
-    yield source.line
+    yield sources["timeline"].line
 
 
-def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
+def _terms(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     """The terms of the cycle, as bars and as a table."""
-    results, source = answer.capacity.results, sources["capacity"]
-    terms = (*bus_of(answer.profile).term_figures, LEFT)
+    results = answer.capacity.results
+    yield Chart(TermsDrawing(results), _largest_term(answer), Sentence((_ORDER,)))
     words = (TableColumn("term", kind="words"), TableColumn("eq", kind="words"))
-    table = Table(
-        (*words, *(TableColumn(one.timing_model) for one in results)),
-        tuple(
-            TableRow((Swatch(term.ink, term.letter, term.label), term.reference, *_of(term, answer))) for term in terms
-        ),
-        Sentence(("Terms of the cycle, us",)),
-    )
-    chart = Chart(TermsDrawing(results), _largest_term(answer), Sentence((_ORDER,)))
-    blocks = (chart, table, source.line)
-    return Chapter(Sentence(("Where the microseconds go",)), blocks, "terms")
+    rows = []
+    for term in (*bus_of(answer.profile).term_figures, LEFT):
+        under_each = (attribute_value(term, figures) for figures in results)
+        rows.append(TableRow((Swatch(term.ink, term.letter, term.label), term.reference, *under_each)))
+    columns = (*words, *(TableColumn(figures.timing_model) for figures in results))
+    yield Table(columns, tuple(rows), Sentence(("Terms of the cycle, us",)))
+    yield sources["capacity"].line
 
 
 def _largest_term(answer: AllAnswers) -> Sentence:
@@ -152,22 +162,9 @@ def _largest_term(answer: AllAnswers) -> Sentence:
     )
 
 
-def _of(term: Figure, answer: AllAnswers) -> Iterator[ShownValue]:
-    """A term under each timing model."""
-    return (attribute_value(term, one) for one in answer.capacity.results)
-
-
-def sensitivity_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """What moves the margin, and what binds next."""
-    blocks = (*sensitivity_blocks(answer.sensitivity), sources["capacity"].line)
-    return Chapter(Sentence(("What moves the margin",)), blocks, "sensitivity")
-
-
-def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """The most axes over the period, as a chart and as a table; of groups, the most nodes of each."""
-    if answer.profile.group:
-        return _groups_part(answer, sources)
-    source, steps = sources["axes"], answer.steps
+def _axes(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
+    """The most axes over the period, as a chart and as a table."""
+    steps = answer.steps
     network = network_of(answer.profile)
     nodes, axes = int(network.nodes), int(network.axes)
     deciding = answer.verdict.deciding
@@ -180,58 +177,53 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
         count_value(axes, AXES.key),
         count_value(nodes, NODES.key),
     )
-    table = Table(
-        (
-            TableColumn("period", "us"),
-            *(
-                TableColumn(figure.label, kind="words" if figure.sort == "word" else "figures", group=one.timing_model)
-                for one in steps
-                for figure in _shown_of(one.is_safe)
-            ),
-        ),
-        tuple(_over_period(answer)),
-        Sentence(("Nodes and axes at the profile's own period and about it",)),
-    )
-    chart = Chart(AxesDrawing(answer.profile, steps), caption, Sentence((_curves(answer),)))
-    return Chapter(Sentence(("Axes against period",)), (chart, table, source.line), "axes")
+    yield Chart(AxesDrawing(answer.profile, steps), caption, Sentence((_curves(answer),)))
+    columns = [
+        TableColumn(figure.label, kind="words" if figure.sort == "word" else "figures", group=model.timing_model)
+        for model in steps
+        for figure in _shown_of(model.is_safe)
+    ]
+
+    def shown(figures: CapacityFigures) -> Iterator[tuple[Figure, object]]:
+        yield from ((figure, figures) for figure in _shown_of(figures.verdict is not None))
+
+    yield _over_period(answer, columns, shown, "Nodes and axes at the profile's own period and about it")
+    yield sources["axes"].line
 
 
-def map_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """The map of period against axes, and what limits each region."""
-    found = answer.trade_off
-    blocks = (headline(found), map_chart(found), regions_table(found), sources["map"].line)
-    return Chapter(Sentence(("What fits, and what limits it",)), blocks, "map")
-
-
-def _groups_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    source = sources["axes"]
-    columns = [TableColumn("period", "us")]
-    for one in answer.profile.group:
-        columns += (
-            TableColumn(SAFE_NODES.label, group=one.name),
-            TableColumn("limited by", kind="words", group=one.name),
+def _groups(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
+    """The most nodes of each group over the period, as a table."""
+    columns = [
+        column
+        for group in answer.profile.group
+        for column in (
+            TableColumn(SAFE_NODES.label, group=group.name),
+            TableColumn("limited by", kind="words", group=group.name),
         )
+    ]
+
+    def shown(figures: CapacityFigures) -> Iterator[tuple[Figure, object]]:
+        if figures.verdict is not None:
+            yield from ((figure, group) for group in figures.groups for figure in (SAFE_NODES, SAFE_LIMITED_BY))
+
+    caption = "Nodes of each group that a period carries, the others as they are, all shown to fit"
+    yield _over_period(answer, columns, shown, caption)
+    yield sources["axes"].line
+
+
+def _over_period(
+    answer: AllAnswers,
+    columns: Sequence[TableColumn],
+    shown: Callable[[CapacityFigures], Iterable[tuple[Figure, object]]],
+    caption: str,
+) -> Table:
+    """A row for each period; `shown` gives figures under a timing model, each with what has it."""
     rows = []
     for results in answer.periods.periods:
         cells = [attribute_value(PERIOD, results[0])]
-        for figures in results:
-            for group in figures.groups if figures.verdict is not None else ():
-                cells += (attribute_value(figure, group) for figure in (SAFE_NODES, SAFE_LIMITED_BY))
+        cells += (attribute_value(figure, owner) for figures in results for figure, owner in shown(figures))
         rows.append(TableRow(tuple(cells), highlighted=results[0].period_us == answer.profile.cycle.period_us))
-    caption = Sentence(("Nodes of each group that a period carries, the others as they are, all shown to fit",))
-    table = Table(tuple(columns), tuple(rows), caption)
-    return Chapter(Sentence(("Nodes against period",)), (table, source.line), "axes")
-
-
-def _over_period(answer: AllAnswers) -> Iterator[TableRow]:
-    """One row for each period; the timing models one after the other."""
-    for results in answer.periods.periods:
-        period_us = results[0].period_us
-        cells = [attribute_value(PERIOD, results[0])]
-        for one in results:
-            shown = _shown_of(one.verdict is not None)
-            cells += (attribute_value(figure, one) for figure in shown)
-        yield TableRow(tuple(cells), highlighted=period_us == answer.profile.cycle.period_us)
+    return Table((TableColumn("period", "us"), *columns), tuple(rows), Sentence((caption,)))
 
 
 def _shown_of(is_safe: bool) -> tuple[Figure, ...]:
@@ -282,12 +274,8 @@ def _why_not(answer: AllAnswers) -> tuple[str, ...]:
     return ("The profile has no section for a circle test, so none was run.",)
 
 
-def circle_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """The magnified circle and its figures."""
-    return Chapter(Sentence(("The circle",)), tuple(_circle(answer, sources)), "circle")
-
-
 def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
+    """The magnified circle and its figures."""
     result = answer.circle_figures
     if result is None:
         yield from (Sentence((why,)) for why in _why_not(answer))
@@ -297,12 +285,9 @@ def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     yield sources["circle"].line
 
 
-def sources_part(answer: AllAnswers, sources: Sources) -> Chapter | None:
-    """The ranked error sources; None without a simulation."""
-    result = answer.circle_figures
-    if result is None or result.contributions is None:
-        return None
-    title = Sentence(("What to attack",))
-    if not result.contributions:
-        return Chapter(title, (NO_SOURCES,), "sources")
-    return Chapter(title, (contributions_table(result), ACT_TOGETHER, sources["circle"].line), "sources")
+def _error_sources(result: CircleFigures, sources: Sources) -> Iterator[Block]:
+    """The ranked error sources."""
+    if result.contributions:
+        yield from (contributions_table(result), ACT_TOGETHER, sources["circle"].line)
+    else:
+        yield NO_SOURCES
