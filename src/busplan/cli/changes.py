@@ -64,12 +64,14 @@ def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..
     def replaced(command: Callable[..., None]) -> Callable[..., None]:
         own = signature(command)
         parameters: list[Parameter] = []
-        for one in own.parameters.values():
-            if one.name == "changes":
+        for parameter in own.parameters.values():
+            if parameter.name == "changes":
                 kinds = options.items()
-                parameters += [Parameter(name, one.kind, default=None, annotation=option) for name, option in kinds]
+                parameters += [
+                    Parameter(name, parameter.kind, default=None, annotation=option) for name, option in kinds
+                ]
             else:
-                parameters.append(one)
+                parameters.append(parameter)
 
         @wraps(command)
         def with_changes(*arguments: Any, set_: list[str] | None, **others: Any) -> None:

@@ -273,8 +273,8 @@ def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
 def joined(*sentences: Sentence, by: str = " ") -> Sentence:
     """Join sentences, or pieces of one, with a separator; the state is that of the first."""
     parts: list[Part] = []
-    for one in sentences:
-        parts += [by, *one.parts] if parts else one.parts
+    for words in sentences:
+        parts += [by, *words.parts] if parts else words.parts
     return Sentence(tuple(parts), sentences[0].state)
 
 

@@ -87,9 +87,9 @@ def wrapped(line: Line, width: int | None, *, hang: int = 0) -> list[Line]:
     for start, end in _spans(line.text, width, hang):
         indent = hang if found else 0
         marks = (
-            Mark(max(one.start, start) - start + indent, min(one.end, end) - start + indent, one.tone)
-            for one in line.marks
-            if one.start < end and one.end > start
+            Mark(max(mark.start, start) - start + indent, min(mark.end, end) - start + indent, mark.tone)
+            for mark in line.marks
+            if mark.start < end and mark.end > start
         )
         found.append(Line(" " * indent + line.text[start:end], line.tone, tuple(marks)))
     return found

@@ -146,7 +146,7 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
             yield from _steps(block)
         case Question():
             yield from (f"**{escaped(block.question)} {escaped(block.answer.text)}.**", "")
-            yield from (f"- {_sentence(one)}" for one in block.sentences)
+            yield from (f"- {_sentence(words)}" for words in block.sentences)
             if block.facts.items:
                 yield from ("", f"{_facts(block.facts)}.")
         case Chapter():

@@ -247,7 +247,7 @@ def _placed(columns: Sequence[_Column], widths: Sequence[int]) -> Iterator[_Plac
 
 def _heading(placed: Sequence[_Placed]) -> list[Line]:
     """Heading lines from the top: group, heading and unit, aligned at the bottom; and a rule."""
-    stacks = zip_longest(*(one.column.heads for one in placed), fillvalue="")
+    stacks = zip_longest(*(place.column.heads for place in placed), fillvalue="")
     lines = [Line(_laid(stack, placed), "heading") for stack in stacks]
     return [*lines[::-1], Line("-" * (placed[-1].start + placed[-1].width), "drawn")]
 
@@ -263,7 +263,7 @@ def _laid(cells: Sequence[str], placed: Sequence[_Placed]) -> str:
 
 def _row_lines(row: TableRow, at: int, placed: Sequence[_Placed]) -> Iterator[Line]:
     """The row, in several lines if words of it are wrapped; a state is marked where it stands."""
-    pieces = [[line.text for line in _cell_lines(one.column.cells[at], one.width)] for one in placed]
+    pieces = [[line.text for line in _cell_lines(place.column.cells[at], place.width)] for place in placed]
     for cells in zip_longest(*pieces, fillvalue=""):
         marks = [
             Mark(begin, begin + len(cell), one.column.tones[at])

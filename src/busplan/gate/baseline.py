@@ -233,7 +233,7 @@ def _wins_back(subject: Subject, key: str, value: object, lost: Mapping[str, obj
 
 def _keys(changes: Mapping[str, ChangedValue]) -> str:
     """Say how keys changed; the finding begins with the first of them."""
-    first, *others = (f"{_shown(one.now)}, was {_shown(one.before)}" for one in changes.values())
+    first, *others = (f"{_shown(value.now)}, was {_shown(value.before)}" for value in changes.values())
     named = [f"{key} = {words}" for key, words in zip(list(changes)[1:], others, strict=True)][: _MOST_NAMED - 1]
     more = len(changes) - 1 - len(named)
     return "; ".join((first, *named, *([f"and {more} more"] if more else ())))

@@ -116,7 +116,7 @@ def check(
         "changes": changed,
         "record": record,
     }
-    check_file = partial(check_source, recorded=recorded, **options)
+    check_file = partial(check_source, recorded=recorded, options=options)
     if executor is None:
         found = list(map(check_file, collection.sources))
     else:

@@ -44,7 +44,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
         return
     result = circle_test(profile).results[0]
     # A cycle that is not shown to fit has a rule of its own: nothing of the circle mends it.
-    failures = [one for one in result.failures if not one.is_of_bus]
+    failures = [failure for failure in result.failures if not failure.is_of_bus]
     first = to_attack(result)
     attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
     for failure in failures:

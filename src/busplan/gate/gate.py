@@ -138,7 +138,9 @@ class FileResult(NamedTuple):
         return "findings" if self.findings else "ok"
 
 
-def check_source(source: ProfileSource, *, recorded: Mapping[str, Record] | None = None, **options: Any) -> FileResult:
+def check_source(
+    source: ProfileSource, *, recorded: Mapping[str, Record] | None, options: Mapping[str, Any]
+) -> FileResult:
     """Read one file and check it against all rules.
 
     Parameters
@@ -148,7 +150,7 @@ def check_source(source: ProfileSource, *, recorded: Mapping[str, Record] | None
     recorded
         Records of a baseline by file name; None for no baseline.
     options
-        As of `check_document`.
+        Named arguments of `check_document`.
     """
     if source.failure is not None:
         return FileResult(source.name, None, (), {}, failure=source.failure)

@@ -126,13 +126,13 @@ def check_records(report: CheckReport) -> list[Record]:
 def check_document(report: CheckReport) -> JsonDocument:
     """Document of `busplan check --format json`."""
     files = []
-    for one in report.files:
+    for file in report.files:
         content = {
-            "path": one.path,
-            "profile": one.profile,
-            "status": one.status,
-            **(one.fit or Fit(None, None, None))._asdict(),
-            "findings": [finding._asdict() for finding in one.findings],
+            "path": file.path,
+            "profile": file.profile,
+            "status": file.status,
+            **(file.fit or Fit(None, None, None))._asdict(),
+            "findings": [finding._asdict() for finding in file.findings],
         }
-        files.append(content if one.failure is None else {**content, "failure": one.failure})
+        files.append(content if file.failure is None else {**content, "failure": file.failure})
     return changed_document(document("check", files=files, summary=report.summary._asdict()), report.changes)

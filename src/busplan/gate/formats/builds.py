@@ -43,7 +43,7 @@ _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ff
 
 def junit(report: CheckReport) -> str:
     """One test case for each profile: errors are failures, files that could not be checked errors, warnings output."""
-    failures = sum(any(one.severity == "error" for one in file.findings) for file in report.files)
+    failures = sum(any(finding.severity == "error" for finding in file.findings) for file in report.files)
     errors = sum(file.failure is not None for file in report.files)
     counts = {"tests": str(len(report.files)), "failures": str(failures), "errors": str(errors)}
     root = Element("testsuites", {"name": "busplan check", **counts})
@@ -59,7 +59,7 @@ def _case(suite: Element, file: FileResult) -> None:
     if file.failure is not None:
         SubElement(case, "error", message=_clean(file.failure))
     for severity, tag in (("error", "failure"), ("warning", "system-out")):
-        found = [one for one in file.findings if one.severity == severity]
+        found = [finding for finding in file.findings if finding.severity == severity]
         if not found:
             continue
         said = {"message": _clean(found[0].message), "type": found[0].code} if tag == "failure" else {}
@@ -100,7 +100,7 @@ def _profile(file: FileResult) -> list[str]:
 def _profile_result(file: FileResult) -> str:
     if file.failure is not None:
         return f"**could not be checked**: {escaped(file.failure)}"
-    severities = [one.severity for one in file.findings]
+    severities = [finding.severity for finding in file.findings]
     counts = [plural(severities.count(one), one) for one in ("error", "warning") if one in severities]
     said = ", ".join(counts) or "passes"
     return f"**{said}**" if "error" in severities else said

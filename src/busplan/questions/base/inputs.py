@@ -141,7 +141,7 @@ def checked_models(timing_model: Models | None, profile: Profile) -> tuple[str, 
     if timing_model is None:
         return model_names(profile)
     found = one_or_several(timing_model, name="timing_model")
-    names = [one.name for one in bus_of(profile).timing_models]
+    names = [model.name for model in bus_of(profile).timing_models]
     if len(set(map(str, found))) != len(found) or not set(map(str, found)) <= set(names):
         raise BusplanError(
             f"timing_model {timing_model!r}: expected {listed([*map(repr, names)], 'or')}, or a list of them, each once"
@@ -167,7 +167,7 @@ def known_model(profile: Profile, model: str, *, name: str) -> str:
         The profile's kind of bus has no such model, or the model cannot express the profile.
     """
     bus = bus_of(profile)
-    names = [one.name for one in bus.timing_models]
+    names = [model.name for model in bus.timing_models]
     if model not in names:
         raise BusplanError(
             f"{name} {model}: no timing model of bus.kind {profile.bus.kind}; there are {', '.join(names)}"

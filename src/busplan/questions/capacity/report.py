@@ -55,10 +55,10 @@ def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
 
 def _of_all(said: Sequence[Sequence[Sentence]]) -> Iterator[Sentence]:
     """The sentences of each period, and at the end once those that are the same for all."""
-    first, *others = ([sentence_text(one) for one in sentences] for sentences in said)
+    first, *others = ([sentence_text(words) for words in sentences] for sentences in said)
     common = {text for text in first if all(text in other for other in others)}
     for sentences in said:
-        yield from (one for one in sentences if sentence_text(one) not in common)
+        yield from (words for words in sentences if sentence_text(words) not in common)
     yield from (one for one in said[0] if sentence_text(one) in common)
 
 
@@ -91,12 +91,12 @@ def capacity_table(result: Capacity) -> Table:
 def _owners(result: Capacity) -> Iterator[Owner]:
     """A column for each period and timing model, the profile's own model first."""
     leading, deciding = leading_model(result.profile), bus_of(result.profile).deciding_model
-    for figures in result.periods:
+    for results in result.periods:
         several = len(result.periods) > 1
-        group = period(figures[0].period_us) if several else ""
-        for one in sorted(figures, key=lambda each: each.timing_model != leading):
-            rank = 1 if several and len(figures) > 1 and one.timing_model != deciding else 0
-            yield Owner(TableColumn(one.timing_model, group=group, rank=rank), one)
+        group = period(results[0].period_us) if several else ""
+        for figures in sorted(results, key=lambda each: each.timing_model != leading):
+            rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
+            yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures)
 
 
 def _state(key: Figure, one: CapacityFigures) -> State:
@@ -172,7 +172,7 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
     )
     return [
         *((one, 0) for one in above),
-        *((one, 1) for one in bus.term_figures),
+        *((term, 1) for term in bus.term_figures),
         *((one, 0) for one in below),
     ]
 
@@ -192,7 +192,7 @@ def _results(result: Capacity) -> Iterator[Record]:
     """As the rows, with a list of groups where the profile has some."""
     for figures in result.results:
         record: Record = figures.by_key()
-        yield {**record, "groups": [one.record() for one in figures.groups]} if figures.groups else record
+        yield {**record, "groups": [group.record() for group in figures.groups]} if figures.groups else record
 
 
 def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocument:

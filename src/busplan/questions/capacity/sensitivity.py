@@ -74,7 +74,7 @@ def next_bottleneck(profile: Profile) -> NextBottleneck:
     cycle = bus.cycle(network, model=bus.deciding_model)
     binding = _largest(cycle)
     cycles = (bus.cycle(one, model=bus.deciding_model) for one in _relieved(network))
-    without = next((one for one in cycles if not _of(one, binding.key)), None)
+    without = next((cycle for cycle in cycles if not _of(cycle, binding.key)), None)
     return NextBottleneck(
         limits=tuple(_next_limit(profile, name) for name in network.names),
         binding_term=binding,
@@ -98,11 +98,11 @@ def _relieved(network: Network) -> Iterator[Network]:
 
 
 def _largest(cycle: BusCycle, *, but: str = "") -> Term:
-    return max((one for one in cycle.terms if one.key != but), key=lambda one: plain(one.us))
+    return max((term for term in cycle.terms if term.key != but), key=lambda one: plain(one.us))
 
 
 def _of(cycle: BusCycle, key: str) -> float:
-    return next(plain(one.us) for one in cycle.terms if one.key == key)
+    return next(plain(term.us) for term in cycle.terms if term.key == key)
 
 
 _EXECUTION_SHARE: Final = 0.1
@@ -144,8 +144,8 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
 def _slower(network: Network, *, if_nothing: str) -> Perturbed:
     factor = 1 + _EXECUTION_SHARE
     groups = tuple(
-        with_execution(one, read_us=factor * one.read_execution_us, write_us=factor * one.write_execution_us)
-        for one in network.groups
+        with_execution(group, read_us=factor * group.read_execution_us, write_us=factor * group.write_execution_us)
+        for group in network.groups
     )
     before, after = (
         _the_one(us for group in each for us in (group.read_execution_us, group.write_execution_us))
@@ -169,7 +169,9 @@ def _one_axis_more(network: Network, alike: AlikeNodes) -> Perturbed:
 
 
 def _more_bytes(network: Network) -> Perturbed:
-    sizes = [(one.read_bytes + _PAYLOAD_STEP_BYTES, one.write_bytes + _PAYLOAD_STEP_BYTES) for one in network.groups]
+    sizes = [
+        (group.read_bytes + _PAYLOAD_STEP_BYTES, group.write_bytes + _PAYLOAD_STEP_BYTES) for group in network.groups
+    ]
 
     def change() -> Network:
         pairs = zip(network.groups, sizes, strict=True)
@@ -213,7 +215,7 @@ def _in(alike: AlikeNodes) -> str:
 def _the_one(values: Iterable[Any]) -> Any:
     """The value that all share; None where they differ."""
     first, *others = values
-    return first if all(one == first for one in others) else None
+    return first if all(other == first for other in others) else None
 
 
 class Standing(NamedTuple):
@@ -278,7 +280,7 @@ def sensitivity(profile: Profile) -> Sensitivity:
     """
     network = network_of(profile)
     now = standing(network)
-    effects = [_effect(one, now) for one in perturbed(network)]
+    effects = [_effect(change, now) for change in perturbed(network)]
     effects.sort(key=lambda one: (one.margin_change_us is None, -abs(one.margin_change_us or 0.0)))
     return Sensitivity(profile, bus_of(profile).deciding_model, now, tuple(effects), next_bottleneck(profile))
 
@@ -286,7 +288,7 @@ def sensitivity(profile: Profile) -> Sensitivity:
 def sensitivities(capacity: Capacity) -> tuple[Sensitivity, ...]:
     """What moves the margin at each period of a capacity result."""
     periods_us = (results[0].period_us for results in capacity.periods)
-    return tuple(sensitivity(override(capacity.profile, {"cycle.period_us": one})) for one in periods_us)
+    return tuple(sensitivity(override(capacity.profile, {"cycle.period_us": period_us})) for period_us in periods_us)
 
 
 def standing(network: Network) -> Standing:

@@ -55,7 +55,9 @@ class SensitivityDrawing(Drawing):
 
     def __init__(self, found: Sensitivity) -> None:
         self._bars = [
-            _bar(one.change, one.margin_change_us) for one in found.effects if one.margin_change_us is not None
+            _bar(effect.change, effect.margin_change_us)
+            for effect in found.effects
+            if effect.margin_change_us is not None
         ]
         self._margin_us = found.now.margin_corrected_us
         self._least_us = min((one.start_us for one in self._bars), default=0.0)
@@ -240,7 +242,7 @@ def sensitivity_blocks(found: Sensitivity) -> Iterator[Block]:
         legend = Sentence(("The red line is where nothing is left of the margin.",)) if drawn.shows_the_end else None
         yield Chart(drawn, caption, legend)
     yield _headline(found)
-    yield from (Sentence((f"{_capital(one.change)}: {one.note}.",)) for one in found.effects if one.note)
+    yield from (Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in found.effects if effect.note)
     yield next_bottleneck_sentence(found.next_bottleneck, found.profile)
 
 
@@ -264,7 +266,7 @@ def sensitivity_table(found: Sensitivity) -> Table:
         TableColumn("then", "us", group="margin"),
         TableColumn("verdict then", kind="words", wraps=True),
     )
-    rows = (TableRow(tuple(_cells(one, found))) for one in found.effects)
+    rows = (TableRow(tuple(_cells(effect, found))) for effect in found.effects)
     return Table(columns, tuple(rows), caption)
 
 
@@ -319,7 +321,7 @@ def _after_each(found: Sensitivity) -> Iterator[Sentence]:
     """Say what becomes of a cycle that is shown to fit."""
     if found.now.verdict != FITS:
         return
-    made = [(one.change, one.then) for one in found.effects if one.then is not None]
+    made = [(effect.change, effect.then) for effect in found.effects if effect.then is not None]
     lost = [change for change, then in made if then.verdict != FITS]
     unsafe = [change for change, then in made if then.verdict == FITS and found.now.safe and not then.safe]
     if lost:
@@ -345,11 +347,11 @@ def sensitivity_document(result: Capacity, verdicts: Sequence[Verdict], found: S
 
 def _rows(found: Sensitivity) -> Iterator[Record]:
     """One row for each change."""
-    for one in found.effects:
+    for effect in found.effects:
         yield {
             "period_us": found.profile.cycle.period_us,
             "timing_model": found.timing_model,
-            **_record(one, found.profile),
+            **_record(effect, found.profile),
         }
 
 

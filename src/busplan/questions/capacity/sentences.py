@@ -101,9 +101,9 @@ def _assumed(figures: CapacityFigures, profile: Profile) -> Iterator[Sentence]:
     """Say which assumptions carry much of the cycle or of its doubt, and how its execution time is known."""
     heavy = heavy_assumptions(figures, profile)
     if heavy:
-        said = (f"{listed(one.keys, 'and')}, which {one.carries}" for one in heavy)
+        said = (f"{listed(assumption.keys, 'and')}, which {assumption.carries}" for assumption in heavy)
         yield Sentence((f"Assumed: {'; '.join(said)}.",), "warns")
-    if not (any(one.is_execution for one in heavy) and execution_grades(profile) == "assumed"):
+    if not (any(assumption.is_execution for assumption in heavy) and execution_grades(profile) == "assumed"):
         yield from execution_sentence(profile)
 
 
@@ -145,7 +145,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
 
 def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
     """What the uncertainty is made of, the largest first."""
-    whole = sum(float(one.us) ** 2 for one in figures.doubts)
+    whole = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     return [
         {
             "input": one.key,
@@ -195,8 +195,11 @@ def _carries(figures: CapacityFigures) -> Sentence:
     safely = "" if figures.safe else " on a bus that is set safely"
     if figures.groups:
         each = (
-            sentence(f"{one.name} up to {{}} {nouns(one.safe_nodes or 0, 'node')} ({one.safe_limited_by})", _safe(one))
-            for one in figures.groups
+            sentence(
+                f"{group.name} up to {{}} {nouns(group.safe_nodes or 0, 'node')} ({group.safe_limited_by})",
+                _safe(group),
+            )
+            for group in figures.groups
         )
         return Sentence((f"Shown to fit{safely}, one group at a time: ", *joined(*each, by=", ").parts, "."))
     return Sentence(

@@ -151,9 +151,9 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
     The two margins may come from different axes. If either loop is unstable, all are None.
     """
     axes = (run.margins_x, run.margins_y)
-    if not all(one.stable for one in axes):
+    if not all(axis.stable for axis in axes):
         return None, None, None
-    gains = [one.gain_margin_db for one in axes if one.gain_margin_db is not None]
+    gains = [axis.gain_margin_db for axis in axes if axis.gain_margin_db is not None]
     phase = min(axes, key=lambda one: inf if one.phase_margin_deg is None else one.phase_margin_deg)
     return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
 
@@ -170,7 +170,7 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
     """
     network = network_of(profile)
     behind = limits_behind(capacity)
-    broken = [one for one in bus_of(profile).limits if one.key in behind]
+    broken = [limit for limit in bus_of(profile).limits if limit.key in behind]
     late: tuple[Failure, ...] = ()
     if TIME in capacity.exceeded:
         late = (Failure("required_us", capacity.required_us, capacity.available_us),)

@@ -117,7 +117,7 @@ def failure_words(result: CircleFigures) -> Sentence:
     result
         The circle test at one period, which fails.
     """
-    each = (Sentence(tuple(map(_part, one.parts()))) for one in result.failures)
+    each = (Sentence(tuple(map(_part, failure.parts()))) for failure in result.failures)
     return joined(*each, by=", and ")
 
 

@@ -29,7 +29,9 @@ class CompareAnswer(Answer, KindComparison):
         KeyError
             The kind was not asked for.
         """
-        return {one.kind if isinstance(one, NotOnKind) else one.figures.kind: one for one in self.kinds}[kind]
+        return {
+            machine.kind if isinstance(machine, NotOnKind) else machine.figures.kind: machine for machine in self.kinds
+        }[kind]
 
     def svg(self, *, note: str = "") -> str:
         """Draw the most axes over the period, a line for each kind of bus, as an SVG file.

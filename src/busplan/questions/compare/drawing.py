@@ -203,7 +203,7 @@ def _area(body: Element, found: KindComparison, plane: Plane, lines: tuple[KindL
     """Draw the scales and the lines, and return the y below them."""
     text_at(body, "axes, logarithmic", x="0", y=y + 14, css="small")
     top, labels = y + LINE + _RADIUS, axes_labels(plane)
-    gutter = 100 * (_LETTER * max(len(str(one)) for one in labels) + 12) / PHONE
+    gutter = 100 * (_LETTER * max(len(str(label)) for label in labels) + 12) / PHONE
     area = inside(body, x_percent=gutter, width_percent=98 - gutter, y=0)
     for axes in labels:
         at = _y(plane, axes, top=top)

@@ -81,8 +81,12 @@ class MachineOnKind(NamedTuple):
         """What is assumed of the host's own time, by its own profile, too: then it has no rank among known hosts."""
         keys = kind_named(self.profile.bus.kind).host_keys
         inputs = [given(self.profile, key) for key in keys] if self.is_own else []
-        own = (AssumedKey(one.name, one.value, "profile") for one in inputs if one.grade == "assumed" and one.value)
-        return (*own, *(one for one in self.assumed if one.key in keys))
+        own = (
+            AssumedKey(known.name, known.value, "profile")
+            for known in inputs
+            if known.grade == "assumed" and known.value
+        )
+        return (*own, *(assumed for assumed in self.assumed if assumed.key in keys))
 
 
 class NotOnKind(NamedTuple):
@@ -103,7 +107,7 @@ class KindComparison(NamedTuple):
     @property
     def compared(self) -> tuple[MachineOnKind, ...]:
         """The kinds that can have the machine."""
-        return tuple(one for one in self.kinds if isinstance(one, MachineOnKind))
+        return tuple(machine for machine in self.kinds if isinstance(machine, MachineOnKind))
 
     @property
     def counted(self) -> str:
@@ -172,7 +176,7 @@ def _on_kind(profile: Profile, kind: str) -> MachineOnKind | NotOnKind:
         return NotOnKind(kind, error.problems)
     needed = {} if kind == profile.bus.kind else needed_settings(other.profile)
     if needed:
-        assumed = (one for one in other.assumed if one.key not in needed)
+        assumed = (assumed for assumed in other.assumed if assumed.key not in needed)
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
         other = other._replace(profile=override(other.profile, dict(needed)), assumed=(*tried, *assumed))
     found = figures(other.profile, model=kind_named(kind).deciding_model)
@@ -203,7 +207,7 @@ def most_safe_axes(profile: Profile) -> SafeAxes:
     varied = varied_nodes(profile)
     nodes, limit = safe_nodes(profile, group=varied.name)
     each = int(varied.node.axes)
-    others = sum(int(one.nodes) * int(one.node.axes) for one in profile.alike_nodes if one.name != varied.name)
+    others = sum(int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name)
     axes = None if not each else others + nodes * each if nodes else 0
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
 
@@ -236,4 +240,4 @@ def _circle(one: MachineOnKind, run: ComputeCircleFigures) -> CircleAtSmallest |
 
 def fitting(found: KindComparison) -> Iterator[MachineOnKind]:
     """The kinds on which the machine is shown to fit its period, on a bus that is set safely."""
-    return (one for one in found.compared if one.figures.verdict == FITS and one.figures.safe)
+    return (machine for machine in found.compared if machine.figures.verdict == FITS and machine.figures.safe)

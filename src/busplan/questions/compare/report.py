@@ -67,7 +67,7 @@ def compare_document(found: KindComparison) -> JsonDocument:
         axes=int(plain(network.axes)),
         counted_group=found.counted or None,
         with_circle=found.with_circle,
-        buses=[_bus_record(one) for one in found.kinds],
+        buses=[_bus_record(machine) for machine in found.kinds],
     )
 
 
@@ -162,9 +162,9 @@ def notes(found: KindComparison) -> Iterator[Sentence]:
 def _left_out(found: KindComparison) -> Iterator[Sentence]:
     """What of the profile is left out, once for the kinds that leave out the same."""
     titles: dict[tuple[str, ...], list[str]] = {}
-    for one in found.compared:
-        if one.left_out:
-            titles.setdefault(one.left_out, []).append(bus_of(one.profile).title)
+    for machine in found.compared:
+        if machine.left_out:
+            titles.setdefault(machine.left_out, []).append(bus_of(machine.profile).title)
     for left_out, names in titles.items():
         keys = joined(*(Sentence((Code(key),)) for key in left_out), by=", ")
         yield Sentence((f"Left out on {listed(names, 'and')}: ", *keys.parts, "."))
@@ -251,7 +251,7 @@ def _blocks(found: KindComparison) -> Iterator[Block]:
         yield compare_chart(found)
     yield from notes(found)
     yield from execution_sentence(found.profile)
-    if any(one.assumed for one in found.compared):
+    if any(machine.assumed for machine in found.compared):
         yield assumed_table(found)
 
 
@@ -272,7 +272,7 @@ def headline(found: KindComparison) -> Sentence:
 
 def _best(found: KindComparison) -> Iterator[Sentence]:
     """Say which kind has the smallest period, and which the most axes, of those whose host's time is known."""
-    ranked = [one for one in found.compared if not one.assumed_host]
+    ranked = [machine for machine in found.compared if not machine.assumed_host]
     shortest = [(one.smallest.us, one) for one in ranked if one.smallest.us is not None]
     if shortest:
         us, one = min(shortest, key=lambda each: each[0])
@@ -287,7 +287,9 @@ def _best(found: KindComparison) -> Iterator[Sentence]:
             count_value(axes, SAFE_AXES.key),
         )
     unranked = [
-        f"{bus_of(one.profile).title} ({_words(one.assumed_host)})" for one in found.compared if one.assumed_host
+        f"{bus_of(machine.profile).title} ({_words(machine.assumed_host)})"
+        for machine in found.compared
+        if machine.assumed_host
     ]
     if unranked:
         words = f"Not ranked, for the host's own time is assumed there: {listed(unranked, 'and')}."
@@ -309,7 +311,7 @@ def _remarks(found: KindComparison) -> Iterator[Sentence]:
     """Say how axes are counted, and what the figures of other kinds rest on."""
     if found.counted:
         yield sentence("Axes are counted with more nodes of {}, the other groups as they are.", Code(found.counted))
-    if any(not one.is_own for one in found.kinds if isinstance(one, MachineOnKind)):
+    if any(not machine.is_own for machine in found.kinds if isinstance(machine, MachineOnKind)):
         words = "On another kind than its own the machine has the bus of a new profile, which is assumed."
         yield Sentence((words,), "warns")
 
@@ -323,7 +325,7 @@ def kinds_table(found: KindComparison) -> Table:
         The comparison.
     """
     columns = (*_COLUMNS, *(_CIRCLE if found.with_circle else ()))
-    rows = (_row(one, columns=len(columns), with_circle=found.with_circle) for one in found.kinds)
+    rows = (_row(machine, columns=len(columns), with_circle=found.with_circle) for machine in found.kinds)
     circle = " and its circle at the smallest period" if found.with_circle else ""
     return Table(columns, tuple(rows), Sentence((f"The machine on each kind of bus{circle}",)))
 

@@ -53,7 +53,14 @@ _CONTEXT: Final = 8
 
 def change_table(keys: Iterable[KeyDifference]) -> Table:
     """One row for each key: its values in A and B, with a note if a value is a default."""
-    rows = ((Code(one.key), _cell(one.key, one.a, one.b), _cell(one.key, one.b, one.a)) for one in keys)
+    rows = (
+        (
+            Code(difference.key),
+            _cell(difference.key, difference.a, difference.b),
+            _cell(difference.key, difference.b, difference.a),
+        )
+        for difference in keys
+    )
     return Table(_COLUMNS, tuple(map(TableRow, rows)))
 
 
@@ -193,8 +200,8 @@ def _loud_figures(found: Difference) -> dict[str, dict[Judgement, str]]:
 
 def _loud(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
     figures = found.judged(judgement)
-    judged = {one.figure.key for one in figures}
-    models = " and ".join(one.part for one in figures if one.figure.key == "fits")
+    judged = {compared.figure.key for compared in figures}
+    models = " and ".join(compared.part for compared in figures if compared.figure.key == "fits")
     state = STATES[judgement]
     if "shown_to_fit" in judged:
         yield sentence(_SHOWN[judgement], state=state)
@@ -224,8 +231,8 @@ def named(figures: Sequence[ComparedFigure], found: Difference) -> list[str]:
     """Names of figures, each once, with the timing model if only one judges it so."""
     models = {*model_names(found.a), *model_names(found.b)}
     parts: dict[str, list[str]] = {}
-    for one in figures:
-        parts.setdefault(one.figure.label, []).append(one.part)
+    for compared in figures:
+        parts.setdefault(compared.figure.label, []).append(compared.part)
     return [f"{label} ({of[0]})" if len(of) == 1 and of[0] in models else label for label, of in parts.items()]
 
 
@@ -300,7 +307,7 @@ def diff_document(found: Difference, *, arguments: Arguments) -> JsonDocument:
         b=b,
         verdict=sentence_text(headline(found)),
         same=not found.keys,
-        changes=[change_document(one) for one in found.keys],
+        changes=[change_document(difference) for difference in found.keys],
         figures=diff_records(found),
     )
 
@@ -323,7 +330,7 @@ def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
     if hidden > 0:
         yield sentence(f"And {{}} more {nouns(hidden, 'key')}.", count_value(hidden))
     # If one side has no circle, a note says why, and its figures need no rows.
-    shown = [one for one in found.figures if one.judgement != "neutral" or None not in (one.a, one.b)]
+    shown = [figure for figure in found.figures if figure.judgement != "neutral" or None not in (figure.a, figure.b)]
     if any(one.judgement != "same" for one in shown):
         yield Table(_FIGURES, tuple(map(_row, shown)), heads=3)
     same = len(named([one for one in shown if one.judgement == "same"], found))

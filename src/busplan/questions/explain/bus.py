@@ -25,7 +25,7 @@ from busplan.sourced import Input, Sourced, short
 def latency_names(profile: Profile) -> tuple[str, ...]:
     """Names of the transactions in `latency`, or of the cycle."""
     bus = bus_of(profile)
-    return tuple(one.label for one in bus.cycle(network_of(profile), model=bus.deciding_model).latencies())
+    return tuple(latency.label for latency in bus.cycle(network_of(profile), model=bus.deciding_model).latencies())
 
 
 class TracedLatencies(NamedTuple):

@@ -134,7 +134,7 @@ def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Tra
     if key in ("servo_grade", "ideal_drive"):
         graded = sorted(profile.servo.grades.model_fields_set) if key == "servo_grade" else ()
         keys = ("servo.grade", *(f"servo.grades.{name}" for name in graded))
-        return found(value, _WAYS[key], tuple(traced(profile, one) for one in keys))
+        return found(value, _WAYS[key], tuple(traced(profile, key) for key in keys))
     if key in _PATH:
         return found(value, _WAYS[key], tuple(_path_inputs(profile, key)))
     if not result.bus_fits:

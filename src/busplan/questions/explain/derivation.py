@@ -149,7 +149,7 @@ class Derivation(NamedTuple):
     @property
     def weakest_grade(self) -> str:
         """Grade of the least well known input."""
-        return min((one.grade for one in self.inputs), key=_GRADES.index, default=_GRADES[-1])
+        return min((given.grade for given in self.inputs), key=_GRADES.index, default=_GRADES[-1])
 
 
 class Explanation(NamedTuple):
@@ -248,7 +248,7 @@ def explained_figures(profile: Profile) -> Iterator[tuple[CommandName, Figure]]:
     bus = bus_of(profile)
     has_bias = bus.cycle(network_of(profile), model=bus.deciding_model).bias_us() is not None
     for command, figures in figures_of(bus).items():
-        yield from ((command, one) for one in figures.values() if has_bias or one != BIAS)
+        yield from ((command, figure) for figure in figures.values() if has_bias or figure != BIAS)
 
 
 def assumptions(profile: Profile) -> tuple[Input, ...]:
@@ -278,12 +278,16 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
             found.setdefault(one.name, one)
     # An execution time is a fact, not a choice: without a grade it is the least well known input.
     choices = bus_of(profile).choosing_keys
-    executions = tuple(one.node_key("execution.") for one in profile.alike_nodes)
+    executions = tuple(alike.node_key("execution.") for alike in profile.alike_nodes)
     known = (
-        one
-        for one in found.values()
-        if one.grade != "given"
-        or (one.name.startswith(executions) and not one.name.endswith(choices) and not one.source.startswith("default"))
+        given
+        for given in found.values()
+        if given.grade != "given"
+        or (
+            given.name.startswith(executions)
+            and not given.name.endswith(choices)
+            and not given.source.startswith("default")
+        )
     )
     return tuple(sorted(known, key=lambda one: -1 if one.grade == "given" else _GRADES.index(one.grade)))
 
@@ -310,15 +314,15 @@ def _traced(
 
 
 def _steps(profile: Profile, traced: Traced, command: CommandName, figure: Figure) -> Iterator[Step]:
-    for one in lines(traced):
-        known = figure if one is traced else _known(profile, one.key, command)
+    for line in lines(traced):
+        known = figure if line is traced else _known(profile, line.key, command)
         yield Step(
             key=known.key,
-            symbol=figure.symbol if one is traced else one.symbol,
+            symbol=figure.symbol if line is traced else line.symbol,
             reference=known.reference,
-            formula=formula_text(one, in_numbers=False),
-            numbers=formula_text(one, in_numbers=True),
-            value=one.value,
+            formula=formula_text(line, in_numbers=False),
+            numbers=formula_text(line, in_numbers=True),
+            value=line.value,
             unit=known.unit,
         )
 

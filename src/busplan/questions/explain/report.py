@@ -86,7 +86,7 @@ def assumptions_table(assumptions: Sequence[Input]) -> Table:
     assumptions
         The inputs.
     """
-    rows = (TableRow((*input_cells(one), one.meaning)) for one in assumptions)
+    rows = (TableRow((*input_cells(given), given.meaning)) for given in assumptions)
     return Table((*INPUT_COLUMNS, _MEANING), tuple(rows), stacks=True)
 
 
@@ -124,7 +124,7 @@ def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Json
     return document(
         "explain",
         profile=profile.name,
-        assumptions=[one._asdict() for one in assumptions],
+        assumptions=[given._asdict() for given in assumptions],
         figures=figure_rows(profile),
         equations=equation_rows(),
         constants=constant_rows(bus_of(profile)),
@@ -163,7 +163,7 @@ def explain_report(explanation: Explanation) -> Report:
     name = found.profile.name
     return Report(
         Sentence(("Where ", Code(found.derivations[0].figure.key), " of ", Code(name), " comes from")),
-        lambda: [_section(one, name) for one in found.derivations],
+        lambda: [_section(derivation, name) for derivation in found.derivations],
         partial(_explain_document, found),
         lambda: with_profile(name, [record for one in found.derivations for record in _step_records(one)]),
     )
@@ -171,7 +171,9 @@ def explain_report(explanation: Explanation) -> Report:
 
 def _in_words(explanation: Explanation) -> Explanation:
     """Fill in the value of figures that are sentences or changes: the report of `capacity` makes them."""
-    return explanation._replace(derivations=tuple(_with_words(one, explanation) for one in explanation.derivations))
+    return explanation._replace(
+        derivations=tuple(_with_words(derivation, explanation) for derivation in explanation.derivations)
+    )
 
 
 def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
@@ -192,7 +194,7 @@ def _explain_document(explanation: Explanation) -> JsonDocument:
     return document(
         "explain",
         profile=explanation.profile.name,
-        derivations=[_derivation(one) for one in explanation.derivations],
+        derivations=[_derivation(derivation) for derivation in explanation.derivations],
     )
 
 

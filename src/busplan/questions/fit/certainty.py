@@ -110,7 +110,7 @@ def certainty(cycle: BusCycle) -> Certainty:
     """
     network, bias_us, doubts = cycle.network, cycle.bias_us(), cycle.doubts()
     extra_us: Number = 0.0 if bias_us is None else bias_us
-    combined_us = square_root(total(one.us * one.us for one in doubts))
+    combined_us = square_root(total(doubt.us * doubt.us for doubt in doubts))
     expanded_us = COVERAGE * named(combined_us, "combined_uncertainty_us", "u_c")
     longer_us = cycle.added_us(extra_us)
     uncertain_us = cycle.added_us(expanded_us, after_us=extra_us)
@@ -127,7 +127,7 @@ def certainty(cycle: BusCycle) -> Certainty:
 
 def limit_codes(network: Network) -> dict[str, Number]:
     """The place among `VERDICTS` of each limit of the bus by key, those of safety left out."""
-    return {one.key: one.verdict_code(network) for one in bus_of(network.profile).limits if not one.is_safety}
+    return {limit.key: limit.verdict_code(network) for limit in bus_of(network.profile).limits if not limit.is_safety}
 
 
 def time_code(found: Certainty, network: Network) -> Number:

@@ -283,8 +283,8 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     exceeded = (*broken, *((TIME,) if late else ()))
     decides = model == bus.deciding_model
     counts = (
-        GroupCapacity(one.name, int(one.nodes), int(one.nodes) * one.node.axes, one.node.axes, model, profile)
-        for one in profile.alike_nodes
+        GroupCapacity(alike.name, int(alike.nodes), int(alike.nodes) * alike.node.axes, alike.node.axes, model, profile)
+        for alike in profile.alike_nodes
     )
     return CapacityFigures(
         kind=bus.kind,

@@ -92,7 +92,7 @@ def telling_periods(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float
         Its steps, one for each timing model of interest.
     """
     own_us = profile.cycle.period_us
-    carrying = [one for one in steps if one.from_us]
+    carrying = [step for step in steps if step.from_us]
     lasts = [one.from_us[-1] * 1.25 for one in carrying]
     needed = [one.from_us[min(one.own_nodes, len(one.from_us)) - 1] * 1.25 for one in carrying]
     to_us = max(2 * own_us, *needed, min(4 * own_us, max(lasts, default=0.0)), 0.0)

@@ -59,7 +59,7 @@ def nodes_with(axes: Value, profile: Profile, *, nodes_key: str) -> int:
     >>> nodes_with(12, load("paper-4ms").profile, nodes_key="bus.nodes")
     3
     """
-    alike = next(one for one in profile.alike_nodes if one.nodes_key == nodes_key)
+    alike = next(alike for alike in profile.alike_nodes if alike.nodes_key == nodes_key)
     each = int(alike.node.axes)
     others = int(plain(network_of(profile).axes)) - int(alike.nodes) * each
     own = axes - others if isinstance(axes, int) else 0
@@ -146,7 +146,7 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
     )
     if with_circle or profile.asks_for_circle:
         # Periods whose circle can be run; all, where the step goes with none.
-        periods_us = [one for one in periods_us if not any(step_refusals(profile, one))] or periods_us
+        periods_us = [period_us for period_us in periods_us if not any(step_refusals(profile, period_us))] or periods_us
     return Direction(PERIOD, tuple(sorted({*periods_us, own_us})))
 
 

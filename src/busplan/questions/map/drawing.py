@@ -163,10 +163,10 @@ def map_lines(found: TradeOff, *, width: int) -> list[Line]:
     width
         Width of the drawing, in columns; a map of many narrow cells may need up to 80.
     """
-    labels = [value_text(found.y, one) for one in found.y.values]
+    labels = [value_text(found.y, value) for value in found.y.values]
     gutter = len(_OWN_ROW) + max(map(len, labels))
     room = width - gutter - len(_EDGE) - 1
-    widest = max(_BRACKETED, *(len(value_text(found.x, one)) + 1 for one in found.x.values))
+    widest = max(_BRACKETED, *(len(value_text(found.x, value)) + 1 for value in found.x.values))
     cell_width = max(1, min(widest, room // len(found.x.values)))
     own_row, own_column = found.own_place or (None, None)
     looks = looks_of(found)
@@ -206,7 +206,7 @@ def _below(found: TradeOff, own: int | None, *, cell_width: int) -> Iterator[str
     """A pointer to the column of this design, and values of `x` below their columns as far as there is room."""
     if own is not None:
         yield " " * ((cell_width - 1) // 2 + own * cell_width) + _OWN_COLUMN
-    texts = [value_text(found.x, one) for one in found.x.values]
+    texts = [value_text(found.x, value) for value in found.x.values]
     line = ""
     for column, start in placed_labels(texts, own=own, pitch=cell_width, letter=1).items():
         line = f"{line:<{int(start)}}{texts[column]}"
@@ -265,7 +265,7 @@ def map_svg(found: TradeOff, *, title: str, inline: bool = False) -> str:
 
 def _map(body: Element, found: TradeOff, looks: Looks, *, y: int) -> int:
     """Draw both scales and the cells, and return the y below them."""
-    labels = [value_text(found.y, one) for one in found.y.values]
+    labels = [value_text(found.y, value) for value in found.y.values]
     gutter = min(40.0, 100 * (_LETTER * max(map(len, labels)) + 10) / PHONE)
     text_at(body, title_of(found.y, found.profile), x="0", y=y + 14, css="small")
     y += LINE
@@ -302,13 +302,13 @@ def _row(area: Element, found: TradeOff, row: Sequence[Cell | NotDrawn], looks: 
     if drawn and len(row) <= _MOST_TALL and tall == _CELL:
         # One text with a place for each character: a page may have many maps.
         places = " ".join(f"{100 * (column + 0.5) / len(row):.4g}%" for column in drawn)
-        marks = "".join(look_of(one, looks).mark for one in drawn.values())
+        marks = "".join(look_of(cell, looks).mark for cell in drawn.values())
         text_at(area, marks, x=places, y=top + 14, css="mark", anchor="middle")
 
 
 def _across(area: Element, found: TradeOff, own: int | None, *, y: int, room: float) -> None:
     """Draw the values of `x`, as many as there is room for on a phone, and always this design's."""
-    texts = [value_text(found.x, one) for one in found.x.values]
+    texts = [value_text(found.x, value) for value in found.x.values]
     pitch = room / len(texts)
     for column in placed_labels(texts, own=own, pitch=pitch, letter=_LETTER):
         x = f"{100 * (column + 0.5) / len(texts):.5g}%"

@@ -99,7 +99,7 @@ def map_chart(found: TradeOff) -> Chart:
 
 
 def _counts(*numbers: int) -> tuple[ShownValue, ...]:
-    return tuple(count_value(one) for one in numbers)
+    return tuple(count_value(number) for number in numbers)
 
 
 def regions_table(found: TradeOff) -> Table:
@@ -109,7 +109,7 @@ def regions_table(found: TradeOff) -> Table:
         TableColumn("limited by", kind="words", wraps=True),
         TableColumn("settings"),
     )
-    rows = (_region_row(found, one) for one in found.regions)
+    rows = (_region_row(found, region) for region in found.regions)
     return Table(columns, tuple(rows), Sentence(("What limits each region",)))
 
 

@@ -109,7 +109,9 @@ def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value
         Values of the map's directions.
     """
     network = network_of(setting.profile)
-    unsafe = tuple(one.key for one in bus_of(setting.profile).limits if one.is_safety and one.is_broken(network))
+    unsafe = tuple(
+        limit.key for limit in bus_of(setting.profile).limits if limit.is_safety and limit.is_broken(network)
+    )
     verdict = figures["verdict"]
     keys = figures["not_shown" if verdict == NOT_SHOWN else "exceeded"]
     broken = tuple(key for key in keys if key != TIME) or (TIME,)
@@ -343,7 +345,7 @@ def trade_off(
     }
     found = {place: one for place, one in settings.items() if isinstance(one, MapPoint)}
     if not found:
-        reason = next(one for one in settings.values() if not isinstance(one, MapPoint))
+        reason = next(value for value in settings.values() if not isinstance(value, MapPoint))
         raise BusplanError(f"no setting of this map can exist: {reason}")
     cells = {
         (row, column): cell_of(found[row, column], figures, x=x.values[column], y=y.values[row])

@@ -43,7 +43,7 @@ class Cure(NamedTuple):
 
 def changeable(profile: Profile) -> tuple[str, ...]:
     """What may be changed unless a user says otherwise, in words, the cheapest first."""
-    return tuple(one.label for one in freed(profile, None))
+    return tuple(freedom.label for freedom in freed(profile, None))
 
 
 def cure(profile: Profile, *, circle_steps: int | None = None) -> Cure:

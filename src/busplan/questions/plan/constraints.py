@@ -48,7 +48,7 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
         Nodes differ, so that axes do not say how many of which.
     """
     if profile.group:
-        keys = ", ".join(one.nodes_key for one in profile.alike_nodes)
+        keys = ", ".join(alike.nodes_key for alike in profile.alike_nodes)
         raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; set the nodes of a group instead: {keys}")
     (alike,) = profile.alike_nodes
     return ceil(axes / int(alike.node.axes))
@@ -184,7 +184,7 @@ def most_asking(needs: Iterable[Need], *, ratio: float) -> Need:
 def keeps_limits(network: Network) -> bool:
     """Whether a network keeps the limits that its period plays a part in, at its own period and slice ratio."""
     limits = bus_of(network.profile).limits
-    return not any(one.kept_from_us is not None and one.shown.is_broken(network) for one in limits)
+    return not any(limit.kept_from_us is not None and limit.shown.is_broken(network) for limit in limits)
 
 
 def verdict(profile: Profile) -> Iterator[Need]:
@@ -235,7 +235,7 @@ def refused_period(profile: Profile) -> Need | None:
         The network.
     """
     network, bus = network_of(profile), bus_of(profile)
-    broken = next((one for one in bus.limits if one.is_of_period and one.is_broken(network)), None)
+    broken = next((limit for limit in bus.limits if limit.is_of_period and limit.is_broken(network)), None)
     if broken is not None:
         return Need(inf, broken.key, broken.words(network))
     causes = circle_refusals(profile)

@@ -148,8 +148,8 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
     """Everything that may be changed in a network, the cheapest first; the step of a circle where it must change."""
     network = network_of(profile)
     own = (
-        Freedom(one.name, one.label, one.cost, one.keys, partial(_of_bus, one.name))
-        for one in bus_of(profile).settings(network)
+        Freedom(setting.name, setting.label, setting.cost, setting.keys, partial(_of_bus, setting.name))
+        for setting in bus_of(profile).settings(network)
     )
     found = (
         *own,
@@ -256,7 +256,7 @@ def _payloads(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) ->
 
     sizes = sizes[: bisect_left(sizes, x=True, key=lambda size: cut(size) is None)]
     # Below a point after which a table of execution times falls, a smaller payload may take longer.
-    from_bytes = max(one.node.execution.ascends_from_bytes for one in profile.alike_nodes)
+    from_bytes = max(alike.node.execution.ascends_from_bytes for alike in profile.alike_nodes)
     rising = bisect_left(sizes, x=True, key=lambda size: size < from_bytes)
     first = bisect_left(
         sizes, x=True, hi=rising, key=lambda size: search.reaches({**changes, **(cut(size) or {})}, cheaper)

@@ -107,7 +107,7 @@ def frontier(goal: Profile, search: Search, levels: Sequence[Freedom]) -> Iterat
     levels
         What may be changed, of which what is cheaper than a payload is.
     """
-    cheap = [one for one in levels if one.cost < Cost.PAYLOAD]
+    cheap = [level for level in levels if level.cost < Cost.PAYLOAD]
     yield _shortest_period(goal, search, cheap)
     yield _largest_payload(goal, search, cheap)
     if not goal.group:
@@ -224,14 +224,14 @@ def relaxations(
     Relaxation
         Freedoms in the order of their cost, then keys of [limits], then the circle.
     """
-    names = {one.name for one in levels}
-    for one in freedoms(goal):
-        if one.name not in names:
-            more = [each for each in freedoms(goal) if each.name in {*names, one.name}]
-            search = Search(goal, circle=circle, kept=set(kept) - set(one.keys), max_circles=max_circles)
+    names = {level.name for level in levels}
+    for freedom in freedoms(goal):
+        if freedom.name not in names:
+            more = [each for each in freedoms(goal) if each.name in {*names, freedom.name}]
+            search = Search(goal, circle=circle, kept=set(kept) - set(freedom.keys), max_circles=max_circles)
             found = search.least(more)
             if found is not None:
-                yield Relaxation(one.name, None, dict(found))
+                yield Relaxation(freedom.name, None, dict(found))
     for key, values in _weaker_limits(goal):
         relaxed = _least_relaxed(goal, key, values, levels, kept=kept)
         if relaxed is not None:

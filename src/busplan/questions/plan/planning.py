@@ -106,12 +106,12 @@ def plan(
     search = Search(goal, circle=circle, kept=kept, max_circles=max_circles)
     steps = [*_steps(search, levels)]
     found = [*steps, *frontier(goal, search, levels)]
-    has_plan = any(isinstance(one, Option) and one.recommended for one in steps)
+    has_plan = any(isinstance(step, Option) and step.recommended for step in steps)
     return Plan(
         profile=profile,
         goal=goal,
         wanted={key: value for key, value in asked.items() if _differs(profile, goal, key)},
-        free=tuple(one.name for one in levels),
+        free=tuple(level.name for level in levels),
         options=tuple(one for one in found if isinstance(one, Option)),
         impossible=tuple(one for one in found if isinstance(one, Impossible)),
         binding=None if has_plan else search.binding(levels),
@@ -126,7 +126,7 @@ def _differs(profile: Profile, goal: Profile, key: str) -> bool:
     """Whether two profiles differ in a key, or in one of a section; other changes may be needed for either alone."""
     own, asked = (dict(flat(one.model_dump())) for one in (profile, goal))
     keys = [one for one in {**own, **asked} if one == key or one.startswith(f"{key}.")]
-    return any(own.get(one) != asked.get(one) for one in keys)
+    return any(own.get(key) != asked.get(key) for key in keys)
 
 
 def _steps(search: Search, levels: Sequence[Freedom]) -> Iterator[Option | Impossible]:

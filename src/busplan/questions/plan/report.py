@@ -60,17 +60,17 @@ def plan_report(plan: Plan) -> Report:
 def _blocks(plan: Plan) -> Iterator[Block]:
     """The recommendation, or what stands in its way; a row for each step of the search, and what could be reached."""
     yield _headline(plan)
-    yield from (_relaxed(plan, one) for one in plan.relaxations)
+    yield from (_relaxed(plan, relaxation) for relaxation in plan.relaxations)
     yield from _warnings(plan)
     yield options_table(plan)
     mark = "" if plan.recommended is None else "* recommended. "
     yield Sentence((f"{mark}'Held by' is what keeps a row from passing, or its value from being better.",))
     if not all(option.proven for option in plan.options):
         yield Sentence(("? not proven: the search for a period was cut short (--max-circles).",))
-    for one in plan.impossible:
-        proven = "" if one.proven else " (not proven: the search was cut short, --max-circles)"
-        reason = ShownValue(one.reason, "reason")
-        yield sentence(f"{one.title.capitalize()}: none, {{}}{proven}.", reason)
+    for impossible in plan.impossible:
+        proven = "" if impossible.proven else " (not proven: the search was cut short, --max-circles)"
+        reason = ShownValue(impossible.reason, "reason")
+        yield sentence(f"{impossible.title.capitalize()}: none, {{}}{proven}.", reason)
 
 
 # --- sentences ------------------------------------------------------------------------------------------------
@@ -115,7 +115,7 @@ def _headline(plan: Plan) -> Sentence:
 
 def _freed(plan: Plan, before: str | None = None) -> str:
     """What may be changed, in words; only what is cheaper than the freedom of a key."""
-    known = [one for one in freedoms(plan.goal) if one.name in plan.free]
+    known = [freedom for freedom in freedoms(plan.goal) if freedom.name in plan.free]
     cost = next((one.cost for one in known if before in one.keys), None)
     labels = [one.label for one in known if cost is None or one.cost < cost]
     return listed(labels, "and") if labels else "anything else"
@@ -132,7 +132,7 @@ def _relaxed(plan: Plan, one: Relaxation) -> Sentence:
 
 
 def _label(plan: Plan, name: str) -> str:
-    return next(one.label for one in freedoms(plan.goal) if one.name == name)
+    return next(freedom.label for freedom in freedoms(plan.goal) if freedom.name == name)
 
 
 def _goal(plan: Plan) -> tuple[Part, ...]:
@@ -207,9 +207,9 @@ def plan_document(plan: Plan) -> JsonDocument:
         period_is_kept=plan.period_is_kept,
         recommended_changes=recommended,
         binding=None if plan.binding is None else {"constraint": plan.binding.key, "why": plan.binding.why},
-        relaxations=[one._asdict() for one in plan.relaxations],
+        relaxations=[relaxation._asdict() for relaxation in plan.relaxations],
         options=_options(plan),
-        impossible=[one._asdict() for one in plan.impossible],
+        impossible=[impossible._asdict() for impossible in plan.impossible],
     )
 
 

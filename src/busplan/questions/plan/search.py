@@ -88,8 +88,8 @@ class Search:
         kept = self._least(cheaper, changes)
         if kept is not None:
             return kept
-        for one in dearest.values(self, changes, cheaper):
-            found = None if self.kept & set(one) else self._least(cheaper, {**changes, **one})
+        for change in dearest.values(self, changes, cheaper):
+            found = None if self.kept & set(change) else self._least(cheaper, {**changes, **change})
             if found is not None:
                 return found
         return None
@@ -178,9 +178,9 @@ class Search:
         yield from self.combinations(changes, cheaper)
         if not last.gives_time:
             proven = self.proven
-            for one in last.values(self, changes, cheaper):
-                if not self.kept & set(one):
-                    yield from self.combinations({**changes, **one}, cheaper)
+            for change in last.values(self, changes, cheaper):
+                if not self.kept & set(change):
+                    yield from self.combinations({**changes, **change}, cheaper)
             self.proven = proven
 
     def furthest(self, changes: Changes, levels: Sequence[Freedom]) -> Changes:
@@ -201,16 +201,16 @@ class Search:
     def most_ratio(self, changes: Changes, levels: Sequence[Freedom]) -> float:
         """The largest slice ratio with some freedoms [1]."""
         own = self.ratio(changes)
-        return max(own, MOST_RATIO) if any(one.cost == Cost.HOST_TIME for one in levels) else own
+        return max(own, MOST_RATIO) if any(level.cost == Cost.HOST_TIME for level in levels) else own
 
     def most_period_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
         """The longest period with some freedoms [us]."""
-        is_free = any(one.cost == Cost.PERIOD for one in levels)
+        is_free = any(level.cost == Cost.PERIOD for level in levels)
         return longest_period_us(self._own) if is_free else self.period_us(changes)
 
     def is_bounded(self, levels: Sequence[Freedom]) -> bool:
         """Whether some freedoms have an end: no period is free, and no limit of the bus is broken."""
-        return all(one.cost != Cost.PERIOD for one in levels) and self.least_needed_us({}, levels) < inf
+        return all(level.cost != Cost.PERIOD for level in levels) and self.least_needed_us({}, levels) < inf
 
     def reaches(self, changes: Changes, levels: Sequence[Freedom]) -> bool:
         """Whether the bus fits with some freedoms, whatever its circle."""

@@ -36,13 +36,13 @@ class ReportAnswer(Answer):
     @property
     def answers(self) -> tuple[AllAnswers, ...]:
         """All answers for each profile."""
-        return tuple(one.answer for one in self.profiles)
+        return tuple(profile.answer for profile in self.profiles)
 
     def report(self) -> Report:
         """The answer in blocks."""
         page, changes = page_report(self.profiles, title=self.title), self.profiles[0].changes
         # As on the command line, where all profiles have the same ones.
-        return changed_report(page, changes) if all(one.changes == changes for one in self.profiles) else page
+        return changed_report(page, changes) if all(profile.changes == changes for profile in self.profiles) else page
 
     def _headline(self) -> str:
         return "; ".join(f"{one.profile.name}: {one.verdict.deciding.verdict}" for one in self.answers)

@@ -110,8 +110,8 @@ def _document(subjects: Sequence[_Subject]) -> JsonDocument:
     return document(
         "report",
         profiles=[
-            {"profile": one.name, "answers": {name: source.document for name, source in one.sources.items()}}
-            for one in subjects
+            {"profile": subject.name, "answers": {name: source.document for name, source in subject.sources.items()}}
+            for subject in subjects
         ],
     )
 
@@ -121,8 +121,8 @@ def _blocks(subjects: Sequence[_Subject]) -> Iterator[Block]:
         yield from _chapter(subjects[0])
         return
     yield Chapter(Sentence(("Comparison",)), (_comparison(subjects),), "comparison", "comparison")
-    for one in subjects:
-        yield Chapter(Sentence((Code(one.name),)), tuple(_chapter(one)), key=one.key)
+    for subject in subjects:
+        yield Chapter(Sentence((Code(subject.name),)), tuple(_chapter(subject)), key=subject.key)
 
 
 def _chapter(subject: _Subject) -> Iterator[Block]:
@@ -149,8 +149,8 @@ _MOST_NAMED: Final = 6
 def _assumed(answer: AllAnswers) -> Iterator[Sentence]:
     """Say which keys of the profile are assumed, before any figure that rests on them; those that carry most first."""
     heavy = heavy_assumptions(answer.verdict.deciding, answer.profile)
-    names = [one.name for one in answer.assumptions if one.grade == "assumed" and "." in one.name]
-    names.sort(key=lambda name: not any(one.covers(name) for one in heavy))
+    names = [given.name for given in answer.assumptions if given.grade == "assumed" and "." in given.name]
+    names.sort(key=lambda name: not any(assumption.covers(name) for assumption in heavy))
     if names:
         parts = [part for name in names[:_MOST_NAMED] for part in (Code(name), ", ")][:-1]
         more = len(names) - _MOST_NAMED
@@ -162,7 +162,7 @@ def _assumed(answer: AllAnswers) -> Iterator[Sentence]:
 def _facts(subject: _Subject) -> Facts:
     """Settings of the bus, and the PROFILE argument."""
     bus, figures = bus_of(subject.answer.profile), subject.answer.capacity.results[0]
-    setup = (one for one in bus.setup_figures if one.key in bus.facts)
+    setup = (figure for figure in bus.setup_figures if figure.key in bus.facts)
 
     def item(name: str, figure: Figure) -> tuple[str, ShownValue]:
         unit = "us" if figure.unit == "us" else ""
@@ -201,7 +201,7 @@ def _comparison(subjects: Sequence[_Subject]) -> Table:
         *(TableColumn(CIRCLE_BY_KEY[key].symbol, group="contour error, um") for key in _MEASURES),
         TableColumn("circle", kind="words"),
     )
-    rows = tuple(TableRow(_compared(one)) for one in subjects)
+    rows = tuple(TableRow(_compared(subject)) for subject in subjects)
     return Table(columns, rows, Sentence(("All profiles, each under the timing model that decides",)))
 
 

@@ -233,7 +233,7 @@ def _shown_of(is_safe: bool) -> tuple[Figure, ...]:
 
 def _curves(answer: AllAnswers) -> str:
     """Legend of the curves."""
-    names = [f"{one.timing_model}, {'shown to fit' if one.is_safe else 'the closed form'}" for one in answer.steps]
+    names = [f"{step.timing_model}, {'shown to fit' if step.is_safe else 'the closed form'}" for step in answer.steps]
     marks = ("solid with a square", "dashed with a diamond")
     curves = (f"{name}: {mark}" for name, mark in zip(names, marks, strict=False))
     return f"The axes that a period carries, {'; '.join(curves)}; the point is this profile's own."

@@ -50,7 +50,7 @@ def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDoc
         return dict(content)
     name = "changes" if "changes" not in content else "changes_of_both"
     head = {key: content[key] for key in ("schema", "command")}
-    return {**head, name: {one.key: one.value for one in changes.by_set}, **content}
+    return {**head, name: {change.key: change.value for change in changes.by_set}, **content}
 
 
 def changed_report(report: Report, changes: KeyChanges) -> Report:
@@ -63,7 +63,7 @@ def changed_report(report: Report, changes: KeyChanges) -> Report:
 
 def changes_sentences(changes: KeyChanges) -> list[Sentence]:
     """Name the --set options in a sentence, because what is computed is not what the file says; empty without them."""
-    options = [Sentence((Code(one.typed),)) for one in changes.by_set]
+    options = [Sentence((Code(change.typed),)) for change in changes.by_set]
     return [joined(Sentence(("With ",)), joined(*options, by=" and "), Sentence((".",)), by="")] if options else []
 
 

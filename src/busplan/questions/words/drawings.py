@@ -52,7 +52,7 @@ class TermsDrawing(Drawing):
         """Draw a bar for each timing model."""
         results = self._results
         root = drawing("Terms of the cycle under each timing model, and what is left of the slice", css="chart terms")
-        used_us, slice_us = max(one.required_us for one in results), results[0].available_us
+        used_us, slice_us = max(result.required_us for result in results), results[0].available_us
         small = used_us < _MAGNIFIED_BELOW * slice_us
         head = "The slice, us" if used_us <= slice_us else "The cycle and where its slice ends, us"
         y = _bars(root, results, head, y=0, end_us=max(used_us, slice_us), thin=small)
@@ -68,10 +68,10 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
     top = y = y + LINE
     scale, height = Scale(0.0, end_us), _THIN if thin else _THICK
     area = SubElement(root, "g")
-    for one in results:
-        text_at(root, one.timing_model, x="0", y=y + 14, css="small")
+    for result in results:
+        text_at(root, result.timing_model, x="0", y=y + 14, css="small")
         y += LINE
-        for part in _segments(one, _drawn(one, end_us)):
+        for part in _segments(result, _drawn(result, end_us)):
             _segment(root, part, scale, y=y, height=height)
         y += height
     if end_us > results[0].available_us:
@@ -156,7 +156,7 @@ class AxesDrawing(Drawing):
         root.set("height", str(_TOP + _HEIGHT + _BELOW))
         own_us, own_axes = profile.cycle.period_us, int(network_of(profile).axes)
         from_us, to_us = telling_periods(profile, steps)
-        plane = _Plane(from_us, to_us, max(own_axes, *(one.max_axes(to_us) for one in steps)))
+        plane = _Plane(from_us, to_us, max(own_axes, *(step.max_axes(to_us) for step in steps)))
         _grid(root, plane)
         stretched = {"y": str(_TOP), "width": "100%", "height": str(_HEIGHT), "preserveAspectRatio": "none"}
         area = SubElement(root, "svg", {**stretched, "viewBox": f"0 0 {_WIDE} {_HEIGHT}", "overflow": "visible"})

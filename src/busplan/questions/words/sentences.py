@@ -107,8 +107,8 @@ def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterato
 def execution_grades(profile: Profile) -> str | None:
     """Grade of the execution time; where groups differ, each with the groups that have it. None without a grade."""
     names: dict[str, list[str]] = {}
-    for one in profile.alike_nodes:
-        names.setdefault(one.node.execution.grade or "without a grade", []).append(one.name)
+    for alike in profile.alike_nodes:
+        names.setdefault(alike.node.execution.grade or "without a grade", []).append(alike.name)
     if len(names) == 1:
         return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
     return ", ".join(f"{grade} of {' and '.join(each)}" for grade, each in names.items())
