@@ -19,7 +19,7 @@ from busplan.gate.rules import all_rules
 from busplan.profile.toml import decode, override
 from busplan.questions.circle.figures import CircleTest
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.fit.circle_move import path_steps
+from busplan.questions.fit.circle_refusal import path_steps
 from busplan.sections.profile import Profile
 
 EXAMPLES = Path(__file__).parent / "examples"

@@ -8,7 +8,7 @@ from typing import Final
 
 from busplan.buses.rule import Mending, RuleProblem
 from busplan.gate.finding import Subject
-from busplan.questions.fit.circle_refusal import STEP, circle_refusals
+from busplan.questions.fit.circle_refusal import STEP, circle_refusals, path_steps
 from busplan.sections.base import value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
@@ -35,7 +35,6 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
         return
     from busplan.questions.circle.failures import STABILITY
     from busplan.questions.circle.roundness import circle_test, to_attack
-    from busplan.questions.fit.circle_move import path_steps
 
     steps = path_steps(profile)
     if steps > most_steps:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from busplan.errors import BusplanError
 from busplan.progress import Progress, part_of
+from busplan.questions.fit.circle_refusal import path_steps
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us, skew_us
 from busplan.sections.profile import Profile
 
@@ -86,8 +87,6 @@ def failures_within(profile: Profile, *, most_steps: int) -> tuple[str, ...] | N
     most_steps
         Most simulated steps of each axis.
     """
-    from busplan.questions.fit.circle_move import path_steps
-
     try:
         steps = path_steps(profile)
     except BusplanError as error:

@@ -16,8 +16,7 @@ from busplan.questions.circle.failures import (
 )
 from busplan.questions.circle.figures import CircleFigures, CircleTest
 from busplan.questions.circle.setup import Contribution, Setup, announce, bus, contributions, estimate, setup, sources
-from busplan.questions.fit.circle_move import loop_timing, path_setpoints
-from busplan.questions.fit.circle_refusal import require_circle
+from busplan.questions.fit.circle_refusal import loop_timing, path_setpoints, require_circle
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us
 from busplan.sections.machine import CONTOUR_MEASURES

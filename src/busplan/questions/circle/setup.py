@@ -6,8 +6,14 @@ from dataclasses import replace
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from busplan.questions.fit.circle_move import loop_axes, loop_timing, path_settling_us
-from busplan.questions.fit.circle_refusal import delivery_of, parameters_in, require_circle
+from busplan.questions.fit.circle_refusal import (
+    delivery_of,
+    loop_axes,
+    loop_timing,
+    parameters_in,
+    path_settling_us,
+    require_circle,
+)
 from busplan.questions.fit.figures import CapacityFigures, figures
 from busplan.questions.fit.network import bus_of
 from busplan.sections.profile import Profile
