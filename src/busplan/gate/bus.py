@@ -70,9 +70,9 @@ def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
             yield RuleProblem("limits.min_spare_axes", _spare(counts, spare, limit), *_room(subject, counts))
 
 
-def _counted(one: RuleFigures) -> Sequence[Any]:
+def _counted(figures: RuleFigures) -> Sequence[Any]:
     """What has counts of its own: the whole, or each group."""
-    return one.groups or (one,)
+    return figures.groups or (figures,)
 
 
 def _spare(counts: Any, spare: int, limit: int) -> str:

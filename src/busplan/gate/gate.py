@@ -93,8 +93,8 @@ def suppress(found: Iterable[Violation], document: Document, *, ran: set[str]) -
     return left, own
 
 
-def _finding(rule: Rule, one: Suppression, words: str, way_out: str = "") -> Finding:
-    return finding_of(rule, RuleProblem("", words, way_out), one.spot, words=words)
+def _finding(rule: Rule, suppression: Suppression, words: str, way_out: str = "") -> Finding:
+    return finding_of(rule, RuleProblem("", words, way_out), suppression.spot, words=words)
 
 
 Status = Literal["ok", "findings", "error"]

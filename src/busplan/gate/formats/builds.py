@@ -20,10 +20,10 @@ def github(report: CheckReport) -> str:
     return "".join(f"{_command(one)}\n" for one in report.located)
 
 
-def _command(one: Located) -> str:
-    finding = one.finding
+def _command(located: Located) -> str:
+    finding = located.finding
     properties = {
-        "file": one.path,
+        "file": located.path,
         "line": str(finding.line),
         "col": str(finding.column),
         "title": f"{finding.code} {finding.rule}",
@@ -106,10 +106,10 @@ def _profile_result(file: FileResult) -> str:
     return f"**{said}**" if "error" in severities else said
 
 
-def _finding_row(one: Located) -> list[str]:
-    finding = one.finding
+def _finding_row(located: Located) -> list[str]:
+    finding = located.finding
     mending = [escaped(finding.help)] if finding.help else []
     mending += map(code, finding.cure.split("\n")) if finding.cure else []
-    place = code(f"{one.path}:{finding.line}:{finding.column}")
+    place = code(f"{located.path}:{finding.line}:{finding.column}")
     words = [escaped(f"{finding.code} {finding.rule}"), finding.severity, escaped(finding.problem)]
     return [place, *words, "<br>".join(mending)]

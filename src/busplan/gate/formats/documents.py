@@ -80,8 +80,8 @@ def _rule(rule: Rule) -> JsonDocument:
     }
 
 
-def _result(one: Located) -> JsonDocument:
-    finding = one.finding
+def _result(located: Located) -> JsonDocument:
+    finding = located.finding
     return {
         "ruleId": finding.code,
         "ruleIndex": list(all_rules()).index(finding.code),
@@ -90,7 +90,7 @@ def _result(one: Located) -> JsonDocument:
         "locations": [
             {
                 "physicalLocation": {
-                    "artifactLocation": _artifact(one.path),
+                    "artifactLocation": _artifact(located.path),
                     "region": {
                         "startLine": finding.line,
                         "startColumn": finding.column,
@@ -99,7 +99,7 @@ def _result(one: Located) -> JsonDocument:
                 }
             }
         ],
-        "partialFingerprints": {"busplanFinding/v1": one.fingerprint},
+        "partialFingerprints": {"busplanFinding/v1": located.fingerprint},
         # SARIF's own fixes are edits of a file, and a cure may be a key that the file does not say.
         **({"properties": {"cure": finding.cure}} if finding.cure else {}),
     }

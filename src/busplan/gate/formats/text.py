@@ -52,19 +52,19 @@ def _lines(report: CheckReport, width: int) -> Iterator[Line]:
         yield BLANK
 
 
-def _heading(one: Located, width: int) -> Iterator[Line]:
+def _heading(located: Located, width: int) -> Iterator[Line]:
     """Place, code and severity, which editors read, and the problem, wrapped."""
-    place, words = finding_parts(one.path, one.finding)
-    head = printable(f"{place} {words.removesuffix(one.finding.message)}")
-    first, *others = _wrapped(one.finding.problem, width, first=head)
-    yield marked_line(first, one.path, one.finding)
+    place, words = finding_parts(located.path, located.finding)
+    head = printable(f"{place} {words.removesuffix(located.finding.message)}")
+    first, *others = _wrapped(located.finding.problem, width, first=head)
+    yield marked_line(first, located.path, located.finding)
     yield from (Line(line, "drawn") for line in others)
 
 
-def _source(one: Located, width: int) -> Iterator[Line]:
-    number, finding = str(one.finding.line), one.finding
+def _source(located: Located, width: int) -> Iterator[Line]:
+    number, finding = str(located.finding.line), located.finding
     margin = f"{' ' * len(number)} | "
-    shown = _shown(one.source, finding.marked_column - 1, finding.marked_end_column - 1, width - len(margin))
+    shown = _shown(located.source, finding.marked_column - 1, finding.marked_end_column - 1, width - len(margin))
     under = f"{margin}{' ' * _columns(shown.before)}"
     carets = "^" * max(_columns(shown.marked), 1)
     named = f"{under}{carets} {finding.rule}"
@@ -74,12 +74,12 @@ def _source(one: Located, width: int) -> Iterator[Line]:
     yield Line(marked, "drawn", (Mark(len(under), len(marked), TONES[finding.severity]),))
 
 
-def _mending(one: Located, width: int) -> Iterator[Line]:
-    if one.finding.help:
-        yield from (Line(line, "drawn") for line in _wrapped(one.finding.help, width, first="help: "))
-    if one.finding.cure:
+def _mending(located: Located, width: int) -> Iterator[Line]:
+    if located.finding.help:
+        yield from (Line(line, "drawn") for line in _wrapped(located.finding.help, width, first="help: "))
+    if located.finding.cure:
         yield Line("cheapest cure:", "drawn")
-        yield from (Line(f"{_INDENT}{line}", "drawn") for line in one.finding.cure.split("\n"))
+        yield from (Line(f"{_INDENT}{line}", "drawn") for line in located.finding.cure.split("\n"))
 
 
 def _wrapped(text: str, width: int, *, first: str) -> list[str]:

@@ -99,16 +99,16 @@ def _owners(result: Capacity) -> Iterator[Owner]:
             yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures)
 
 
-def _state(key: Figure, one: CapacityFigures) -> State:
+def _state(key: Figure, figures: CapacityFigures) -> State:
     """State of a figure that, by itself, decides whether the cycle fits."""
     match key:
         case figure.VERDICT:
-            return "neutral" if one.verdict is None else state_of(one.verdict == FITS)
+            return "neutral" if figures.verdict is None else state_of(figures.verdict == FITS)
         case figure.MARGIN_CORRECTED:
-            is_short = one.safe_required_us is not None and one.safe_required_us > one.available_us
+            is_short = figures.safe_required_us is not None and figures.safe_required_us > figures.available_us
             return "fails" if is_short else "neutral"
         case figure.MARGIN:
-            return "fails" if TIME in one.exceeded else "neutral"
+            return "fails" if TIME in figures.exceeded else "neutral"
     return "neutral"
 
 

@@ -185,19 +185,19 @@ def _more_bytes(network: Network) -> Perturbed:
     return Perturbed(label, "payload_bytes", before, _the_one(size for one in sizes for size in one), found, unknown)
 
 
-def _with_keys(profile: Profile, one: Perturbation) -> Perturbed:
+def _with_keys(profile: Profile, perturbation: Perturbation) -> Perturbed:
     """A change that a kind of bus names by keys of the profile."""
-    key, before, after = ", ".join(one.changes), None, None
-    if len(one.changes) == 1:
-        ((_, after),) = one.changes.items()
+    key, before, after = ", ".join(perturbation.changes), None, None
+    if len(perturbation.changes) == 1:
+        ((_, after),) = perturbation.changes.items()
         before = value_at(profile, key)
-    if one.why_not:
-        return Perturbed(one.label, key, before, None, None, one.why_not)
+    if perturbation.why_not:
+        return Perturbed(perturbation.label, key, before, None, None, perturbation.why_not)
     try:
-        found = network_of(override(profile, dict(one.changes)))
+        found = network_of(override(profile, dict(perturbation.changes)))
     except BusplanError as error:
-        return Perturbed(one.label, key, before, after, None, "; ".join(error.problems))
-    return Perturbed(one.label, key, before, after, found, one.if_nothing)
+        return Perturbed(perturbation.label, key, before, after, None, "; ".join(error.problems))
+    return Perturbed(perturbation.label, key, before, after, found, perturbation.if_nothing)
 
 
 def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:

@@ -53,13 +53,13 @@ class SensitivityDrawing(Drawing):
         What moves the margin.
     """
 
-    def __init__(self, found: Sensitivity) -> None:
+    def __init__(self, sensitivity: Sensitivity) -> None:
         self._bars = [
             _bar(effect.change, effect.margin_change_us)
-            for effect in found.effects
+            for effect in sensitivity.effects
             if effect.margin_change_us is not None
         ]
-        self._margin_us = found.now.margin_corrected_us
+        self._margin_us = sensitivity.now.margin_corrected_us
         self._least_us = min((one.start_us for one in self._bars), default=0.0)
         self._most_us = max((one.end_us for one in self._bars), default=0.0)
 
@@ -166,16 +166,16 @@ def _term(term: Term, profile: Profile) -> str:
     return by_key(bus_of(profile).term_figures)[term.key].label
 
 
-def next_bottleneck_record(found: NextBottleneck, profile: Profile) -> Record:
+def next_bottleneck_record(bottleneck: NextBottleneck, profile: Profile) -> Record:
     """Of the document: what binds now and next, with the sentence that says it."""
     return {
-        "binding_term": found.binding_term.name,
-        "binding_term_us": found.binding_term.us,
-        "next_binding_term": found.next_binding_term.name,
-        "next_binding_term_us": found.next_binding_term.us,
-        "next_margin_corrected_us": found.next_margin_corrected_us,
-        **_limits(found.limits),
-        "text": sentence_text(next_bottleneck_sentence(found, profile)),
+        "binding_term": bottleneck.binding_term.name,
+        "binding_term_us": bottleneck.binding_term.us,
+        "next_binding_term": bottleneck.next_binding_term.name,
+        "next_binding_term_us": bottleneck.next_binding_term.us,
+        "next_margin_corrected_us": bottleneck.next_margin_corrected_us,
+        **_limits(bottleneck.limits),
+        "text": sentence_text(next_bottleneck_sentence(bottleneck, profile)),
     }
 
 
@@ -225,39 +225,41 @@ def _of_periods(found: Sequence[Sensitivity]) -> Iterator[Block]:
         yield from sensitivity_blocks(one)
 
 
-def sensitivity_blocks(found: Sensitivity) -> Iterator[Block]:
+def sensitivity_blocks(sensitivity: Sensitivity) -> Iterator[Block]:
     """What moves the margin at one period.
 
     Parameters
     ----------
-    found
+    sensitivity
         The effects of all changes.
     """
-    yield sensitivity_table(found)
-    drawn = SensitivityDrawing(found)
+    yield sensitivity_table(sensitivity)
+    drawn = SensitivityDrawing(sensitivity)
     if not drawn.is_empty:
-        change = _capital(found.effects[0].change)
+        change = _capital(sensitivity.effects[0].change)
         sides = "a bar to the left takes from it, one to the right adds to it"
         caption = Sentence((f"{change} moves the margin most; {sides}, in us",))
         legend = Sentence(("The red line is where nothing is left of the margin.",)) if drawn.shows_the_end else None
         yield Chart(drawn, caption, legend)
-    yield _headline(found)
-    yield from (Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in found.effects if effect.note)
-    yield next_bottleneck_sentence(found.next_bottleneck, found.profile)
+    yield _headline(sensitivity)
+    yield from (
+        Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in sensitivity.effects if effect.note
+    )
+    yield next_bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.profile)
 
 
-def sensitivity_table(found: Sensitivity) -> Table:
+def sensitivity_table(sensitivity: Sensitivity) -> Table:
     """Every change with what it does to the margin, the largest effect first.
 
     Parameters
     ----------
-    found
+    sensitivity
         The effects of all changes.
     """
     caption = sentence(
-        f"What moves the margin of {{}} at {{}}, by the {found.timing_model} model",
-        figure_value(MARGIN_CORRECTED, found.now.margin_corrected_us),
-        period_value(found.profile.cycle.period_us),
+        f"What moves the margin of {{}} at {{}}, by the {sensitivity.timing_model} model",
+        figure_value(MARGIN_CORRECTED, sensitivity.now.margin_corrected_us),
+        period_value(sensitivity.profile.cycle.period_us),
     )
     columns = (
         TableColumn("what changes", kind="words"),
@@ -266,25 +268,25 @@ def sensitivity_table(found: Sensitivity) -> Table:
         TableColumn("then", "us", group="margin"),
         TableColumn("verdict then", kind="words", wraps=True),
     )
-    rows = (TableRow(tuple(_cells(effect, found))) for effect in found.effects)
+    rows = (TableRow(tuple(_cells(effect, sensitivity))) for effect in sensitivity.effects)
     return Table(columns, tuple(rows), caption)
 
 
-def _cells(one: Effect, found: Sensitivity) -> Iterator[Cell]:
-    yield one.change
-    yield _step(one)
-    yield ShownValue(one.margin_change_us, "margin_change_us", "us", 3, signed=True)
-    then = None if one.then is None else one.then.margin_corrected_us
+def _cells(effect: Effect, sensitivity: Sensitivity) -> Iterator[Cell]:
+    yield effect.change
+    yield _step(effect)
+    yield ShownValue(effect.margin_change_us, "margin_change_us", "us", 3, signed=True)
+    then = None if effect.then is None else effect.then.margin_corrected_us
     yield figure_value(MARGIN_CORRECTED, then)
-    yield _verdict(one.then, found.profile)
+    yield _verdict(effect.then, sensitivity.profile)
 
 
-def _step(one: Effect) -> Cell:
+def _step(effect: Effect) -> Cell:
     """From which value to which; nothing where the change has no single one."""
-    if one.before is None or one.after is None:
+    if effect.before is None or effect.after is None:
         return ""
-    before = ShownValue(one.before, one.key, digits=_DIGITS)
-    after = ShownValue(one.after, one.key, unit_of(one.key), digits=_DIGITS)
+    before = ShownValue(effect.before, effect.key, digits=_DIGITS)
+    after = ShownValue(effect.after, effect.key, unit_of(effect.key), digits=_DIGITS)
     return sentence("{} -> {}", before, after)
 
 
@@ -299,13 +301,13 @@ def _verdict(then: Standing | None, profile: Profile) -> Cell:
     return Sentence((shown, *(f", {one}" for one in why)), "neutral" if _is_well(then) else "fails")
 
 
-def _is_well(one: Standing) -> bool:
-    return one.verdict == FITS and one.safe
+def _is_well(standing: Standing) -> bool:
+    return standing.verdict == FITS and standing.safe
 
 
-def _headline(found: Sensitivity) -> Sentence:
+def _headline(sensitivity: Sensitivity) -> Sentence:
     """Say which change moves the margin most, and after which ones all is no longer well."""
-    first = found.effects[0]
+    first = sensitivity.effects[0]
     if not first.margin_change_us:
         return Sentence(("None of these changes moves the margin.",))
     then = None if first.then is None else first.then.margin_corrected_us
@@ -314,20 +316,20 @@ def _headline(found: Sensitivity) -> Sentence:
         ShownValue(first.margin_change_us, "margin_change_us", "us", 3, signed=True),
         figure_value(MARGIN_CORRECTED, then),
     )
-    return joined(most, *_after_each(found))
+    return joined(most, *_after_each(sensitivity))
 
 
-def _after_each(found: Sensitivity) -> Iterator[Sentence]:
+def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
     """Say what becomes of a cycle that is shown to fit."""
-    if found.now.verdict != FITS:
+    if sensitivity.now.verdict != FITS:
         return
-    made = [(effect.change, effect.then) for effect in found.effects if effect.then is not None]
+    made = [(effect.change, effect.then) for effect in sensitivity.effects if effect.then is not None]
     lost = [change for change, then in made if then.verdict != FITS]
-    unsafe = [change for change, then in made if then.verdict == FITS and found.now.safe and not then.safe]
+    unsafe = [change for change, then in made if then.verdict == FITS and sensitivity.now.safe and not then.safe]
     if lost:
         yield Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
     if unsafe:
-        yield Sentence((f"Its {bus_of(found.profile).safety} is unsafe after {listed(unsafe, 'or')}.",))
+        yield Sentence((f"Its {bus_of(sensitivity.profile).safety} is unsafe after {listed(unsafe, 'or')}.",))
     if not lost and not unsafe:
         yield Sentence(("The cycle is shown to fit after each of them alone.",))
 
@@ -345,27 +347,27 @@ def sensitivity_document(result: Capacity, verdicts: Sequence[Verdict], found: S
     return whole
 
 
-def _rows(found: Sensitivity) -> Iterator[Record]:
+def _rows(sensitivity: Sensitivity) -> Iterator[Record]:
     """One row for each change."""
-    for effect in found.effects:
+    for effect in sensitivity.effects:
         yield {
-            "period_us": found.profile.cycle.period_us,
-            "timing_model": found.timing_model,
-            **_record(effect, found.profile),
+            "period_us": sensitivity.profile.cycle.period_us,
+            "timing_model": sensitivity.timing_model,
+            **_record(effect, sensitivity.profile),
         }
 
 
-def _record(one: Effect, profile: Profile) -> Record:
-    then = one.then
+def _record(effect: Effect, profile: Profile) -> Record:
+    then = effect.then
     safety = bus_of(profile).safety_figure
     own: dict[str, Any] = {} if safety is None else {safety.key: None if then is None else then.safe}
     return {
-        "change": one.change,
-        "key": one.key,
-        "from": one.before,
-        "to": one.after,
-        "margin_change_us": one.margin_change_us,
+        "change": effect.change,
+        "key": effect.key,
+        "from": effect.before,
+        "to": effect.after,
+        "margin_change_us": effect.margin_change_us,
         **fields(then, "margin_corrected_us", "uncertainty_us", "verdict", "exceeded", "not_shown"),
         **own,
-        "note": one.note or None,
+        "note": effect.note or None,
     }

@@ -210,8 +210,8 @@ def _carries(figures: CapacityFigures) -> Sentence:
     )
 
 
-def _safe(one: GroupCapacity) -> ShownValue:
-    return count_value(one.safe_nodes or 0)
+def _safe(group: GroupCapacity) -> ShownValue:
+    return count_value(group.safe_nodes or 0)
 
 
 def _nodes(nodes: int, axes: int) -> Sentence:

@@ -49,11 +49,11 @@ class Plane(NamedTuple):
         return log10(axes) / log10(self.top_axes)
 
 
-def kind_lines(found: KindComparison) -> tuple[KindLine, ...]:
+def kind_lines(comparison: KindComparison) -> tuple[KindLine, ...]:
     """A line for each kind that can have the machine; its letter is one of the kind's name."""
     taken: set[str] = set()
     lines = []
-    for number, one in enumerate(found.compared):
+    for number, one in enumerate(comparison.compared):
         letters = [each for each in f"{one.profile.bus.kind.upper()}{ascii_uppercase}" if each in ascii_uppercase]
         letter = next((each for each in letters if each not in taken), "#")
         taken.add(letter)
@@ -64,20 +64,20 @@ def kind_lines(found: KindComparison) -> tuple[KindLine, ...]:
     return tuple(lines)
 
 
-def _points(one: MachineOnKind) -> tuple[tuple[float, int], ...]:
-    return tuple((each.period_us, each.axes) for each in one.curve if each.axes)
+def _points(machine: MachineOnKind) -> tuple[tuple[float, int], ...]:
+    return tuple((each.period_us, each.axes) for each in machine.curve if each.axes)
 
 
-def plane_of(found: KindComparison) -> Plane:
+def plane_of(comparison: KindComparison) -> Plane:
     """The scales that hold every line and the machine itself."""
-    periods_us = [each.period_us for one in found.compared for each in one.curve]
-    axes = [each.axes or 1 for one in found.compared for each in one.curve]
-    return Plane(min(periods_us), max(periods_us), max(_LEAST_TOP, own_axes(found), *axes))
+    periods_us = [each.period_us for one in comparison.compared for each in one.curve]
+    axes = [each.axes or 1 for one in comparison.compared for each in one.curve]
+    return Plane(min(periods_us), max(periods_us), max(_LEAST_TOP, own_axes(comparison), *axes))
 
 
-def own_axes(found: KindComparison) -> int:
+def own_axes(comparison: KindComparison) -> int:
     """Axes of the machine."""
-    return int(plain(network_of(found.profile).axes))
+    return int(plain(network_of(comparison.profile).axes))
 
 
 def axes_labels(plane: Plane) -> list[int]:
@@ -85,9 +85,9 @@ def axes_labels(plane: Plane) -> list[int]:
     return [int(one) for one in round_numbers(1, plane.top_axes, most=_MOST_LABELS)]
 
 
-def period_labels(found: KindComparison) -> list[tuple[float, str]]:
+def period_labels(comparison: KindComparison) -> list[tuple[float, str]]:
     """Periods of the points with their text, the machine's own among them."""
-    return [(us, period(us)) for us in _periods_us(found.compared)]
+    return [(us, period(us)) for us in _periods_us(comparison.compared)]
 
 
 def _periods_us(compared: Sequence[MachineOnKind]) -> list[float]:
@@ -99,32 +99,32 @@ _WIDEST: Final = 78
 _SEVERAL, _OWN, _OWN_PERIOD = "*", ".", "^"
 
 
-def compare_lines(found: KindComparison, *, width: int) -> list[Line]:
+def compare_lines(comparison: KindComparison, *, width: int) -> list[Line]:
     """Draw a letter where a kind of bus carries so many axes at a period.
 
     Parameters
     ----------
-    found
+    comparison
         The comparison.
     width
         Width of the drawing, in columns.
     """
-    plane, lines = plane_of(found), kind_lines(found)
+    plane, lines = plane_of(comparison), kind_lines(comparison)
     labels = {_row(plane, one): str(one) for one in axes_labels(plane)}
     gutter = max(map(len, labels.values()))
     columns = min(width, _WIDEST) - gutter - 3
     cells = [[" "] * columns for _ in range(_ROWS)]
-    if own_axes(found):
-        cells[_row(plane, own_axes(found))] = [_OWN] * columns
+    if own_axes(comparison):
+        cells[_row(plane, own_axes(comparison))] = [_OWN] * columns
     for line in lines:
         for period_us, axes in line.points:
             place = _column(plane, period_us, columns)
             before = cells[_row(plane, axes)][place]
             cells[_row(plane, axes)][place] = line.letter if before in (" ", _OWN) else _SEVERAL
     drawn = [f"{labels.get(row, ''):>{gutter}} |{''.join(cells[row])}|" for row in reversed(range(_ROWS))]
-    own = _column(plane, found.profile.cycle.period_us, columns)
+    own = _column(plane, comparison.profile.cycle.period_us, columns)
     indent = " " * (gutter + 2)
-    below = (" " * own + _OWN_PERIOD, _below(found, plane, columns))
+    below = (" " * own + _OWN_PERIOD, _below(comparison, plane, columns))
     legend = [f"{line.letter} {line.title}" for line in lines]
     legend += [f"{_SEVERAL} several"] if any(_SEVERAL in row for row in cells) else []
     legend.append(f"{_OWN} and {_OWN_PERIOD} the axes and the period of this machine")
@@ -144,11 +144,11 @@ def _column(plane: Plane, period_us: float, columns: int) -> int:
     return round((columns - 1) * plane.x(period_us))
 
 
-def _below(found: KindComparison, plane: Plane, columns: int) -> str:
+def _below(comparison: KindComparison, plane: Plane, columns: int) -> str:
     """Periods below their columns, this machine's first, the others as far as there is room."""
     taken: dict[int, str] = {}
-    own_us = found.profile.cycle.period_us
-    for period_us, text in sorted(period_labels(found), key=lambda one: one[0] != own_us):
+    own_us = comparison.profile.cycle.period_us
+    for period_us, text in sorted(period_labels(comparison), key=lambda one: one[0] != own_us):
         start = min(max(0, _column(plane, period_us, columns) - len(text) // 2), columns - len(text))
         if all(start + len(text) < other or start > other + len(one) for other, one in taken.items()):
             taken[start] = text
@@ -175,14 +175,14 @@ STYLE: Final = f"""\
 """Rules of the drawing."""
 
 
-def compare_svg(found: KindComparison, *, title: str, inline: bool = False) -> str:
+def compare_svg(comparison: KindComparison, *, title: str, inline: bool = False) -> str:
     """Draw the most axes over the period, a line for each kind of bus, with its scales and legend.
 
     It fills the width of its container, from 320 px on.
 
     Parameters
     ----------
-    found
+    comparison
         The comparison.
     title
         Title: its message in a sentence.
@@ -193,13 +193,13 @@ def compare_svg(found: KindComparison, *, title: str, inline: bool = False) -> s
     SubElement(root, "desc").text = "Most axes that are shown to fit over the period, both logarithmic"
     body = inside(root, x_percent=2.5, width_percent=95.0, y=0)
     y = _GAP if inline else paragraph(body, title, y=8, css="head") + _GAP
-    plane, lines = plane_of(found), kind_lines(found)
-    y = _area(body, found, plane, lines, y=y)
+    plane, lines = plane_of(comparison), kind_lines(comparison)
+    y = _area(body, comparison, plane, lines, y=y)
     root.set("height", str(_legend(body, lines, y=y) + _GAP))
     return markup(root) if inline else styled(markup(root), css=STYLE)
 
 
-def _area(body: Element, found: KindComparison, plane: Plane, lines: tuple[KindLine, ...], *, y: int) -> int:
+def _area(body: Element, comparison: KindComparison, plane: Plane, lines: tuple[KindLine, ...], *, y: int) -> int:
     """Draw the scales and the lines, and return the y below them."""
     text_at(body, "axes, logarithmic", x="0", y=y + 14, css="small")
     top, labels = y + LINE + _RADIUS, axes_labels(plane)
@@ -209,12 +209,12 @@ def _area(body: Element, found: KindComparison, plane: Plane, lines: tuple[KindL
         at = _y(plane, axes, top=top)
         SubElement(area, "line", {"x1": "0", "x2": "100%", "y1": str(at), "y2": str(at), "class": "rule"})
         text_at(body, str(axes), x=f"{gutter - 2:.5g}%", y=at + 4, css="small", anchor="end")
-    _own(area, found, plane, top=top)
+    _own(area, comparison, plane, top=top)
     for line in lines:
         _line(area, line, plane, top=top)
     bottom = top + _HEIGHT
-    shown = period_labels(found)
-    own_us, every = found.profile.cycle.period_us, 1 + (len(shown) - 1) // 6
+    shown = period_labels(comparison)
+    own_us, every = comparison.profile.cycle.period_us, 1 + (len(shown) - 1) // 6
     for number, (period_us, text) in enumerate(shown):
         # Every label has its place on a phone; this machine's own is on its line.
         if number % every == 0 and period_us != own_us:
@@ -224,15 +224,15 @@ def _area(body: Element, found: KindComparison, plane: Plane, lines: tuple[KindL
     return bottom + 2 * LINE + _GAP
 
 
-def _own(area: Element, found: KindComparison, plane: Plane, *, top: int) -> None:
+def _own(area: Element, comparison: KindComparison, plane: Plane, *, top: int) -> None:
     """Draw the period and the axes of the machine as two lines, with a label at the top."""
-    at_percent, axes = 100 * plane.x(found.profile.cycle.period_us), own_axes(found)
+    at_percent, axes = 100 * plane.x(comparison.profile.cycle.period_us), own_axes(comparison)
     x = f"{at_percent:.5g}%"
     SubElement(area, "line", {"x1": x, "x2": x, "y1": str(top - 4), "y2": str(top + _HEIGHT), "class": "own"})
     if axes:
         y = str(_y(plane, axes, top=top))
         SubElement(area, "line", {"x1": "0", "x2": "100%", "y1": y, "y2": y, "class": "own"})
-    words = f"this machine: {period(found.profile.cycle.period_us)}, {plural(axes, 'axis')}"
+    words = f"this machine: {period(comparison.profile.cycle.period_us)}, {plural(axes, 'axis')}"
     text_at(area, words, x=x, y=top - _RADIUS - 2, css="small", anchor=anchor(at_percent, edge=40))
 
 

@@ -222,22 +222,22 @@ def _curve_periods(profile: Profile, smallest_us: Sequence[float | None]) -> tup
     return tuple(sorted({own_us, *(one for one in round_us if MIN_STEP_US <= one <= MAX_TIME_US)}))
 
 
-def _curve(one: MachineOnKind, periods_us: Sequence[float]) -> tuple[SafeAxes, ...]:
-    return tuple(most_safe_axes(override(one.profile, {PERIOD: period_us})) for period_us in periods_us)
+def _curve(machine: MachineOnKind, periods_us: Sequence[float]) -> tuple[SafeAxes, ...]:
+    return tuple(most_safe_axes(override(machine.profile, {PERIOD: period_us})) for period_us in periods_us)
 
 
-def _circle(one: MachineOnKind, run: ComputeCircleFigures) -> CircleAtSmallest | None:
+def _circle(machine: MachineOnKind, run: ComputeCircleFigures) -> CircleAtSmallest | None:
     """The circle at the smallest period, in steps that divide it."""
-    if one.smallest.us is None:
+    if machine.smallest.us is None:
         return None
-    step_us = dividing_step_us(one.smallest.us, most_us=one.profile.servo.step_us)
+    step_us = dividing_step_us(machine.smallest.us, most_us=machine.profile.servo.step_us)
     try:
-        found = run(override(one.profile, {PERIOD: one.smallest.us, STEP: step_us}))
+        found = run(override(machine.profile, {PERIOD: machine.smallest.us, STEP: step_us}))
     except BusplanError as error:
         return CircleAtSmallest(step_us, None, error.problems)
     return CircleAtSmallest(step_us, found, tuple(failure.text for failure in found.failures))
 
 
-def fitting(found: KindComparison) -> Iterator[MachineOnKind]:
+def fitting(comparison: KindComparison) -> Iterator[MachineOnKind]:
     """The kinds on which the machine is shown to fit its period, on a bus that is set safely."""
-    return (machine for machine in found.compared if machine.figures.verdict == FITS and machine.figures.safe)
+    return (machine for machine in comparison.compared if machine.figures.verdict == FITS and machine.figures.safe)

@@ -247,8 +247,8 @@ def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:
         yield figure._replace(key=f"group.{name}.{figure.key}", label=f"{figure.label} of {name}")
 
 
-def _counts(found: CapacityFigures, figure: Figure) -> _Figures:
-    return {f"group.{one.name}.{figure.key}": getattr(one, figure.key) for one in found.groups}
+def _counts(figures: CapacityFigures, figure: Figure) -> _Figures:
+    return {f"group.{one.name}.{figure.key}": getattr(one, figure.key) for one in figures.groups}
 
 
 def _plan(profile: Profile) -> _Figures:

@@ -137,14 +137,14 @@ def _text(text: str, other: str) -> str:
     return f"{'..' if start else ''}{piece}{'..' if end < len(text) else ''}"
 
 
-def change_document(one: KeyDifference) -> JsonDocument:
+def change_document(difference: KeyDifference) -> JsonDocument:
     """A difference as plain data, both values in full."""
     return {
-        "key": one.key,
-        "a": one.a and one.a.value,
-        "a_source": "absent" if one.a is None else one.a.source,
-        "b": one.b and one.b.value,
-        "b_source": "absent" if one.b is None else one.b.source,
+        "key": difference.key,
+        "a": difference.a and difference.a.value,
+        "a_source": "absent" if difference.a is None else difference.a.source,
+        "b": difference.b and difference.b.value,
+        "b_source": "absent" if difference.b is None else difference.b.source,
     }
 
 
@@ -168,28 +168,30 @@ _MOST_NAMED: Final = 4
 """Most figures that a headline names."""
 
 
-def headline(found: Difference) -> Sentence:
+def headline(difference: Difference) -> Sentence:
     """The verdict: where B is worse, and where it is better."""
-    if not found.keys:
+    if not difference.keys:
         return sentence("A and B are the same profile: every key has the same value.")
     verdicts = [
-        one for judgement in ("worse", "better") for one in (*_loud(found, judgement), *_counted(found, judgement))
+        one
+        for judgement in ("worse", "better")
+        for one in (*_loud(difference, judgement), *_counted(difference, judgement))
     ]
     if verdicts:
         said = joined(*verdicts, by="; ")
         return said._replace(parts=(*said.parts, "."))
-    keys = len(found.keys)
-    figures = "and only figures that are neither" if found.judged("neutral") else "and no figure"
+    keys = len(difference.keys)
+    figures = "and only figures that are neither" if difference.judged("neutral") else "and no figure"
     return sentence(
         f"B is neither better nor worse: {{}} {nouns(keys, 'key')} {'differs' if keys == 1 else 'differ'}, {figures}.",
         count_value(keys),
     )
 
 
-def _loud_figures(found: Difference) -> dict[str, dict[Judgement, str]]:
+def _loud_figures(difference: Difference) -> dict[str, dict[Judgement, str]]:
     """Sentences for the figures that have their own, apart from whether the cycle fits."""
     loud: dict[str, dict[Judgement, str]] = {}
-    for bus in (bus_of(found.a), bus_of(found.b)):
+    for bus in (bus_of(difference.a), bus_of(difference.b)):
         if bus.safety_figure is not None:
             loud[bus.safety_figure.key] = {
                 "worse": f"B has an unsafe {bus.safety} where A has a safe one",
@@ -198,8 +200,8 @@ def _loud_figures(found: Difference) -> dict[str, dict[Judgement, str]]:
     return {**loud, "passed": _PASSES}
 
 
-def _loud(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
-    figures = found.judged(judgement)
+def _loud(difference: Difference, judgement: Judgement) -> Iterator[Sentence]:
+    figures = difference.judged(judgement)
     judged = {compared.figure.key for compared in figures}
     models = " and ".join(compared.part for compared in figures if compared.figure.key == "fits")
     state = STATES[judgement]
@@ -208,14 +210,14 @@ def _loud(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
     elif models:
         form = f"{_FITS[judgement]} by the closed form of {models}, which does not change the verdict"
         yield sentence(form, state=state)
-    for key, words in _loud_figures(found).items():
+    for key, words in _loud_figures(difference).items():
         if key in judged:
             yield sentence(words[judgement], state=state)
 
 
-def _counted(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
-    told = {"shown_to_fit", "verdict", "fits", *_loud_figures(found)}
-    names = named([one for one in found.judged(judgement) if one.figure.key not in told], found)
+def _counted(difference: Difference, judgement: Judgement) -> Iterator[Sentence]:
+    told = {"shown_to_fit", "verdict", "fits", *_loud_figures(difference)}
+    names = named([one for one in difference.judged(judgement) if one.figure.key not in told], difference)
     if not names:
         return
     said = sentence(
@@ -227,19 +229,19 @@ def _counted(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
     yield joined(said, sentence("and {} more", count_value(hidden))) if hidden > 0 else said
 
 
-def named(figures: Sequence[ComparedFigure], found: Difference) -> list[str]:
+def named(figures: Sequence[ComparedFigure], difference: Difference) -> list[str]:
     """Names of figures, each once, with the timing model if only one judges it so."""
-    models = {*model_names(found.a), *model_names(found.b)}
+    models = {*model_names(difference.a), *model_names(difference.b)}
     parts: dict[str, list[str]] = {}
     for compared in figures:
         parts.setdefault(compared.figure.label, []).append(compared.part)
     return [f"{label} ({of[0]})" if len(of) == 1 and of[0] in models else label for label, of in parts.items()]
 
 
-def regression_words(found: Difference, regressions: Sequence[ComparedFigure], *, tolerance: float) -> str:
+def regression_words(difference: Difference, regressions: Sequence[ComparedFigure], *, tolerance: float) -> str:
     """Message that lists the regressions."""
     by = f" by more than {tolerance:.12g} %" if tolerance else ""
-    names = named(regressions, found)
+    names = named(regressions, difference)
     return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}"
 
 
@@ -267,12 +269,12 @@ _MOST_KEYS: Final = 20
 """Most keys shown to a reader; JSON lists all."""
 
 
-def diff_report(found: Difference, *, arguments: Arguments) -> Report:
+def diff_report(difference: Difference, *, arguments: Arguments) -> Report:
     """Report of `diff`.
 
     Parameters
     ----------
-    found
+    difference
         The difference.
     arguments
         A and B as they were typed.
@@ -280,9 +282,9 @@ def diff_report(found: Difference, *, arguments: Arguments) -> Report:
     a, b = map(Code, arguments)
     return Report(
         Sentence(("Changes from ", a, " to ", b)),
-        lambda: tuple(_blocks(found, arguments)),
-        partial(diff_document, found, arguments=arguments),
-        lambda: diff_records(found),
+        lambda: tuple(_blocks(difference, arguments)),
+        partial(diff_document, difference, arguments=arguments),
+        lambda: diff_records(difference),
     )
 
 
@@ -312,34 +314,36 @@ def diff_document(found: Difference, *, arguments: Arguments) -> JsonDocument:
     )
 
 
-def diff_records(found: Difference) -> list[Record]:
+def diff_records(difference: Difference) -> list[Record]:
     """One row for each figure, whatever its judgement."""
-    return [_figure_record(figure) for figure in found.figures]
+    return [_figure_record(figure) for figure in difference.figures]
 
 
-def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
+def _blocks(difference: Difference, arguments: Arguments) -> Iterator[Block]:
     """The verdict, the two sides, the keys that differ, and the figures that differ."""
-    yield headline(found)
-    yield _sides(found, arguments)
-    if not found.keys:
-        yield from refused_circle(found.a)
+    yield headline(difference)
+    yield _sides(difference, arguments)
+    if not difference.keys:
+        yield from refused_circle(difference.a)
         return
-    yield from _notes(found)
-    yield change_table(found.keys[:_MOST_KEYS])
-    hidden = len(found.keys) - _MOST_KEYS
+    yield from _notes(difference)
+    yield change_table(difference.keys[:_MOST_KEYS])
+    hidden = len(difference.keys) - _MOST_KEYS
     if hidden > 0:
         yield sentence(f"And {{}} more {nouns(hidden, 'key')}.", count_value(hidden))
     # If one side has no circle, a note says why, and its figures need no rows.
-    shown = [figure for figure in found.figures if figure.judgement != "neutral" or None not in (figure.a, figure.b)]
+    shown = [
+        figure for figure in difference.figures if figure.judgement != "neutral" or None not in (figure.a, figure.b)
+    ]
     if any(one.judgement != "same" for one in shown):
         yield Table(_FIGURES, tuple(map(_row, shown)), heads=3)
-    same = len(named([one for one in shown if one.judgement == "same"], found))
+    same = len(named([one for one in shown if one.judgement == "same"], difference))
     if same:
         are = "is" if same == 1 else "are"
         yield sentence(f"{{}} {nouns(same, 'figure')} {are} the same.", count_value(same))
 
 
-def _sides(found: Difference, arguments: Arguments) -> Table:
+def _sides(difference: Difference, arguments: Arguments) -> Table:
     rows = (
         TableRow(
             (
@@ -350,30 +354,30 @@ def _sides(found: Difference, arguments: Arguments) -> Table:
                 profile.bus.timing_model,
             )
         )
-        for side, argument, profile in zip("AB", arguments, (found.a, found.b), strict=True)
+        for side, argument, profile in zip("AB", arguments, (difference.a, difference.b), strict=True)
     )
     return Table(_SIDES, tuple(rows))
 
 
-def _notes(found: Difference) -> Iterator[Sentence]:
+def _notes(difference: Difference) -> Iterator[Sentence]:
     """Say why a circle fails or has no figures, and how well the inputs of the figures are known."""
-    for side, profile in zip("AB", (found.a, found.b), strict=True):
+    for side, profile in zip("AB", (difference.a, difference.b), strict=True):
         yield from (joined(sentence(f"{side}:"), one) for one in not_applicable(profile))
-    executions = (execution_grades(found.a), execution_grades(found.b))
+    executions = (execution_grades(difference.a), execution_grades(difference.b))
     yield from _graded("execution time behind these figures is", *executions)
-    if found.circles is None:
+    if difference.circles is None:
         yield from (
             joined(sentence(f"{side}:"), words)
-            for side, profile in zip("AB", (found.a, found.b), strict=True)
+            for side, profile in zip("AB", (difference.a, difference.b), strict=True)
             for words in refused_circle(profile)
         )
         return
-    for side, circle in zip("AB", found.circles, strict=True):
+    for side, circle in zip("AB", difference.circles, strict=True):
         if circle.problems:
             state = "FAILED" if circle.simulated else "is not simulated"
             yield Sentence((f"The circle of {side} {state}: {', and '.join(circle.problems)}.",), "warns")
-    if any(circle.simulated for circle in found.circles):
-        grades = (one.servo.grades_given[0] for one in (found.a, found.b))
+    if any(circle.simulated for circle in difference.circles):
+        grades = (one.servo.grades_given[0] for one in (difference.a, difference.b))
         yield from _graded("servo values behind the circle's figures are", *grades)
 
 
@@ -385,13 +389,13 @@ def _graded(words: str, a: str | None, b: str | None) -> Iterator[Sentence]:
         yield sentence(f"The {words} {text}.", state="warns" if "assumed" in text else "neutral")
 
 
-def _row(one: ComparedFigure) -> TableRow:
-    figure = one.figure
-    a, b, difference = (figure_value(figure, getattr(one, key)) for key in ("a", "b", "difference"))
-    relative = ShownValue(one.relative_difference, "relative_difference", "%", 1, signed=True)
-    judged = Words(one.judgement, STATES[one.judgement])
-    cells = (figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged)
-    return TableRow(cells, is_detail=one.judgement == "same")
+def _row(compared: ComparedFigure) -> TableRow:
+    figure = compared.figure
+    a, b, difference = (figure_value(figure, getattr(compared, key)) for key in ("a", "b", "difference"))
+    relative = ShownValue(compared.relative_difference, "relative_difference", "%", 1, signed=True)
+    judged = Words(compared.judgement, STATES[compared.judgement])
+    cells = (figure.label, compared.part, b.unit, a, b, difference._replace(signed=True), relative, judged)
+    return TableRow(cells, is_detail=compared.judgement == "same")
 
 
 def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -> JsonDocument:
@@ -404,10 +408,10 @@ def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -
     }
 
 
-def _figure_record(one: ComparedFigure) -> Record:
+def _figure_record(compared: ComparedFigure) -> Record:
     return {
-        "part": one.part,
-        "figure": one.figure.key,
-        "better": one.figure.better,
-        **fields(one, "a", "b", "difference", "relative_difference", "judgement"),
+        "part": compared.part,
+        "figure": compared.figure.key,
+        "better": compared.figure.better,
+        **fields(compared, "a", "b", "difference", "relative_difference", "judgement"),
     }

@@ -131,10 +131,10 @@ def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Json
     )
 
 
-def input_cells(one: Input) -> tuple[Cell, ...]:
+def input_cells(given: Input) -> tuple[Cell, ...]:
     """Cells of one input."""
-    value = ShownValue(one.value, "value", one.unit, digits=DIGITS)
-    return Code(one.name), value, one.unit, one.grade, one.source
+    value = ShownValue(given.value, "value", given.unit, digits=DIGITS)
+    return Code(given.name), value, given.unit, given.grade, given.source
 
 
 def _figure_table(profile: Profile) -> Table:
@@ -176,18 +176,18 @@ def _in_words(explanation: Explanation) -> Explanation:
     )
 
 
-def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
-    key = one.figure.key
+def _with_words(derivation: Derivation, explanation: Explanation) -> Derivation:
+    key = derivation.figure.key
     if key not in (*OF_DOCUMENT, *OF_SENSITIVITY, "text", "warnings", "cheapest_change"):
-        return one
-    result = capacity(explanation.profile, periods_us=[one.period_us])
+        return derivation
+    result = capacity(explanation.profile, periods_us=[derivation.period_us])
     if key in OF_SENSITIVITY:
         found = sensitivity_document(result, verdicts(result), sensitivities(result))
     else:
         found = capacity_document(result, verdicts(result))
     value = found["verdicts"][0][key]
-    *before, last = one.steps
-    return one._replace(value=value, steps=(*before, last._replace(value=value)))
+    *before, last = derivation.steps
+    return derivation._replace(value=value, steps=(*before, last._replace(value=value)))
 
 
 def _explain_document(explanation: Explanation) -> JsonDocument:
@@ -198,26 +198,26 @@ def _explain_document(explanation: Explanation) -> JsonDocument:
     )
 
 
-def _derivation(one: Derivation) -> JsonDocument:
+def _derivation(derivation: Derivation) -> JsonDocument:
     return {
-        "command": one.command,
-        "figure": one.figure.key,
-        **fields(one.figure, "symbol", "unit", "reference", "meaning"),
-        **fields(one, "timing_model", "transaction", "period_us", "value", "weakest_grade"),
-        "steps": [step._asdict() for step in one.steps],
-        "inputs": [input_._asdict() for input_ in one.inputs],
+        "command": derivation.command,
+        "figure": derivation.figure.key,
+        **fields(derivation.figure, "symbol", "unit", "reference", "meaning"),
+        **fields(derivation, "timing_model", "transaction", "period_us", "value", "weakest_grade"),
+        "steps": [step._asdict() for step in derivation.steps],
+        "inputs": [input_._asdict() for input_ in derivation.inputs],
     }
 
 
-def _step_records(one: Derivation) -> Iterator[Record]:
+def _step_records(derivation: Derivation) -> Iterator[Record]:
     """One row for each step; a figure that is itself an input has one row, without a formula."""
-    figure = one.figure
-    itself = Step(figure.key, figure.symbol, figure.reference, "", "", one.value, figure.unit)
-    for number, step in enumerate(one.steps or (itself,), start=1):
+    figure = derivation.figure
+    itself = Step(figure.key, figure.symbol, figure.reference, "", "", derivation.value, figure.unit)
+    for number, step in enumerate(derivation.steps or (itself,), start=1):
         yield {
-            "command": one.command,
+            "command": derivation.command,
             "figure": figure.key,
-            **fields(one, "timing_model", "transaction", "period_us"),
+            **fields(derivation, "timing_model", "transaction", "period_us"),
             "step": number,
             **fields(step, "reference", "symbol", "formula", "numbers"),
             "value": json_text(step.value) if _has_names(step.value) else step.value,
@@ -225,28 +225,30 @@ def _step_records(one: Derivation) -> Iterator[Record]:
         }
 
 
-def _section(one: Derivation, profile: str) -> Chapter:
+def _section(derivation: Derivation, profile: str) -> Chapter:
     """The result, its meaning, every step to it, and the inputs."""
-    figure = one.figure
-    kind = f"{one.transaction}, " if one.transaction else ""
+    figure = derivation.figure
+    kind = f"{derivation.transaction}, " if derivation.transaction else ""
     title = Sentence(
         (
-            *(Code(figure.key), " of ", Code(profile), " at ", period_value(one.period_us)),
-            *(f", {kind}{one.timing_model} model: ", *_result_parts(one)),
+            *(Code(figure.key), " of ", Code(profile), " at ", period_value(derivation.period_us)),
+            *(f", {kind}{derivation.timing_model} model: ", *_result_parts(derivation)),
         )
     )
     about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}.",))
-    steps = Calculation(tuple(map(_step, one.steps)))
-    found: tuple[Block, ...] = (about, steps, _inputs(one))
+    steps = Calculation(tuple(map(_step, derivation.steps)))
+    found: tuple[Block, ...] = (about, steps, _inputs(derivation))
     return Chapter(title, found)
 
 
-def _result_parts(one: Derivation) -> tuple[Part, ...]:
+def _result_parts(derivation: Derivation) -> tuple[Part, ...]:
     """The result in a sentence: one figure, or the keys that a change sets."""
-    if isinstance(one.value, dict) and "changes" in one.value:
-        settings = (Sentence((Code(key), " = ", ShownValue(new, key))) for key, new in one.value["changes"].items())
+    if isinstance(derivation.value, dict) and "changes" in derivation.value:
+        settings = (
+            Sentence((Code(key), " = ", ShownValue(new, key))) for key, new in derivation.value["changes"].items()
+        )
         return joined(*settings, by=", ").parts
-    found = _result(one.value, one.figure.key, one.figure.unit)
+    found = _result(derivation.value, derivation.figure.key, derivation.figure.unit)
     return (found if isinstance(found, ShownValue) else found.text,)
 
 
@@ -278,7 +280,7 @@ def _step(step: Step) -> blocks.CalculationStep:
     return blocks.CalculationStep(step.reference, step.symbol, formula, numbers, result)
 
 
-def _inputs(one: Derivation) -> Table:
-    rows = (TableRow((Code(given.symbol), *input_cells(given))) for given in one.inputs)
-    caption = Sentence((f"It starts from these; the least well known is {one.weakest_grade}.",))
+def _inputs(derivation: Derivation) -> Table:
+    rows = (TableRow((Code(given.symbol), *input_cells(given))) for given in derivation.inputs)
+    caption = Sentence((f"It starts from these; the least well known is {derivation.weakest_grade}.",))
     return Table((_SYMBOL, *INPUT_COLUMNS), tuple(rows), caption, stacks=True)

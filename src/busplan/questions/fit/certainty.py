@@ -130,19 +130,19 @@ def limit_codes(network: Network) -> dict[str, Number]:
     return {limit.key: limit.verdict_code(network) for limit in bus_of(network.profile).limits if not limit.is_safety}
 
 
-def time_code(found: Certainty, network: Network) -> Number:
+def time_code(weighed: Certainty, network: Network) -> Number:
     """The place among `VERDICTS` of the limit of time.
 
     Parameters
     ----------
-    found
+    weighed
         The certainty of the network's cycle.
     network
         The network.
     """
     given_us = available_us(network)
-    is_shown = fits_in(found.safe_required_us, available_us=given_us)
-    best_us: Number = found.margin_corrected_us + found.uncertainty_us
+    is_shown = fits_in(weighed.safe_required_us, available_us=given_us)
+    best_us: Number = weighed.margin_corrected_us + weighed.uncertainty_us
     least_us: Number = -FIT_ROUNDING * given_us
     return choose(is_shown, KEPT, choose(best_us < least_us, BROKEN, NOT_SHOWN_KEPT))
 
@@ -168,9 +168,9 @@ class Judged(Protocol):
         """Keys of the limits that may be kept; None as the verdict."""
 
 
-def limits_behind(one: Judged) -> tuple[str, ...]:
+def limits_behind(judged: Judged) -> tuple[str, ...]:
     """Keys of the limits of the bus that a verdict rests on, without time: the broken ones, or those not shown."""
-    keys = (one.not_shown or ()) if one.verdict == NOT_SHOWN else one.exceeded
+    keys = (judged.not_shown or ()) if judged.verdict == NOT_SHOWN else judged.exceeded
     return tuple(key for key in keys if key != TIME)
 
 

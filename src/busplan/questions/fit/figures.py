@@ -320,22 +320,22 @@ def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[st
     }
 
 
-def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
+def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
     """Figures of how sure the verdict is that follow by operators alone.
 
     Parameters
     ----------
-    found
+    weighed
         The certainty of the cycle. Its numbers may be of any sort.
     cycle
         The cycle under the timing model that decides.
     """
     return {
-        "bias_us": found.bias_us,
-        "margin_corrected_us": found.margin_corrected_us,
-        "uncertainty_us": found.known_uncertainty_us,
-        "safe_required_us": found.safe_required_us,
-        "safe_min_period_us": shortest_us(cycle.network, found.safe_required_us, is_shown=True),
+        "bias_us": weighed.bias_us,
+        "margin_corrected_us": weighed.margin_corrected_us,
+        "uncertainty_us": weighed.known_uncertainty_us,
+        "safe_required_us": weighed.safe_required_us,
+        "safe_min_period_us": shortest_us(cycle.network, weighed.safe_required_us, is_shown=True),
     }
 
 

@@ -53,17 +53,17 @@ Looks = Mapping[tuple[State, tuple[str, ...]], Look]
 """The look of each region, by its state and limits."""
 
 
-def looks_of(found: TradeOff) -> Looks:
+def looks_of(trade_off: TradeOff) -> Looks:
     """Give each region of a map its look: that of its state, with a letter for each limit that no time helps.
 
     Parameters
     ----------
-    found
+    trade_off
         The map.
     """
     looks: dict[tuple[State, tuple[str, ...]], Look] = {}
     taken: set[str] = set()
-    for one in found.regions:
+    for one in trade_off.regions:
         looks[one.state, one.limited_by] = LOOKS[one.state]
         if one.state == "does not fit" and one.limited_by != (TIME,):
             letters = (letter for letter in "".join(one.limited_by) + ascii_lowercase if letter in ascii_lowercase)
@@ -78,12 +78,12 @@ def look_of(cell: Cell, looks: Looks) -> Look:
     return looks[cell.state, cell.limited_by]
 
 
-def legend_of(found: TradeOff, looks: Looks) -> list[Swatch]:
+def legend_of(trade_off: TradeOff, looks: Looks) -> list[Swatch]:
     """Explain each mark of a map once; a letter names its limit.
 
     Parameters
     ----------
-    found
+    trade_off
         The map.
     looks
         From `looks_of`.
@@ -91,15 +91,15 @@ def legend_of(found: TradeOff, looks: Looks) -> list[Swatch]:
     entries: dict[str, Swatch] = {}
     for (state, limits), look in looks.items():
         limit = f": {' and '.join(limits)}" if look.ink == _BARRED.ink else ""
-        entries.setdefault(look.mark, Swatch(look.ink, look.mark, f"{state_words(state, found)}{limit}"))
+        entries.setdefault(look.mark, Swatch(look.ink, look.mark, f"{state_words(state, trade_off)}{limit}"))
     return list(entries.values())
 
 
-def state_words(state: State, found: TradeOff) -> str:
+def state_words(state: State, trade_off: TradeOff) -> str:
     """Name of a state on a map."""
     if state == "unsafe":
-        return f"unsafe {bus_of(found.profile).safety}"
-    return f"{state}, and the circle passes" if state == "fits" and found.with_circle else state
+        return f"unsafe {bus_of(trade_off.profile).safety}"
+    return f"{state}, and the circle passes" if state == "fits" and trade_off.with_circle else state
 
 
 def limit_words(region: Region | Cell, profile: Profile) -> str:
@@ -125,9 +125,11 @@ def value_text(direction: Direction, value: Value) -> str:
     return with_unit(shown._replace(digits=_DIGITS))
 
 
-def setting_words(found: TradeOff, cell: Cell) -> str:
+def setting_words(trade_off: TradeOff, cell: Cell) -> str:
     """Write the setting of a cell, as "8 axes, period 4 ms"."""
-    return ", ".join(_along(one, value, found.profile) for one, value in ((found.x, cell.x), (found.y, cell.y)))
+    return ", ".join(
+        _along(one, value, trade_off.profile) for one, value in ((trade_off.x, cell.x), (trade_off.y, cell.y))
+    )
 
 
 def _along(direction: Direction, value: Value, profile: Profile) -> str:
@@ -135,15 +137,15 @@ def _along(direction: Direction, value: Value, profile: Profile) -> str:
     return f"{text} axes" if direction.key == AXES else f"{title_of(direction, profile)} {text}"
 
 
-def map_title(found: TradeOff) -> str:
+def map_title(trade_off: TradeOff) -> str:
     """Say what lies along which direction."""
-    return f"{title_of(found.y, found.profile)} up, {title_of(found.x, found.profile)} across"
+    return f"{title_of(trade_off.y, trade_off.profile)} up, {title_of(trade_off.x, trade_off.profile)} across"
 
 
-def cell_words(found: TradeOff, cell: Cell) -> str:
+def cell_words(trade_off: TradeOff, cell: Cell) -> str:
     """Say the setting of a cell, its state and its limit."""
-    limit = limit_words(cell, found.profile)
-    return f"{setting_words(found, cell)}: {state_words(cell.state, found)}{limit and f', {limit}'}"
+    limit = limit_words(cell, trade_off.profile)
+    return f"{setting_words(trade_off, cell)}: {state_words(cell.state, trade_off)}{limit and f', {limit}'}"
 
 
 _BRACKETED: Final = 3
@@ -153,25 +155,25 @@ _OWN_ROW: Final = "> "
 _OWN_COLUMN: Final = "^"
 
 
-def map_lines(found: TradeOff, *, width: int) -> list[Line]:
+def map_lines(trade_off: TradeOff, *, width: int) -> list[Line]:
     """Draw a map: a row of characters for each value of `y`, the last on top.
 
     Parameters
     ----------
-    found
+    trade_off
         The map.
     width
         Width of the drawing, in columns; a map of many narrow cells may need up to 80.
     """
-    labels = [value_text(found.y, value) for value in found.y.values]
+    labels = [value_text(trade_off.y, value) for value in trade_off.y.values]
     gutter = len(_OWN_ROW) + max(map(len, labels))
     room = width - gutter - len(_EDGE) - 1
-    widest = max(_BRACKETED, *(len(value_text(found.x, value)) + 1 for value in found.x.values))
-    cell_width = max(1, min(widest, room // len(found.x.values)))
-    own_row, own_column = found.own_place or (None, None)
-    looks = looks_of(found)
+    widest = max(_BRACKETED, *(len(value_text(trade_off.x, value)) + 1 for value in trade_off.x.values))
+    cell_width = max(1, min(widest, room // len(trade_off.x.values)))
+    own_row, own_column = trade_off.own_place or (None, None)
+    looks = looks_of(trade_off)
     lines = []
-    for number, (label, row) in enumerate(zip(labels, found.rows, strict=True)):
+    for number, (label, row) in enumerate(zip(labels, trade_off.rows, strict=True)):
         head = f"{_OWN_ROW if number == own_row else '':<{len(_OWN_ROW)}}{label:>{gutter - len(_OWN_ROW)}}{_EDGE}"
         cells = _cells(row, looks, own=own_column if number == own_row else None, cell_width=cell_width)
         tones = _tones(row, start=len(head), cell_width=cell_width)
@@ -179,9 +181,9 @@ def map_lines(found: TradeOff, *, width: int) -> list[Line]:
     indent = " " * (gutter + len(_EDGE))
     return [
         *reversed(lines),
-        *(Line(f"{indent}{one}".rstrip(), "drawn") for one in _below(found, own_column, cell_width=cell_width)),
+        *(Line(f"{indent}{one}".rstrip(), "drawn") for one in _below(trade_off, own_column, cell_width=cell_width)),
         BLANK,
-        *legend_lines(_legend_words(found, looks, is_bracketed=cell_width >= _BRACKETED), width=width),
+        *legend_lines(_legend_words(trade_off, looks, is_bracketed=cell_width >= _BRACKETED), width=width),
     ]
 
 
@@ -202,22 +204,22 @@ def _tones(row: Sequence[Cell | NotDrawn], *, start: int, cell_width: int) -> It
         start = end
 
 
-def _below(found: TradeOff, own: int | None, *, cell_width: int) -> Iterator[str]:
+def _below(trade_off: TradeOff, own: int | None, *, cell_width: int) -> Iterator[str]:
     """A pointer to the column of this design, and values of `x` below their columns as far as there is room."""
     if own is not None:
         yield " " * ((cell_width - 1) // 2 + own * cell_width) + _OWN_COLUMN
-    texts = [value_text(found.x, value) for value in found.x.values]
+    texts = [value_text(trade_off.x, value) for value in trade_off.x.values]
     line = ""
     for column, start in placed_labels(texts, own=own, pitch=cell_width, letter=1).items():
         line = f"{line:<{int(start)}}{texts[column]}"
     yield line
 
 
-def _legend_words(found: TradeOff, looks: Looks, *, is_bracketed: bool) -> list[str]:
-    entries = [f"{entry.letter} {entry.text}" for entry in legend_of(found, looks)]
-    if found.own is not None:
+def _legend_words(trade_off: TradeOff, looks: Looks, *, is_bracketed: bool) -> list[str]:
+    entries = [f"{entry.letter} {entry.text}" for entry in legend_of(trade_off, looks)]
+    if trade_off.own is not None:
         entries.append("[ ] or > and ^ this design" if is_bracketed else "> and ^ this design")
-    return [*entries, "blank cannot exist"] if found.not_drawn else entries
+    return [*entries, "blank cannot exist"] if trade_off.not_drawn else entries
 
 
 _CELL: Final = 20
@@ -237,14 +239,14 @@ STYLE: Final = """\
 """Rules of the drawing."""
 
 
-def map_svg(found: TradeOff, *, title: str, inline: bool = False) -> str:
+def map_svg(trade_off: TradeOff, *, title: str, inline: bool = False) -> str:
     """Draw a map with its scales and, as a file of its own, its title and legend.
 
     It fills the width of its container, from 320 px on.
 
     Parameters
     ----------
-    found
+    trade_off
         The map.
     title
         Title: its message in a sentence.
@@ -252,39 +254,39 @@ def map_svg(found: TradeOff, *, title: str, inline: bool = False) -> str:
         If True, leave out style sheet, title and legend: the page has them.
     """
     root = drawing(title, css="chart map")
-    SubElement(root, "desc").text = map_title(found)
+    SubElement(root, "desc").text = map_title(trade_off)
     body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
-    looks = looks_of(found)
+    looks = looks_of(trade_off)
     y = 0 if inline else paragraph(body, title, y=8, css="head") + _GAP
-    y = _map(body, found, looks, y=y)
+    y = _map(body, trade_off, looks, y=y)
     if not inline:
-        y = _legend(body, found, looks, y=y + _GAP) + _GAP
+        y = _legend(body, trade_off, looks, y=y + _GAP) + _GAP
     root.set("height", str(y))
     return markup(root) if inline else styled(markup(root), css=STYLE)
 
 
-def _map(body: Element, found: TradeOff, looks: Looks, *, y: int) -> int:
+def _map(body: Element, trade_off: TradeOff, looks: Looks, *, y: int) -> int:
     """Draw both scales and the cells, and return the y below them."""
-    labels = [value_text(found.y, value) for value in found.y.values]
+    labels = [value_text(trade_off.y, value) for value in trade_off.y.values]
     gutter = min(40.0, 100 * (_LETTER * max(map(len, labels)) + 10) / PHONE)
-    text_at(body, title_of(found.y, found.profile), x="0", y=y + 14, css="small")
+    text_at(body, title_of(trade_off.y, trade_off.profile), x="0", y=y + 14, css="small")
     y += LINE
     tall = _CELL if len(labels) <= _MOST_TALL else _THIN_CELL
     area = inside(body, x_percent=gutter, width_percent=100 - gutter, y=0)
     bottom = y + tall * len(labels)
-    own_row, own_column = found.own_place or (None, None)
+    own_row, own_column = trade_off.own_place or (None, None)
     for number, label in enumerate(labels):
         top = bottom - tall * (number + 1)
         if tall == _CELL or number % 2 == 0 or number == own_row:
             css = "small here" if number == own_row else "small"
             text_at(body, label, x=f"{gutter - 1.5:.5g}%", y=top + tall - 4, css=css, anchor="end")
-    for number, row in enumerate(found.rows):
-        _row(area, found, row, looks, top=bottom - tall * (number + 1), tall=tall)
+    for number, row in enumerate(trade_off.rows):
+        _row(area, trade_off, row, looks, top=bottom - tall * (number + 1), tall=tall)
     if own_row is not None and own_column is not None:
-        box = _box(own_column, bottom - tall * (own_row + 1), of=len(found.x.values), tall=tall)
+        box = _box(own_column, bottom - tall * (own_row + 1), of=len(trade_off.x.values), tall=tall)
         SubElement(area, "rect", {**box, "class": "own"})
-    _across(area, found, own_column, y=bottom + 15, room=PHONE * (1 - gutter / 100))
-    text_at(body, title_of(found.x, found.profile), x="100%", y=bottom + 32, css="small", anchor="end")
+    _across(area, trade_off, own_column, y=bottom + 15, room=PHONE * (1 - gutter / 100))
+    text_at(body, title_of(trade_off.x, trade_off.profile), x="100%", y=bottom + 32, css="small", anchor="end")
     return bottom + 2 * LINE
 
 
@@ -292,13 +294,15 @@ def _box(column: int, top: int, *, of: int, tall: int) -> dict[str, str]:
     return {"x": f"{100 * column / of:.4g}%", "y": str(top), "width": f"{100 / of:.4g}%", "height": str(tall)}
 
 
-def _row(area: Element, found: TradeOff, row: Sequence[Cell | NotDrawn], looks: Looks, *, top: int, tall: int) -> None:
+def _row(
+    area: Element, trade_off: TradeOff, row: Sequence[Cell | NotDrawn], looks: Looks, *, top: int, tall: int
+) -> None:
     """Draw the cells of a row, whose words are tooltips, and their marks where there is room."""
     drawn = {column: one for column, one in enumerate(row) if isinstance(one, Cell)}
     for column, one in drawn.items():
         css = f"cell {look_of(one, looks).ink}"
         rect = SubElement(area, "rect", {**_box(column, top, of=len(row), tall=tall), "class": css})
-        SubElement(rect, "title").text = cell_words(found, one)
+        SubElement(rect, "title").text = cell_words(trade_off, one)
     if drawn and len(row) <= _MOST_TALL and tall == _CELL:
         # One text with a place for each character: a page may have many maps.
         places = " ".join(f"{100 * (column + 0.5) / len(row):.4g}%" for column in drawn)
@@ -306,27 +310,27 @@ def _row(area: Element, found: TradeOff, row: Sequence[Cell | NotDrawn], looks: 
         text_at(area, marks, x=places, y=top + 14, css="mark", anchor="middle")
 
 
-def _across(area: Element, found: TradeOff, own: int | None, *, y: int, room: float) -> None:
+def _across(area: Element, trade_off: TradeOff, own: int | None, *, y: int, room: float) -> None:
     """Draw the values of `x`, as many as there is room for on a phone, and always this design's."""
-    texts = [value_text(found.x, value) for value in found.x.values]
+    texts = [value_text(trade_off.x, value) for value in trade_off.x.values]
     pitch = room / len(texts)
     for column in placed_labels(texts, own=own, pitch=pitch, letter=_LETTER):
         x = f"{100 * (column + 0.5) / len(texts):.5g}%"
         text_at(area, texts[column], x=x, y=y, css="small here" if column == own else "small", anchor="middle")
 
 
-def _legend(body: Element, found: TradeOff, looks: Looks, *, y: int) -> int:
+def _legend(body: Element, trade_off: TradeOff, looks: Looks, *, y: int) -> int:
     """Draw the meaning of each colour and mark, and return the y below them."""
-    for entry in legend_of(found, looks):
+    for entry in legend_of(trade_off, looks):
         SubElement(body, "rect", {"class": entry.ink, "y": str(y + 3), "width": "14", "height": "14"})
         text_at(body, entry.letter, x="7", y=y + 14, css="mark", anchor="middle")
         text_at(body, entry.text, x="22", y=y + 15)
         y += LINE
-    if found.own is not None:
+    if trade_off.own is not None:
         SubElement(body, "rect", {"class": "own", "x": "1.5", "y": str(y + 4), "width": "11", "height": "11"})
         text_at(body, "this design", x="22", y=y + 15)
         y += LINE
-    if found.not_drawn:
+    if trade_off.not_drawn:
         text_at(body, "blank: cannot exist", x="22", y=y + 15)
         y += LINE
     return y

@@ -98,9 +98,9 @@ def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
     return _change(profile, more, nodes=nodes), more.why
 
 
-def _change(profile: Profile, found: Cure, *, nodes: int) -> Change | None:
-    if found.changes is None:
+def _change(profile: Profile, cure: Cure, *, nodes: int) -> Change | None:
+    if cure.changes is None:
         return None
-    after = override(profile, dict(found.changes))
+    after = override(profile, dict(cure.changes))
     decided = figures(after, model=bus_of(after).deciding_model)
-    return Change(found.changes, nodes, decided, circle_is_untested=found.circle_failures is None)
+    return Change(cure.changes, nodes, decided, circle_is_untested=cure.circle_failures is None)

@@ -121,13 +121,13 @@ def _freed(plan: Plan, before: str | None = None) -> str:
     return listed(labels, "and") if labels else "anything else"
 
 
-def _relaxed(plan: Plan, one: Relaxation) -> Sentence:
+def _relaxed(plan: Plan, relaxation: Relaxation) -> Sentence:
     """Say what would be enough, and what to set then."""
-    changes = _settings(plan.goal, one.changes).parts if one.changes else ("nothing to change",)
-    if one.value is not None:
-        value = ShownValue(one.value, one.relaxed)
-        return Sentence((f"Enough would be {one.relaxed} = ", value, ": ", *changes, "."))
-    what = "leave out the circle" if one.relaxed == CIRCLE else f"free the {_label(plan, one.relaxed)}"
+    changes = _settings(plan.goal, relaxation.changes).parts if relaxation.changes else ("nothing to change",)
+    if relaxation.value is not None:
+        value = ShownValue(relaxation.value, relaxation.relaxed)
+        return Sentence((f"Enough would be {relaxation.relaxed} = ", value, ": ", *changes, "."))
+    what = "leave out the circle" if relaxation.relaxed == CIRCLE else f"free the {_label(plan, relaxation.relaxed)}"
     return Sentence((f"Enough would be to {what}: ", *changes, "."))
 
 

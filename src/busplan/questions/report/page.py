@@ -179,9 +179,9 @@ def _facts(subject: _Subject) -> Facts:
     )
 
 
-def _commands(found: Sources) -> Chapter:
+def _commands(sources: Sources) -> Chapter:
     columns = (TableColumn("what", kind="words"), TableColumn("command", kind="words"))
-    rows = tuple(TableRow((source.command.purpose, source.command)) for source in found.values())
+    rows = tuple(TableRow((source.command.purpose, source.command)) for source in sources.values())
     line = "The JSON document of one of these commands has each figure above, with all its digits."
     table = Table(columns, rows, Sentence(("Commands",)), stacks=True)
     return part("commands", "How to get every figure again", (Sentence((line,)), table))

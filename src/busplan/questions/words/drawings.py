@@ -80,17 +80,17 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
     return scale.marks(area, top=top, bottom=y)
 
 
-def _drawn(one: CapacityFigures, end_us: float) -> tuple[Figure, ...]:
+def _drawn(figures: CapacityFigures, end_us: float) -> tuple[Figure, ...]:
     """The terms, and the rest of the slice if the scale reaches its end."""
-    terms = kind_named(one.kind).term_figures
-    return (*terms, LEFT) if end_us >= one.available_us else terms
+    terms = kind_named(figures.kind).term_figures
+    return (*terms, LEFT) if end_us >= figures.available_us else terms
 
 
-def _segments(one: CapacityFigures, terms: Sequence[Figure]) -> Iterator[_Segment]:
+def _segments(figures: CapacityFigures, terms: Sequence[Figure]) -> Iterator[_Segment]:
     """The terms that take time, one after the other."""
     start_us = 0.0
     for term in terms:
-        size_us = getattr(one, term.key)
+        size_us = getattr(figures, term.key)
         if size_us > 0:
             yield _Segment(term, start_us, start_us + size_us)
             start_us += size_us
@@ -206,18 +206,18 @@ def _legend(root: Element, steps: Sequence[NodeSteps]) -> None:
         text_at(place, one.timing_model, x="50", y=14)
 
 
-def _path(one: NodeSteps, plane: _Plane) -> str:
+def _path(steps: NodeSteps, plane: _Plane) -> str:
     """Path of the staircase from the left edge to the right one."""
-    commands = chain(_commands(one, plane), [f"H{_WIDE}"])
+    commands = chain(_commands(steps, plane), [f"H{_WIDE}"])
     return "".join(commands)
 
 
-def _commands(one: NodeSteps, plane: _Plane) -> Iterator[str]:
-    axes = one.max_axes(plane.from_us)
+def _commands(steps: NodeSteps, plane: _Plane) -> Iterator[str]:
+    axes = steps.max_axes(plane.from_us)
     yield f"M0 {plane.y(axes) - _TOP:.1f}"
-    for from_us in one.from_us:
+    for from_us in steps.from_us:
         if plane.from_us < from_us <= plane.to_us:
-            axes += one.axes_per_node
+            axes += steps.axes_per_node
             yield f"H{plane.x(from_us) / 100 * _WIDE:.1f}V{plane.y(axes) - _TOP:.1f}"
 
 
