@@ -33,7 +33,7 @@ def init_command(
         option(
             "--bus KIND",
             f"Kind of bus: {' or '.join(kind_names())}.  [default: {_KIND}]",
-            autocompletion=lambda incomplete: [one for one in kind_names() if one.startswith(incomplete)],
+            autocompletion=lambda incomplete: [kind for kind in kind_names() if kind.startswith(incomplete)],
         ),
     ] = None,
     nodes: Annotated[

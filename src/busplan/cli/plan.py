@@ -169,7 +169,7 @@ def _check_options(
 ) -> None:
     problems = []
     if axes is not None:
-        nodes = [one.typed for one in changes.each if one.key == "bus.nodes"]
+        nodes = [change.typed for change in changes.each if change.key == "bus.nodes"]
         problems += [f"{typed} and --axes {axes}: give one of them" for typed in nodes]
     if apply and new is not None:
         problems.append(f"--apply and -o {new}: give one of them; -o leaves PROFILE as it is")

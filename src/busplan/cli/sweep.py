@@ -161,9 +161,9 @@ def sweep_command(
 
     loaded = load_changed(profile, changes)
     varied = parse_axes(vary or [])
-    for one in changes.each:
+    for change in changes.each:
         for key in varied:
-            require_separate(one, key, typed=f"--vary {key}")
+            require_separate(change, key, typed=f"--vary {key}")
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")

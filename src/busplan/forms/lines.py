@@ -100,7 +100,7 @@ def _spans(text: str, width: int, hang: int) -> Iterator[tuple[int, int]]:
     breaks = [(match.start(), match.end()) for match in _BREAK.finditer(text) if match.start() > hang]
     start, room = 0, width
     while len(text) - start > room:
-        fitting = [one for one in breaks if start < one[0] <= start + room]
+        fitting = [gap for gap in breaks if start < gap[0] <= start + room]
         end, after = fitting[-1] if fitting else (start + room, start + room)
         yield start, end
         start, room = after, max(width - hang, 1)

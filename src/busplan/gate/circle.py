@@ -30,7 +30,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     """
     profile, most_steps = subject.profile, subject.circle_steps
     refused = circle_refusals(profile) if subject.deciding.circle_refused_by else ()
-    yield from (("BP203", _refused(one, subject)) for one in refused)
+    yield from (("BP203", _refused(cause, subject)) for cause in refused)
     if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
         return
     from busplan.questions.circle.failures import STABILITY

@@ -232,7 +232,7 @@ def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
     """Make the result for a file that is not text."""
     lines = content.decode("utf-8-sig", errors="replace").split("\n")
     found = tuple(_of_file(error))
-    return FileResult(name, None, found, {}, tuple(lines[one.line - 1] for one in found))
+    return FileResult(name, None, found, {}, tuple(lines[finding.line - 1] for finding in found))
 
 
 def _of_file(error: PlacedError) -> Iterator[Finding]:
@@ -260,4 +260,4 @@ def _said(placed: Violation, subject: Subject) -> Finding:
 def _result(document: Document, name: str | None, found: list[Finding]) -> FileResult:
     ordered = tuple(sorted(found, key=lambda one: (one.line, one.column, one.code, one.message)))
     lines = document.text.split("\n") if ordered else []
-    return FileResult(document.name, name, ordered, {}, tuple(lines[one.line - 1] for one in ordered))
+    return FileResult(document.name, name, ordered, {}, tuple(lines[finding.line - 1] for finding in ordered))

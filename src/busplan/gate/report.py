@@ -84,9 +84,9 @@ def check_report(report: CheckReport) -> Report:
 
 def _sentences(report: CheckReport) -> Iterator[Sentence]:
     """Each finding, each file that could not be checked, and the summary."""
-    for one in report.located:
-        place, words = finding_parts(one.path, one.finding)
-        yield Sentence((Code(place), f" {words}"), "fails" if one.finding.severity == "error" else "warns")
+    for located in report.located:
+        place, words = finding_parts(located.path, located.finding)
+        yield Sentence((Code(place), f" {words}"), "fails" if located.finding.severity == "error" else "warns")
     yield from (Sentence((file.failure,), "fails") for file in report.files if file.failure is not None)
     yield summary_sentence(report)
 
@@ -120,7 +120,7 @@ def _state(report: CheckReport) -> State:
 
 def check_records(report: CheckReport) -> list[Record]:
     """One row for each finding."""
-    return [{"path": one.path, **one.finding._asdict()} for one in report.located]
+    return [{"path": located.path, **located.finding._asdict()} for located in report.located]
 
 
 def check_document(report: CheckReport) -> JsonDocument:

@@ -17,7 +17,7 @@ from busplan.questions.words.documents import changes_sentences
 
 def github(report: CheckReport) -> str:
     """One workflow command for each finding, which GitHub shows next to the line of the file."""
-    return "".join(f"{_command(one)}\n" for one in report.located)
+    return "".join(f"{_command(located)}\n" for located in report.located)
 
 
 def _command(located: Located) -> str:
@@ -63,7 +63,7 @@ def _case(suite: Element, file: FileResult) -> None:
         if not found:
             continue
         said = {"message": _clean(found[0].message), "type": found[0].code} if tag == "failure" else {}
-        SubElement(case, tag, said).text = _clean("\n".join(finding_line(file.path, one) for one in found))
+        SubElement(case, tag, said).text = _clean("\n".join(finding_line(file.path, finding) for finding in found))
 
 
 def _clean(text: str) -> str:
@@ -101,7 +101,9 @@ def _profile_result(file: FileResult) -> str:
     if file.failure is not None:
         return f"**could not be checked**: {escaped(file.failure)}"
     severities = [finding.severity for finding in file.findings]
-    counts = [plural(severities.count(one), one) for one in ("error", "warning") if one in severities]
+    counts = [
+        plural(severities.count(severity), severity) for severity in ("error", "warning") if severity in severities
+    ]
     said = ", ".join(counts) or "passes"
     return f"**{said}**" if "error" in severities else said
 

@@ -28,13 +28,13 @@ def gitlab(report: CheckReport) -> str:
     """GitLab's code quality report: one issue for each finding."""
     issues = [
         {
-            "description": f"{one.finding.code} {one.finding.message}",
-            "check_name": one.finding.rule,
-            "fingerprint": one.fingerprint,
-            "severity": "major" if one.finding.severity == "error" else "minor",
-            "location": {"path": PurePath(one.path).as_posix(), "lines": {"begin": one.finding.line}},
+            "description": f"{located.finding.code} {located.finding.message}",
+            "check_name": located.finding.rule,
+            "fingerprint": located.fingerprint,
+            "severity": "major" if located.finding.severity == "error" else "minor",
+            "location": {"path": PurePath(located.path).as_posix(), "lines": {"begin": located.finding.line}},
         }
-        for one in report.located
+        for located in report.located
     ]
     return to_json(issues)
 
@@ -62,7 +62,7 @@ def sarif(report: CheckReport) -> str:
                 ],
             }
         ],
-        "results": [_result(one) for one in report.located],
+        "results": [_result(located) for located in report.located],
     }
     document = {"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}
     return to_json(document)

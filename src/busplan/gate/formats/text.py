@@ -26,7 +26,10 @@ def marked_line(text: str, path: str, finding: Finding) -> Line:
 
 def concise(report: CheckReport, *, width: int | None = None) -> str:
     """One line for each finding; in colours if there is a width, at which the terminal breaks the lines itself."""
-    lines = [marked_line(finding_line(one.path, one.finding), one.path, one.finding) for one in report.located]
+    lines = [
+        marked_line(finding_line(located.path, located.finding), located.path, located.finding)
+        for located in report.located
+    ]
     return plain_text(lines) if width is None else styled_text(lines)
 
 
@@ -45,10 +48,10 @@ def full(report: CheckReport, *, width: int | None = None) -> str:
 
 
 def _lines(report: CheckReport, width: int) -> Iterator[Line]:
-    for one in report.located:
-        yield from _heading(one, width)
-        yield from _source(one, width)
-        yield from _mending(one, width)
+    for located in report.located:
+        yield from _heading(located, width)
+        yield from _source(located, width)
+        yield from _mending(located, width)
         yield BLANK
 
 
@@ -122,4 +125,7 @@ def _shown(source: str, start: int, end: int, width: int) -> _Shown:
 
 def _columns(text: str) -> int:
     """Columns that a text takes."""
-    return sum(0 if category(one) in ("Mn", "Me") else 2 if east_asian_width(one) in "WF" else 1 for one in text)
+    return sum(
+        0 if category(character) in ("Mn", "Me") else 2 if east_asian_width(character) in "WF" else 1
+        for character in text
+    )

@@ -171,9 +171,9 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
         *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES, figure.LIMITED_BY),
     )
     return [
-        *((one, 0) for one in above),
+        *((row, 0) for row in above),
         *((term, 1) for term in bus.term_figures),
-        *((one, 0) for one in below),
+        *((row, 0) for row in below),
     ]
 
 
@@ -221,7 +221,7 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
         **certainty_record(figures),
         "uncertainty_parts": uncertainty_parts(figures),
         "reserve": result.profile.limits.reserve,
-        "not_in_it": [one.key for one in left_out],
+        "not_in_it": [missing.key for missing in left_out],
         "not_applicable": {model: list(keys) for model, keys in unable.items() if keys},
         "cheapest_change": change
         and {

@@ -73,7 +73,7 @@ def next_bottleneck(profile: Profile) -> NextBottleneck:
     network, bus = network_of(profile), bus_of(profile)
     cycle = bus.cycle(network, model=bus.deciding_model)
     binding = _largest(cycle)
-    cycles = (bus.cycle(one, model=bus.deciding_model) for one in _relieved(network))
+    cycles = (bus.cycle(relieved, model=bus.deciding_model) for relieved in _relieved(network))
     without = next((cycle for cycle in cycles if not _of(cycle, binding.key)), None)
     return NextBottleneck(
         limits=tuple(_next_limit(profile, name) for name in network.names),
@@ -133,8 +133,8 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     """
     bus = bus_of(network.profile)
     yield _slower(network, if_nothing="" if bus.has_execution(network) else "no execution time is on the bus")
-    yield from (_one_node_more(network, one) for one in network.alike)
-    yield from (_one_axis_more(network, one) for one in network.alike)
+    yield from (_one_node_more(network, alike) for alike in network.alike)
+    yield from (_one_axis_more(network, alike) for alike in network.alike)
     yield _more_bytes(network)
     own = bus.perturbations(network)
     reset = Perturbation("a bus reset", bus.reset_changes, if_nothing="it is set so already")

@@ -60,8 +60,8 @@ class SensitivityDrawing(Drawing):
             if effect.margin_change_us is not None
         ]
         self._margin_us = sensitivity.now.margin_corrected_us
-        self._least_us = min((one.start_us for one in self._bars), default=0.0)
-        self._most_us = max((one.end_us for one in self._bars), default=0.0)
+        self._least_us = min((bar.start_us for bar in self._bars), default=0.0)
+        self._most_us = max((bar.end_us for bar in self._bars), default=0.0)
 
     @property
     def is_empty(self) -> bool:
@@ -89,11 +89,11 @@ class SensitivityDrawing(Drawing):
 
     def characters(self, width: int) -> list[Line] | None:
         """Draw a row for each change: its name, its bar and its figure."""
-        return None if self.is_empty else [Line(one, "drawn") for one in self._rows(width)]
+        return None if self.is_empty else [Line(row, "drawn") for row in self._rows(width)]
 
     def _rows(self, width: int) -> Iterator[str]:
-        names = max(len(one.label) for one in self._bars)
-        figures = max(len(one.words) for one in self._bars)
+        names = max(len(bar.label) for bar in self._bars)
+        figures = max(len(bar.words) for bar in self._bars)
         columns = max(_NARROWEST, width - names - figures - 5)
         left, right = _shared(columns, least=self._least_us, most=self._most_us)
         for one in self._bars:
@@ -298,7 +298,7 @@ def _verdict(then: Standing | None, profile: Profile) -> Cell:
     why = list(limits_behind(then))
     if not why and then.verdict == FITS and not then.safe:
         why = [f"unsafe {bus_of(profile).safety}"]
-    return Sentence((shown, *(f", {one}" for one in why)), "neutral" if _is_well(then) else "fails")
+    return Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if _is_well(then) else "fails")
 
 
 def _is_well(standing: Standing) -> bool:

@@ -179,9 +179,12 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
     return (
         *(
             Failure(
-                one.failure or one.key, existing(one.value(network)), existing(one.most(network)), one.words(network)
+                limit.failure or limit.key,
+                existing(limit.value(network)),
+                existing(limit.most(network)),
+                limit.words(network),
             )
-            for one in broken
+            for limit in broken
         ),
         *late,
     )

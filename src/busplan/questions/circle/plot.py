@@ -103,7 +103,7 @@ def common_scales(rows: Sequence[CircleRow], tolerance: ToleranceSection) -> Sca
 
 
 def _ends(errors: Sequence[Floats]) -> tuple[float, float]:
-    return min(float(one.min()) for one in errors), max(float(one.max()) for one in errors)
+    return min(float(error_um.min()) for error_um in errors), max(float(error_um.max()) for error_um in errors)
 
 
 def _curves(run: CircleRun) -> tuple[Curve, ...]:

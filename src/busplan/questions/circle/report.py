@@ -186,9 +186,9 @@ def _blocks(test: CircleTest) -> Iterator[Block]:
     yield circle_table(test.results)
     if test.with_contributions:
         ranked = [result for result in test.results if result.contributions is not None]
-        yield from (contributions_table(one) for one in ranked if one.contributions)
+        yield from (contributions_table(source) for source in ranked if source.contributions)
         if ranked:
-            yield ACT_TOGETHER if any(one.contributions for one in ranked) else NO_SOURCES
+            yield ACT_TOGETHER if any(source.contributions for source in ranked) else NO_SOURCES
     for result, run in zip(test.results, test.runs, strict=True):
         # A cycle that does not fit has no circle; the verdict says why.
         if result.stable is not None:
@@ -231,7 +231,7 @@ def contributions_table(result: CircleFigures) -> Table:
         The circle test at one period, with contributions.
     """
     ranked = result.contributions or ()
-    removed = [one.removed_mm for one in ranked]
+    removed = [source.removed_mm for source in ranked]
     least, most = min((0.0, *removed)), max((0.0, *removed))
     rows = []
     for one in ranked:
@@ -317,6 +317,6 @@ def circle_document(test: CircleTest) -> JsonDocument:
         record["centre_offset_mm"] = result.centre_offset_mm and list(result.centre_offset_mm)
         ranked = record.pop("contributions")
         if test.with_contributions:
-            record["contributions"] = None if ranked is None else [one._asdict() for one in ranked]
+            record["contributions"] = None if ranked is None else [source._asdict() for source in ranked]
         results.append(record)
     return document("circle-test", profile=test.profile.name, results=results)

@@ -107,8 +107,8 @@ def circle_test(
         setup(variant) if capacity.fits else _timing(variant)
         for variant, capacity in zip(variants, capacities, strict=True)
     ]
-    simulated = [one for one in setups if isinstance(one, Setup)]
-    ranked = [sources(one) if with_contributions and isinstance(one, Setup) else {} for one in setups]
+    simulated = [prepared for prepared in setups if isinstance(prepared, Setup)]
+    ranked = [sources(prepared) if with_contributions and isinstance(prepared, Setup) else {} for prepared in setups]
     passing = [source for each in ranked for source in each.values()]
     counter.expect(*simulated, *passing)
     announce(estimate(simulated, passing))
@@ -134,7 +134,7 @@ class _Counter:
         self._done = 0
 
     def expect(self, *setups: Setup) -> None:
-        self._expected += sum(2 * one.steps for one in setups)
+        self._expected += sum(2 * prepared.steps for prepared in setups)
 
     def run(self, one: Setup) -> CircleRun:
         before = self._done

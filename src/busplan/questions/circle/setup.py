@@ -243,10 +243,10 @@ def estimate(kept: Sequence[Setup], passing: Sequence[Setup] = ()) -> Estimate:
     """
     rate_us = _STEP_US[compiled_kernel("auto") is not None]
     every = [*kept, *passing]
-    sizes = [_STEP_BYTES * one.steps + _SETPOINT_BYTES * one.path.setpoints for one in every]
+    sizes = [_STEP_BYTES * each.steps + _SETPOINT_BYTES * each.path.setpoints for each in every]
     return Estimate(
-        steps=_AXES * sum(one.steps for one in every),
-        time_s=sum(_AXES * rate_us * one.steps + _SETPOINT_US * one.path.setpoints for one in every) / 1e6,
+        steps=_AXES * sum(each.steps for each in every),
+        time_s=sum(_AXES * rate_us * each.steps + _SETPOINT_US * each.path.setpoints for each in every) / 1e6,
         memory_bytes=sum(sizes[: len(kept)]) + max(sizes[len(kept) :], default=0),
     )
 

@@ -110,7 +110,7 @@ def compare_lines(comparison: KindComparison, *, width: int) -> list[Line]:
         Width of the drawing, in columns.
     """
     plane, lines = plane_of(comparison), kind_lines(comparison)
-    labels = {_row(plane, one): str(one) for one in axes_labels(plane)}
+    labels = {_row(plane, label): str(label) for label in axes_labels(plane)}
     gutter = max(map(len, labels.values()))
     columns = min(width, _WIDEST) - gutter - 3
     cells = [[" "] * columns for _ in range(_ROWS)]
@@ -129,8 +129,8 @@ def compare_lines(comparison: KindComparison, *, width: int) -> list[Line]:
     legend += [f"{_SEVERAL} several"] if any(_SEVERAL in row for row in cells) else []
     legend.append(f"{_OWN} and {_OWN_PERIOD} the axes and the period of this machine")
     return [
-        *(Line(one, "drawn") for one in drawn),
-        *(Line(f"{indent}{one}".rstrip(), "drawn") for one in below),
+        *(Line(row, "drawn") for row in drawn),
+        *(Line(f"{indent}{row}".rstrip(), "drawn") for row in below),
         BLANK,
         *legend_lines(legend, width=width),
     ]

@@ -159,7 +159,7 @@ def compare(
         Called now and then with the parts of all circle tests that are done, and all of them.
     """
     own = profile.bus.kind
-    names = tuple(kinds) if kinds is not None else (own, *(one for one in kind_names() if one != own))
+    names = tuple(kinds) if kinds is not None else (own, *(kind for kind in kind_names() if kind != own))
     found = [_on_kind(profile, name) for name in names]
     periods_us = _curve_periods(profile, [one.smallest.us for one in found if isinstance(one, MachineOnKind)])
     found = [one if isinstance(one, NotOnKind) else one._replace(curve=_curve(one, periods_us)) for one in found]
@@ -215,11 +215,11 @@ def most_safe_axes(profile: Profile) -> SafeAxes:
 def _curve_periods(profile: Profile, smallest_us: Sequence[float | None]) -> tuple[float, ...]:
     """Periods about the smallest ones and the profile's own, which is among them [us]."""
     own_us = profile.cycle.period_us
-    marks_us = [own_us, *(one for one in smallest_us if one is not None)]
+    marks_us = [own_us, *(us for us in smallest_us if us is not None)]
     first, last = floor(log2(min(marks_us) / _ROUND_US)) - 1, ceil(log2(max(marks_us) / _ROUND_US)) + 1
     every = ceil((last - first + 1) / _MOST_POINTS)
     round_us = (_ROUND_US * 2.0**power for power in range(first, last + 1) if power % every == 0)
-    return tuple(sorted({own_us, *(one for one in round_us if MIN_STEP_US <= one <= MAX_TIME_US)}))
+    return tuple(sorted({own_us, *(us for us in round_us if MIN_STEP_US <= us <= MAX_TIME_US)}))
 
 
 def _curve(machine: MachineOnKind, periods_us: Sequence[float]) -> tuple[SafeAxes, ...]:

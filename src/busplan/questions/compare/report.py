@@ -257,7 +257,7 @@ def _blocks(comparison: KindComparison) -> Iterator[Block]:
 
 def headline(comparison: KindComparison) -> Sentence:
     """Say on how many kinds of bus the machine is shown to fit its period, and on which."""
-    carrying = [bus_of(one.profile).title for one in fitting(comparison)]
+    carrying = [bus_of(machine.profile).title for machine in fitting(comparison)]
     of = len(comparison.kinds)
     where = f": {', '.join(carrying)}" if carrying else ""
     return sentence(
@@ -273,12 +273,12 @@ def headline(comparison: KindComparison) -> Sentence:
 def _best(comparison: KindComparison) -> Iterator[Sentence]:
     """Say which kind has the smallest period, and which the most axes, of those whose host's time is known."""
     ranked = [machine for machine in comparison.compared if not machine.assumed_host]
-    shortest = [(one.smallest.us, one) for one in ranked if one.smallest.us is not None]
+    shortest = [(machine.smallest.us, machine) for machine in ranked if machine.smallest.us is not None]
     if shortest:
         us, one = min(shortest, key=lambda each: each[0])
         value = ShownValue(us, "smallest_period_us", "us", 3)
         yield sentence(f"The smallest period is {{}} on {bus_of(one.profile).title}.", value)
-    most = [(one.safe.axes, one) for one in ranked if one.safe.axes]
+    most = [(machine.safe.axes, machine) for machine in ranked if machine.safe.axes]
     if most:
         axes, one = max(most, key=lambda each: each[0])
         yield sentence(
@@ -297,7 +297,7 @@ def _best(comparison: KindComparison) -> Iterator[Sentence]:
 
 
 def _words(assumed: Sequence[AssumedKey]) -> str:
-    return ", ".join(f"{one.key} = {short_text(one.value)}" for one in assumed)
+    return ", ".join(f"{assumption.key} = {short_text(assumption.value)}" for assumption in assumed)
 
 
 def _assumed(machine: MachineOnKind) -> str:

@@ -226,7 +226,7 @@ def _figures(
     circles: tuple[CircleSide, CircleSide] | None,
 ) -> Iterator[ComparedFigure]:
     buses = (bus_of(a), bus_of(b))
-    groups = tuple(dict.fromkeys(one.name for one in (*a.group, *b.group)))
+    groups = tuple(dict.fromkeys(group.name for group in (*a.group, *b.group)))
     plan = (*plan_figures(*buses), *_of_groups(groups, known.SAFE_NODES))
     yield from _compared("plan", plan, _plan(a), _plan(b))
     deciding = (("deciding", buses[0].deciding_model, buses[1].deciding_model),)

@@ -217,7 +217,9 @@ def _loud(difference: Difference, judgement: Judgement) -> Iterator[Sentence]:
 
 def _counted(difference: Difference, judgement: Judgement) -> Iterator[Sentence]:
     told = {"shown_to_fit", "verdict", "fits", *_loud_figures(difference)}
-    names = named([one for one in difference.judged(judgement) if one.figure.key not in told], difference)
+    names = named(
+        [compared for compared in difference.judged(judgement) if compared.figure.key not in told], difference
+    )
     if not names:
         return
     said = sentence(
@@ -335,9 +337,9 @@ def _blocks(difference: Difference, arguments: Arguments) -> Iterator[Block]:
     shown = [
         figure for figure in difference.figures if figure.judgement != "neutral" or None not in (figure.a, figure.b)
     ]
-    if any(one.judgement != "same" for one in shown):
+    if any(compared.judgement != "same" for compared in shown):
         yield Table(_FIGURES, tuple(map(_row, shown)), heads=3)
-    same = len(named([one for one in shown if one.judgement == "same"], difference))
+    same = len(named([compared for compared in shown if compared.judgement == "same"], difference))
     if same:
         are = "is" if same == 1 else "are"
         yield sentence(f"{{}} {nouns(same, 'figure')} {are} the same.", count_value(same))
@@ -377,7 +379,7 @@ def _notes(difference: Difference) -> Iterator[Sentence]:
             state = "FAILED" if circle.simulated else "is not simulated"
             yield Sentence((f"The circle of {side} {state}: {', and '.join(circle.problems)}.",), "warns")
     if any(circle.simulated for circle in difference.circles):
-        grades = (one.servo.grades_given[0] for one in (difference.a, difference.b))
+        grades = (profile.servo.grades_given[0] for profile in (difference.a, difference.b))
         yield from _graded("servo values behind the circle's figures are", *grades)
 
 

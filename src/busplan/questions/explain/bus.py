@@ -63,7 +63,7 @@ def latency_figures(
         By key, all figures of `latency`; one that this transaction does not have is None.
     """
     latencies = latencies or traced_latencies(profile, model=model)
-    (one,) = (one for one in latencies.each if one.label == kind)
+    (one,) = (each for each in latencies.each if each.label == kind)
     found: dict[str, Number | None] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         "transaction": chosen(kind, "transaction", "transaction asked for"),
@@ -269,7 +269,7 @@ def _words(
         "binding_term": Traced(
             plain.binding_term,
             formula=f"the largest of {', '.join(term.name for term in terms)}",
-            numbers=f"the largest of {', '.join(short(one.value) for one in sizes)}",
+            numbers=f"the largest of {', '.join(short(size.value) for size in sizes)}",
             parts=sizes,
         ),
         "exceeded": broken,

@@ -100,7 +100,7 @@ def circle_figures(
 
 def simulated_inputs(profile: Profile) -> tuple[Input, ...]:
     """Inputs of a profile's circle test; nothing is simulated."""
-    return tuple(one.given for one in _simulation_inputs(profile) if one.given is not None)
+    return tuple(number.given for number in _simulation_inputs(profile) if number.given is not None)
 
 
 def _delay(profile: Profile, key: str, result: CircleFigures, required: Traced) -> Traced:
@@ -172,7 +172,7 @@ def _loop_inputs(profile: Profile) -> Iterator[Traced]:
     sampled = "cycle.period_us" if profile.servo.loop == "host" else "servo.step_us"
     yield from (traced(profile, key) for key in ("servo.loop", sampled))
     keys = {f"servo.{axis}{key}" for axis in ("", "x.", "y.") for key in _LOOP_KEYS}
-    yield from (one for one in _simulation_inputs(profile) if one.given and one.given.name in keys)
+    yield from (number for number in _simulation_inputs(profile) if number.given and number.given.name in keys)
 
 
 def _simulation_inputs(profile: Profile) -> Iterator[Traced]:

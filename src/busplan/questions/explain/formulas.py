@@ -121,7 +121,7 @@ def _chained(operand: Traced) -> list[Number]:
 def _shortened(name: str, terms: Sequence[Number], *, in_numbers: bool) -> tuple[str, int]:
     """The first operands and the last: nobody reads a sum of hundreds."""
     operation = OPERATIONS[name]
-    each = [_written(one, in_numbers=in_numbers)[0] for one in (*terms[:_SHOWN_TERMS], terms[-1])]
+    each = [_written(term, in_numbers=in_numbers)[0] for term in (*terms[:_SHOWN_TERMS], terms[-1])]
     each.insert(-1, f"... {len(terms) - len(each)} more ...")
     if operation.rank == FUNCTION:
         return f"{operation.sign}({', '.join(each)})", FUNCTION
@@ -186,14 +186,14 @@ def found(value: object, words: str, parts: Iterable[Number]) -> Traced:
 
 def lines(figure: Traced) -> Iterator[Traced]:
     """Every named number behind a figure, in the order of computation; the figure is last."""
-    yield from (one for one in _visit(figure) if not one.given and (one.symbol or one is figure))
+    yield from (number for number in _visit(figure) if not number.given and (number.symbol or number is figure))
 
 
 def inputs(figure: Traced) -> Iterator[Input]:
     """Inputs of a figure: keys of the profile and constants, each once."""
     found: dict[tuple[str, str], Input] = {}
-    for one in _visit(figure):
-        for leaf in (one.given, *(input_of(part) for part in one.parts if isinstance(part, Sourced))):
+    for number in _visit(figure):
+        for leaf in (number.given, *(input_of(part) for part in number.parts if isinstance(part, Sourced))):
             if leaf is not None:
                 found.setdefault((leaf.name, leaf.symbol), leaf)
     yield from found.values()

@@ -261,14 +261,14 @@ def _result(value: object, key: str, unit: str) -> ShownValue | Words:
         changes = value.get("changes", value)
         return Words(", ".join(f"{changed} = {new}" for changed, new in changes.items()))
     if isinstance(value, list) and _has_names(value):
-        names = (next(one[key] for key in _NAMING if key in one) for one in value)
+        names = (next(item[key] for key in _NAMING if key in item) for item in value)
         return Words(", ".join(names))
     return ShownValue(value, key, unit, digits=DIGITS)
 
 
 def _has_names(value: object) -> bool:
     """Whether a value has named parts."""
-    return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(one, dict) for one in value))
+    return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(item, dict) for item in value))
 
 
 def _step(step: Step) -> blocks.CalculationStep:

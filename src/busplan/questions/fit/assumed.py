@@ -58,7 +58,7 @@ def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssu
     ]
     shares += [((term.rests_on,), plain(term.us) / figures.required_us, "the required time") for term in figures.terms]
     # What is no key has no grade, and execution times are no term or doubt of one key.
-    shares = [one for one in shares if one[1] > _MUCH and _is_assumed(profile, one[0][0])]
+    shares = [share for share in shares if share[1] > _MUCH and _is_assumed(profile, share[0][0])]
     shares += _of_execution(figures, profile, variance)
     said: dict[tuple[str, ...], list[str]] = {}
     for keys, share, whole in shares:

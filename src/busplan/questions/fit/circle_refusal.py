@@ -233,7 +233,7 @@ def move_of(profile: Profile, settling_us: float | None) -> Move:
 
 def parameters_in(section: Section, of: type) -> dict[str, Any]:
     """The parameters of the servo core in a section, to which a kind of bus may have added keys."""
-    return section.model_dump(include={one.name for one in parameters(of)})
+    return section.model_dump(include={parameter.name for parameter in parameters(of)})
 
 
 _REST_SHARE: Final = 1e-3
@@ -281,7 +281,7 @@ def path_settling_us(profile: Profile) -> float | None:
     from busplan.servo.measured_part import REST_MM, settling_time_us  # only what the lead-in decides loads numpy
 
     tolerances_mm = [getattr(profile.tolerance, name) for name in CONTOUR_MEASURES]
-    least_mm = min((one for one in tolerances_mm if one), default=None)
+    least_mm = min((tolerance_mm for tolerance_mm in tolerances_mm if tolerance_mm), default=None)
     x, y = loop_axes(profile)
     found = settling_time_us(
         x,

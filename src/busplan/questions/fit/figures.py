@@ -303,7 +303,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
 
 
 _UNDECIDED: Final[dict[str, Any]] = {
-    **{one.key: None for one in CERTAINTY if one.key not in COUNTS},
+    **{figure.key: None for figure in CERTAINTY if figure.key not in COUNTS},
     "doubts": (),
 }
 

@@ -64,7 +64,7 @@ def safe_nodes(profile: Profile, *, group: str = "", without: str | None = None)
         Number of nodes [1], and the key of the limit.
     """
     network = network_of(profile).asking(group)
-    return _with_key(network, [one for one in limits_to_be_safe(network) if one.key != without])
+    return _with_key(network, [limit for limit in limits_to_be_safe(network) if limit.key != without])
 
 
 def _with_key(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:

@@ -105,7 +105,7 @@ def checked_direction(
         raise BusplanError(
             f"{option} {key}: {values.size:,} values; a map shows up to {MOST_VALUES} of a key. A sweep takes more"
         )
-    found = [whole(one) for one in values.part(0, values.size).tolist()]
+    found = [whole(value) for value in values.part(0, values.size).tolist()]
     return Direction(key, tuple(found if values.has_words else sorted(found)))
 
 
@@ -140,7 +140,7 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
         return Direction(AXES, tuple(others + one * each for one in nodes))
     own_us = own_value(PERIOD, profile)
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
-    known = [one for one in bus_of(profile).periods.us if least_us <= one <= most_us]
+    known = [known_us for known_us in bus_of(profile).periods.us if least_us <= known_us <= most_us]
     periods_us = (
         known[:: ceil(len(known) / _MOST)] if known else round_numbers(least_us, most_us, most=_MOST, decades=_FACTORS)
     )

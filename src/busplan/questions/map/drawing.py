@@ -189,7 +189,7 @@ def map_lines(trade_off: TradeOff, *, width: int) -> list[Line]:
 
 def _cells(row: Sequence[Cell | NotDrawn], looks: Looks, *, own: int | None, cell_width: int) -> str:
     """Looks of a row; this design stands in brackets where there is room."""
-    texts = [f"{look_of(one, looks).mark if isinstance(one, Cell) else '':^{cell_width}}" for one in row]
+    texts = [f"{look_of(cell, looks).mark if isinstance(cell, Cell) else '':^{cell_width}}" for cell in row]
     if own is not None and cell_width >= _BRACKETED:
         texts[own] = f"{f'[{texts[own].strip()}]':^{cell_width}}"
     return "".join(texts)

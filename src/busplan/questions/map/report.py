@@ -137,7 +137,8 @@ def map_document(trade_off: TradeOff) -> JsonDocument:
         regions=[fields(region, *region._fields) for region in trade_off.regions],
         cells=[_record(trade_off, cell) for cell in trade_off.cells],
         not_drawn=[
-            {trade_off.x.key: one.x, trade_off.y.key: one.y, "reason": one.reason} for one in trade_off.not_drawn
+            {trade_off.x.key: absent.x, trade_off.y.key: absent.y, "reason": absent.reason}
+            for absent in trade_off.not_drawn
         ],
     )
 

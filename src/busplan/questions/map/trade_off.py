@@ -218,7 +218,7 @@ def judged(
     places = list(runs)
     for start in range(0, len(places), _AT_ONCE):
         part = places[start : start + _AT_ONCE]
-        for place, found in zip(part, mapper(_judge, [runs[one] for one in part]), strict=True):
+        for place, found in zip(part, mapper(_judge, [runs[place] for place in part]), strict=True):
             cells[place] = _with_circle(cells[place], found)
         if progress is not None:
             progress(start + len(part), len(places))
@@ -259,7 +259,7 @@ class TradeOff(NamedTuple):
     @property
     def own_place(self) -> Place | None:
         """Row and column of the profile's own setting; None if it is not on the map."""
-        own_x, own_y = (own_value(one.key, self.profile) for one in (self.x, self.y))
+        own_x, own_y = (own_value(direction.key, self.profile) for direction in (self.x, self.y))
         if own_x not in self.x.values or own_y not in self.y.values:
             return None
         return self.y.values.index(own_y), self.x.values.index(own_x)
@@ -335,7 +335,7 @@ def trade_off(
         x = default_direction(AXES if is_free else PERIOD, profile, with_circle=with_circle)
     if y is None:
         y = default_direction(AXES if x.key == PERIOD else PERIOD, profile, with_circle=with_circle)
-    key_x, key_y = (profile_key(one.key, profile) for one in (x, y))
+    key_x, key_y = (profile_key(direction.key, profile) for direction in (x, y))
     if key_x == key_y:
         raise BusplanError(f"{x.key} across and {y.key} up both vary {key_x}; give two keys")
     settings = {

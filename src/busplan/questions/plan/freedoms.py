@@ -185,25 +185,25 @@ def freed(
         The network has no freedom of that name, or its value was asked for.
     """
     known = freedoms(profile)
-    still = [one for one in known if not set(one.keys) <= set(asked)]
+    still = [freedom for freedom in known if not set(freedom.keys) <= set(asked)]
     if names is None:
-        return tuple(one for one in still if one.cost in DEFAULT_COSTS)
-    said = ", ".join(one.name for one in known)
+        return tuple(freedom for freedom in still if freedom.cost in DEFAULT_COSTS)
+    said = ", ".join(freedom.name for freedom in known)
     kind = f"{profile.bus.kind} with groups" if profile.group else profile.bus.kind
     unknown = [
         f"{option} {name}: there is nothing of that name to free on a bus of kind {kind}; there are {said}"
         for name in names
-        if name not in {one.name for one in known}
+        if name not in {freedom.name for freedom in known}
     ]
     fixed = [
-        f"{option} {one.name}: {' and '.join(key for key in one.keys if key in asked)} was given a value, which is "
-        "kept; give one of them"
-        for one in known
-        if one.name in names and one not in still
+        f"{option} {freedom.name}: {' and '.join(key for key in freedom.keys if key in asked)} was given a value, "
+        "which is kept; give one of them"
+        for freedom in known
+        if freedom.name in names and freedom not in still
     ]
     if unknown or fixed:
         raise BusplanError(*unknown, *fixed)
-    return tuple(one for one in still if one.name in names)
+    return tuple(freedom for freedom in still if freedom.name in names)
 
 
 def _of_bus(name: str, search: "Search", changes: Changes, _cheaper: Sequence[Freedom]) -> Iterator[Changes]:
@@ -320,7 +320,7 @@ def period_grid(profile: "Profile") -> NumberGrid:
     """Periods that are advised: those that the bus knows, or short ones; no circle refuses one for its step."""
     known = bus_of(profile).periods.us
     if known:
-        return ListedNumbers(tuple(one for one in known if goes_with_step(profile, one)))
+        return ListedNumbers(tuple(us for us in known if goes_with_step(profile, us)))
     return ShortNumbers(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
 
 

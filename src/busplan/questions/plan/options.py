@@ -87,7 +87,7 @@ def option(search: Search, title: str, changes: Changes, *, held_by: str | None 
         changes=dict(changes),
         profile=changed,
         deciding=deciding,
-        others=tuple(figures(changed, model=one) for one in model_names(changed) if one != model),
+        others=tuple(figures(changed, model=other) for other in model_names(changed) if other != model),
         passes=search.passes(changes),
         held_by=held_by,
         circle_failures=search.circle_failures(changes) if is_run else None,

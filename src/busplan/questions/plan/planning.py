@@ -112,8 +112,8 @@ def plan(
         goal=goal,
         wanted={key: value for key, value in asked.items() if _differs(profile, goal, key)},
         free=tuple(level.name for level in levels),
-        options=tuple(one for one in found if isinstance(one, Option)),
-        impossible=tuple(one for one in found if isinstance(one, Impossible)),
+        options=tuple(offer for offer in found if isinstance(offer, Option)),
+        impossible=tuple(offer for offer in found if isinstance(offer, Impossible)),
         binding=None if has_plan else search.binding(levels),
         relaxations=()
         if has_plan
@@ -124,7 +124,7 @@ def plan(
 
 def _differs(profile: Profile, goal: Profile, key: str) -> bool:
     """Whether two profiles differ in a key, or in one of a section; other changes may be needed for either alone."""
-    own, asked = (dict(flat(one.model_dump())) for one in (profile, goal))
+    own, asked = (dict(flat(side.model_dump())) for side in (profile, goal))
     keys = [one for one in {**own, **asked} if one == key or one.startswith(f"{key}.")]
     return any(own.get(key) != asked.get(key) for key in keys)
 
@@ -143,5 +143,5 @@ def _steps(search: Search, levels: Sequence[Freedom]) -> Iterator[Option | Impos
         if not number or search.is_bounded(freed_now):
             yield option(search, title, search.furthest({}, freed_now), held_by=binding.key)
         elif binding.why != said:
-            yield Impossible(", ".join(one.label for one in freed_now), binding.why, search.proven)
+            yield Impossible(", ".join(freedom.label for freedom in freed_now), binding.why, search.proven)
             said = binding.why

@@ -116,8 +116,8 @@ def _headline(plan: Plan) -> Sentence:
 def _freed(plan: Plan, before: str | None = None) -> str:
     """What may be changed, in words; only what is cheaper than the freedom of a key."""
     known = [freedom for freedom in freedoms(plan.goal) if freedom.name in plan.free]
-    cost = next((one.cost for one in known if before in one.keys), None)
-    labels = [one.label for one in known if cost is None or one.cost < cost]
+    cost = next((freedom.cost for freedom in known if before in freedom.keys), None)
+    labels = [freedom.label for freedom in known if cost is None or freedom.cost < cost]
     return listed(labels, "and") if labels else "anything else"
 
 
@@ -242,7 +242,7 @@ def _row(option: Option) -> TableRow:
         ShownValue(option.held_by, "held_by"),
         circle,
         *option_margin(option),
-        *(attribute_value(one, option.deciding) for one in (SAFE_NODES, SAFE_AXES)),
+        *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES)),
     )
     return TableRow(cells, highlighted=option.recommended)
 
@@ -255,7 +255,7 @@ def option_margin(option: Option) -> tuple[ShownValue, ShownValue]:
     option
         The option.
     """
-    margin, doubt = (attribute_value(one, option.deciding) for one in (MARGIN_CORRECTED, UNCERTAINTY))
+    margin, doubt = (attribute_value(figure, option.deciding) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     one = option.deciding
     # A margin beyond its uncertainty is none of the causes where limits of the bus are.
     beyond_us = (one.margin_corrected_us or 0.0) - (one.uncertainty_us or 0.0)

@@ -196,7 +196,7 @@ class Search:
     def least_needed_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
         """The shortest period that gives all constraints what they ask, with some freedoms [us]."""
         ratio = self.most_ratio(changes, levels)
-        return min(self.needed_us(one, ratio=ratio) for one in self.combinations(changes, levels))
+        return min(self.needed_us(combination, ratio=ratio) for combination in self.combinations(changes, levels))
 
     def most_ratio(self, changes: Changes, levels: Sequence[Freedom]) -> float:
         """The largest slice ratio with some freedoms [1]."""

@@ -45,7 +45,7 @@ class ReportAnswer(Answer):
         return changed_report(page, changes) if all(profile.changes == changes for profile in self.profiles) else page
 
     def _headline(self) -> str:
-        return "; ".join(f"{one.profile.name}: {one.verdict.deciding.verdict}" for one in self.answers)
+        return "; ".join(f"{answer.profile.name}: {answer.verdict.deciding.verdict}" for answer in self.answers)
 
 
 def report(
@@ -97,9 +97,12 @@ def report(
         raise BusplanError(f"title {title!r}: expected words in one line, without control characters")
     # A profile is iterable, too: over its sections.
     given = [profiles] if isinstance(profiles, Profile) else one_or_several(profiles, name="profiles")
-    loaded = [load_profile(one) for one in given]
+    loaded = [load_profile(profile) for profile in given]
     if origins is None:
-        origins = [origin_of(one) if isinstance(one, Profile) else (os.fspath(one), NO_CHANGES) for one in given]
+        origins = [
+            origin_of(profile) if isinstance(profile, Profile) else (os.fspath(profile), NO_CHANGES)
+            for profile in given
+        ]
     named = list(origins)
     if len(named) != len(given):
         raise BusplanError(f"origins: {len(named)} for {plural(len(given), 'profile')}; expected one for each")

@@ -71,8 +71,8 @@ def period_option(period_us: float) -> tuple[str, str]:
 
 def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
     """Options of the changes, quoted for a shell; --period with the profile's period [us]."""
-    for one in changes.each:
-        yield from period_option(period_us) if one.option == "--period" else (one.option, shell_word(one.text))
+    for change in changes.each:
+        yield from period_option(period_us) if change.option == "--period" else (change.option, shell_word(change.text))
 
 
 def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[str, Source]:
@@ -97,7 +97,7 @@ def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[s
         found[name] = Source(Command(line, purpose), changed_document(document, own))
 
     # Neither latency nor the list of explain takes --period.
-    elsewhere = KeyChanges(tuple(one for one in changes.each if one.option != "--period"))
+    elsewhere = KeyChanges(tuple(change for change in changes.each if change.option != "--period"))
     bus, periods = answer.capacity, answer.periods
     document = sensitivity_document(bus, (answer.verdict,), (answer.sensitivity,))
     add("capacity", "verdict, timing models, terms, what moves the margin", document, "--sensitivity")

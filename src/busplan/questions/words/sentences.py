@@ -183,7 +183,7 @@ def margin_parts(figures: CapacityFigures) -> tuple[Part, ...]:
     figures
         Figures under the timing model that decides.
     """
-    margin, doubt = (attribute_value(one, figures) for one in (MARGIN_CORRECTED, UNCERTAINTY))
+    margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
 
 
