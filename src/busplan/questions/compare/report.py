@@ -15,6 +15,7 @@ from busplan.forms.blocks import (
     Chart,
     Code,
     JsonDocument,
+    OwnPicture,
     Record,
     Report,
     Sentence,
@@ -43,7 +44,6 @@ from busplan.questions.compare.kinds import (
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.words.documents import document, fields, parts_by, with_profile
-from busplan.questions.words.own_picture import OwnPicture
 from busplan.questions.words.sentences import evidence_sentence, execution_sentence, refused_circle, reset_sentence
 from busplan.sections.profile import Profile
 

@@ -1,6 +1,7 @@
 """Why the circle that a profile asks for cannot be run: the one place that says so, and nothing is simulated.
 
-Every command that gives a verdict asks here, so that all say the same of a profile, at the key that causes it.
+Every command that gives a verdict asks here, so that all say the same of a profile, at the key that causes it. Of a
+circle that can be run, its loops and its length are told at the end.
 """
 
 from collections.abc import Iterator, Sequence

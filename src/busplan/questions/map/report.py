@@ -8,6 +8,7 @@ from busplan.forms.blocks import (
     Chart,
     Code,
     JsonDocument,
+    OwnPicture,
     Record,
     Report,
     Sentence,
@@ -36,7 +37,6 @@ from busplan.questions.map.drawing import (
 from busplan.questions.map.trade_off import Cell, Region, TradeOff
 from busplan.questions.sweep.top import payload_sentences
 from busplan.questions.words.documents import document, fields, with_profile
-from busplan.questions.words.own_picture import OwnPicture
 from busplan.questions.words.sentences import refused_circle
 
 

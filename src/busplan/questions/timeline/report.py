@@ -11,6 +11,7 @@ from busplan.forms.blocks import (
     Chart,
     Code,
     JsonDocument,
+    OwnPicture,
     Part,
     Record,
     Report,
@@ -36,7 +37,6 @@ from busplan.questions.timeline.lanes import charged, drawn_window, overruns
 from busplan.questions.timeline.period import model_bars
 from busplan.questions.timeline.svg import STYLE, is_coarse, timeline_svg
 from busplan.questions.words.documents import document
-from busplan.questions.words.own_picture import OwnPicture
 from busplan.questions.words.sentences import refused_circle, safety_record, story, warnings
 
 _TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
