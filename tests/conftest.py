@@ -13,6 +13,7 @@ from typing import IO, Any
 from unittest import mock
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from busplan.cli import run as run_command_line
 
@@ -23,6 +24,13 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # Matrices are small, and every processor has a test of its own.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Few examples in each run, and new ones in the next; a slow one is no failure where the machine is shared.
+# After a change of a computation: pytest --hypothesis-profile=thorough
+EASY = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+settings.register_profile("quick", EASY, max_examples=20)
+settings.register_profile("thorough", EASY, max_examples=500)
+settings.load_profile("quick")
 
 
 @pytest.fixture

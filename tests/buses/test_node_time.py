@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
@@ -46,7 +46,6 @@ def test_a_node_is_done_once_a_cycle(kind: str, base_us: float, extra_us: float,
     assert (found.safe_limited_by == "node") == (verdict != "fits")
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.sampled_from(KINDS), st.floats(1, 5000), st.floats(0, 300), st.floats(0, 500))
 def test_the_limit_is_that_by_hand(kind: str, base_us: float, uncertainty_us: float, extra_us: float) -> None:
     changes = {"base_us": base_us, "uncertainty_us": uncertainty_us, "worst_extra_us": extra_us}

@@ -1,10 +1,9 @@
 """Whatever a file holds, the gate says something of it, soon, and at a place inside the file.
 
-A few hundred inputs in a normal run. For many more: BUSPLAN_FUZZ_EXAMPLES=10000 pytest tests/rules/test_fuzz.py
+For many more inputs than in a normal run: pytest --hypothesis-profile=thorough tests/gate/test_fuzz.py
 """
 
 import json
-import os
 import random
 import re
 import subprocess
@@ -13,7 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import process_time
 
-from hypothesis import HealthCheck, event, given, settings
+from hypothesis import event, given
 from hypothesis import strategies as st
 
 from busplan.errors import PlacedError
@@ -26,7 +25,6 @@ from busplan.gate.report import CheckReport
 from busplan.profile.shipped import shipped_folder
 from busplan.profile.toml import decode
 
-EXAMPLES = int(os.environ.get("BUSPLAN_FUZZ_EXAMPLES", "150"))
 LONGEST_S = 1.0
 MOST_BYTES = 120_000
 """A little more than a profile may have, so that the limit is crossed too."""
@@ -182,14 +180,12 @@ def hold(content: bytes) -> FileResult:
     return result
 
 
-@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 2**63).map(mutated))
 def test_a_mutated_profile_is_judged(content: bytes) -> None:
     result = hold(content)
     event(" ".join(sorted({one.code for one in result.findings})) or "ok")
 
 
-@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck))
 @given(
     st.binary(max_size=300)
     | st.text(max_size=300).map(str.encode)

@@ -3,7 +3,7 @@
 from functools import cache
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses import kind_names
@@ -59,7 +59,6 @@ def test_what_is_not_key_and_value_is_refused(text: str) -> None:
     assert str(caught.value).startswith(f"--set {text}: expected KEY=VALUE")
 
 
-@settings(deadline=None)
 @given(text=st.text(max_size=30), key=st.sampled_from(["bus.nodes", "name", "node.execution", "cycle.period_us"]))
 def test_anything_typed_is_a_valid_change_or_refused_by_its_option(text: str, key: str) -> None:
     try:

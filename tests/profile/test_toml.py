@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from busplan.buses import kind_names
@@ -679,13 +679,11 @@ def mutations(draw: st.DrawFn) -> bytes:
     return content
 
 
-@settings(max_examples=300, deadline=None)
 @given(content=mutations())
 def test_a_shipped_profile_after_any_accident_loads_or_is_refused_with_places_inside_it(content: bytes) -> None:
     check_outcome(content)
 
 
-@settings(max_examples=200, deadline=None)
 @given(content=st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
 @example(content=b"\xef\xbb\xbf\xff")
 @example(content=b"a = [\r\r\n")
@@ -696,7 +694,6 @@ def test_any_bytes_load_or_are_refused_with_places_inside_them(content: bytes) -
     check_outcome(content)
 
 
-@settings(max_examples=200, deadline=None)
 @given(pieces=st.lists(st.one_of(PIECES, st.sampled_from(TEXT.encode().splitlines(keepends=True))), max_size=30))
 def test_any_pieces_of_toml_load_or_are_refused_with_places_inside_them(pieces: list[bytes]) -> None:
     check_outcome(b"".join(pieces))

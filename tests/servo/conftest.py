@@ -9,15 +9,10 @@ from types import ModuleType
 import control
 import numpy as np
 import pytest
-from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from busplan.servo.parameters import Axis, LoopTiming
-
-# The machine is shared: a slow example is no failure.
-settings.register_profile("servo", deadline=None)
-settings.load_profile("servo")
 
 Floats = NDArray[np.float64]
 Loop = Callable[[Axis, LoopTiming], control.StateSpace]

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -220,7 +220,6 @@ def test_memory_grows_by_no_more_than_16_bytes_a_step(monkeypatch: pytest.Monkey
 # --- bad input ---------------------------------------------------------------------------------------------
 
 
-@settings(suppress_health_check=[HealthCheck.too_slow])
 @given(
     gains=st.tuples(st.floats(0, 1e9), st.floats(0, 1e9), st.floats(0, 1e9)),
     lag_us=st.floats(0, 1e9),

@@ -7,7 +7,7 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -167,7 +167,6 @@ DEADBEAT = {"position_gain_per_s": 1000.0, "integral_gain_per_s2": 0.0, "derivat
 delays = st.one_of(st.sampled_from([0.0, 1000.0, 2000.0]), st.floats(0, 1000), st.floats(1000, 5000))
 
 
-@settings(max_examples=60)
 @given(plant=plants, delay_us=delays)
 @example(plant=DEADBEAT, delay_us=0.0)
 @example(plant=DEADBEAT | {"position_gain_per_s": 999.0}, delay_us=0.0)
@@ -187,7 +186,6 @@ def test_stability_is_where_the_poles_are(reference_loop: Loop, plant: dict[str,
         assert 1e-3 ** (1000 / found.settling_us) == pytest.approx(radius, abs=1e-3)
 
 
-@settings(max_examples=60)
 @given(plant=plants, delay_us=delays)
 def test_no_crossover_is_missed(plant: dict[str, float], delay_us: float) -> None:
     """Against a search on a grid, which can only find what lies between two of its points."""

@@ -3,12 +3,11 @@
 from itertools import cycle, islice
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses.can.equations import frame_bits, frame_us, payload_us
 
-SOME = settings(max_examples=100, deadline=None)
 STUFFABLE = {11: 34, 29: 54}
 NEVER_STUFFED = 13
 CRC_15 = 0x4599
@@ -81,7 +80,6 @@ def test_a_payload_of_more_than_eight_bytes_takes_more_frames(size: int, us: flo
     assert payload_us(size, identifier_bits=11, bit_rate_kbit_s=1000, is_stuffed=True) == us
 
 
-@SOME
 @given(st.sampled_from([11, 29]), st.data(), st.binary(max_size=8))
 def test_no_frame_is_longer_than_the_worst_case(identifier_bits: int, draw: st.DataObject, data: bytes) -> None:
     identifier = draw.draw(st.integers(0, 2**identifier_bits - 1))

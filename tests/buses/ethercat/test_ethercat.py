@@ -116,7 +116,7 @@ def test_three_frames_in_a_cycle() -> None:
     assert sum(one.duration_us for one in events if one.term) == pytest.approx(found.required_us, rel=1e-12)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(1, 1474), st.booleans(), st.booleans(), st.integers(0, 1))
 def test_what_most_devices_rest_on_never_falls_and_is_no_less_than_any_cycle_so_far(
     size: int, clocks: bool, apart: bool, polls: int

@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import pytest
-from hypothesis import given, settings, target
+from hypothesis import given, target
 from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
@@ -226,7 +226,6 @@ def allowance_us(case: Case) -> float:
 
 @pytest.mark.parametrize("alone", [False, True])
 def test_the_bus_never_takes_longer_than_the_closed_form(*, alone: bool) -> None:
-    @settings(max_examples=100, deadline=None)
     @given(cases(alone=alone))
     def holds(case: Case) -> None:
         found_us = allowance_us(case)

@@ -1,13 +1,12 @@
 """Length of the telegrams against telegrams that are written bit by bit."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses.sercos2.constants import PERIODS
 from busplan.buses.sercos2.equations import start_us, telegram_bits, telegram_us
 
-SOME = settings(max_examples=150, deadline=None)
 FLAG = [0, 1, 1, 1, 1, 1, 1, 0]
 
 
@@ -47,7 +46,6 @@ def test_the_check_sequence_is_that_of_hdlc() -> None:
     assert check_sequence(b"123456789") == (0x906E).to_bytes(2, "little")
 
 
-@SOME
 @given(st.integers(0, 255), st.binary(min_size=1, max_size=60))
 def test_no_telegram_is_longer_than_the_worst_case(address: int, data: bytes) -> None:
     actual = len(written(address, data))

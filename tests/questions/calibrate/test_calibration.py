@@ -26,7 +26,6 @@ from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 Make = Callable[..., Profile]
 MODELS: tuple[TimingModelName, ...] = ("paper", "standard")
-SOME = settings(max_examples=50, deadline=None)
 
 
 def phases(profile: Profile, kind: TransactionKind, *, model: TimingModelName, payload_bytes: int) -> Phases:
@@ -109,7 +108,6 @@ def test_what_the_model_leaves_of_table_1_is_measured_less_equation_13(model: Ti
     assert result.payloads[0].unexplained_us == pytest.approx(6 - half_us, abs=1e-9)
 
 
-@SOME
 @given(data=st.data())
 def test_latencies_of_a_profile_give_its_own_execution_time(
     any_profile: st.SearchStrategy[Profile], data: st.DataObject
@@ -149,7 +147,6 @@ def outlying(result: Calibration) -> set[int]:
 points = st.lists(st.tuples(st.integers(1, 2048), st.floats(0, 500)), min_size=2, max_size=30)
 
 
-@SOME
 @given(points=points)
 def test_lines_agree_with_scipy(make: Make, points: list[tuple[int, float]]) -> None:
     profile = make()
@@ -177,7 +174,6 @@ def test_lines_agree_with_scipy(make: Make, points: list[tuple[int, float]]) -> 
     assert (line.base_us, line.per_byte_us) == pytest.approx((base, slope), abs=2e-3)
 
 
-@SOME
 @given(points=points)
 def test_figures_by_payload_and_residuals_agree_with_numpy(make: Make, points: list[tuple[int, float]]) -> None:
     result = run(make(), of_execution(make(), points), form="table")
@@ -283,7 +279,6 @@ def test_a_fit_says_which_model_and_gap_count_it_was_fitted_against(make: Make, 
     assert result.fit_keys == {"residual": model, "measured_gap_count": 8}
 
 
-@SOME
 @given(points=points)
 def test_the_uncertainty_of_a_fit_is_the_spread_about_it(make: Make, points: list[tuple[int, float]]) -> None:
     profile = make()
@@ -343,7 +338,7 @@ def test_a_tail_of_slow_executions_loses_none_of_them(make: Make) -> None:
             assert all(time_us <= most_us + 1e-6 for (_, time_us), most_us in zip(rows, covered_us, strict=True))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     seed=st.integers(0, 10**6),
     repetitions=st.integers(3, 5),

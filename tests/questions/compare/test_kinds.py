@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.buses import kind_names
@@ -31,7 +31,7 @@ from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
 
 Profiles = Mapping[str, st.SearchStrategy[Profile]]
-SOME = settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=4)
 KINDS = pytest.mark.parametrize("kind", kind_names())
 BOTH = ("ieee1394", "can")
 CABLES = ("cable_length_m", "cable_m")

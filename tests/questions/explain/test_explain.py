@@ -7,7 +7,7 @@ from itertools import groupby
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses import kind_named
@@ -58,7 +58,6 @@ def value_of(found: Any) -> Any:
     return found.value if isinstance(found, Traced) else found
 
 
-@settings(max_examples=80, deadline=None)
 @given(data=st.data(), model=MODELS)
 def test_every_figure_of_capacity_is_derived_as_it_is_computed(
     data: st.DataObject, model: TimingModelName, any_profile: st.SearchStrategy[Profile]
@@ -74,7 +73,6 @@ def test_every_figure_of_capacity_is_derived_as_it_is_computed(
         assert isinstance(derived[key], Traced), key
 
 
-@settings(max_examples=50, deadline=None)
 @given(data=st.data(), model=MODELS, kind=st.sampled_from(["read", "write"]))
 def test_every_figure_of_latency_is_derived_as_it_is_computed(
     data: st.DataObject, model: TimingModelName, kind: Any, any_profile: st.SearchStrategy[Profile]
@@ -87,7 +85,6 @@ def test_every_figure_of_latency_is_derived_as_it_is_computed(
         assert value_of(derived[key]) == value, key
 
 
-@settings(max_examples=60, deadline=None)
 @given(data=st.data(), model=MODELS, key=st.sampled_from(sorted(FIGURES["capacity"])))
 def test_every_line_in_numbers_reads_back_as_its_result(
     data: st.DataObject, model: TimingModelName, key: str, any_profile: st.SearchStrategy[Profile]

@@ -11,7 +11,7 @@ from threading import Condition, Thread
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
@@ -65,7 +65,6 @@ class Shuffled(Executor):
                     future.set_exception(error)
 
 
-@settings(max_examples=40, deadline=None)  # a thread may wait
 @given(seed=st.integers(0, 1000), number=st.integers(0, 40), most=st.integers(1, 12))
 def test_results_come_in_order_whatever_the_order_of_completion(seed: int, number: int, most: int) -> None:
     with closing(Shuffled(seed, waiting=min(most, 3))) as executor:

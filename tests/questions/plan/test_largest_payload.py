@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.buses import kind_names
@@ -19,7 +19,7 @@ from busplan.questions.plan.planning import plan
 from busplan.questions.plan.search import Search
 from busplan.sections.profile import Profile
 
-SOME = settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=4)
 
 
 @pytest.mark.parametrize("kind", kind_names())

@@ -13,7 +13,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
@@ -115,7 +115,6 @@ def test_hostile_names_are_text_in_markdown() -> None:
         assert " ".join(text.split()) in " ".join(reader.text.split())
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.binary(min_size=1, max_size=20).filter(lambda raw: b"\0" not in raw))
 def test_a_shell_gives_back_any_path(raw: bytes) -> None:
     word = shell_word(os.fsdecode(raw))

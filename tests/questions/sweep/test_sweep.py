@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
@@ -90,7 +90,6 @@ def assert_rows_are_those_of_capacity(
     assert points == grid.points
 
 
-@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = data.draw(any_profile)
@@ -109,7 +108,6 @@ def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile
     assert_rows_are_those_of_capacity(profile, grid, chunk_points=data.draw(st.integers(1, 40)))
 
 
-@settings(max_examples=60, deadline=None)
 @given(data=st.data(), nodes=st.integers(1, 20))
 def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
     data: st.DataObject, nodes: int, any_profile: st.SearchStrategy[Profile]

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.forms.csv_rows import csv_cell
@@ -89,7 +89,7 @@ def test_bytes_are_those_of_a_writer_by_cell(name: str, chunk_points: int) -> No
     assert written("jsonl", table, parts) == jsonl_by_cell(table, rows)
 
 
-@settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@settings(max_examples=10)
 @given(st.data())
 def test_any_columns_in_any_order(data: st.DataObject) -> None:
     table, parts = blocks("words among numbers", data.draw(st.integers(1, 9)))
