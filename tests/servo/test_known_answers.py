@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import control
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -15,7 +14,10 @@ from busplan.servo.measured_part import settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import Direction, circle_path
 
-Loop = Callable[[Axis, LoopTiming], control.StateSpace]
+if TYPE_CHECKING:
+    import control
+
+Loop = Callable[[Axis, LoopTiming], "control.StateSpace"]
 
 FEED_MM_S = 100.0
 PERIOD_S = 1e-3
@@ -75,7 +77,7 @@ def sagitta_mm(radius_mm: float) -> float:
     return (FEED_MM_S * PERIOD_S) ** 2 / (8 * radius_mm)
 
 
-def follows(loop: control.StateSpace, angle: float) -> complex:
+def follows(loop: "control.StateSpace", angle: float) -> complex:
     """The closed loop at an angle on the unit circle."""
     gain = complex(loop(np.exp(1j * angle)))
     return gain / (1 + gain)

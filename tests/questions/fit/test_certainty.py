@@ -157,7 +157,7 @@ def test_where_the_cycle_has_a_kink_it_still_covers_95_percent_on_one_side(make:
 
 def _drawn_us(profile: Profile) -> NDArray[np.float64]:
     """Cycles, each input drawn anew and the same in every transaction."""
-    draws, random = 400_000, np.random.default_rng(1394)
+    draws, random = 100_000, np.random.default_rng(1394)
     network = network_of(profile)
     (group,) = network.groups
     cycle = Ieee1394Cycle(network, "standard")

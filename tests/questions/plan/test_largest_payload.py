@@ -19,7 +19,7 @@ from busplan.questions.plan.planning import plan
 from busplan.questions.plan.search import Search
 from busplan.sections.profile import Profile
 
-SOME = settings(max_examples=4)
+SOME = settings(max_examples=3)
 
 
 @pytest.mark.parametrize("kind", kind_names())

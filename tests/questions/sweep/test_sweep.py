@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
@@ -90,6 +90,7 @@ def assert_rows_are_those_of_capacity(
     assert points == grid.points
 
 
+@settings(max_examples=12)
 @given(data=st.data())
 def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = data.draw(any_profile)
