@@ -591,10 +591,10 @@ def test_the_profile_schema_accepts_what_is_shipped(validator: Any) -> None:
         validator.validate(load(name).document.data())
 
 
-@pytest.mark.parametrize("code", [code for code in all_rules() if not code.startswith("BP0")])
-def test_the_profile_schema_accepts_what_only_the_gate_finds(validator: Any, code: str) -> None:
-    for path in (EXAMPLES / code).glob("*.toml"):
-        validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
+def test_the_profile_schema_accepts_what_only_the_gate_finds(validator: Any) -> None:
+    for code in [code for code in all_rules() if not code.startswith("BP0")]:
+        for path in (EXAMPLES / code).glob("*.toml"):
+            validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
 
 
 @pytest.mark.parametrize("code", ["BP002", "BP003", "BP004", "BP005"])

@@ -16,9 +16,8 @@ from busplan.sections.profile import Profile
 KINDS = " or ".join(f'"{one}"' for one in kind_names())
 
 
-@pytest.mark.parametrize(
-    ("written", "value"),
-    [
+def test_a_value_is_toml_and_a_word_is_text() -> None:
+    for written, value in [
         ("4000", 4000),
         ("0.5", 0.5),
         ("-1", -1),
@@ -35,12 +34,10 @@ KINDS = " or ".join(f'"{one}"' for one in kind_names())
         ('{kind = "linear", base_us = 30}', {"kind": "linear", "base_us": 30}),
         ('"a=b"', "a=b"),
         ("4 # a comment of TOML", 4),
-    ],
-)
-def test_a_value_is_toml_and_a_word_is_text(written: str, value: object) -> None:
-    (change,) = parse_set([f" bus.key = {written} "])
-    assert (change.key, change.value, change.typed) == ("bus.key", value, f"--set bus.key={written}")
-    assert type(change.value) is type(value)
+    ]:
+        (change,) = parse_set([f" bus.key = {written} "])
+        assert (change.key, change.value, change.typed) == ("bus.key", value, f"--set bus.key={written}")
+        assert type(change.value) is type(value)
 
 
 @pytest.mark.parametrize("written", ["4ms", "S200 S400", "[1, 2", "{a = 1", "4\nbus.nodes = 3", "3\n[bus]", "-", "µ"])

@@ -288,9 +288,8 @@ def edited(text: str, changes: dict[str, Any], *, notes: dict[str, str] | None =
     return edited_file(text.encode(), changes, name="x.toml", notes=notes).decode()
 
 
-@pytest.mark.parametrize(
-    ("changes", "old", "new"),
-    [
+def test_only_this_changes() -> None:
+    cases: list[tuple[dict[str, Any], str, str]] = [
         ({"bus.nodes": 2}, "", ""),
         ({"bus.max_hops": None}, "", ""),
         ({"bus.nodes": 16}, "nodes = 2    # N", "nodes = 16   # N"),
@@ -302,10 +301,9 @@ def edited(text: str, changes: dict[str, Any], *, notes: dict[str, str] | None =
         ({"node.execution.grade": "measured"}, "# by hand", '# by hand\n  grade = "measured"\n'),
         ({"limits.max_utilisation": 0.5}, "# by hand", "# by hand\n\n[limits]\nmax_utilisation = 0.5\n"),
         ({"description": 'a "b"\n'}, "# the cycle\n", '# the cycle\ndescription = "a \\"b\\"\\n"\n'),
-    ],
-)
-def test_only_this_changes(changes: dict[str, Any], old: str, new: str) -> None:
-    assert edited(PLAIN, changes) == PLAIN.replace(old, new, 1)
+    ]
+    for changes, old, new in cases:
+        assert edited(PLAIN, changes) == PLAIN.replace(old, new, 1)
 
 
 def test_a_new_kind_takes_the_old_keys_away_and_keeps_their_comments() -> None:

@@ -260,9 +260,8 @@ def test_no_axis_however_unstable_leaves_the_numbers(
         assert np.isfinite(simulate_axis(np.sin(np.arange(60.0)), axis=axis, timing=timing)).all()
 
 
-@pytest.mark.parametrize(
-    ("bad", "name"),
-    [
+def test_bad_values_are_named() -> None:
+    cases: list[tuple[dict[str, float], str]] = [
         ({"position_gain_per_s": math.nan}, "position_gain_per_s"),
         ({"position_gain_per_s": -1.0}, "position_gain_per_s"),
         ({"integral_gain_per_s2": math.inf}, "integral_gain_per_s2"),
@@ -278,11 +277,10 @@ def test_no_axis_however_unstable_leaves_the_numbers(
         ({"reversal_smoothing_mm_s": 0.0}, "reversal_smoothing_mm_s"),
         ({"delay_us": -1.0}, "delay_us"),
         ({"delay_us": math.nan}, "delay_us"),
-    ],
-)
-def test_bad_values_are_named(bad: dict[str, float], name: str) -> None:
-    with pytest.raises(BusplanError, match=f"^{name} = "):
-        an_axis(**bad)
+    ]
+    for bad, name in cases:
+        with pytest.raises(BusplanError, match=f"^{name} = "):
+            an_axis(**bad)
 
 
 @pytest.mark.parametrize(

@@ -294,34 +294,36 @@ def test_the_uncertainty_of_a_fit_is_the_spread_about_it(make: Make, points: lis
     assert result.uncertainty_us == pytest.approx(max(spread_us, 0.1 / np.sqrt(12)), abs=0.002)
 
 
-@pytest.mark.parametrize("halves", [True, False])
-@pytest.mark.parametrize(
-    ("index", "off_us"),
-    [(index, off_us) for index in range(8) for off_us in (-60.0, 50.0, 148.0) if off_us > 0 or index > 3],
-)
-def test_a_wild_row_of_table_1_is_told_where_it_breaks_the_order(index: int, off_us: float, halves: bool) -> None:
-    bench = load("paper-two-node").profile
-    rows = [one if halves else one._replace(request_and_acknowledge_us=None) for one in table_1()]
-    assert run(bench, rows).outliers == ()
-    wild = rows[index]
-    rows[index] = wild._replace(latency_us=wild.latency_us + off_us)
-    times_us = [36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7]
-    times_us[index] += off_us
-    before, behind = times_us[:index][-1:], times_us[index + 1 :][:1]
-    is_slow, is_fast = bool(behind and times_us[index] > behind[0]), bool(before and times_us[index] < before[0])
-    for form in ("table", "linear"):
-        result = run(bench, rows, form=form)
-        assert result.execution.grade == "measured"
-        if not (is_slow or is_fast):
-            # A slower execution of that payload, or of all larger ones; nothing says otherwise.
-            assert (result.outliers, result.worst_extra_us) == ((), None)
-            continue
-        (one,) = result.outliers
-        assert (one.line, one.off_us > 0) == (wild.line, is_slow)
-        assert [fit.left_out for fit in result.payloads] == [int(at == index) for at in range(8)]
-        assert (len(result.residuals), result.measurements) == (7, 8)
-        # The line bends less than Table I does.
-        assert result.worst_extra_us == (pytest.approx(off_us, abs=25) if is_slow else None)
+def test_a_wild_row_of_table_1_is_told_where_it_breaks_the_order() -> None:
+    for halves in [True, False]:
+        for index, off_us in [
+            (index, off_us) for index in range(8) for off_us in (-60.0, 50.0, 148.0) if off_us > 0 or index > 3
+        ]:
+            bench = load("paper-two-node").profile
+            rows = [one if halves else one._replace(request_and_acknowledge_us=None) for one in table_1()]
+            assert run(bench, rows).outliers == ()
+            wild = rows[index]
+            rows[index] = wild._replace(latency_us=wild.latency_us + off_us)
+            times_us = [36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7]
+            times_us[index] += off_us
+            before, behind = times_us[:index][-1:], times_us[index + 1 :][:1]
+            is_slow, is_fast = (
+                bool(behind and times_us[index] > behind[0]),
+                bool(before and times_us[index] < before[0]),
+            )
+            for form in ("table", "linear"):
+                result = run(bench, rows, form=form)
+                assert result.execution.grade == "measured"
+                if not (is_slow or is_fast):
+                    # A slower execution of that payload, or of all larger ones; nothing says otherwise.
+                    assert (result.outliers, result.worst_extra_us) == ((), None)
+                    continue
+                (one,) = result.outliers
+                assert (one.line, one.off_us > 0) == (wild.line, is_slow)
+                assert [fit.left_out for fit in result.payloads] == [int(at == index) for at in range(8)]
+                assert (len(result.residuals), result.measurements) == (7, 8)
+                # The line bends less than Table I does.
+                assert result.worst_extra_us == (pytest.approx(off_us, abs=25) if is_slow else None)
 
 
 def test_a_tail_of_slow_executions_loses_none_of_them(make: Make) -> None:

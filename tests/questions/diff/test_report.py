@@ -248,9 +248,8 @@ def test_regressions_are_named_with_the_timing_that_has_them(paper: Profile) -> 
 # --- values -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("value", "other", "shown"),
-    [
+def test_a_value_is_shown_as_toml_has_it() -> None:
+    for value, other, shown in [
         (63, "optimal", "63"),
         ("optimal", 63, '"optimal"'),
         (0.1, None, "0.1"),
@@ -270,10 +269,8 @@ def test_regressions_are_named_with_the_timing_that_has_them(paper: Profile) -> 
         ('a"b\\\n', None, r'"a\"b\\\n"'),
         ("x" * 41, None, f'"{"x" * 40}"..'),
         ("x" * 60 + "a", "x" * 60 + "b", '.."xxxxxxxxa"'),
-    ],
-)
-def test_a_value_is_shown_as_toml_has_it(value: object, other: object, shown: str) -> None:
-    assert shown_value(value, other) == shown
+    ]:
+        assert shown_value(value, other) == shown
 
 
 NUMBERS = st.lists(st.integers(0, 3), max_size=30).map(tuple)

@@ -161,9 +161,8 @@ def test_a_chunk_of_a_huge_axis_is_no_larger_than_asked() -> None:
     assert chunk.shape == (1, 1000)
 
 
-@pytest.mark.parametrize(
-    ("axes", "message"),
-    [
+def test_what_no_profile_could_have_is_refused_in_the_profiles_own_words(make: Make) -> None:
+    cases: list[tuple[dict[str, Values], str]] = [
         ({"bus.nods": Listed((1,))}, "--vary bus.nods: no such key of this profile; did you mean bus.nodes?"),
         ({"bsu.nodes": Listed((1,))}, "--vary bsu.nodes: no such key of this profile; did you mean bus.nodes?"),
         ({"node.execution": Listed((1,))}, "--vary node.execution: is a section; expected the key of one number"),
@@ -188,14 +187,11 @@ def test_a_chunk_of_a_huge_axis_is_no_larger_than_asked() -> None:
             "cable_length_m is 6",
         ),
         ({"cycle.period_us": Steps(1, 1, 1, 10**7), "bus.nodes": Steps(1, 1, 1, 10**6)}, "vary less"),
-    ],
-)
-def test_what_no_profile_could_have_is_refused_in_the_profiles_own_words(
-    axes: dict[str, Values], message: str, make: Make
-) -> None:
-    profile = override(make(), {"node.execution": TABLE})
-    with pytest.raises(BusplanError, match=re.escape(message)):
-        checked_grid(profile, axes, with_circle=False)
+    ]
+    for axes, message in cases:
+        profile = override(make(), {"node.execution": TABLE})
+        with pytest.raises(BusplanError, match=re.escape(message)):
+            checked_grid(profile, axes, with_circle=False)
 
 
 def test_a_table_is_read_at_its_points_between_them_and_at_both_ends(make: Make) -> None:
