@@ -324,7 +324,7 @@ def test_every_cell_is_shown_as_the_table_on_a_terminal_has_it(paper: Profile) -
     assert words >= {" ".join(line.split()) for line in lines if line.endswith(("worse", "better", "neutral"))}
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("name", [" ".join(HOSTILE[:8]), " ".join(HOSTILE[8:])])
 def test_hostile_names_are_shown_and_do_nothing_else(paper: Profile, name: str) -> None:
     b = override(paper, {"name": name, "description": f"{name}\n{name}", "bus.nodes": 3})
     page = Page(comment(difference(paper, b), arguments=("a.toml", f"main:{name}.toml")))
