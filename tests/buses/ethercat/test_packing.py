@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from busplan.buses.ethercat.equations import datagram_bytes, frame_bytes, room_bytes, sending_us
@@ -73,6 +73,10 @@ GROUPS = st.lists(
 
 
 @given(GROUPS, st.booleans(), st.booleans())
+@example([(1, 1466, 1)], True, True)  # all the room beside the clocks
+@example([(2, 1467, 1)], True, True)  # one byte more: the clocks go alone, in a padded frame
+@example([(1, 727, 727), (1, 1, 1)], False, True)
+@example([(3, 737, 737)], False, False)
 def test_frames_are_those_of_a_writer(groups: list[tuple[int, int, int]], is_shared: bool, clocks: bool) -> None:
     each = [(read, write) for nodes, read, write in groups for _ in range(nodes)]
     whole = written(each, is_shared=is_shared, clocks=clocks)
