@@ -102,6 +102,7 @@ def test_a_format_is_a_class_of_its_own_and_loads_alone() -> None:
     # Each in a process of its own, which has loaded what none of them goes without.
     code = (
         "import os, sys; from busplan.gate.formats import FORMATS, gate_format\n"
+        "gate_format('concise')  # whose lines all may have\n"
         "for name in FORMATS:\n"
         "    if not os.fork():\n"
         "        gate_format(name)\n"

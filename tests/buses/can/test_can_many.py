@@ -78,7 +78,7 @@ def test_many_messages_are_answered(run: Run, tmp_path: Path, line: str, count: 
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(("load", "slow", "seed"), [(0.995, 0.9, 1), (0.99, 0.5, 2), (0.9998, 0.8, 4)])
+@pytest.mark.parametrize(("load", "slow", "seed"), [(0.995, 0.9, 1), (0.9998, 0.8, 4)])
 def test_no_busy_period_near_a_full_bus_takes_long(load: float, slow: float, seed: int) -> None:
     profile = many(200, load=load, slow=slow, seed=seed)
     start_s = process_time()

@@ -6,7 +6,7 @@ from math import fsum
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.buses import kind_names
@@ -21,11 +21,13 @@ from busplan.sections.profile import Profile
 
 Profiles = Mapping[str, st.SearchStrategy[Profile]]
 KINDS = pytest.mark.parametrize("kind", kind_names())
+SOME = settings(max_examples=10)  # of each kind
 PLACES = st.lists(st.integers(2, 68), min_size=4, max_size=4).map(lambda places: {0, 1, *places})
 """Some of an array, the first two always."""
 
 
 @KINDS
+@SOME
 @given(data=st.data())
 def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
     kind: str, data: st.DataObject, profiles_by_kind: Profiles
@@ -46,6 +48,7 @@ def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
 
 
 @KINDS
+@SOME
 @given(data=st.data())
 def test_an_array_of_nodes_gives_what_each_number_gives(
     kind: str, data: st.DataObject, profiles_by_kind: Profiles
@@ -68,6 +71,7 @@ def test_an_array_of_nodes_gives_what_each_number_gives(
 
 
 @KINDS
+@SOME
 @given(data=st.data())
 def test_of_the_most_nodes_no_limit_is_broken_and_one_more_breaks_it(
     kind: str, data: st.DataObject, profiles_by_kind: Profiles
@@ -84,6 +88,7 @@ def test_of_the_most_nodes_no_limit_is_broken_and_one_more_breaks_it(
 
 
 @KINDS
+@SOME
 @given(data=st.data())
 def test_a_traced_number_has_the_same_value(kind: str, data: st.DataObject, profiles_by_kind: Profiles) -> None:
     profile = data.draw(profiles_by_kind[kind])
@@ -98,6 +103,7 @@ def test_a_traced_number_has_the_same_value(kind: str, data: st.DataObject, prof
 
 
 @KINDS
+@SOME
 @given(data=st.data())
 def test_what_a_cycle_needs_rests_on_neither_the_period_nor_the_slice_ratio(
     kind: str, data: st.DataObject, profiles_by_kind: Profiles
@@ -109,6 +115,7 @@ def test_what_a_cycle_needs_rests_on_neither_the_period_nor_the_slice_ratio(
 
 
 @KINDS
+@SOME
 @given(data=st.data())
 def test_the_safe_nodes_are_safe_and_one_more_is_not(
     kind: str, data: st.DataObject, profiles_by_kind: Profiles
@@ -129,6 +136,7 @@ def test_the_safe_nodes_are_safe_and_one_more_is_not(
 
 
 @KINDS
+@SOME
 @given(data=st.data())
 def test_the_certainty_of_an_array_is_that_of_each_number(
     kind: str, data: st.DataObject, profiles_by_kind: Profiles

@@ -5,7 +5,7 @@ from fractions import Fraction
 from math import ulp
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
@@ -170,6 +170,7 @@ GROWING = {
 
 
 @pytest.mark.parametrize("key", GROWING)
+@settings(max_examples=6)  # of each key
 @given(data=st.data(), model=MODELS, period_us=st.floats(50, 20_000))
 def test_max_nodes_never_grows_with_what_costs_time(
     key: str, data: st.DataObject, model: TimingModelName, period_us: float, make: Make

@@ -271,7 +271,7 @@ def test_what_cannot_be_drawn_is_said(profile: Profile, words: list[str]) -> Non
     ],
 )
 def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int, said: str) -> None:
-    profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=700.0)
+    profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=300.0)
     results = all_answers(profile, with_circle=nodes == 62)
     html = render(page_report([ReportedProfile("x", results)], title=None), "html")
     assert len(html.encode()) < 300_000
