@@ -4,7 +4,7 @@ import os
 import pty
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import chdir
 from io import BufferedWriter, BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
@@ -99,6 +99,7 @@ def environment(**changes: str) -> dict[str, str]:
         "COLUMNS",
         "LINES",
         "PYTHONIO",
+        "PYTHONUNBUFFERED",
         "PYTHONUTF8",
         "LC_",
         "TERM",
@@ -110,17 +111,37 @@ def environment(**changes: str) -> dict[str, str]:
     return {**kept, "LANG": "C.UTF-8", "TERM": "xterm-256color", **changes}
 
 
+@pytest.fixture(scope="session")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """An executable `busplan`: the program as a process, without the time that an interpreter takes to load it."""
+    folder = tmp_path_factory.mktemp("program")
+    forks, path = Path(__file__).with_name("forks.py"), folder / "busplan"
+    words = ["call", str(folder / "forks")]
+    text = f"#!{sys.executable} -IS\nimport sys\nsys.argv[1:1] = {words}\nexec(open({str(forks)!r}).read())\n"
+    path.write_text(text, encoding="utf-8")
+    path.chmod(0o755)
+    serve = [sys.executable, forks, "serve", folder / "forks"]
+    with subprocess.Popen(
+        serve, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=folder, env=environment()
+    ) as server:
+        assert server.stdout is not None
+        assert server.stdout.readline() == b"ready\n"
+        yield path
+        assert server.stdin is not None
+        server.stdin.close()
+
+
 def run_busplan(
     *arguments: str,
+    program: tuple[str | Path, ...],
     cwd: Path,
     stdin: str | bytes | None = None,
     env: Mapping[str, str] | None = None,
     stdout: int | IO[bytes] = subprocess.PIPE,
-    python: tuple[str, ...] = ("-m", "busplan"),
 ) -> "subprocess.CompletedProcess[str]":
     """Run the program to its end; the streams as text, bytes that are no UTF-8 escaped."""
     done = subprocess.run(
-        [sys.executable, *python, *arguments],
+        [*program, *arguments],
         check=False,
         cwd=cwd,
         env=environment(**(env or {})),
@@ -235,11 +256,11 @@ def no_compiler(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
 
 
 @pytest.fixture(scope="session")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Run the program: as a process where a stream, the environment or the interpreter matters, else in this one.
+def run(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Run:
+    """Run the program: as a process where a stream or the environment matters, else in this one.
 
     The same call twice is one run, unless it names a working directory or a stream. `inside` has more arguments of
-    `run_inside`.
+    `run_inside`; `python` has those of an interpreter, where it matters, too.
     """
     home = tmp_path_factory.mktemp("cwd")
     known: dict[object, subprocess.CompletedProcess[str]] = {}
@@ -250,9 +271,13 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         stdin: str | bytes | None = None,
         env: Mapping[str, str] | None = None,
         inside: Mapping[str, Any] | None = None,
+        python: tuple[str, ...] | None = None,
         **options: object,
     ) -> "subprocess.CompletedProcess[str]":
+        if python is not None:
+            options["program"] = (sys.executable, *python)
         if options or env is not None:
+            options.setdefault("program", (request.getfixturevalue("program"),))
             return run_busplan(*arguments, cwd=cwd or home, stdin=stdin, env=env, **options)  # type: ignore[arg-type]
         if cwd is not None or stdin is not None or inside is not None:
             return run_inside(*arguments, cwd=cwd or home, stdin=stdin, **(inside or {}))
@@ -292,7 +317,7 @@ def refused(run: Run) -> Callable[..., str]:
 
 
 @pytest.fixture(scope="session")
-def on_terminal(run: Run) -> Callable[..., tuple[int, str]]:
+def on_terminal(run: Run, request: pytest.FixtureRequest) -> Callable[..., tuple[int, str]]:
     """Run the program with a terminal for its standard output and error; gives exit code and what the terminal got.
 
     In this process, as `run` does, unless a process is asked for.
@@ -308,7 +333,7 @@ def on_terminal(run: Run) -> Callable[..., tuple[int, str]]:
         try:
             if process:
                 code = subprocess.run(
-                    [sys.executable, "-m", "busplan", *arguments],
+                    [request.getfixturevalue("program"), *arguments],
                     check=False,
                     cwd=cwd,
                     env=environment(**(env or {})),

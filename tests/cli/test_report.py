@@ -2,15 +2,16 @@
 
 import json
 import re
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from decimal import Decimal
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
+
+if TYPE_CHECKING:
+    import subprocess
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -265,17 +266,3 @@ def test_all_problems_of_all_profiles_are_said_and_nothing_is_written(
     assert all(f"{name}.toml:" in said for name in "abc")
     assert (tmp_path / "x.html").read_text(encoding="utf-8") == "old"
     assert len(list(tmp_path.iterdir())) == 3
-
-
-def test_markdown_loads_no_templates_and_neither_do_other_commands(tmp_path: Path) -> None:
-    program = (
-        "import sys; from busplan.__main__ import main\n"
-        "try: main()\n"
-        "except SystemExit as leaving: assert not leaving.code\n"
-        "print({'jinja2', 'resvg_py'} & set(sys.modules), file=sys.stderr)"
-    )
-    for arguments in (["report", "paper-4ms", "--no-circle", "--format", "markdown"], ["capacity", "paper-4ms"]):
-        done = subprocess.run(
-            [sys.executable, "-c", program, *arguments], capture_output=True, text=True, cwd=tmp_path, check=True
-        )
-        assert done.stderr == "set()\n"

@@ -34,14 +34,6 @@ WRITERS = {
     "the help": ("--help",),
     "the help of a command": ("sweep", "--help"),
 }
-LIMITED = """
-import resource, sys
-from busplan.__main__ import main
-resource.setrlimit(resource.RLIMIT_FSIZE, (512, 512))
-main()
-"""
-CUT_SHORT = {"PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1"}
-"""Compiled modules would be cut short, too: Python keeps what it wrote of them."""
 MIXED = """\
 schema_version = 1
 name = "Fräse 日本"
@@ -64,12 +56,6 @@ def test_a_file_that_takes_a_part_ends_with_exit_2_and_a_message(
             done = run(*WRITERS[name], inside={"stdout": file.fileno()})
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    require_a_part(done, tmp_path / "out")
-
-
-def test_a_process_without_buffers_says_it_too(run: Run, tmp_path: Path) -> None:
-    with (tmp_path / "out").open("wb") as file:
-        done = run(*WRITERS["a document"], python=("-c", LIMITED), env=CUT_SHORT, stdout=file)
     require_a_part(done, tmp_path / "out")
 
 
@@ -197,11 +183,11 @@ def test_no_bytes_go_to_a_terminal(on_terminal: Callable[..., tuple[int, str]], 
 
 
 def test_a_working_folder_that_is_gone_is_said(run: Run, tmp_path: Path) -> None:
-    gone = "import os; from busplan.__main__ import main; os.rmdir(os.getcwd()); main()"
+    gone = {"FORK_FIRST": "import os; os.rmdir(os.getcwd())"}
     sweep = ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3", "-o", "rows.csv")
     for number, arguments in enumerate((sweep, ("init", "x"))):
         folder = tmp_path / str(number)
         folder.mkdir()
-        done = run(*arguments, cwd=folder, python=("-c", gone))
+        done = run(*arguments, cwd=folder, env=gone)
         assert (done.returncode, done.stdout) == (2, "")
         assert done.stderr == "the working folder no longer exists; change into one that does\n"
