@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import chdir
+from functools import partial
 from io import BufferedWriter, BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
 from threading import Thread
@@ -208,7 +209,7 @@ def run_inside(
     )
 
 
-def run_line(line: str, *, cwd: Path) -> "subprocess.CompletedProcess[str]":
+def run_line(line: str, *, cwd: Path, program: Path) -> "subprocess.CompletedProcess[str]":
     """Run a line as it is typed into bash.
 
     Of a line that begins with one command of the program, bash says what its words are, and the program is called with
@@ -216,7 +217,7 @@ def run_line(line: str, *, cwd: Path) -> "subprocess.CompletedProcess[str]":
     """
 
     def bash(script: str, *, check: bool = False, stdin: str = "") -> "subprocess.CompletedProcess[bytes]":
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        path = f"{program.parent}{os.pathsep}{os.environ['PATH']}"
         return subprocess.run(
             ["bash", "-c", script],
             check=check,
@@ -241,9 +242,9 @@ def run_line(line: str, *, cwd: Path) -> "subprocess.CompletedProcess[str]":
 
 
 @pytest.fixture(scope="session")
-def shell() -> Run:
+def shell(program: Path) -> Run:
     """Run a line of documentation as it stands."""
-    return run_line
+    return partial(run_line, program=program)
 
 
 @pytest.fixture(scope="session")
