@@ -22,6 +22,7 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 # Hundreds of runs of the program compile its modules once, as those of a user do, and not in each run again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+os.environ.pop("PYTHONUNBUFFERED", None)  # whoever tests it sets it
 # Matrices are small, and every processor has a test of its own.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -100,7 +101,6 @@ def environment(**changes: str) -> dict[str, str]:
         "COLUMNS",
         "LINES",
         "PYTHONIO",
-        "PYTHONUNBUFFERED",
         "PYTHONUTF8",
         "LC_",
         "TERM",

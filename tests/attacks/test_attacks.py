@@ -22,8 +22,7 @@ def test_an_attack_does_no_harm(script: Path, tmp_path: Path, program: Path) -> 
     text = script.read_text(encoding="utf-8")
     (code,) = re.findall(r"^# exits: (\d+)$", text, re.MULTILINE)
     shutil.copy(PROFILE, tmp_path / "p.toml")
-    dropped = ("BUSPLAN_", "GIT_", "PYTHONIO", "PYTHONUNBUFFERED")
-    kept = {key: value for key, value in os.environ.items() if not key.startswith(dropped)}
+    kept = {key: value for key, value in os.environ.items() if not key.startswith(("BUSPLAN_", "GIT_", "PYTHONIO"))}
     done = subprocess.run(
         ["bash", "-u", script],
         check=False,

@@ -419,7 +419,7 @@ def test_a_limit_of_any_form_is_searched_whatever_the_profiles_own_stations(
     ring_file.write_text(text, encoding="utf-8")
     with registered(ring_with((limit,))):
         profile = busplan.load_profile(ring_file)
-        for nodes in (1, 5, 30):
+        for nodes in (1, 30):
             found, _ = largest_nodes(override(profile, {"bus.nodes": nodes}), model="plain")
             assert found == min(most, 37)
         changes = busplan.plan(override(profile, {"bus.nodes": 30}), circle=False).recommended_changes

@@ -268,7 +268,12 @@ WORK = ("busplan.profile", "busplan.questions", "busplan.gate")
 LIGHT = {"busplan.gate", "busplan.gate.formats", "busplan.profile", "busplan.profile.changes"}
 """The register of the gate's formats, where the choices of `check --format` are read; and what --set makes."""
 EQUATIONS = ("capacity {}", "latency {}", "capacity {} --format json", "profiles")
-NO_CIRCLE = ("check {} --no-circle", "plan {} --no-circle --format csv", "diff {} paper-1ms --no-circle", "timeline {} -o a.svg")
+NO_CIRCLE = (
+    "check {} --no-circle",
+    "plan {} --no-circle --format csv",
+    "diff {} paper-1ms --no-circle",
+    "timeline {} -o a.svg",
+)
 
 
 def test_nothing_is_loaded_before_it_is_needed(run: Run, tmp_path: Path) -> None:
