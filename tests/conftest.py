@@ -121,7 +121,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     text = f"#!{sys.executable} -IS\nimport sys\nsys.argv[1:1] = {words}\nexec(open({str(forks)!r}).read())\n"
     path.write_text(text, encoding="utf-8")
     path.chmod(0o755)
-    serve = [sys.executable, forks, "serve", folder / "forks"]
+    serve = [sys.executable, str(forks), "serve", str(folder / "forks")]
     with subprocess.Popen(
         serve, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=folder, env=environment()
     ) as server:

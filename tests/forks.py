@@ -60,7 +60,7 @@ def serve(path: str) -> None:
         with suppress(SystemExit):
             main()
     os.write(1, b"ready\n")
-    while sys.stdin not in select([listener, sys.stdin], [], [])[0]:
+    while 0 not in select([listener.fileno(), 0], [], [])[0]:
         with suppress(ChildProcessError):
             while os.waitpid(-1, os.WNOHANG)[0]:
                 pass
@@ -114,7 +114,7 @@ def watch(client: socket.socket, pid: int) -> None:
 
     client.sendall(pid.to_bytes(4, "big"))
     ended = os.pidfd_open(pid)
-    if ended not in select([ended, client], [], [])[0]:
+    if ended not in select([ended, client.fileno()], [], [])[0]:
         os.kill(pid, signal.SIGKILL)
     _, status = os.waitpid(pid, 0)
     with suppress(OSError):

@@ -107,7 +107,7 @@ def test_a_drawing_takes_the_width_of_its_terminal(program: Path, tmp_path: Path
     leader, follower = pty.openpty()
     fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 117, 0, 0))
     environment = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "LINES")}
-    command = [program, "timeline", "paper-4ms"]
+    command = [str(program), "timeline", "paper-4ms"]
     run = subprocess.Popen(command, stdout=follower, cwd=tmp_path, env={**environment, "NO_COLOR": "1"})
     os.close(follower)
     shown = b""
