@@ -419,11 +419,11 @@ def test_a_limit_of_any_form_is_searched_whatever_the_profiles_own_stations(
     ring_file.write_text(text, encoding="utf-8")
     with registered(ring_with((limit,))):
         profile = busplan.load_profile(ring_file)
-        for nodes in (1, 5, 30):
+        for nodes in (1, 30):
             found, _ = largest_nodes(override(profile, {"bus.nodes": nodes}), model="plain")
             assert found == min(most, 37)
-        changes = busplan.plan(override(profile, {"bus.nodes": 30}), circle=False).recommended_changes
-        assert changes is None or float(changes.get("bus.nodes", 30)) <= most
+        if most == 5:  # a plan asks the same search, and looks long for what is not there
+            assert busplan.plan(override(profile, {"bus.nodes": 30}), circle=False).recommended_changes is None
 
 
 def test_a_sweep_has_room_for_more_limits_than_bits_of_a_byte(run: Run, ring_file: Path) -> None:
