@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import NamedTuple
 
-from busplan.buses.figure import REQUIRED
+from busplan.buses.figure import REQUIRED, term_name
 from busplan.buses.network import Network
 from busplan.elementwise import Number, total
 
@@ -22,7 +22,7 @@ class Term(NamedTuple):
     @property
     def name(self) -> str:
         """What it is called beside the other terms."""
-        return self.key.removeprefix("cycle_").removesuffix("_us")
+        return term_name(self.key)
 
 
 class BusEvent(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusLatency
-from busplan.buses.figure import NODES, TIMING_MODEL, TRANSACTION, Figure
+from busplan.buses.figure import Figure
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, larger, plain, rounded_up, total
 from busplan.sourced import Sourced, constants
@@ -64,7 +64,6 @@ WHOLE_PERIOD: Final = "1            # assumed: the master computes beside the te
 MEASURE: Final = "it runs beside the telegrams; take it from the drives' data, S-0-0005 (SERCOS III: S-0-1005)"
 BASE: Final = "from a sample to the telegram that carries it, and from a command to its effect"
 """What a new profile says of the slice and of the execution times."""
-LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *DELAYS)
 
 
 def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Number = 0.0) -> tuple[BusLatency, ...]:
@@ -116,22 +115,13 @@ class SercosCycle(BusCycle):
 class SercosBus(Bus):
     """A ring of SERCOS: its drives work beside the telegrams."""
 
-    @property
-    def latency_figures(self) -> tuple[Figure, ...]:
-        """Of `latency`, in the order of its document."""
-        return LATENCY
-
     def latency_subject(self, network: Network) -> str:
         """Say whose delay it is, and how the bus is set."""
         return ", ".join(("feedback and commands of all nodes", *self.setup_words(network)))
 
-    def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
-        """It runs beside the telegrams: drives sample before their telegram, and act behind the last MDT."""
-        return False
-
-    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
-        """The nodes' time is in every latency."""
-        return True
+    def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
+        """It runs beside the telegrams, and is in every latency: drives sample before their telegram."""
+        return of_latency
 
     def arrivals_us(self, cycle: BusCycle) -> Mapping[int, float]:
         """When the last byte of the MDT has passed the ring: all nodes have their commands then [us]."""

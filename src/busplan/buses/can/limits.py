@@ -269,6 +269,7 @@ LIMITS: Final = (
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         has_rule=True,
         says=_load_words,
+        period=lambda _limit, network: CanCycle(network, WORST).load_period_us,
         kept_from_us=lambda network: plain(CanCycle(network, WORST).load_period_us),
     ),
     Limit(

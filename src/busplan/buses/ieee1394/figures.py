@@ -8,6 +8,7 @@ from busplan.buses.figure import (
     PAYLOAD_BYTES,
     TIMING_MODEL,
     TRANSACTION,
+    BusFigures,
     Figure,
     Ink,
     by,
@@ -139,15 +140,6 @@ WRITE_TRANSACTION: Final = Figure(
 _PLAIN: Final = (SYNC, NONPERIODIC)
 _DOCUMENT_TERMS: Final = (*_PLAIN, *(one for one in TERMS if one not in _PLAIN))
 """In the order of the document, which is older than that of the wire."""
-CAPACITY: Final = capacity_figures(
-    _DOCUMENT_TERMS,
-    setup=SETUP,
-    own=(
-        *(READ_LATENCY, WRITE_LATENCY, READ_TRANSACTION, WRITE_TRANSACTION),
-        *(BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
-    ),
-    counted=(NODES_EQ11,),
-)
 TABLE: Final = (
     READ_LATENCY,
     WRITE_LATENCY,
@@ -292,3 +284,23 @@ LATENCY_TABLE: Final = tuple(
     )
 )
 """In the order of the bench: T1+T2, T3, T4+T5, and the gaps behind them."""
+
+FIGURES: Final = BusFigures(
+    TERMS,
+    capacity_figures(
+        _DOCUMENT_TERMS,
+        setup=SETUP,
+        own=(
+            *(READ_LATENCY, WRITE_LATENCY, READ_TRANSACTION, WRITE_TRANSACTION),
+            *(BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
+        ),
+        counted=(NODES_EQ11,),
+    ),
+    setup=SETUP,
+    headings=(HOPS.key, GAP_COUNT.key),
+    table=TABLE,
+    compared=COMPARED,
+    planned=(GAP_COUNT.key, GAP_COUNT_SAFE.key),
+    phases=LATENCY_TABLE,
+    latency_document=LATENCY,
+)

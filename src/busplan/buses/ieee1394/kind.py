@@ -5,8 +5,8 @@ from math import ceil
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
-from busplan.buses.figure import NONPERIODIC, Figure, Ink, by_key
-from busplan.buses.ieee1394 import figures, rules
+from busplan.buses.figure import NONPERIODIC, Ink, by_key
+from busplan.buses.ieee1394 import rules
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.constants import (
     CONSTANTS,
@@ -22,6 +22,7 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
+from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE, SYNC
 from busplan.buses.ieee1394.limits import LIMITS
 from busplan.buses.ieee1394.settings import gap_count, responses, schedule
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
@@ -30,9 +31,12 @@ from busplan.buses.network import Group, Network
 from busplan.buses.parts import (
     EventKind,
     Halves,
+    Key,
     Limit,
+    MeasuredLatencies,
     PayloadRange,
     Perturbation,
+    Safety,
     Setting,
     Starter,
     TimingModel,
@@ -47,13 +51,50 @@ if TYPE_CHECKING:
     from busplan.buses.ieee1394.section import Ieee1394Profile
     from busplan.buses.published import EvidenceSection
 
-_PHASES: Final = by_key(figures.LATENCY)
+_PHASES: Final = by_key(FIGURES.latency)
 _HOST_STEP_US: Final = 10.0
 """How much slower the host is made, to see what that does to the margin."""
 
 
 def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
     return EventKind(key, label, _PHASES[phase].reference, mark, ink)
+
+
+def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
+    """What the packets of a split transaction with the farthest node of a group take.
+
+    Raises
+    ------
+    BusplanError
+        Nodes do not answer such a transaction split: then no execution time is on the bus.
+    """
+    if is_broadcast(network):
+        raise BusplanError(
+            'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
+            'calibrate with cycle.schedule = "individual"'
+        )
+    said = next(alike for alike in network.alike if alike.name == group)
+    answer, key = getattr(said.node, f"{kind}_response"), said.node_key(f"{kind}_response")
+    if answer != "split":
+        raise BusplanError(
+            f'{key} = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
+            f'be found from its latency; leave its lines out, or calibrate with {key} = "split"'
+        )
+    phases = transaction(
+        kind,  # type: ignore[arg-type]
+        model=TIMING_MODELS[model],  # type: ignore[index]
+        link=farthest_link(network, group),
+        payload_bytes=payload_bytes,
+        overhead_bytes=said.payload.overhead_bytes,
+        responder=Responder(0.0),
+    )
+    parts_us = (phases.latency_us, phases.request_and_acknowledge_us, phases.subaction_gap_us)
+    return Halves(*map(plain, parts_us))
+
+
+def fitted_against(network: Network, model: str | None) -> dict[str, Value]:
+    """The timing model and the gap count."""
+    return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
 
 
 class Ieee1394(Bus):
@@ -66,16 +107,8 @@ class Ieee1394(Bus):
         TimingModel("standard", "the standard's clock and packets, and the gaps as the bus runs them"),
     )
     deciding_model = "standard"
-    term_figures = figures.TERMS
-    capacity_figures = figures.CAPACITY
-    setup_figures = figures.SETUP
-    compared_figures = figures.COMPARED
-    table_figures = figures.TABLE
-    latency_table_figures = figures.LATENCY_TABLE
-    planned_figures = ("gap_count", "gap_count_safe")
-    facts = ("hops", "gap_count")
-    safety = "gap count"
-    safety_figure = figures.GAP_COUNT_SAFE
+    figures = FIGURES
+    safety = Safety("gap count", GAP_COUNT_SAFE, {"bus.gap_count": MAX_GAP_COUNT})
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
     starter = Starter(
@@ -91,7 +124,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
     event_kinds = (
         EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
-        EventKind("sync", "synchronous packet", figures.SYNC.reference, "S", "sync"),
+        EventKind("sync", "synchronous packet", SYNC.reference, "S", "sync"),
         _kind("arbitration", "arbitration", "arbitration_us", "a", "contention"),
         _kind("request_data", "request data", "request_data_us", ">", "request"),
         _kind("acknowledge", "acknowledge", "acknowledge_us", "k", "acknowledge"),
@@ -112,35 +145,25 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         EventKind("write", "writes", "", "W", "out"),
     )
     constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
-    key_sources: ClassVar[Mapping[str, Sourced]] = {
-        "bus.cable_length_m": REFERENCE_CABLE_M,
-        "cycle.slice_ratio": SLICE_RATIO,
-        "cycle.sync.ping_us": PING_US,
-        "cycle.sync.ping_per_node_us": PING_PER_NODE_US,
-        "payload.overhead_bytes": PACKET_OVERHEAD_BYTES,
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.nodes": Key(meaning="the others on a second bus"),
+        "bus.max_hops": Key(meaning="rewired as a tree", short="tree of {} hops"),
+        "bus.speed": Key(meaning="if all nodes can", short="speed {}"),
+        "bus.gap_count": Key(short="gap count {}"),
+        "bus.cable_length_m": Key(default=REFERENCE_CABLE_M, warned_at=REFERENCE_CABLE_M, role="cable"),
+        "cycle.slice_ratio": Key(default=SLICE_RATIO),
+        "cycle.schedule": Key(meaning="if the firmware of all nodes can", short="schedule {}"),
+        "cycle.sync.ping_us": Key("ping", PING_US),
+        "cycle.sync.ping_per_node_us": Key("ping_node", PING_PER_NODE_US),
+        "host.transaction_us": Key("T_host", role="host"),
+        "payload.overhead_bytes": Key("overhead", PACKET_OVERHEAD_BYTES),
+        "node.read_response": Key(meaning="if the nodes can", short="reads {}"),
+        "node.write_response": Key(meaning="if the nodes can", short="writes {}"),
+        "node.response_us": Key("T_hold"),
+        "node.execution.worst_extra_us": Key("T_extra"),
+        "node.execution.residual": Key(chooses=True),
     }
-    key_symbols: ClassVar[Mapping[str, str]] = {
-        "payload.overhead_bytes": "overhead",
-        "host.transaction_us": "T_host",
-        "node.execution.worst_extra_us": "T_extra",
-        "node.response_us": "T_hold",
-        "cycle.sync.ping_us": "ping",
-        "cycle.sync.ping_per_node_us": "ping_node",
-    }
-    choosing_keys = ("execution.grade", "execution.residual")
-    warning_keys = ("bus.cable_length_m",)
-    warning_constants = (REFERENCE_CABLE_M,)
-    change_meanings: ClassVar[Mapping[str, str]] = {
-        "bus.max_hops": "rewired as a tree",
-        "bus.nodes": "the others on a second bus",
-        "bus.speed": "if all nodes can",
-        "cycle.schedule": "if the firmware of all nodes can",
-        "node.read_response": "if the nodes can",
-        "node.write_response": "if the nodes can",
-    }
-    reset_changes: ClassVar[Mapping[str, Value]] = {"bus.gap_count": MAX_GAP_COUNT}
-    cable_key = "bus.cable_length_m"
-    host_keys = ("host.transaction_us",)
+    calibration = MeasuredLatencies(packets_of, fitted_against)
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
         {"bus.cycle_master": False, "bus.isochronous_us": 0.0},
         {"host.transaction_us": 0.0},
@@ -148,14 +171,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     )
     evidence_data = ("paper", "dvrk", "ieee1394")
     evidence_profiles = ("paper-two-node", "dvrk")
-    change_words: ClassVar[Mapping[str, str]] = {
-        "bus.gap_count": "gap count {}",
-        "bus.max_hops": "tree of {} hops",
-        "bus.speed": "speed {}",
-        "cycle.schedule": "schedule {}",
-        "node.read_response": "reads {}",
-        "node.write_response": "writes {}",
-    }
 
     def profile_model(self) -> "type[Ieee1394Profile]":
         """The model of its profiles."""
@@ -167,11 +182,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """The cycle of a network under one timing model, by its schedule."""
         schedule = BroadcastCycle if is_broadcast(network) else Ieee1394Cycle
         return schedule(network, model)  # type: ignore[arg-type]
-
-    @property
-    def latency_figures(self) -> tuple[Figure, ...]:
-        """Of `latency`, in the order of its document."""
-        return figures.LATENCY
 
     def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:
         """Keys that the paper's equations have no term for."""
@@ -198,41 +208,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         farthest = f"farthest of {nodes}" if network.is_uniform else "the farthest node of each group"
         return ", ".join((farthest, *self.setup_words(network)))
 
-    def halves(self, network: Network, *, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
-        """What the packets of a split transaction with the farthest node of a group take.
-
-        Raises
-        ------
-        BusplanError
-            Nodes do not answer such a transaction split: then no execution time is on the bus.
-        """
-        if is_broadcast(network):
-            raise BusplanError(
-                'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
-                'calibrate with cycle.schedule = "individual"'
-            )
-        said = next(one for one in network.alike if one.name == group)
-        answer, key = getattr(said.node, f"{kind}_response"), said.node_key(f"{kind}_response")
-        if answer != "split":
-            raise BusplanError(
-                f'{key} = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
-                f'be found from its latency; leave its lines out, or calibrate with {key} = "split"'
-            )
-        phases = transaction(
-            kind,  # type: ignore[arg-type]
-            model=TIMING_MODELS[model],  # type: ignore[index]
-            link=farthest_link(network, group),
-            payload_bytes=payload_bytes,
-            overhead_bytes=said.payload.overhead_bytes,
-            responder=Responder(0.0),
-        )
-        parts_us = (phases.latency_us, phases.request_and_acknowledge_us, phases.subaction_gap_us)
-        return Halves(*map(plain, parts_us))
-
-    def fit_keys(self, network: Network, *, model: str | None) -> dict[str, Value]:
-        """The timing model and the gap count."""
-        return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
-
     def taking_us(self, group: Group, network: Network) -> float:
         """Nothing behind a split write, which holds the execution; else the node executes beside the bus [us]."""
         is_split = group.node.write_response == "split" and not is_broadcast(network)
@@ -247,10 +222,10 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         needed_us = min(plain(self.cycle(network, model=self.deciding_model).required_us), period_us)
         return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
 
-    def has_execution(self, network: Network) -> bool:
+    def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - latencies, too
         """Whether a transaction is split: other answers keep the execution off the bus, and so do broadcasts."""
         return not is_broadcast(network) and any(
-            "split" in (one.node.read_response, one.node.write_response) for one in network.groups
+            "split" in (group.node.read_response, group.node.write_response) for group in network.groups
         )
 
     def settings(self, network: Network) -> tuple[Setting, ...]:

@@ -5,21 +5,22 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
+from busplan.buses.parts import EventKind, Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import BASE, DELAYS, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos2 import figures, rules
+from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
+from busplan.buses.sercos2 import rules
 from busplan.buses.sercos2.constants import CONSTANTS, MOST_DRIVE_BYTES, PERIODS, TURNAROUND_US
 from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
+from busplan.buses.sercos2.figures import FIGURES, MDT_BYTES
 from busplan.buses.sercos2.limits import LIMITS
 from busplan.elementwise import plain
-from busplan.sourced import Grade, Sourced
+from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
     from busplan.buses.sercos2.section import Sercos2Profile
 
-_TELEGRAMS: Final = figures.MDT_BYTES.reference
+_TELEGRAMS: Final = MDT_BYTES.reference
 _FASTEST: Final = 16
 
 
@@ -33,13 +34,7 @@ class Sercos2(SercosBus):
         TimingModel(NONE, "no stuff bits"),
     )
     deciding_model = WORST
-    term_figures = figures.TERMS
-    capacity_figures = figures.CAPACITY
-    setup_figures = (figures.DATA_RATE,)
-    compared_figures = (figures.MDT_BYTES,)
-    table_figures = (figures.MDT_BYTES,)
-    latency_table_figures = DELAYS
-    facts = ("data_rate_mbit_s",)
+    figures = FIGURES
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
     periods = PERIODS
@@ -67,21 +62,16 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         EventKind("mdt_stretch", "MDT", "", "M", "out"),
     )
     constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
-    key_sources: ClassVar[Mapping[str, Sourced]] = {
-        "bus.turnaround_us": TURNAROUND_US,
-        "bus.pipeline_cycles": PIPELINE_CYCLES,
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.nodes": Key(meaning="the others on a second ring"),
+        "bus.data_rate_mbit_s": Key("f"),
+        "bus.at_gap_us": Key("t_gap", grade="assumed"),
+        "bus.at_start_us": Key("t_1"),
+        "bus.turnaround_us": Key("t_ATMT", TURNAROUND_US),
+        "bus.recovery_us": Key("t_MTSY"),
+        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
+        "node.execution.worst_extra_us": Key("T_extra"),
     }
-    key_grades: ClassVar[Mapping[str, Grade]] = {"bus.at_gap_us": "assumed"}
-    key_symbols: ClassVar[Mapping[str, str]] = {
-        "bus.data_rate_mbit_s": "f",
-        "bus.at_gap_us": "t_gap",
-        "bus.at_start_us": "t_1",
-        "bus.turnaround_us": "t_ATMT",
-        "bus.recovery_us": "t_MTSY",
-        "bus.pipeline_cycles": "n",
-        "node.execution.worst_extra_us": "T_extra",
-    }
-    change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second ring"}
     evidence_data = ("sercos2", "paper")
     evidence_profiles = ("sercos2-servo-8",)
 

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Cost, EventKind, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import BASE, DELAYS, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos3 import figures, rules
+from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
+from busplan.buses.sercos3 import rules
 from busplan.buses.sercos3.constants import (
     COMPONENT_DELAY_US,
     CONNECTION_BYTES,
@@ -23,6 +23,7 @@ from busplan.buses.sercos3.constants import (
     PERIODS,
 )
 from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
+from busplan.buses.sercos3.figures import FIGURES, MDT_TELEGRAMS
 from busplan.buses.sercos3.limits import LIMITS
 from busplan.elementwise import plain
 from busplan.sourced import Sourced
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
     from busplan.buses.sercos3.section import Sercos3Profile
 
-_COSEMA: Final = figures.MDT_TELEGRAMS.reference
+_COSEMA: Final = MDT_TELEGRAMS.reference
 _METHOD: Final = "bus.timing_method"
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
 
@@ -46,12 +47,7 @@ class Sercos3(SercosBus):
         TimingModel(TELEGRAMS, "telegrams and their gaps alone, as performance tables count"),
     )
     deciding_model = WINDOW
-    term_figures = figures.TERMS
-    capacity_figures = figures.CAPACITY
-    compared_figures = figures.COUNTS
-    table_figures = figures.COUNTS
-    latency_table_figures = DELAYS
-    planned_figures = tuple(one.key for one in figures.COUNTS)
+    figures = FIGURES
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
     periods = PERIODS
@@ -79,31 +75,19 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     )
     stretch_kinds = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
     constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
-    key_sources: ClassVar[Mapping[str, Sourced]] = {
-        "bus.gap_bytes": DEFAULT_GAP_BYTES,
-        "bus.device_delay_us": DEVICE_DELAY_US,
-        "bus.master_jitter_us": MASTER_JITTER_US,
-        "bus.master_delay_us": MASTER_DELAY_US,
-        "bus.component_delay_us": COMPONENT_DELAY_US,
-        "bus.pipeline_cycles": PIPELINE_CYCLES,
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.nodes": Key(meaning="the others on a second network"),
+        "bus.gap_bytes": Key("gap", DEFAULT_GAP_BYTES),
+        "bus.device_delay_us": Key("t_dev", DEVICE_DELAY_US),
+        "bus.master_jitter_us": Key("J_master", MASTER_JITTER_US),
+        "bus.master_delay_us": Key("t_master", MASTER_DELAY_US),
+        "bus.component_delay_us": Key("t_comp", COMPONENT_DELAY_US),
+        "bus.at_start_us": Key("t_1,min"),
+        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
+        _METHOD: Key(meaning="a setting of the master", short="method {}"),
+        "cycle.nonperiodic_us": Key(warned_at=LEAST_UCC_US),
+        "node.execution.worst_extra_us": Key("T_extra"),
     }
-    key_symbols: ClassVar[Mapping[str, str]] = {
-        "bus.gap_bytes": "gap",
-        "bus.device_delay_us": "t_dev",
-        "bus.master_jitter_us": "J_master",
-        "bus.master_delay_us": "t_master",
-        "bus.component_delay_us": "t_comp",
-        "bus.at_start_us": "t_1,min",
-        "bus.pipeline_cycles": "n",
-        "node.execution.worst_extra_us": "T_extra",
-    }
-    warning_keys = ("cycle.nonperiodic_us",)
-    warning_constants = (LEAST_UCC_US,)
-    change_meanings: ClassVar[Mapping[str, str]] = {
-        "bus.nodes": "the others on a second network",
-        _METHOD: "a setting of the master",
-    }
-    change_words: ClassVar[Mapping[str, str]] = {_METHOD: "method {}"}
     evidence_data = ("sercos3",)
     evidence_profiles = ("sercos3-servo-8",)
 

@@ -4,6 +4,7 @@ from busplan.buses.cycle import BusCycle
 from busplan.elementwise import plain
 from busplan.questions.fit.cycle import cycle_of
 from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
 
@@ -37,10 +38,16 @@ def skew_us(profile: Profile) -> float:
 
     A loop on the host has it in its delays.
     """
-    if profile.servo.loop == "host" or bus_of(profile).acts_at_once(network_of(profile)):
+    if profile.servo.loop == "host" or acts_at_once(profile):
         return 0.0
     first_us, last_us = _first_and_last_us(cycle_of(profile, model=bus_of(profile).deciding_model))
     return last_us - first_us
+
+
+def acts_at_once(profile: Profile) -> bool:
+    """Whether the nodes take their set-points at one time; otherwise each does when it has its own."""
+    clock = bus_of(profile).key_of("clock")
+    return not clock or bool(value_at(profile, clock))
 
 
 def jitter_us(profile: Profile) -> float:
