@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.figure import BusFigures
+from busplan.buses.limits import ANY_PERIOD, Periods
 from busplan.buses.network import Group, Network
-from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.buses.rule import Rule
 from busplan.elementwise import Number, plain
 from busplan.sourced import Sourced
@@ -52,7 +52,7 @@ class Bus(ABC):
     limits: ClassVar[tuple[Limit, ...]]
     """In the order in which they are reported; at least one grows with the nodes."""
     periods: ClassVar[Periods] = ANY_PERIOD
-    """Communication periods that it knows. One that knows some alone has a limit and a rule of `known_period`."""
+    """Communication periods that it knows. One that knows some alone has a limit and a rule of `limits`."""
     starter: ClassVar[Starter]
     """What a new profile starts from."""
     rules: ClassVar[tuple[Rule, ...]] = ()

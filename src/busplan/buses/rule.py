@@ -1,7 +1,7 @@
 """What a rule of the gate is, and what it may ask: figures, figures after changes, a cure."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 
 if TYPE_CHECKING:
     from busplan.sections.profile import Profile
@@ -28,71 +28,8 @@ class RuleProblem(NamedTuple):
     cure: tuple[str, ...] = ()
 
 
-class RuleFigures(Protocol):
-    """What a rule may read of the capacity under one timing model; figures of the kind are attributes, too."""
-
-    @property
-    def timing_model(self) -> str:
-        """Name of the timing model."""
-
-    @property
-    def period_us(self) -> float:
-        """The period [us]."""
-
-    @property
-    def exceeded(self) -> tuple[str, ...]:
-        """Keys of the limits that are broken."""
-
-    @property
-    def not_shown(self) -> tuple[str, ...] | None:
-        """Keys of the limits that are neither broken nor shown to be kept; of the model that decides."""
-
-    @property
-    def terms(self) -> Sequence[Any]:
-        """The parts of what the cycle needs."""
-
-    @property
-    def doubts(self) -> Sequence[Any]:
-        """What its uncertainty is made of."""
-
-    @property
-    def required_us(self) -> float:
-        """What the cycle needs [us]."""
-
-    @property
-    def available_us(self) -> float:
-        """What the slice gives it [us]."""
-
-    @property
-    def margin_us(self) -> float:
-        """What is left of the slice [us]."""
-
-    @property
-    def safe_nodes(self) -> int | None:
-        """Most nodes that are shown to fit [1]; of the model that decides, and None of groups."""
-
-    @property
-    def groups(self) -> Sequence[Any]:
-        """The counts of each group of nodes; empty where all are alike."""
-
-    @property
-    def verdict(self) -> str | None:
-        """fits, not shown to fit, or does not fit; of the model that decides."""
-
-    @property
-    def bias_us(self) -> float | None:
-        """What the bus takes beyond the model [us]; None where nobody has measured it."""
-
-    @property
-    def margin_corrected_us(self) -> float | None:
-        """What is left of the slice, less the bias [us]; of the model that decides."""
-
-    @property
-    def uncertainty_us(self) -> float | None:
-        """Expanded uncertainty of that [us]; of the model that decides."""
-
-    def __getattr__(self, key: str) -> Any:
-        """A figure of the kind."""
+RuleFigures: TypeAlias = Any
+"""Figures of `capacity` under one timing model, each an attribute by its key; those of the kind, too."""
 
 
 class RuleSubject(Protocol):

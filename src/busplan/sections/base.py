@@ -1,7 +1,7 @@
 """What all sections of a profile share: strictness, ranges, and errors in our own words."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -57,6 +57,15 @@ class Section(BaseModel):
         # Editors show it.
         model_title_generator=_title,
     )
+
+
+class Extended(Section):
+    """A section with keys that no type checker sees: those of a kind of bus, or of the servo core."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any:
+            """One of those keys."""
 
 
 _Section = TypeVar("_Section", bound=Section)

@@ -16,11 +16,11 @@ from busplan.sections.cycle import (
     BusSection,
     CycleSection,
     GroupSection,
+    Limits,
     NodeSection,
     PayloadSection,
 )
 from busplan.sections.execution import TableExecution
-from busplan.sections.limits import Limits
 from busplan.sections.machine import CircleSection, DeliverySection, MechanicsSection, ServoSection, ToleranceSection
 from busplan.sections.transactions import TRANSACTION_KINDS
 

@@ -11,8 +11,8 @@ from busplan.buses.can.response import TooManyStepsError
 from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
 from busplan.buses.can.traffic import Sent, Traffic, traffic_of, without_times
 from busplan.buses.can.waiting import Messages, messages
+from busplan.buses.limits import NODE_LIMIT
 from busplan.buses.network import Network
-from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
 from busplan.elementwise import Number, is_everywhere, larger, plain, pointwise, total
 from busplan.sections.base import MAX_TIME_US

@@ -19,9 +19,8 @@ from busplan.buses.can.cycle import WORST, TimingModelName
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC
 from busplan.elementwise import Number
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
-from busplan.sections.cycle import BusSection, GroupAxes, GroupName, GroupSection, NodeSection, PayloadSection
+from busplan.sections.cycle import BusSection, GroupAxes, GroupName, GroupSection, Limits, NodeSection, PayloadSection
 from busplan.sections.execution import UNKNOWN_SHARE
-from busplan.sections.limits import Limits
 from busplan.sections.profile import Profile
 
 Identifier = Annotated[int, Field(ge=0, le=MAX_IDENTIFIER[29])]

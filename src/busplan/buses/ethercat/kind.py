@@ -4,13 +4,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.bus import Bus
-from busplan.buses.ethercat import rules
 from busplan.buses.ethercat.constants import CONSTANTS, MAILBOX_BYTES, PIPELINE_CYCLES, SEPARATE, SHARED, SYNC_SHIFT
 from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
 from busplan.buses.ethercat.equations import room_bytes
 from busplan.buses.ethercat.figures import FIGURES, FRAME
 from busplan.buses.ethercat.latency import loop_periods
-from busplan.buses.ethercat.limits import LIMITS
+from busplan.buses.ethercat.rules import LIMITS, RULES
 from busplan.buses.ethercat.traffic import arrivals_us, datagrams, layout
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
@@ -48,7 +47,7 @@ class Ethercat(Bus):
     deciding_model = LAST_BYTE
     figures = FIGURES
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    rules: ClassVar[tuple[Rule, ...]] = RULES
     starter = Starter(
         """\
 [bus]

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.figure import NONPERIODIC, Ink, by_key
-from busplan.buses.ieee1394 import rules
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.constants import (
     CONSTANTS,
@@ -23,12 +22,12 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
 from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE, SYNC
-from busplan.buses.ieee1394.limits import LIMITS
-from busplan.buses.ieee1394.settings import gap_count, responses, schedule
+from busplan.buses.ieee1394.rules import LIMITS, RULES
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
 from busplan.buses.network import Group, Network
 from busplan.buses.parts import (
+    Cost,
     EventKind,
     Halves,
     Key,
@@ -97,6 +96,40 @@ def fitted_against(network: Network, model: str | None) -> dict[str, Value]:
     return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
 
 
+_UNSPLIT: Final = {"read_response": "concatenated", "write_response": "unified"}
+"""Answers that need no second arbitration."""
+
+
+def _gap_count(network: Network) -> Setting:
+    """The smallest safe gap count."""
+    key = "bus.gap_count"
+    empty = Setting("gap_count", "gap count", Cost.REGISTER, (key,), ())
+    if not network.profile.bus.cable_is_standard:
+        return empty._replace(reason=f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m")
+    safe = plain(safe_gap_count(hops_of(network)))
+    return empty if gap_count_of(network) == safe else empty._replace(values=({key: safe},))
+
+
+def _schedule(network: Network) -> Setting:
+    """The other way to read and write all nodes."""
+    other = "individual" if is_broadcast(network) else "broadcast"
+    return Setting("schedule", "schedule", Cost.SCHEDULE, ("cycle.schedule",), ({"cycle.schedule": other},))
+
+
+def _responses(network: Network) -> Setting:
+    """Answers without a second arbitration: of reads, of writes, of both."""
+    keys = tuple(group.key(name) for group in network.groups for name in _UNSPLIT)
+    if is_broadcast(network):
+        return Setting("responses", "responses", Cost.RESPONSES, keys, (), "no node answers a broadcast")
+    of_reads, of_writes = (
+        {group.key(name): answer for group in network.groups if getattr(group.node, name) == "split"}
+        for name, answer in _UNSPLIT.items()
+    )
+    both = {**of_reads, **of_writes} if of_reads and of_writes else {}
+    values = tuple(filter(None, (of_reads, of_writes, both)))
+    return Setting("responses", "responses", Cost.RESPONSES, keys, values, "" if values else "no node answers split")
+
+
 class Ieee1394(Bus):
     """The bus of the paper."""
 
@@ -110,7 +143,7 @@ class Ieee1394(Bus):
     figures = FIGURES
     safety = Safety("gap count", GAP_COUNT_SAFE, {"bus.gap_count": MAX_GAP_COUNT})
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    rules: ClassVar[tuple[Rule, ...]] = RULES
     starter = Starter(
         """\
 [bus]
@@ -230,7 +263,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The gap count, one register in each node, how the nodes answer, and the other schedule."""
-        return (gap_count(network), responses(network), schedule(network))
+        return (_gap_count(network), _responses(network), _schedule(network))
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """One hop, one busy retry, and a slower host."""

@@ -3,7 +3,7 @@
 from typing import Final, Literal
 
 from busplan.buses import sercos
-from busplan.buses.periods import Periods
+from busplan.buses.limits import Periods
 from busplan.sourced import Sourced, constants
 
 DataRate = Literal[2, 4, 8, 16]

@@ -4,15 +4,22 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.figure import NONPERIODIC
+from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind, Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos2 import rules
-from busplan.buses.sercos2.constants import CONSTANTS, MOST_DRIVE_BYTES, PERIODS, TURNAROUND_US
+from busplan.buses.sercos2.constants import (
+    CONSTANTS,
+    MOST_DRIVE_BYTES,
+    MOST_DRIVES,
+    MOST_MDT_BYTES,
+    PERIODS,
+    PERIODS_SOURCE,
+    TURNAROUND_US,
+)
 from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
 from busplan.buses.sercos2.figures import FIGURES, MDT_BYTES
-from busplan.buses.sercos2.limits import LIMITS
 from busplan.elementwise import plain
 from busplan.sourced import Sourced
 
@@ -22,6 +29,26 @@ if TYPE_CHECKING:
 
 _TELEGRAMS: Final = MDT_BYTES.reference
 _FASTEST: Final = 16
+
+LIMITS: Final = (
+    period_limit(PERIODS),
+    NODE_LIMIT,
+    Limit(
+        "nodes",
+        "{value:.0f} drives are over the {most:.0f} of a ring",
+        lambda network: network.nodes,
+        lambda _network: MOST_DRIVES,
+        way_out=f"a second ring has {MOST_DRIVES:g} more",
+    ),
+    Limit(
+        "payload",
+        "the MDT has {value:.0f} bytes of data, over {most:.0f}",
+        lambda network: Sercos2Cycle(network, NONE).mdt_bytes,
+        lambda _network: MOST_MDT_BYTES,
+        way_out="a smaller payload or a second ring would do",
+        failure="payload_bytes",
+    ),
+)
 
 
 class Sercos2(SercosBus):
@@ -36,7 +63,7 @@ class Sercos2(SercosBus):
     deciding_model = WORST
     figures = FIGURES
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    rules: ClassVar[tuple[Rule, ...]] = (period_rule("BP151", PERIODS, kind="sercos2", source=PERIODS_SOURCE),)
     periods = PERIODS
     starter = Starter(
         """\

@@ -4,7 +4,7 @@ from math import sqrt
 from typing import Final, Literal
 
 from busplan.buses import sercos
-from busplan.buses.periods import Periods
+from busplan.buses.limits import Periods
 from busplan.sourced import Sourced, constants
 
 Version = Literal["V1.0", "V1.1"]

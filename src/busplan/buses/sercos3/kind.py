@@ -1,14 +1,15 @@
 """SERCOS III, as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.figure import NONPERIODIC
+from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
 from busplan.buses.parts import Cost, EventKind, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos3 import rules
 from busplan.buses.sercos3.constants import (
     COMPONENT_DELAY_US,
     CONNECTION_BYTES,
@@ -19,13 +20,15 @@ from busplan.buses.sercos3.constants import (
     MASTER_DELAY_US,
     MASTER_JITTER_US,
     MOST_BYTES,
+    MOST_DEVICES,
     MOST_TELEGRAMS,
     PERIODS,
+    PERIODS_SOURCE,
 )
 from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
 from busplan.buses.sercos3.figures import FIGURES, MDT_TELEGRAMS
-from busplan.buses.sercos3.limits import LIMITS
-from busplan.elementwise import plain
+from busplan.buses.sercos3.telegrams import SORTS, data_bytes, telegrams_of
+from busplan.elementwise import Number, larger, plain
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
@@ -35,6 +38,42 @@ if TYPE_CHECKING:
 _COSEMA: Final = MDT_TELEGRAMS.reference
 _METHOD: Final = "bus.timing_method"
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
+
+
+def _most_telegrams(network: Network) -> Number:
+    return reduce(larger, (telegrams_of(network, kind).filling.telegrams for kind in SORTS))
+
+
+def _largest_telegram(network: Network) -> Number:
+    return data_bytes(network, network.largest_payload_bytes) + telegrams_of(network, "write").next_bytes
+
+
+LIMITS: Final = (
+    period_limit(PERIODS),
+    NODE_LIMIT,
+    Limit(
+        "nodes",
+        "{value:.0f} devices are over the {most:.0f} of a network",
+        lambda network: network.nodes,
+        lambda _network: MOST_DEVICES,
+        way_out=f"a second network has {MOST_DEVICES:g} more",
+    ),
+    Limit(
+        "payload",
+        "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
+        _largest_telegram,
+        lambda _network: MOST_BYTES,
+        way_out="a smaller payload would do",
+        failure="payload_bytes",
+    ),
+    Limit(
+        "telegrams",
+        "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
+        _most_telegrams,
+        lambda _network: MOST_TELEGRAMS,
+        way_out="a smaller payload or a second network would do",
+    ),
+)
 
 
 class Sercos3(SercosBus):
@@ -49,7 +88,7 @@ class Sercos3(SercosBus):
     deciding_model = WINDOW
     figures = FIGURES
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    rules: ClassVar[tuple[Rule, ...]] = (period_rule("BP141", PERIODS, kind="sercos3", source=PERIODS_SOURCE),)
     periods = PERIODS
     starter = Starter(
         """\
