@@ -6,8 +6,8 @@ from typing import Any, Final
 from busplan.buses.bus import Bus
 from busplan.buses.parts import Key
 from busplan.elementwise import GivenTable, Traced
-from busplan.profile.graded import comment_grade
 from busplan.profile.kinds import cycle_keys, models_of
+from busplan.profile.toml import comment_grade
 from busplan.questions.fit.network import bus_of
 from busplan.sections.base import value_at, with_unchecked
 from busplan.sections.execution import TableExecution
