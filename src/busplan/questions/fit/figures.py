@@ -194,7 +194,7 @@ class CapacityFigures(NamedTuple):
         return None if self._whole is None else self._whole.safe_limited_by
 
     def __getattr__(self, key: str) -> Any:
-        # Only what is no field comes here.
+        # Figures of the kind and terms are attributes as all others are; only what is no field comes here.
         if not key.startswith("_"):
             if key in self.own:
                 return self.own[key]
