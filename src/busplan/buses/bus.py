@@ -7,6 +7,7 @@ numbers.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.figure import BusFigures
@@ -76,9 +77,11 @@ class Bus(ABC):
     evidence_profiles: ClassVar[tuple[str, ...]] = ()
     """Shipped profiles that these figures are compared on."""
 
-    @abstractmethod
     def profile_model(self) -> "type[Profile]":
-        """The model of its profiles."""
+        """The model of its profiles: that of module `section` beside the kind's own, which loads pydantic."""
+        room = type(self).__module__.rpartition(".")[0]
+        model: type[Profile] = import_module(f"{room}.section").PROFILE
+        return model
 
     @abstractmethod
     def cycle(self, network: Network, *, model: str) -> BusCycle:

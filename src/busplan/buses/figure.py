@@ -281,13 +281,7 @@ SAFE_MIN_PERIOD: Final = Figure(
     better="less",
 )
 VERDICT: Final = Figure(
-    "verdict",
-    "verdict",
-    _CERTAINTY,
-    "fits, not shown to fit, or does not fit",
-    "verdict",
-    sort="word",
-    better="more",
+    "verdict", "verdict", _CERTAINTY, "fits, not shown to fit, or does not fit", "verdict", sort="word", better="more"
 )
 NOT_SHOWN: Final = Figure(
     "not_shown",
@@ -302,13 +296,7 @@ CERTAINTY: Final = (
 )
 """Figures of the timing model that decides; under another they do not exist."""
 VERDICT_FIGURES: Final = (
-    Figure(
-        "missed_limits",
-        "missed",
-        _CYCLE,
-        "keys of [limits] that ask for more than the slice gives",
-        sort="words",
-    ),
+    Figure("missed_limits", "missed", _CYCLE, "keys of [limits] that ask for more than the slice gives", sort="words"),
     Figure(
         "models_agree",
         "models agree",

@@ -19,13 +19,10 @@ from busplan.buses.can.figures import BUS_LOAD, FIGURES
 from busplan.buses.can.limits import LIMITS
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
-from busplan.buses.rule import Rule
+from busplan.buses.parts import EventKind, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.elementwise import Number, plain
-from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
-    from busplan.buses.can.section import CanProfile
     from busplan.buses.published import EvidenceSection
 
 _DAVIS: Final = BUS_LOAD.reference
@@ -47,8 +44,8 @@ class Can(Bus):
     )
     deciding_model = WORST
     figures = FIGURES
-    limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    limits = LIMITS
+    rules = rules.RULES
     starter = Starter(
         """\
 [bus]
@@ -75,7 +72,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         EventKind("feedback", "feedback", "", "F", "in"),
         EventKind("command", "command", "", "C", "out"),
     )
-    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
+    constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),
         "bus.bit_rate_kbit_s": Key("f", meaning="if the cable is short enough", short="{} kbit/s"),
@@ -94,12 +91,6 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     }
     term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0},)
     evidence_data = ("can", "paper")
-
-    def profile_model(self) -> "type[CanProfile]":
-        """The model of its profiles."""
-        from busplan.buses.can.section import CanProfile  # the one module of the bus that loads pydantic
-
-        return CanProfile
 
     def cycle(self, network: Network, *, model: str) -> CanCycle:
         """The cycle of a network under one timing model."""

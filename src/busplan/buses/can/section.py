@@ -1,7 +1,7 @@
 """The keys that only profiles of a CAN bus have, in [bus], [payload], [[group]], [[message]] and [limits]."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -210,3 +210,6 @@ class CanProfile(Profile):
                 yield f"{section}.feedback_identifier", payload.feedback_identifier
                 yield f"{section}.command_identifier", payload.command_identifier
         yield from ((f"message.{place}.identifier", one.identifier) for place, one in enumerate(self.message))
+
+
+PROFILE: Final = CanProfile

@@ -13,14 +13,11 @@ from busplan.buses.ethercat.rules import LIMITS, RULES
 from busplan.buses.ethercat.traffic import arrivals_us, datagrams, layout
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
-from busplan.buses.rule import Rule
+from busplan.buses.parts import Cost, EventKind, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.elementwise import plain
-from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.cycle import BusCycle
-    from busplan.buses.ethercat.section import EthercatProfile
     from busplan.buses.published import EvidenceSection
 
 _PROCESS_DATA = "bus.process_data"
@@ -46,8 +43,8 @@ class Ethercat(Bus):
     )
     deciding_model = LAST_BYTE
     figures = FIGURES
-    limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = RULES
+    limits = LIMITS
+    rules = RULES
     starter = Starter(
         """\
 [bus]
@@ -80,7 +77,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         EventKind("frame", "frames", "", "F", "out"),
         EventKind("way", "way through the devices", "", "W", "in"),
     )
-    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
+    constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second segment"),
         "bus.master_us": Key("T_master", role="host"),
@@ -101,12 +98,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     )
     evidence_data = ("ethercat",)
     evidence_profiles = ("ethercat-servo-8",)
-
-    def profile_model(self) -> "type[EthercatProfile]":
-        """The model of its profiles."""
-        from busplan.buses.ethercat.section import EthercatProfile  # the one module of the bus that loads pydantic
-
-        return EthercatProfile
 
     def cycle(self, network: Network, *, model: str) -> EthercatCycle:
         """The cycle of a network under one timing model."""

@@ -31,7 +31,6 @@ from busplan.buses.parts import (
     EventKind,
     Halves,
     Key,
-    Limit,
     MeasuredLatencies,
     PayloadRange,
     Perturbation,
@@ -41,13 +40,10 @@ from busplan.buses.parts import (
     TimingModel,
     Value,
 )
-from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
-    from busplan.buses.ieee1394.section import Ieee1394Profile
     from busplan.buses.published import EvidenceSection
 
 _PHASES: Final = by_key(FIGURES.latency)
@@ -142,8 +138,8 @@ class Ieee1394(Bus):
     deciding_model = "standard"
     figures = FIGURES
     safety = Safety("gap count", GAP_COUNT_SAFE, {"bus.gap_count": MAX_GAP_COUNT})
-    limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = RULES
+    limits = LIMITS
+    rules = RULES
     starter = Starter(
         """\
 [bus]
@@ -177,7 +173,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         EventKind("read", "reads", "", "R", "in"),
         EventKind("write", "writes", "", "W", "out"),
     )
-    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
+    constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),
         "bus.max_hops": Key(meaning="rewired as a tree", short="tree of {} hops"),
@@ -204,12 +200,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     )
     evidence_data = ("paper", "dvrk", "ieee1394")
     evidence_profiles = ("paper-two-node", "dvrk")
-
-    def profile_model(self) -> "type[Ieee1394Profile]":
-        """The model of its profiles."""
-        from busplan.buses.ieee1394.section import Ieee1394Profile  # the one module of the bus that loads pydantic
-
-        return Ieee1394Profile
 
     def cycle(self, network: Network, *, model: str) -> CycleWithStarts:
         """The cycle of a network under one timing model, by its schedule."""

@@ -7,7 +7,6 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind, Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
-from busplan.buses.rule import Rule
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
 from busplan.buses.sercos2.constants import (
     CONSTANTS,
@@ -21,11 +20,9 @@ from busplan.buses.sercos2.constants import (
 from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
 from busplan.buses.sercos2.figures import FIGURES, MDT_BYTES
 from busplan.elementwise import plain
-from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
-    from busplan.buses.sercos2.section import Sercos2Profile
 
 _TELEGRAMS: Final = MDT_BYTES.reference
 _FASTEST: Final = 16
@@ -62,8 +59,8 @@ class Sercos2(SercosBus):
     )
     deciding_model = WORST
     figures = FIGURES
-    limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = (period_rule("BP151", PERIODS, kind="sercos2", source=PERIODS_SOURCE),)
+    limits = LIMITS
+    rules = (period_rule("BP151", PERIODS, kind="sercos2", source=PERIODS_SOURCE),)
     periods = PERIODS
     starter = Starter(
         """\
@@ -88,7 +85,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         EventKind("at_stretch", "AT", "", "A", "in"),
         EventKind("mdt_stretch", "MDT", "", "M", "out"),
     )
-    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
+    constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second ring"),
         "bus.data_rate_mbit_s": Key("f"),
@@ -101,12 +98,6 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
     }
     evidence_data = ("sercos2", "paper")
     evidence_profiles = ("sercos2-servo-8",)
-
-    def profile_model(self) -> "type[Sercos2Profile]":
-        """The model of its profiles."""
-        from busplan.buses.sercos2.section import Sercos2Profile  # the one module of the bus that loads pydantic
-
-        return Sercos2Profile
 
     def cycle(self, network: Network, *, model: str) -> Sercos2Cycle:
         """The cycle of a network under one timing model."""

@@ -1,6 +1,6 @@
 """The keys that only profiles of SERCOS I and II have, in [bus]."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
@@ -59,3 +59,6 @@ class Sercos2Profile(Profile):
     """A whole profile: one motion network and its cycle."""
 
     bus: Sercos2Bus = Field(description="The bus")
+
+
+PROFILE: Final = Sercos2Profile

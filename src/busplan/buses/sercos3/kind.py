@@ -8,7 +8,6 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
 from busplan.buses.parts import Cost, EventKind, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
-from busplan.buses.rule import Rule
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
 from busplan.buses.sercos3.constants import (
     COMPONENT_DELAY_US,
@@ -29,11 +28,9 @@ from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
 from busplan.buses.sercos3.figures import FIGURES, MDT_TELEGRAMS
 from busplan.buses.sercos3.telegrams import SORTS, data_bytes, telegrams_of
 from busplan.elementwise import Number, larger, plain
-from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
-    from busplan.buses.sercos3.section import Sercos3Profile
 
 _COSEMA: Final = MDT_TELEGRAMS.reference
 _METHOD: Final = "bus.timing_method"
@@ -87,8 +84,8 @@ class Sercos3(SercosBus):
     )
     deciding_model = WINDOW
     figures = FIGURES
-    limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = (period_rule("BP141", PERIODS, kind="sercos3", source=PERIODS_SOURCE),)
+    limits = LIMITS
+    rules = (period_rule("BP141", PERIODS, kind="sercos3", source=PERIODS_SOURCE),)
     periods = PERIODS
     starter = Starter(
         """\
@@ -113,7 +110,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         EventKind("nonperiodic", "channel for other frames", NONPERIODIC.reference, "N", "reserve"),
     )
     stretch_kinds = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
-    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
+    constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second network"),
         "bus.gap_bytes": Key("gap", DEFAULT_GAP_BYTES),
@@ -129,12 +126,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     }
     evidence_data = ("sercos3",)
     evidence_profiles = ("sercos3-servo-8",)
-
-    def profile_model(self) -> "type[Sercos3Profile]":
-        """The model of its profiles."""
-        from busplan.buses.sercos3.section import Sercos3Profile  # the one module of the bus that loads pydantic
-
-        return Sercos3Profile
 
     def cycle(self, network: Network, *, model: str) -> Sercos3Cycle:
         """The cycle of a network under one timing model."""

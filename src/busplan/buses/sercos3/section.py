@@ -1,6 +1,6 @@
 """The keys that only profiles of SERCOS III have, in [bus] and [[group]]."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
@@ -106,3 +106,6 @@ class Sercos3Profile(Profile):
     group: Annotated[tuple[Sercos3Group, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike devices, instead of bus.nodes, [node] and [payload]"
     )
+
+
+PROFILE: Final = Sercos3Profile
