@@ -5,8 +5,14 @@ from functools import cached_property
 from typing import Final, Literal
 
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
-from busplan.buses.ethercat.constants import BYTE_BIAS_UNCERTAINTY_US, BYTE_BIAS_US
-from busplan.buses.ethercat.equations import device_us, frame_bytes, overhead_bytes, sending_us
+from busplan.buses.ethercat.equations import (
+    BYTE_BIAS_UNCERTAINTY_US,
+    BYTE_BIAS_US,
+    device_us,
+    frame_bytes,
+    overhead_bytes,
+    sending_us,
+)
 from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (

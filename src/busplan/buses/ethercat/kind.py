@@ -4,9 +4,16 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.bus import Bus
-from busplan.buses.ethercat.constants import CONSTANTS, MAILBOX_BYTES, PIPELINE_CYCLES, SEPARATE, SHARED, SYNC_SHIFT
 from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
-from busplan.buses.ethercat.equations import room_bytes
+from busplan.buses.ethercat.equations import (
+    CONSTANTS,
+    MAILBOX_BYTES,
+    PIPELINE_CYCLES,
+    SEPARATE,
+    SHARED,
+    SYNC_SHIFT,
+    room_bytes,
+)
 from busplan.buses.ethercat.figures import FIGURES, FRAME
 from busplan.buses.ethercat.latency import loop_periods
 from busplan.buses.ethercat.rules import LIMITS, RULES

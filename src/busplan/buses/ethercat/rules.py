@@ -5,8 +5,7 @@ from functools import reduce
 from math import ceil
 from typing import Final
 
-from busplan.buses.ethercat.constants import BYTE_BIAS_US, MOST_CABLE_M, MOST_DEVICES
-from busplan.buses.ethercat.equations import room_bytes
+from busplan.buses.ethercat.equations import BYTE_BIAS_US, MOST_CABLE_M, MOST_DEVICES, room_bytes
 from busplan.buses.ethercat.latency import command_doubt_us, last_command_us, sync0_share
 from busplan.buses.ethercat.traffic import datagrams, devices
 from busplan.buses.limits import NODE_LIMIT

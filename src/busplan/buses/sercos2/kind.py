@@ -8,7 +8,8 @@ from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind, Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos2.constants import (
+from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
+from busplan.buses.sercos2.equations import (
     CONSTANTS,
     MOST_DRIVE_BYTES,
     MOST_DRIVES,
@@ -17,7 +18,6 @@ from busplan.buses.sercos2.constants import (
     PERIODS_SOURCE,
     TURNAROUND_US,
 )
-from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
 from busplan.buses.sercos2.figures import FIGURES, MDT_BYTES
 from busplan.elementwise import plain
 

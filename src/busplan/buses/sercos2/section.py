@@ -5,8 +5,8 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from busplan.buses.sercos import MOST_PIPELINE, PIPELINE_CYCLES
-from busplan.buses.sercos2.constants import TURNAROUND_US, DataRate
 from busplan.buses.sercos2.cycle import WORST, TimingModelName
+from busplan.buses.sercos2.equations import TURNAROUND_US, DataRate
 from busplan.sections.base import Count, TimeUs
 from busplan.sections.cycle import BusSection
 from busplan.sections.profile import Profile

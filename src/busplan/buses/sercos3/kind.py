@@ -9,7 +9,8 @@ from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
 from busplan.buses.parts import Cost, EventKind, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos3.constants import (
+from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
+from busplan.buses.sercos3.equations import (
     COMPONENT_DELAY_US,
     CONNECTION_BYTES,
     CONSTANTS,
@@ -24,7 +25,6 @@ from busplan.buses.sercos3.constants import (
     PERIODS,
     PERIODS_SOURCE,
 )
-from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
 from busplan.buses.sercos3.figures import FIGURES, MDT_TELEGRAMS
 from busplan.buses.sercos3.telegrams import SORTS, data_bytes, telegrams_of
 from busplan.elementwise import Number, larger, plain
