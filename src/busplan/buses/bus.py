@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.figure import BusFigures
 from busplan.buses.limits import ANY_PERIOD, Periods
-from busplan.buses.network import Group, Network
+from busplan.buses.network import Network
 from busplan.buses.rule import Rule
-from busplan.elementwise import Number, plain
+from busplan.elementwise import plain
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
@@ -116,37 +116,6 @@ class Bus(ABC):
                 owners = range(1, nodes + 1) if event.node is None else (event.node,)
                 found |= dict.fromkeys(owners, now_us)
         return found or dict.fromkeys(range(1, nodes + 1), now_us)
-
-    def taking_us(self, group: Group, network: Network) -> float:  # noqa: ARG002 - most take commands alike
-        """From a command's arrival at a node of a group to its effect: the slowest execution of a write [us]."""
-        return plain(group.write_execution_us + group.worst_extra_us)
-
-    def sampled_us(self, cycle: BusCycle) -> float:  # noqa: ARG002 - most sample when the cycle starts
-        """When nodes sample what a loop on the host rests on, from the start of the cycle that carries it [us].
-
-        Parameters
-        ----------
-        cycle
-            A cycle of plain numbers.
-        """
-        return 0.0
-
-    def loop_periods(self, network: Network, *, at_sync: bool) -> int:  # noqa: ARG002 - most read and write in a cycle
-        """Whole periods inside a loop on the host, from the cycle of a sample to that of its command [1].
-
-        Parameters
-        ----------
-        network
-            The network, of plain numbers.
-        at_sync
-            Whether commands take effect at the next synchronous point, which is counted; otherwise they do when they
-            arrive, which comes on top.
-        """
-        return 1 if at_sync else 0
-
-    def sync_jitter_us(self, network: Network) -> Number:  # noqa: ARG002 - most have none
-        """Jitter of the synchronous packet that its own traffic makes, either way of its mean [us]."""
-        return 0.0
 
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
         """What of the bus a plan may turn; it is asked again after each change of the network."""

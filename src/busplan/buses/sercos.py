@@ -111,6 +111,19 @@ class SercosCycle(BusCycle):
     def feedback_due_us(self) -> Number:
         """When all nodes must have their feedback ready, from the start of the cycle [us]."""
 
+    def sampled_us(self) -> float:
+        """All nodes sample at once, early enough for the slowest of them [us]."""
+        return plain(self.feedback_due_us) - plain(slowest_us(self.network, lambda group: group.read_execution_us))
+
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """The master's pipeline; and where drives act at their next sample, the cycles until a command is executed."""
+        pipeline = int(self.network.profile.bus.pipeline_cycles)
+        if not at_sync:
+            return pipeline
+        _, command = self.latencies()
+        late_us = plain(command.phases["delay_us"]) - self.sampled_us()
+        return pipeline + ceil(late_us / plain(self.network.period_us))
+
 
 class SercosBus(Bus):
     """A ring of SERCOS: its drives work beside the telegrams."""
@@ -129,18 +142,3 @@ class SercosBus(Bus):
         phases = {key: plain(us) for key, us in command.phases.items()}
         arrived_us = phases["delay_us"] - phases["node_us"]
         return dict.fromkeys(range(1, int(plain(cycle.network.nodes)) + 1), arrived_us)
-
-    def sampled_us(self, cycle: BusCycle) -> float:
-        """All nodes sample at once, early enough for the slowest of them [us]."""
-        assert isinstance(cycle, SercosCycle)  # noqa: S101 - for mypy: both kinds have one
-        return plain(cycle.feedback_due_us) - plain(slowest_us(cycle.network, lambda one: one.read_execution_us))
-
-    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
-        """The master's pipeline; and where drives act at their next sample, the cycles until a command is executed."""
-        pipeline = int(network.profile.bus.pipeline_cycles)
-        if not at_sync:
-            return pipeline
-        cycle = self.cycle(network, model=self.deciding_model)
-        _, command = cycle.latencies()
-        late_us = plain(command.phases["delay_us"]) - self.sampled_us(cycle)
-        return pipeline + ceil(late_us / plain(network.period_us))

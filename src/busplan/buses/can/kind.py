@@ -20,7 +20,7 @@ from busplan.buses.can.limits import LIMITS
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
-from busplan.elementwise import Number, plain
+from busplan.elementwise import plain
 
 if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
@@ -129,14 +129,6 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         largest = int(MOST_PDOS * FRAME_BYTES)
         each = min((plain(one.axes) for one in network.groups if one.said.payload.pdo_per == "axis"), default=1)
         return PayloadRange(1, largest * max(int(each), 1), "PDOs", carrier="four frames")
-
-    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
-        """The host's pipeline, and the period to the next SYNC."""
-        return super().loop_periods(network, at_sync=at_sync) + int(plain(network.profile.bus.pipeline_cycles))
-
-    def sync_jitter_us(self, network: Network) -> Number:
-        """Half of what messages may hold SYNC up [us]."""
-        return CanCycle(network, WORST).sync_spread_us / 2
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
         """Say what each frame is charged."""

@@ -13,7 +13,7 @@ from busplan.buses.ethercat.equations import (
     overhead_bytes,
     sending_us,
 )
-from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
+from busplan.buses.ethercat.latency import last_command_us, latencies, loop_periods, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (
     cables_us,
@@ -172,6 +172,10 @@ class EthercatCycle(BusCycle):
             "command_us": last_command_us(self.network),
             "sync0_us": sync0_us(self.network) if has_clocks else None,
         }
+
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """The master's pipeline, and the cycles that feedback and command wait for a frame and for SYNC0."""
+        return loop_periods(self.network, at_sync=at_sync)
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst case of a command, of feedback, and of both, for each group."""

@@ -15,7 +15,6 @@ from busplan.buses.ethercat.equations import (
     room_bytes,
 )
 from busplan.buses.ethercat.figures import FIGURES, FRAME
-from busplan.buses.ethercat.latency import loop_periods
 from busplan.buses.ethercat.rules import LIMITS, RULES
 from busplan.buses.ethercat.traffic import arrivals_us, datagrams, layout
 from busplan.buses.figure import NONPERIODIC
@@ -124,10 +123,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     def arrivals_us(self, cycle: "BusCycle") -> Mapping[int, float]:
         """When the last byte of its frame has reached each device [us]."""
         return arrivals_us(cycle.network)
-
-    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
-        """The master's pipeline, and the cycles that feedback and command wait for a frame and for SYNC0."""
-        return loop_periods(network, at_sync=at_sync)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """SYNC0 later in the cycle, for commands that come behind it."""

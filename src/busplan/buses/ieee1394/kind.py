@@ -1,7 +1,6 @@
 """IEEE 1394 (FireWire) up to S400, as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
-from math import ceil
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
@@ -25,7 +24,7 @@ from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE, SYNC
 from busplan.buses.ieee1394.rules import LIMITS, RULES
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
-from busplan.buses.network import Group, Network
+from busplan.buses.network import Network
 from busplan.buses.parts import (
     Cost,
     EventKind,
@@ -230,20 +229,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         nodes = f"{network.nodes} node{'s' * (network.nodes != 1)}"
         farthest = f"farthest of {nodes}" if network.is_uniform else "the farthest node of each group"
         return ", ".join((farthest, *self.setup_words(network)))
-
-    def taking_us(self, group: Group, network: Network) -> float:
-        """Nothing behind a split write, which holds the execution; else the node executes beside the bus [us]."""
-        is_split = group.node.write_response == "split" and not is_broadcast(network)
-        return 0.0 if is_split else super().taking_us(group, network)
-
-    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
-        """One, or more where a node has not executed its command when the next synchronous packet comes."""
-        if not at_sync:
-            return 0
-        behind_us = max(self.taking_us(one, network) for one in network.groups)
-        period_us = plain(network.period_us)
-        needed_us = min(plain(self.cycle(network, model=self.deciding_model).required_us), period_us)
-        return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - latencies, too
         """Whether a transaction is split: other answers keep the execution off the bus, and so do broadcasts."""
