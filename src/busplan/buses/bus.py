@@ -159,16 +159,16 @@ class Bus(ABC):
 
     def limit(self, key: str) -> Limit | None:
         """The limit of a key; None for time, which is no limit of the bus."""
-        return next((one for one in self.limits if one.key == key), None)
+        return next((limit for limit in self.limits if limit.key == key), None)
 
     def broken(self, network: Network) -> tuple[Limit, ...]:
         """The limits that plain numbers break, but for safety."""
-        return tuple(one for one in self.limits if not one.is_safety and one.is_broken(network))
+        return tuple(limit for limit in self.limits if not limit.is_safety and limit.is_broken(network))
 
     def is_safe(self, network: Network) -> bool:
         """Whether plain numbers keep every safety limit."""
-        return not any(one.is_broken(network) for one in self.limits if one.is_safety)
+        return not any(limit.is_broken(network) for limit in self.limits if limit.is_safety)
 
     def event_kind(self, key: str) -> EventKind:
         """How an event or a stretch of events is called and drawn."""
-        return next(one for one in (*self.event_kinds, IDLE, *self.stretch_kinds) if one.key == key)
+        return next(kind for kind in (*self.event_kinds, IDLE, *self.stretch_kinds) if kind.key == key)

@@ -124,7 +124,7 @@ def by(*functions: Callable[..., object]) -> str:
     >>> by(time_slice.time_slice_us, time_slice.required_time_slice_us)
     '(1) (2)'
     """
-    numbers = dict.fromkeys(number for one in functions for number in EQUATIONS[one.__name__].numbers)
+    numbers = dict.fromkeys(number for function in functions for number in EQUATIONS[function.__name__].numbers)
     return " ".join(f"({number})" for number in numbers)
 
 

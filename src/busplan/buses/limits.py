@@ -68,7 +68,7 @@ class Periods(NamedTuple):
         >>> Periods((250.0, 500.0)).refusal(300.0)
         'the bus knows no period of 300 us; the next are 250 and 500 us'
         """
-        near = " and ".join(f"{one:g}" for one in self.neighbours(period_us))
+        near = " and ".join(f"{us:g}" for us in self.neighbours(period_us))
         are = "are" if len(self.neighbours(period_us)) > 1 else "is"
         return f"the bus knows no period of {period_us:g} us; the next {are} {near} us"
 
@@ -161,7 +161,7 @@ def busy_words(group: Group, network: Network) -> str:
 
 
 def _all_words(network: Network) -> str:
-    found = ((one.name, busy_words(one, network)) for one in slow_groups(network))
+    found = ((group.name, busy_words(group, network)) for group in slow_groups(network))
     return "; ".join(f"{name}: {words}" if name else words for name, words in found)
 
 

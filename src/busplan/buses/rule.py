@@ -75,7 +75,7 @@ class Rule(NamedTuple):
     """Looks at a profile that could be read; None for what is found in another way."""
 
 
-def contradicts(fits: bool, one: RuleFigures) -> bool:
+def contradicts(fits: bool, figures: RuleFigures) -> bool:
     """Tell whether a timing model that does not decide contradicts the verdict.
 
     A plan that lacks its reserve alone contradicts nothing, and a broken limit is no question of timing.
@@ -84,13 +84,13 @@ def contradicts(fits: bool, one: RuleFigures) -> bool:
     ----------
     fits
         Whether required <= available under that model.
-    one
+    figures
         Figures under the model that decides.
     """
-    if set(one.exceeded) - {"time"}:
+    if set(figures.exceeded) - {"time"}:
         return False
-    is_shown = one.verdict == "fits" or (one.margin_corrected_us or 0) >= (one.uncertainty_us or 0)
-    return not is_shown if fits else one.verdict == "fits"
+    is_shown = figures.verdict == "fits" or (figures.margin_corrected_us or 0) >= (figures.uncertainty_us or 0)
+    return not is_shown if fits else figures.verdict == "fits"
 
 
 _MOST_DECIMALS: Final = 9
@@ -111,18 +111,18 @@ def told_apart(one: float, other: float) -> tuple[str, str]:
     return f"{one:.1f}", f"{other:.1f}"
 
 
-def overrun(one: RuleFigures) -> str:
+def overrun(figures: RuleFigures) -> str:
     """Say what a cycle needs of its slice, and the margin as far as it is known."""
-    needs, given = told_apart(one.required_us, one.available_us)
-    return f"needs {needs} us of {given} us, {margin(one)}"
+    needs, given = told_apart(figures.required_us, figures.available_us)
+    return f"needs {needs} us of {given} us, {margin(figures)}"
 
 
-def margin(one: RuleFigures) -> str:
+def margin(figures: RuleFigures) -> str:
     """Say how large the margin is, as far as it is known."""
-    if one.margin_corrected_us is None:
-        return f"margin {told_apart(one.margin_us, 0.0)[0]} us under the {one.timing_model} timing"
-    value = told_apart(one.margin_corrected_us, 0.0)[0]
-    if one.uncertainty_us is None:
+    if figures.margin_corrected_us is None:
+        return f"margin {told_apart(figures.margin_us, 0.0)[0]} us under the {figures.timing_model} timing"
+    value = told_apart(figures.margin_corrected_us, 0.0)[0]
+    if figures.uncertainty_us is None:
         return f"margin {value} us, no bias or uncertainty known"
-    said = f"{value} +/- {one.uncertainty_us:.1f} us"
-    return f"margin {said}, no bias known" if one.bias_us is None else f"corrected margin {said}"
+    said = f"{value} +/- {figures.uncertainty_us:.1f} us"
+    return f"margin {said}, no bias known" if figures.bias_us is None else f"corrected margin {said}"

@@ -79,8 +79,8 @@ def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Nu
         Delay of the ring [us].
     """
     return (
-        _delay("feedback", slowest_us(network, lambda one: one.read_execution_us), *feedback_us, ring_us),
-        _delay("command", slowest_us(network, lambda one: one.write_execution_us), *command_us, ring_us),
+        _delay("feedback", slowest_us(network, lambda group: group.read_execution_us), *feedback_us, ring_us),
+        _delay("command", slowest_us(network, lambda group: group.write_execution_us), *command_us, ring_us),
     )
 
 
@@ -94,12 +94,12 @@ def slowest_us(network: Network, execution_us: Callable[[Group], Number]) -> Num
     execution_us
         From a group to the execution time of its nodes [us].
     """
-    return reduce(larger, (execution_us(one) + one.worst_extra_us for one in network.groups))
+    return reduce(larger, (execution_us(group) + group.worst_extra_us for group in network.groups))
 
 
 def _delay(name: str, *parts_us: Number) -> BusLatency:
     *parts, whole = DELAYS
-    phases = dict(zip((one.key for one in parts), parts_us, strict=True))
+    phases = dict(zip((figure.key for figure in parts), parts_us, strict=True))
     return BusLatency(name, None, {**phases, whole.key: total(parts_us)})
 
 

@@ -43,27 +43,27 @@ def _without(never: tuple[int, str]) -> AfterValidator:
 
 def _key(of: type, name: str) -> Any:
     """The key of a parameter of the servo core: its default, range, description and example."""
-    (one,) = (one for one in parameters(of) if one.name == name)
-    known = one.known
+    (parameter,) = (parameter for parameter in parameters(of) if parameter.name == name)
+    known = parameter.known
     return Field(
-        default=one.default,
+        default=parameter.default,
         description=known.description,
         examples=[known.example],
         ge=known.least,
         le=known.most,
-        allow_inf_nan=False if one.type is float else None,
+        allow_inf_nan=False if parameter.type is float else None,
     )
 
 
 def _keys(of: type) -> dict[str, Any]:
     """All of a dataclass of the servo core, as pydantic makes a model of them."""
-    return {
-        one.name: (
-            one.type if one.known.never is None else Annotated[one.type, _without(one.known.never)],
-            _key(of, one.name),
-        )
-        for one in parameters(of)
+    types = {
+        parameter.name: parameter.type
+        if parameter.known.never is None
+        else Annotated[parameter.type, _without(parameter.known.never)]
+        for parameter in parameters(of)
     }
+    return {name: (type_, _key(of, name)) for name, type_ in types.items()}
 
 
 _Model = TypeVar("_Model", bound=Section)

@@ -127,7 +127,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     def payloads(self, network: Network) -> PayloadRange:
         """Whole bytes up to four frames."""
         largest = int(MOST_PDOS * FRAME_BYTES)
-        each = min((plain(one.axes) for one in network.groups if one.said.payload.pdo_per == "axis"), default=1)
+        each = min((plain(group.axes) for group in network.groups if group.said.payload.pdo_per == "axis"), default=1)
         return PayloadRange(1, largest * max(int(each), 1), "PDOs", carrier="four frames")
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike

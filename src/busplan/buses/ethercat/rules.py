@@ -16,11 +16,11 @@ from busplan.elementwise import Number, larger, plain, total
 
 
 def _largest_device(network: Network) -> Number:
-    return reduce(larger, (one.data_bytes for one in devices(network)))
+    return reduce(larger, (device.data_bytes for device in devices(network)))
 
 
 def _longest_cable(network: Network) -> Number:
-    lengths_m: list[Number] = [one.node.cable_m for one in network.groups]
+    lengths_m: list[Number] = [group.node.cable_m for group in network.groups]
     return reduce(larger, lengths_m)
 
 
@@ -28,14 +28,14 @@ def _late_command_us(network: Network) -> Number:
     """When the last device has taken its command, with what bytes take beyond the wire; 0 without clocks [us]."""
     if not network.profile.bus.distributed_clocks:
         return 0.0
-    process_bytes = total(one.number * one.data_bytes for one in devices(network))
+    process_bytes = total(device.number * device.data_bytes for device in devices(network))
     return last_command_us(network) + process_bytes * BYTE_BIAS_US
 
 
 def _words(network: Network) -> str:
     """Say when the last command comes, and whether it is late only if all of the master's time is before the wire."""
     value_us, doubt_us, most_us = (
-        plain(one) for one in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
+        plain(us) for us in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
     )
     is_split = SYNC0.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
     where = ", all of bus.master_us before the wire" if is_split else ""
@@ -97,11 +97,11 @@ def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The last command is not shown to be taken before SYNC0, and may take effect cycles later."""
-    one = subject.deciding
-    if SYNC0.key not in (*one.exceeded, *(one.not_shown or ())):
+    figures = subject.deciding
+    if SYNC0.key not in (*figures.exceeded, *(figures.not_shown or ())):
         return
-    late = max(ceil((one.command_us - one.sync0_us) / one.period_us), 1)
-    maybe = "" if SYNC0.key in one.exceeded else "maybe "
+    late = max(ceil((figures.command_us - figures.sync0_us) / figures.period_us), 1)
+    maybe = "" if SYNC0.key in figures.exceeded else "maybe "
     yield RuleProblem(
         "bus.sync_shift",
         f"{subject.limit_words(SYNC0.key)}: {maybe}{late} cycle{'s' * (late > 1)} late",

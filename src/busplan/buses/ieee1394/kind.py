@@ -216,10 +216,10 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             "cycle.retries": profile.cycle.retries,
             "host.transaction_us": profile.host.transaction_us,
         }
-        for one in network.alike:
-            own[one.node_key("read_response")] = one.node.read_response != "split"
-            own[one.node_key("write_response")] = one.node.write_response != "split"
-            own[one.node_key("execution.worst_extra_us")] = one.node.execution.worst_extra_us
+        for alike in network.alike:
+            own[alike.node_key("read_response")] = alike.node.read_response != "split"
+            own[alike.node_key("write_response")] = alike.node.write_response != "split"
+            own[alike.node_key("execution.worst_extra_us")] = alike.node.execution.worst_extra_us
         return tuple(key for key, is_set in own.items() if is_set) if model == "paper" else ()
 
     def latency_subject(self, network: Network) -> str:
@@ -281,12 +281,12 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """An unsafe gap count, and cables that the table does not hold for."""
         bus, found = network.profile.bus, []
         limit = "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
-        for one in [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]:
-            if not self.is_safe(one):
-                hops, given = hops_of(one), gap_count_of(one)
+        for asked in [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]:
+            if not self.is_safe(asked):
+                hops, given = hops_of(asked), gap_count_of(asked)
                 found.append(
                     f"Warning: gap count {given} is unsafe for {hops} hop{'s' * (hops != 1)} "
-                    f"({one.nodes} node{'s' * (one.nodes != 1)}); "
+                    f"({asked.nodes} node{'s' * (asked.nodes != 1)}); "
                     f"the smallest safe one is {safe_gap_count(hops)}{limit}."
                 )
                 break

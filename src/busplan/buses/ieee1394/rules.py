@@ -127,13 +127,13 @@ def paper_disagrees(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The plan rests on a gap count that a bus reset takes away."""
-    one = subject.deciding
-    if one.verdict == "fits" and one.gap_count < MAX_GAP_COUNT:
+    figures = subject.deciding
+    if figures.verdict == "fits" and figures.gap_count < MAX_GAP_COUNT:
         after = subject.after({"bus.gap_count": MAX_GAP_COUNT})
         if after.verdict != "fits":
             yield RuleProblem(
                 "bus.gap_count",
-                f"fits at {one.gap_count}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: {margin(after)}",
+                f"fits at {figures.gap_count}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: {margin(after)}",
                 "have the bus manager write the gap count after each reset",
             )
 
@@ -142,7 +142,7 @@ def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More nodes than one bus has addresses for."""
     if "nodes" in subject.deciding.exceeded:
         each = subject.profile.alike_nodes
-        nodes = sum(one.nodes for one in each)
+        nodes = sum(group.nodes for group in each)
         yield RuleProblem(
             each[-1].nodes_key, f"{nodes} nodes are over the {MAX_NODES:g} of one bus", "put the others on a second bus"
         )
@@ -190,12 +190,13 @@ def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
 
 def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A gap count below the table."""
-    one = subject.deciding
-    if not one.gap_count_safe:
+    figures = subject.deciding
+    if not figures.gap_count_safe:
         is_standard = _bus(subject).cable_is_standard
         yield RuleProblem(
             "bus.gap_count",
-            f"gap count {one.gap_count} is unsafe for {one.hops} hops; the smallest safe one is {one.safe_gap_count}"
+            f"gap count {figures.gap_count} is unsafe for {figures.hops} hops; "
+            f"the smallest safe one is {figures.safe_gap_count}"
             f"{'' if is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}",
             *subject.cure(),
         )
@@ -203,19 +204,20 @@ def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A gap count above the table."""
-    one = subject.deciding
-    if "cycle starts" in one.exceeded:
+    figures = subject.deciding
+    if "cycle starts" in figures.exceeded:
         return  # no time is left, so none can be saved
-    if one.gap_count > one.safe_gap_count and _bus(subject).cable_is_standard:
+    if figures.gap_count > figures.safe_gap_count and _bus(subject).cable_is_standard:
         yield RuleProblem("bus.gap_count", partial(_wasted, subject))
 
 
 def _wasted(subject: RuleSubject) -> str:
     """Say what a gap count above the table costs."""
-    one, after = subject.deciding, subject.after({"bus.gap_count": "optimal"})
-    saved, _ = told_apart(one.required_us - after.required_us, 0.0)
-    safe, nodes = one.safe_gap_count, one.safe_nodes
-    words = f"gap count {one.gap_count} is above the {safe} that {one.hops} hops need; {safe} saves {saved} us a cycle"
+    figures, after = subject.deciding, subject.after({"bus.gap_count": "optimal"})
+    saved, _ = told_apart(figures.required_us - after.required_us, 0.0)
+    safe, nodes = figures.safe_gap_count, figures.safe_nodes
+    above = f"gap count {figures.gap_count} is above the {safe} that {figures.hops} hops need"
+    words = f"{above}; {safe} saves {saved} us a cycle"
     if nodes is None:
         return words
     won = (after.safe_nodes or 0) - nodes

@@ -134,7 +134,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The other timing methods, in the order of CoSeMa."""
         own = network.profile.bus.timing_method
-        values = tuple({_METHOD: one} for one in _METHODS if one != own)
+        values = tuple({_METHOD: method} for method in _METHODS if method != own)
         return (Setting("timing_method", "timing method", Cost.SCHEDULE, (_METHOD,), values),)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
