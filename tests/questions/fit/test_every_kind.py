@@ -36,7 +36,7 @@ def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
     bus = bus_of(profile)
     for model in model_names(profile):
         cycle = cycle_of(profile, model=model)
-        assert [term.key for term in cycle.terms] == [figure.key for figure in bus.term_figures]
+        assert [term.key for term in cycle.terms] == [figure.key for figure in bus.figures.terms]
         assert all(term.us >= 0 for term in cycle.terms)
         of_events: dict[str, list[float]] = defaultdict(list)
         for event in cycle.events():
