@@ -29,7 +29,7 @@ from busplan.gate.gate import FileResult, check_document
 from busplan.gate.report import CheckReport, check_report
 from busplan.gate.rules import all_rules
 from busplan.profile.document import Document, Spot
-from busplan.profile.schema import profile_schema
+from busplan.profile.kinds import profile_schema
 from busplan.profile.shipped import load, shipped_names
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -583,10 +583,10 @@ def test_the_profile_schema_accepts_what_is_shipped(validator: Any) -> None:
         validator.validate(load(name).document.data())
 
 
-@pytest.mark.parametrize("code", [code for code in all_rules() if not code.startswith("BP0")])
-def test_the_profile_schema_accepts_what_only_the_gate_finds(validator: Any, code: str) -> None:
-    for path in (EXAMPLES / code).glob("*.toml"):
-        validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
+def test_the_profile_schema_accepts_what_only_the_gate_finds(validator: Any) -> None:
+    for code in [code for code in all_rules() if not code.startswith("BP0")]:
+        for path in (EXAMPLES / code).glob("*.toml"):
+            validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
 
 
 @pytest.mark.parametrize("code", ["BP002", "BP003", "BP004", "BP005"])

@@ -167,12 +167,12 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
     )
     below = (
         *(figure.MARGIN, figure.UTILISATION, figure.TIME_SLICE, figure.REQUIRED_TIME_SLICE),
-        *bus.table_figures,
+        *bus.figures.table,
         *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES, figure.LIMITED_BY),
     )
     return [
         *((row, 0) for row in above),
-        *((term, 1) for term in bus.term_figures),
+        *((term, 1) for term in bus.figures.terms),
         *((row, 0) for row in below),
     ]
 

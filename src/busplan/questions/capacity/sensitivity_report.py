@@ -163,7 +163,7 @@ def _limit(found: NextLimit) -> Sentence:
 
 
 def _term(term: Term, profile: Profile) -> str:
-    return by_key(bus_of(profile).term_figures)[term.key].label
+    return by_key(bus_of(profile).figures.terms)[term.key].label
 
 
 def next_bottleneck_record(bottleneck: NextBottleneck, profile: Profile) -> Record:
@@ -297,7 +297,7 @@ def _verdict(then: Standing | None, profile: Profile) -> Cell:
         return shown
     why = list(limits_behind(then))
     if not why and then.verdict == FITS and not then.safe:
-        why = [f"unsafe {bus_of(profile).safety}"]
+        why = [f"unsafe {bus_of(profile).safety.setting}"]
     return Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if _is_well(then) else "fails")
 
 
@@ -329,7 +329,7 @@ def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
     if lost:
         yield Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
     if unsafe:
-        yield Sentence((f"Its {bus_of(sensitivity.profile).safety} is unsafe after {listed(unsafe, 'or')}.",))
+        yield Sentence((f"Its {bus_of(sensitivity.profile).safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
     if not lost and not unsafe:
         yield Sentence(("The cycle is shown to fit after each of them alone.",))
 
@@ -359,7 +359,7 @@ def _rows(sensitivity: Sensitivity) -> Iterator[Record]:
 
 def _record(effect: Effect, profile: Profile) -> Record:
     then = effect.then
-    safety = bus_of(profile).safety_figure
+    safety = bus_of(profile).safety.figure
     own: dict[str, Any] = {} if safety is None else {safety.key: None if then is None else then.safe}
     return {
         "change": effect.change,

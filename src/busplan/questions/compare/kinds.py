@@ -79,14 +79,14 @@ class MachineOnKind(NamedTuple):
     @property
     def assumed_host(self) -> tuple[AssumedKey, ...]:
         """What is assumed of the host's own time, by its own profile, too: then it has no rank among known hosts."""
-        keys = kind_named(self.profile.bus.kind).host_keys
-        inputs = [given(self.profile, key) for key in keys] if self.is_own else []
+        key = kind_named(self.profile.bus.kind).key_of("host")
+        inputs = [given(self.profile, key)] if self.is_own and key else []
         own = (
             AssumedKey(known.name, known.value, "profile")
             for known in inputs
             if known.grade == "assumed" and known.value
         )
-        return (*own, *(assumed for assumed in self.assumed if assumed.key in keys))
+        return (*own, *(assumed for assumed in self.assumed if assumed.key == key))
 
 
 class NotOnKind(NamedTuple):

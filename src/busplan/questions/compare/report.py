@@ -341,7 +341,7 @@ def _row(machine: MachineOnKind | NotOnKind, *, columns: int, with_circle: bool)
         f"{bus_of(machine.profile).title}{', as it is' if machine.is_own else ''}",
         _verdict(machine),
         *(ShownValue(getattr(figures, key), key, "us", 3) for key in ("margin_corrected_us", "uncertainty_us")),
-        bus_of(machine.profile).term_label(figures.binding_term),
+        bus_of(machine.profile).figures.term_label(figures.binding_term),
         ShownValue(machine.smallest.us, "smallest_period_us", "us", 3),
         ShownValue(machine.safe.axes, SAFE_AXES.key),
         machine.safe.limited_by,
@@ -353,7 +353,7 @@ def _row(machine: MachineOnKind | NotOnKind, *, columns: int, with_circle: bool)
 def _verdict(machine: MachineOnKind) -> Words:
     figures = machine.figures
     is_unsafe = not figures.safe and figures.verdict != DOES_NOT_FIT
-    unsafe = f", unsafe {bus_of(machine.profile).safety}" if is_unsafe else ""
+    unsafe = f", unsafe {bus_of(machine.profile).safety.setting}" if is_unsafe else ""
     refused = ", circle cannot be run" if figures.circle_refused_by else ""
     is_well = figures.verdict == FITS and figures.safe and not refused
     return Words(f"{figures.verdict}{unsafe}{refused}", state_of(is_well))

@@ -22,6 +22,7 @@ from busplan.questions.explain.bus import (
     verdict_figure,
 )
 from busplan.questions.explain.formulas import formula_text, inputs, lines
+from busplan.questions.fit.inputs import choosing_keys
 from busplan.questions.fit.network import bus_of, leading_model, model_names, network_of
 from busplan.sections.profile import Profile
 from busplan.sourced import Input
@@ -50,8 +51,8 @@ _HOLDERS: Final[Mapping[str, tuple[CommandName, str]]] = MappingProxyType(
 def figures_of(bus: Bus) -> dict[CommandName, dict[str, Figure]]:
     """Figures by command and key. Without a command, a key means that of the first command that has it."""
     return {
-        "capacity": by_key((*bus.capacity_figures, *VERDICT_FIGURES)),
-        "latency": by_key(bus.latency_figures),
+        "capacity": by_key((*bus.figures.capacity, *VERDICT_FIGURES)),
+        "latency": by_key(bus.figures.latency),
         "circle-test": dict(CIRCLE_BY_KEY),
     }
 
@@ -277,7 +278,7 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
         for one in simulated_inputs(profile):
             found.setdefault(one.name, one)
     # An execution time is a fact, not a choice: without a grade it is the least well known input.
-    choices = bus_of(profile).choosing_keys
+    choices = choosing_keys(bus_of(profile))
     executions = tuple(alike.node_key("execution.") for alike in profile.alike_nodes)
     known = (
         given

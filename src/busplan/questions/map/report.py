@@ -145,7 +145,7 @@ def map_document(trade_off: TradeOff) -> JsonDocument:
 
 def _record(trade_off: TradeOff, cell: Cell) -> Record:
     """A cell as plain data, its values under the keys of the directions, as in a row of a sweep."""
-    safety = bus_of(trade_off.profile).safety_figure
+    safety = bus_of(trade_off.profile).safety.figure
     return {
         trade_off.x.key: cell.x,
         trade_off.y.key: cell.y,

@@ -37,6 +37,7 @@ from busplan.questions.plan.planning import Plan
 from busplan.questions.words.documents import document, fields, with_profile
 from busplan.questions.words.sentences import (
     NewValues,
+    change_meanings,
     key_value,
     margin_parts,
     reset_sentence,
@@ -90,7 +91,7 @@ def settings(profile: Profile, changes: NewValues) -> str:
 
 def _settings(profile: Profile, changes: NewValues) -> Sentence:
     # The number of nodes is the goal here, so the note on a second bus does not apply.
-    meanings = {key: words for key, words in bus_of(profile).change_meanings.items() if key != "bus.nodes"}
+    meanings = {key: words for key, words in change_meanings(bus_of(profile)).items() if key != "bus.nodes"}
     return settings_sentence(changes, meanings=meanings)
 
 
@@ -178,7 +179,7 @@ def _record(plan: Plan, option: Option) -> Record:
         "circle_failures": list(option.circle_failures or ()),
         **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
         "slice_ratio": profile.cycle.slice_ratio,
-        **fields(figures, *bus_of(profile).planned_figures),
+        **fields(figures, *bus_of(profile).figures.planned),
         **{f"{kind}_bytes": int(getattr(network_of(profile).groups[0], f"{kind}_bytes")) for kind in TRANSACTION_KINDS},
     }
 
@@ -238,7 +239,7 @@ def _row(option: Option) -> TableRow:
         option.title,
         "*" * option.recommended + "?" * (not option.proven),
         _short(option.profile, option.changes),
-        bus_of(option.profile).term_label(option.deciding.binding_term),
+        bus_of(option.profile).figures.term_label(option.deciding.binding_term),
         ShownValue(option.held_by, "held_by"),
         circle,
         *option_margin(option),
@@ -285,7 +286,8 @@ def _short(profile: Profile, changes: NewValues) -> Cell:
     sizes = {key: value for key, value in changes.items() if key in _BOTH}
     alike = len(sizes) == len(_BOTH) and len(set(sizes.values())) == 1
     shown = {key: value for key, value in changes.items() if not alike or key != _BOTH[-1]}
-    words = {**_SHORT, **bus_of(profile).change_words, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
+    own = {name: key.short for name, key in bus_of(profile).keys.items() if key.short}
+    words = {**_SHORT, **own, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
     return joined(
         *(
             sentence(_counted(words[key], value), _short_value(key, value))

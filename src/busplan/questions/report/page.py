@@ -162,7 +162,7 @@ def _assumed(answer: AllAnswers) -> Iterator[Sentence]:
 def _facts(subject: _Subject) -> Facts:
     """Settings of the bus, and the PROFILE argument."""
     bus, figures = bus_of(subject.answer.profile), subject.answer.capacity.results[0]
-    setup = (figure for figure in bus.setup_figures if figure.key in bus.facts)
+    setup = (figure for figure in bus.figures.setup if figure.key in bus.figures.headings)
 
     def item(name: str, figure: Figure) -> tuple[str, ShownValue]:
         unit = "us" if figure.unit == "us" else ""

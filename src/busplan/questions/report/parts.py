@@ -74,7 +74,7 @@ def bus_question(answer: AllAnswers) -> Question:
     verdict = answer.verdict
     word = str(verdict.deciding.verdict).upper()
     if verdict.deciding.verdict == FITS and not verdict.deciding.safe:
-        word = f"UNSAFE {bus_of(answer.profile).safety.upper()}"
+        word = f"UNSAFE {bus_of(answer.profile).safety.setting.upper()}"
     facts = tuple(
         (figure.label, attribute_value(figure, verdict.deciding))
         for figure in (MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES, UTILISATION, BINDING_TERM)
@@ -143,7 +143,7 @@ def _terms(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     yield Chart(TermsDrawing(results), _largest_term(answer), Sentence((_ORDER,)))
     words = (TableColumn("term", kind="words"), TableColumn("eq", kind="words"))
     rows = []
-    for term in (*bus_of(answer.profile).term_figures, LEFT):
+    for term in (*bus_of(answer.profile).figures.terms, LEFT):
         under_each = (attribute_value(term, figures) for figures in results)
         rows.append(TableRow((Swatch(term.ink, term.letter, term.label), term.reference, *under_each)))
     columns = (*words, *(TableColumn(figures.timing_model) for figures in results))
@@ -154,7 +154,7 @@ def _terms(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 def _largest_term(answer: AllAnswers) -> Sentence:
     """Say which term takes most, by the model that decides."""
     deciding = answer.verdict.deciding
-    term = max(bus_of(answer.profile).term_figures, key=lambda one: getattr(deciding, one.key))
+    term = max(bus_of(answer.profile).figures.terms, key=lambda one: getattr(deciding, one.key))
     return sentence(
         f"Of the {{}} that the cycle needs by the {deciding.timing_model} model, {term.label} takes the most, {{}}",
         attribute_value(REQUIRED, deciding),

@@ -82,7 +82,7 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
 
 def _drawn(figures: CapacityFigures, end_us: float) -> tuple[Figure, ...]:
     """The terms, and the rest of the slice if the scale reaches its end."""
-    terms = kind_named(figures.kind).term_figures
+    terms = kind_named(figures.kind).figures.terms
     return (*terms, LEFT) if end_us >= figures.available_us else terms
 
 
