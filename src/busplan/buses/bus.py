@@ -6,7 +6,7 @@ numbers.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.figure import NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure
@@ -17,7 +17,6 @@ from busplan.elementwise import Number, plain
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
     from busplan.sections.profile import Profile
     from busplan.sourced import Grade, Sourced
 from busplan.buses.cycle import BusCycle, Term
@@ -114,8 +113,6 @@ class Bus(ABC):
 
     evidence_data: ClassVar[tuple[str, ...]] = ()
     """Data files, in busplan/data, with figures of it that others have published or measured."""
-    evidence_profiles: ClassVar[tuple[str, ...]] = ()
-    """Shipped profiles that these figures are compared on."""
     model_error: ClassVar[str] = "how far the bus is from this timing model is not known"
     """What is known of the model that decides, where no bias of it is."""
 
@@ -275,21 +272,9 @@ class Bus(ABC):
         """What to beware of, whatever the verdict, with each of some numbers of nodes on the bus."""
         return []
 
-    def evidence(
-        self,
-        networks: Mapping[str, Network],  # noqa: ARG002 - a kind may have none
-        published: Mapping[str, Mapping[str, Any]],  # noqa: ARG002
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare figures that others have published or measured with what its equations give.
-
-        Parameters
-        ----------
-        networks
-            Those of `evidence_profiles`, by name.
-        published
-            What each of `evidence_data` holds, by name.
-        """
-        return ()
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Functions that rows of evidence name beside its figures: of a cycle and what the row gives."""
+        return {}
 
     def limit(self, key: str) -> Limit | None:
         """The limit of a key; None for time, which is no limit of the bus."""

@@ -1,13 +1,11 @@
-"""Published figures beside computed ones."""
+"""The data files with published and measured figures."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from math import fsum, sqrt
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
-
-from busplan.sourced import Grade
+from typing import Any, Final, NamedTuple
 
 _DATA: Final = Path(__file__).resolve().parents[1] / "data"
 
@@ -46,9 +44,6 @@ class Spread(NamedTuple):
         return cls(mean, sqrt(variance * (1 + 1 / count)))
 
 
-Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
-
-
 class Tested(NamedTuple):
     """Which parts of a kind of bus figures of others set, and which they test."""
 
@@ -81,43 +76,6 @@ def _words(part: str, one: Mapping[str, Any], file: Mapping[str, Any]) -> str:
     found: Any = file
     for key in one.get("of", "").split(".") if "of" in one else ():
         found = found[key]
-    rows = [row for table in file.get("evidence", ()) if table["part"] == part for row in table["rows"]]
+    rows = [row for table in file.get("evidence", ()) if table.get("part") == part for row in table["rows"]]
     words: str = one["words"].format(count=len(found if "of" in one else rows))
     return words
-
-
-class Comparison(NamedTuple):
-    """One published figure and one way to compute it."""
-
-    section: str
-    quantity: str
-    unit: Unit
-    published: float | None
-    """As printed, or the quotient of two printed figures; None where the source gives a formula and no figure."""
-    method: str
-    """The equation or timing model behind the computed figure."""
-    computed: float
-    grade: Grade = "published"
-    """How well the published figure is known."""
-    uncertainty: float | None = None
-    """Expanded uncertainty of the computed figure, in `unit`; None where it is not weighed."""
-
-    @property
-    def residual(self) -> float | None:
-        """Computed less published, in `unit`."""
-        return None if self.published is None else self.computed - self.published
-
-    @property
-    def relative_residual(self) -> float | None:
-        """The residual as a share of the published figure [1]."""
-        return None if self.published is None else (self.computed - self.published) / self.published
-
-
-class EvidenceSection(NamedTuple):
-    """One table or passage of a source."""
-
-    title: str
-    note: str
-    comparisons: tuple[Comparison, ...]
-    data: str = "paper"
-    """Data file that the published figures stand in, with their sources."""

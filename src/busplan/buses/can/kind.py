@@ -1,6 +1,6 @@
 """CAN 2.0 with a CANopen cycle, as a kind of bus."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
@@ -25,7 +25,6 @@ from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.can.section import CanProfile
-    from busplan.buses.published import EvidenceSection
 
 _DAVIS: Final = figures.BUS_LOAD.reference
 _HOST_STEP_US: Final = 10.0
@@ -181,15 +180,11 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         """The bit rate."""
         return (f"{network.profile.bus.bit_rate_kbit_s} kbit/s",)
 
-    def evidence(
-        self,
-        networks: Mapping[str, Network],  # noqa: ARG002 - it is asked for frames and messages alone
-        published: Mapping[str, Mapping[str, Any]],
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare published frames, loads and response times with what the equations give."""
-        from busplan.buses.can.evidence import can_sections  # one command alone asks for it
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Those of `busplan.buses.can.evidence`."""
+        from busplan.buses.can.evidence import FUNCTIONS  # one command alone asks for them
 
-        return can_sections(published["can"], published["paper"])
+        return FUNCTIONS
 
 
 def _all_nodes(network: Network) -> str:

@@ -1,7 +1,7 @@
 """SERCOS I and II, as a kind of bus."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
@@ -16,7 +16,6 @@ from busplan.elementwise import plain
 from busplan.sourced import Grade, Sourced
 
 if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
     from busplan.buses.sercos2.section import Sercos2Profile
 
 _TELEGRAMS: Final = figures.MDT_BYTES.reference
@@ -82,8 +81,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         "node.execution.worst_extra_us": "T_extra",
     }
     change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second ring"}
-    evidence_data = ("sercos2", "paper")
-    evidence_profiles = ("sercos2-servo-8",)
+    evidence_data = ("sercos2",)
 
     def profile_model(self) -> "type[Sercos2Profile]":
         """The model of its profiles."""
@@ -119,14 +117,6 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         """The data rate and the gap."""
         bus = network.profile.bus
         return (f"{bus.data_rate_mbit_s} Mbit/s", f"gap of {bus.at_gap_us:g} us between two drives (assumed)")
-
-    def evidence(
-        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
-    ) -> "tuple[EvidenceSection, ...]":
-        """Say which gap between two drives would make the published number of axes fit."""
-        from busplan.buses.sercos2.evidence import axes_of_a_ring  # one command alone asks for it
-
-        return axes_of_a_ring(networks["sercos2-servo-8"], published["sercos2"], published["paper"])
 
 
 BUS: Final = Sercos2()

@@ -1,7 +1,7 @@
 """SERCOS III, as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
@@ -28,7 +28,6 @@ from busplan.elementwise import plain
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
     from busplan.buses.sercos3.section import Sercos3Profile
 
 _COSEMA: Final = figures.MDT_TELEGRAMS.reference
@@ -105,7 +104,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     }
     change_words: ClassVar[Mapping[str, str]] = {_METHOD: "method {}"}
     evidence_data = ("sercos3",)
-    evidence_profiles = ("sercos3-servo-8",)
 
     def profile_model(self) -> "type[Sercos3Profile]":
         """The model of its profiles."""
@@ -157,14 +155,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
             return []
         why = f"the master opens no channel for other frames of less than {LEAST_UCC_US:g} us"
         return [f"Warning: cycle.nonperiodic_us = {given_us:g}: {why}."]
-
-    def evidence(
-        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare the drives that are published of a network with those that the telegrams carry."""
-        from busplan.buses.sercos3.evidence import performance  # one command alone asks for it
-
-        return performance(networks["sercos3-servo-8"], published["sercos3"])
 
 
 BUS: Final = Sercos3()

@@ -5,7 +5,6 @@ from functools import partial
 from typing import Final
 
 from busplan.buses import kind_named
-from busplan.buses.published import Comparison, EvidenceSection
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -19,7 +18,8 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
 )
-from busplan.questions.evidence.figures import KindEvidence
+from busplan.questions.evidence import KindEvidence
+from busplan.questions.evidence.rows import Comparison, EvidenceSection
 from busplan.questions.words.documents import document, parts_by
 from busplan.questions.words.sentences import evidence_sentence
 
@@ -29,8 +29,6 @@ _DECIMALS: Final = {"mm": 6, "1": 4, "bytes": 0, "bits": 0}
 """Decimals by unit; contour errors in mm are micrometres, so that they need six."""
 _MICROSECOND_DECIMALS: Final = 3
 _RESIDUAL_DECIMALS: Final = 4
-
-"""A comparison with its index in the document's figures."""
 
 
 def paper_report(sections: Sequence[EvidenceSection]) -> Report:
@@ -54,7 +52,6 @@ def paper_records(sections: Sequence[EvidenceSection]) -> list[Record]:
     return [
         {
             **comparison._asdict(),
-            "grade": None if comparison.published is None else comparison.grade,
             "residual": comparison.residual,
             "relative_residual": comparison.relative_residual,
         }
@@ -155,7 +152,7 @@ def _row(by_method: dict[str, Comparison], methods: Sequence[str], *, is_weighed
     first = next(iter(by_method.values()))
     published = ShownValue(first.published, "published", first.unit, digits=_DIGITS)
     compared = (cell for method in methods for cell in _compared(by_method.get(method), is_weighed=is_weighed))
-    return TableRow((first.quantity, first.unit, published, "" if first.published is None else first.grade, *compared))
+    return TableRow((first.quantity, first.unit, published, first.grade or "", *compared))
 
 
 def _compared(one: Comparison | None, *, is_weighed: bool) -> tuple[Cell, ...]:
