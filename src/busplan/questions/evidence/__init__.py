@@ -45,9 +45,9 @@ class EvidenceAnswer(Answer):
 
     def report(self) -> Report:
         """The answer in blocks."""
-        from busplan.questions.evidence.report import evidence_report, paper_report
+        from busplan.questions.evidence.report import evidence_report
 
-        return paper_report(self.kinds[0].sections) if self.paper else evidence_report(self.kinds)
+        return evidence_report(self.kinds, paper=self.paper)
 
     def _headline(self) -> str:
         figures = sum(len(section.comparisons) for kind in self.kinds for section in kind.sections)

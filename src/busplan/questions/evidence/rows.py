@@ -76,9 +76,11 @@ class Row(Section):
 
     quantity: str
     unit: Unit
-    published: int | float | None = Field(default=None, description="The figure as printed; None for a computed alone")
+    published: int | float | None = Field(
+        default=None, gt=0, description="The figure as printed; None for a computed one alone"
+    )
     grade: Grade | None = Field(default=None, description="How well the published figure is known")
-    share_of: int | float = Field(default=1, description="A printed figure that both are shown as a share of")
+    share_of: int | float = Field(default=1, gt=0, description="A printed figure that both are shown as a share of")
     profile: str = Field(description="Shipped profile that is computed")
     set: dict[str, Any] = Field(default={}, description="New values of the profile, by dotted key")
     model: str | None = Field(default=None, description="Timing model; None for the one that decides")
