@@ -22,6 +22,24 @@ def published(name: str) -> dict[str, Any]:
     return tomllib.loads((_DATA / f"{name}.toml").read_text(encoding="utf-8"))
 
 
+def rows_of(name: str, part: str) -> list[dict[str, Any]]:
+    """Rows of evidence of a part of the model, in all tables of a data file.
+
+    Parameters
+    ----------
+    name
+        Name of the file.
+    part
+        The part, as the tables have it.
+
+    Examples
+    --------
+    >>> [row["published"] for row in rows_of("ethercat", "bytes")]
+    [0.0839, 0.0841, 0.0826]
+    """
+    return [row for table in published(name)["evidence"] if table.get("part") == part for row in table["rows"]]
+
+
 class Spread(NamedTuple):
     """Several measurements of one quantity, in their unit."""
 
@@ -63,19 +81,16 @@ def parts_tested(names: Sequence[str]) -> Tested:
     names
         The files.
     """
-    files = [published(name) for name in names]
 
     def parts(table: str) -> dict[str, str]:
-        return {part: _words(part, one, file) for file in files for part, one in file.get(table, {}).items()}
+        return {part: _words(name, part, own) for name in names for part, own in published(name).get(table, {}).items()}
 
-    return Tested(parts("set_by"), parts("tested"), tuple(part for file in files for part in file.get("untested", ())))
+    untested = (part for name in names for part in published(name).get("untested", ()))
+    return Tested(parts("set_by"), parts("tested"), tuple(untested))
 
 
-def _words(part: str, one: Mapping[str, Any], file: Mapping[str, Any]) -> str:
-    """Words of one part; {count} is the length of the list that it names, or the rows of evidence of the part."""
-    found: Any = file
-    for key in one.get("of", "").split(".") if "of" in one else ():
-        found = found[key]
-    rows = [row for table in file.get("evidence", ()) if table.get("part") == part for row in table["rows"]]
-    words: str = one["words"].format(count=len(found if "of" in one else rows))
+def _words(name: str, part: str, own: Mapping[str, Any]) -> str:
+    """Words of a part; {count} is the length of the list `of` [table, key], or the rows of evidence of the part."""
+    table, key = own.get("of", ("", ""))
+    words: str = own["words"].format(count=len(published(name)[table][key] if table else rows_of(name, part)))
     return words

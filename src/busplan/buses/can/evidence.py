@@ -27,32 +27,28 @@ def frame_bits(cycle: object, *, payload_bytes: int, identifier_bits: int, stuff
     return stuffed(cycle, least=least, most=most, stuffing=stuffing)
 
 
-def response_us(_cycle: object, *, message: int, **bus: Any) -> float | None:
-    """Worst-case response time of a message, counted from 1 in the order of identifiers [us]."""
-    senders = _senders(**bus)
+def response_us(
+    _cycle: object, *, message: int, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]
+) -> float | None:
+    """Worst-case response time of a message, counted from 1 in the order of identifiers [us]; None without an end."""
+    senders = _senders(bit_rate_kbit_s, payload_bytes, period_us)
     own, higher, lower = senders[message - 1], senders[: message - 1], senders[message:]
     blocking_us = max((sender.frames_us for sender in lower), default=0.0)
-    bit_us = plain(equations.bit_us(bus["bit_rate_kbit_s"]))
+    bit_us = plain(equations.bit_us(bit_rate_kbit_s))
     worst = worst_response(own, higher, blocking_us=blocking_us, bit_us=bit_us)
-    return worst and worst.us
+    return None if worst is None else float(worst.us)
 
 
-def load(_cycle: object, **bus: Any) -> float:
+def load(_cycle: object, *, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> float:
     """Share of the bus that messages take [1]."""
-    return sum(sender.load for sender in _senders(**bus))
+    return float(sum(sender.load for sender in _senders(bit_rate_kbit_s, payload_bytes, period_us)))
 
 
-def _senders(*, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> list[Sender]:
-    """Messages with stuff bits of the worst case, by payload [bytes] and period [us]."""
-    return [
-        Sender(
-            plain(
-                equations.frame_us(size, identifier_bits=BASE_BITS, bit_rate_kbit_s=bit_rate_kbit_s, is_stuffed=True)
-            ),
-            each_us,
-        )
-        for size, each_us in zip(payload_bytes, period_us, strict=True)
-    ]
+def _senders(bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> list[Sender]:
+    """Messages with the stuff bits of the worst case, by payload [bytes] and period [us]."""
+    wire: dict[str, Any] = {"identifier_bits": BASE_BITS, "bit_rate_kbit_s": bit_rate_kbit_s, "is_stuffed": True}
+    sizes = zip(payload_bytes, period_us, strict=True)
+    return [Sender(plain(equations.frame_us(size, **wire)), each_us) for size, each_us in sizes]
 
 
 FUNCTIONS: Final = {function.__name__: function for function in (stuffed, frame_bits, response_us, load)}

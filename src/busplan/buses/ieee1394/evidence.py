@@ -1,5 +1,6 @@
 """What rows of evidence compute of IEEE 1394 beside the figures of a cycle."""
 
+from collections.abc import Callable, Mapping
 from math import ceil
 from typing import Any, Final
 
@@ -59,15 +60,14 @@ def gap_counts_met(_cycle: object, *, derived: bool) -> int:
     def computed(hops: int) -> float:
         if not derived:
             return plain(safe_gap_count(hops))
-        ticks = 2 * table["hop_us"] * table["base_rate_mhz"] * hops
-        return max(
-            ceil((ticks + offset) / slope) for offset, slope in zip(table["offsets"], table["slopes"], strict=True)
-        )
+        ticks: float = 2 * table["hop_us"] * table["base_rate_mhz"] * hops
+        conditions: list[tuple[int, int]] = list(zip(table["offsets"], table["slopes"], strict=True))
+        return max(ceil((ticks + offset) / slope) for offset, slope in conditions)
 
     return sum(computed(hops) == count for hops, count in enumerate(table["by_hops"], start=1))
 
 
-FUNCTIONS: Final = {
+FUNCTIONS: Final[Mapping[str, Callable[..., Any]]] = {
     "equation_15_us": lambda _, payload_bytes: equations.published_request_and_acknowledge_us(payload_bytes),
     "equation_15_constant_us": equation_15_constant_us,
     "residual_mean_us": lambda cycle: float(residual(cycle.model).mean_us),

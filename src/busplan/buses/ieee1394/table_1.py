@@ -9,13 +9,11 @@ Paper, Table I: one node and the host, gap count 63, S400, write transactions, m
 """
 
 from functools import cache
-from math import sqrt
-from statistics import fmean, stdev
 from typing import Final, NamedTuple
 
 from busplan.buses.ieee1394.constants import DATA_RATE_MBIT_S, MAX_GAP_COUNT, PACKET_OVERHEAD_BYTES, REFERENCE_CABLE_M
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Link, Responder, TimingModelName, transaction
-from busplan.buses.published import published
+from busplan.buses.published import Spread, rows_of
 from busplan.sourced import Sourced
 
 _BENCH: Final = Link(float(DATA_RATE_MBIT_S["S400"]), MAX_GAP_COUNT, 1, float(REFERENCE_CABLE_M))
@@ -27,13 +25,12 @@ class ModelResidual(NamedTuple):
 
     mean_us: Sourced
     uncertainty_us: Sourced
-    """Standard uncertainty of the next half: sd sqrt(1 + 1/n)."""
+    """Standard uncertainty of the next half: `Spread`."""
 
 
 def measured_halves_us() -> dict[int, float]:
     """T1 + T2 as measured, by payload in bytes [us]."""
-    (table,) = (one for one in published("paper")["evidence"] if one.get("part") == "bias and U")
-    return {row["set"]["payload.write_bytes"]: row["published"] for row in table["rows"]}
+    return {row["set"]["payload.write_bytes"]: row["published"] for row in rows_of("paper", "bias and U")}
 
 
 @cache
@@ -51,10 +48,13 @@ def residual(model: TimingModelName = "standard") -> ModelResidual:
     (0.827, 3.131)
     """
     differences = [us - _first_half_us(payload_bytes, model) for payload_bytes, us in measured_halves_us().items()]
-    number, source = len(differences), f"paper, Table I, less the {model} model at its {len(differences)} payloads"
+    spread, source = (
+        Spread.of(differences),
+        f"paper, Table I, less the {model} model at its {len(differences)} payloads",
+    )
     return ModelResidual(
         Sourced(
-            fmean(differences),
+            spread.mean,
             unit="us",
             grade="derived",
             source=source,
@@ -62,7 +62,7 @@ def residual(model: TimingModelName = "standard") -> ModelResidual:
             symbol="b",
         ),
         Sourced(
-            stdev(differences) * sqrt(1 + 1 / number),
+            spread.uncertainty,
             unit="us",
             grade="derived",
             source=source,

@@ -44,8 +44,8 @@ class ComparedMeasurement(NamedTuple):
     """T_exec minus that of the fit; None for an outlier outside a table."""
     expected_us: float | None
     """T_exec that the other measurements say of an outlier; None in the fit."""
-    off_us: float | None
-    """`execution_us` minus `expected_us`; None in the fit."""
+    off_us: float
+    """`execution_us` minus `expected_us`; 0 in the fit."""
 
 
 class PayloadFit(NamedTuple):
@@ -321,21 +321,21 @@ def _more(source: str, hidden: int) -> list[str]:
 
 
 def _compared(
-    one: Measurement, packets_us: float, fitted_us: float | None, expected_us: float | None
+    measurement: Measurement, packets_us: float, fitted_us: float | None, expected_us: float | None
 ) -> ComparedMeasurement:
     """Compare a measurement with the fit, where that covers its payload, and with what the others say [us]."""
-    execution_us = round(one.latency_us - packets_us, _EXACT_DECIMALS)
+    execution_us = round(measurement.latency_us - packets_us, _EXACT_DECIMALS)
     expected_us = None if expected_us is None else round(expected_us, _EXACT_DECIMALS)
     return ComparedMeasurement(
-        line=one.line,
-        transaction=one.transaction,
-        payload_bytes=one.payload_bytes,
-        latency_us=one.latency_us,
+        line=measurement.line,
+        transaction=measurement.transaction,
+        payload_bytes=measurement.payload_bytes,
+        latency_us=measurement.latency_us,
         packets_us=packets_us,
         execution_us=execution_us,
         residual_us=None if fitted_us is None else round(execution_us - fitted_us, _EXACT_DECIMALS),
         expected_us=expected_us,
-        off_us=None if expected_us is None else round(execution_us - expected_us, _EXACT_DECIMALS),
+        off_us=0.0 if expected_us is None else round(execution_us - expected_us, _EXACT_DECIMALS),
     )
 
 
@@ -346,10 +346,10 @@ def _residuals_us(compared: Sequence[ComparedMeasurement]) -> list[float]:
 
 def _worst_extra_us(outliers: Sequence[ComparedMeasurement], residuals_us: Sequence[float]) -> float | None:
     """Time of the slowest of all measurements beyond the fit, where some are slow [us]."""
-    slow = [(one.off_us, one.residual_us) for one in outliers if one.off_us is not None and one.off_us > 0]
+    slow = [one for one in outliers if one.off_us > 0]
     if not slow:
         return None
-    worst_us = max(*(off_us if residual_us is None else residual_us for off_us, residual_us in slow), *residuals_us)
+    worst_us = max(*(one.off_us if one.residual_us is None else one.residual_us for one in slow), *residuals_us)
     return ceil(1000 * worst_us - _PICOSECOND) / 1000
 
 
@@ -364,7 +364,7 @@ def _payload_fits(
         groups[one.payload_bytes].append(place)
 
     def of_payload(size: int, places: Sequence[int]) -> PayloadFit:
-        in_fit = [place for place in places if compared[place].off_us is None]
+        in_fit = [place for place in places if compared[place].expected_us is None]
         group = [compared[place] for place in in_fit or places]
         times_us = [one.execution_us for one in group]
         by_kind = {kind: [one.execution_us for one in group if one.transaction == kind] for kind in ("read", "write")}

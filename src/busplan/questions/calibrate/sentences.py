@@ -143,8 +143,8 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
 
 def slow_and_fast(result: Calibration) -> tuple[list[ComparedMeasurement], list[ComparedMeasurement]]:
     """The outliers that are slow executions, and those that the others contradict."""
-    slow = [one for one in result.outliers if (one.off_us or 0.0) > 0]
-    return slow, [one for one in result.outliers if (one.off_us or 0.0) <= 0]
+    slow = [one for one in result.outliers if one.off_us > 0]
+    return slow, [one for one in result.outliers if one.off_us <= 0]
 
 
 def _outliers(result: Calibration) -> Iterator[Sentence]:
@@ -175,5 +175,5 @@ def _outlier(one: ComparedMeasurement) -> Sentence:
         count_value(one.line, "line"),
         ShownValue(one.latency_us, "latency_us", "us"),
         ShownValue(one.payload_bytes, "payload_bytes", "bytes"),
-        time_value(one.off_us or 0.0, "off_us")._replace(signed=True, decimals=1),
+        time_value(one.off_us, "off_us")._replace(signed=True, decimals=1),
     )

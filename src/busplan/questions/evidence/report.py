@@ -67,11 +67,11 @@ def _records(kinds: Sequence[KindEvidence], *, paper: bool) -> list[Record]:
 
 def _document(kinds: Sequence[KindEvidence], *, paper: bool) -> JsonDocument:
     known: JsonDocument = {
-        "kinds": [one.kind for one in kinds],
-        "without": [one.kind for one in kinds if not one.sections],
-        "set_by": [{"kind": one.kind, **part} for one in kinds for part in parts_by(one.tested.set_by)],
-        "tested": [{"kind": one.kind, **part} for one in kinds for part in parts_by(one.tested.parts)],
-        "not_tested": [{"kind": one.kind, "part": part} for one in kinds for part in one.tested.untested],
+        "kinds": [kind.kind for kind in kinds],
+        "without": [kind.kind for kind in kinds if not kind.sections],
+        "set_by": [{"kind": kind.kind, **part} for kind in kinds for part in parts_by(kind.tested.set_by)],
+        "tested": [{"kind": kind.kind, **part} for kind in kinds for part in parts_by(kind.tested.parts)],
+        "not_tested": [{"kind": kind.kind, "part": part} for kind in kinds for part in kind.tested.untested],
     }
     return document(
         "paper" if paper else "evidence",
@@ -90,11 +90,11 @@ def _blocks(kinds: Sequence[KindEvidence], *, paper: bool) -> Iterator[Block]:
 
 
 def _table(comparisons: Sequence[Comparison]) -> Table:
-    methods = list(dict.fromkeys(one.method for one in comparisons))
-    is_weighed = any(one.uncertainty is not None for one in comparisons)
+    methods = list(dict.fromkeys(comparison.method for comparison in comparisons))
+    is_weighed = any(comparison.uncertainty is not None for comparison in comparisons)
     rows: dict[str, dict[str, Comparison]] = {}
-    for one in comparisons:
-        rows.setdefault(one.quantity, {})[one.method] = one
+    for comparison in comparisons:
+        rows.setdefault(comparison.quantity, {})[comparison.method] = comparison
     columns = (
         *(
             TableColumn("figure", kind="words", wraps=True),
@@ -124,15 +124,17 @@ def _row(by_method: dict[str, Comparison], methods: Sequence[str], *, is_weighed
     return TableRow((first.quantity, first.unit, published, first.grade or "", *compared))
 
 
-def _compared(one: Comparison | None, *, is_weighed: bool) -> tuple[Cell, ...]:
-    if one is None:
+def _compared(comparison: Comparison | None, *, is_weighed: bool) -> tuple[Cell, ...]:
+    if comparison is None:
         return ("",) * (3 + is_weighed)
-    decimals = _DECIMALS.get(one.unit, _MICROSECOND_DECIMALS)
-    doubt = ShownValue(one.uncertainty, "uncertainty", one.unit, decimals, fixed=True)
+    decimals = _DECIMALS.get(comparison.unit, _MICROSECOND_DECIMALS)
+    doubt = ShownValue(comparison.uncertainty, "uncertainty", comparison.unit, decimals, fixed=True)
     # Smaller values are rounding of the printed figure.
     return (
-        ShownValue(one.computed, "computed", one.unit, decimals, fixed=True),
+        ShownValue(comparison.computed, "computed", comparison.unit, decimals, fixed=True),
         *((doubt,) if is_weighed else ()),
-        ShownValue(one.residual, "residual", one.unit, max(decimals, _RESIDUAL_DECIMALS), signed=True, fixed=True),
-        ShownValue(one.relative_residual, "relative_residual", "%", 1, signed=True, fixed=True),
+        ShownValue(
+            comparison.residual, "residual", comparison.unit, max(decimals, _RESIDUAL_DECIMALS), signed=True, fixed=True
+        ),
+        ShownValue(comparison.relative_residual, "relative_residual", "%", 1, signed=True, fixed=True),
     )

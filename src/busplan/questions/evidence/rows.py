@@ -175,7 +175,9 @@ def _checked(model: type[_Model], content: Mapping[str, Any]) -> _Model:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise BusplanError(*(f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors())) from None
+        raise BusplanError(
+            *(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
+        ) from None
 
 
 @contextmanager
@@ -228,7 +230,7 @@ class _Case:
         elif source == "circle":
             value = getattr(self._circle, key, None)
         elif source:
-            transactions = {f"latency.{one.name}": one.phases for one in self._cycle.latencies()}
+            transactions = {f"latency.{each.name}": each.phases for each in self._cycle.latencies()}
             value = transactions.get(source, {}).get(key)
         else:
             value = getattr(self._figures, name, None)
@@ -238,7 +240,7 @@ class _Case:
 
     def uncertainty(self, key: str) -> float:
         """Expanded uncertainty from the doubts of a key."""
-        doubts = [plain(one.us) for one in self._figures.doubts if one.key == key]
+        doubts = [plain(doubt.us) for doubt in self._figures.doubts if doubt.key == key]
         if not doubts:
             raise BusplanError(f"doubt: {key!r} is no doubt of {self.profile.name}")
         return COVERAGE * hypot(*doubts)
