@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 import busplan
-from busplan.buses.published import published
+from busplan.buses import kind_named, kind_names
+from busplan.buses.published import parts_tested, published
 from busplan.errors import BusplanError
 from busplan.forms import render
 from busplan.questions.evidence import rows
@@ -74,3 +75,9 @@ def test_a_function_refuses_arguments_that_it_does_not_take(monkeypatch: pytest.
     monkeypatch.setattr(rows, "published", lambda _: data)
     with pytest.raises(BusplanError, match=r"can\.toml: .*row '0 bytes.*given: frame_bits: got an unexpected keyword"):
         busplan.evidence("can")
+
+
+@pytest.mark.parametrize("kind", kind_names())
+def test_what_a_verdict_counts_has_rows(kind: str) -> None:
+    known = parts_tested(kind_named(kind).evidence_data)
+    assert not [part for part, words in {**known.set_by, **known.parts}.items() if words.startswith("0 ")]
