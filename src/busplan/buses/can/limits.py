@@ -9,7 +9,7 @@ from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES,
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.response import TooManyStepsError
 from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
-from busplan.buses.can.traffic import Sent, Traffic, traffic_of, without_times
+from busplan.buses.can.traffic import Sent, Traffic, pdos_of, traffic_of, without_times
 from busplan.buses.can.waiting import Messages, messages
 from busplan.buses.network import Network
 from busplan.buses.node_time import NODE_LIMIT
@@ -187,8 +187,8 @@ def _most_identifier(network: Network) -> Number:
 
 def _largest_pdo(network: Network) -> Number:
     largest: Number = 0
-    for one in traffic_of(network).pdos:
-        largest = larger(largest, one.payload_bytes)
+    for pdos in traffic_of(network).pdos:
+        largest = larger(largest, pdos.payload_bytes)
     return largest
 
 
@@ -231,7 +231,7 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",
-        lambda network: total(one.pdos for one in traffic_of(network).pdos if one.kind == "read"),
+        lambda network: total(pdos_of(group) for group in network.groups),
         lambda _network: MOST_NODES,
         way_out=f"a second bus has {MOST_NODES:g} more",
     ),

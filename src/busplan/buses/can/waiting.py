@@ -179,6 +179,7 @@ class Messages:
         nothing: Points = 0.0
         self._longest_us: list[Points] = [*accumulate(frames_us, larger, initial=nothing)][::-1]
         """The longest frame from each rank on."""
+        self._known: dict[str, Response | None] = {}
 
     def by_priority(self) -> Iterator[Stream]:
         """The messages, that of the lowest priority first."""
@@ -190,12 +191,17 @@ class Messages:
 
     def response(self, own: Stream) -> Response | None:
         """Worst-case response of a message of plain numbers; None where `worst_response` has none."""
+        if own.name not in self._known:
+            self._known[own.name] = self._worst(own)
+        return self._known[own.name]
+
+    def _worst(self, own: Stream) -> Response | None:
         try:
             found = [*self._responses(own)]
         except TooManyStepsError:
             return None
-        each = [one for one in found if one is not None]
-        return max(each, key=lambda one: plain(one.us)) if len(each) == len(found) else None
+        each = [response for response in found if response is not None]
+        return max(each, key=lambda response: plain(response.us)) if len(each) == len(found) else None
 
     def _responses(self, own: Stream) -> Iterator[Response | None]:
         """The worst instance of a message from each start of a busy period."""
