@@ -6,6 +6,7 @@ R. I. Davis, A. Burns, R. J. Bril, J. J. Lukkien, Controller Area Network (CAN) 
 revisited and revised, Real-Time Systems 35, 2007.
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 
 from busplan.buses.can.constants import (
@@ -141,7 +142,7 @@ def _payload_us(payload_bytes: Number, identifier_bits: Number, bit_rate_kbit_s:
     return full * of_frame(float(FRAME_BYTES)) + choose(rest_bytes > 0, of_frame(rest_bytes), 0.0)
 
 
-_plain_payload_us = lru_cache(maxsize=1024)(_payload_us)
+_plain_payload_us: Callable[..., Number] = lru_cache(maxsize=1024)(_payload_us)
 """The groups of a network have few sizes of payloads between them."""
 
 

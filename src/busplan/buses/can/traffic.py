@@ -67,17 +67,17 @@ class Traffic(NamedTuple):
 
     def numbers(self) -> tuple[Number, ...]:
         """All its numbers in one row, as `with_numbers` takes them."""
-        pdos = (number for one in self.pdos for number in one[_PDO_WORDS:])
+        pdos = (number for pdos in self.pdos for number in pdos[_PDO_WORDS:])
         own: tuple[Any, ...] = self[:_OWN_NUMBERS]
-        return (*own, *pdos, *(number for one in self.messages for number in one[_MESSAGE_WORDS:]))
+        return (*own, *pdos, *(number for message in self.messages for number in message[_MESSAGE_WORDS:]))
 
     def with_numbers(self, *numbers: Number) -> "Traffic":
         """The same senders with other numbers, in the order of `numbers`."""
         rest: Iterator[Any] = iter(numbers)
         own = tuple(islice(rest, _OWN_NUMBERS))
-        pdos = tuple(Pdos(one.kind, one.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for one in self.pdos)
+        pdos = tuple(Pdos(pdos.kind, pdos.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for pdos in self.pdos)
         count = len(Message._fields) - _MESSAGE_WORDS
-        messages = tuple(Message(one.name, *islice(rest, count)) for one in self.messages)
+        messages = tuple(Message(message.name, *islice(rest, count)) for message in self.messages)
         return Traffic._make((*own, pdos, messages))
 
 
@@ -115,8 +115,8 @@ class Sent:
             What a derivation says of it.
         """
         if self.is_ordered:
-            found: Number = function(self.traffic, *others)
-            return found
+            result: Number = function(self.traffic, *others)
+            return result
         return self.of_points(function, *others, words=words)
 
     def of_points(self, function: Callable[..., float], *others: Number, words: str) -> Number:
@@ -131,10 +131,10 @@ class Sent:
     def is_ordered(self) -> bool:
         """Whether identifiers and sizes of messages are plain, and no number is traced."""
         traffic = self.traffic
-        messages = (number for one in traffic.messages for number in (one.identifier, one.payload_bytes))
-        order = (traffic.sync_identifier, *(one.identifier for one in traffic.pdos), *messages)
-        return all(isinstance(one, int | float) for one in order) and not any(
-            isinstance(one, Traced) for one in traffic.numbers()
+        messages = (number for message in traffic.messages for number in (message.identifier, message.payload_bytes))
+        order = (traffic.sync_identifier, *(pdos.identifier for pdos in traffic.pdos), *messages)
+        return all(isinstance(number, int | float) for number in order) and not any(
+            isinstance(number, Traced) for number in traffic.numbers()
         )
 
     @cached_property
@@ -209,7 +209,7 @@ def traffic_of_profile(profile: Any) -> Traffic:
 
 def without_times(traffic: Traffic) -> Traffic:
     """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
-    messages = tuple(one._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for one in traffic.messages)
+    messages = tuple(message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for message in traffic.messages)
     return traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, read_us=0.0, host_us=0.0, messages=messages)
 
 
