@@ -164,7 +164,7 @@ class Digest:
         yield from payload_sentences(sweep.profile, sweep.grid.axes)
         safety = self._bus.safety.figure
         if self._counts["unsafe"] and safety is not None:
-            words = f"At {{}} points the {self._bus.safety} is unsafe ({safety.key})."
+            words = f"At {{}} points the {self._bus.safety.setting} is unsafe ({safety.key})."
             yield sentence(words, count_value(self._counts["unsafe"], grouped=True), state="warns")
 
     def _fitting(self) -> Sentence:
