@@ -35,7 +35,7 @@ from busplan.questions.map.drawing import (
     state_words,
 )
 from busplan.questions.map.trade_off import Cell, Region, TradeOff
-from busplan.questions.sweep.top import payload_sentences
+from busplan.questions.sweep.digest import payload_sentences
 from busplan.questions.words.documents import document, fields, with_profile
 from busplan.questions.words.sentences import refused_circle
 

@@ -110,7 +110,7 @@ def _document(subjects: Sequence[_Subject]) -> JsonDocument:
     return document(
         "report",
         profiles=[
-            {"profile": subject.name, "answers": {name: source.document for name, source in subject.sources.items()}}
+            {"profile": subject.name, "answers": {name: source.document() for name, source in subject.sources.items()}}
             for subject in subjects
         ],
     )
