@@ -183,19 +183,24 @@ class Bus(ABC):
         """Whether the cycle holds an execution time of the nodes."""
         return True
 
-    def arrivals_us(self, cycle: BusCycle) -> Mapping[int, float]:
-        """When each node has its command, by its number from 1, from the start of a cycle of plain numbers [us].
+    def arrival_us(self, cycle: BusCycle, node: int) -> float:
+        """When a node has its command, from the start of a cycle of plain numbers [us].
 
         The last of its `command_events` has ended then; what belongs to no one node is the command of all.
+
+        Parameters
+        ----------
+        cycle
+            The cycle.
+        node
+            Number of the node, from 1.
         """
-        found: dict[int, float] = {}
-        nodes, now_us = int(plain(cycle.network.nodes)), 0.0
+        arrived_us, now_us = None, 0.0
         for event in cycle.events():
             now_us += event.us
-            if (event.transaction, event.kind) in self.command_events:
-                owners = range(1, nodes + 1) if event.node is None else (event.node,)
-                found |= dict.fromkeys(owners, now_us)
-        return found or dict.fromkeys(range(1, nodes + 1), now_us)
+            if (event.transaction, event.kind) in self.command_events and event.node in (None, node):
+                arrived_us = now_us
+        return now_us if arrived_us is None else arrived_us
 
     def taking_us(self, group: Group, network: Network) -> float:  # noqa: ARG002 - most take commands alike
         """From a command's arrival at a node of a group to its effect: the slowest execution of a write [us]."""

@@ -1,7 +1,7 @@
 """What SERCOS I, II and III share: whole words, the master's pipeline, and how long feedback and commands take."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import reduce
 from math import ceil
 from typing import Final, TypeAlias
@@ -133,12 +133,10 @@ class SercosBus(Bus):
         """The nodes' time is in every latency."""
         return True
 
-    def arrivals_us(self, cycle: BusCycle) -> Mapping[int, float]:
+    def arrival_us(self, cycle: BusCycle, node: int) -> float:  # noqa: ARG002 - all at once
         """When the last byte of the MDT has passed the ring: all nodes have their commands then [us]."""
         _, command = cycle.latencies()
-        phases = {key: plain(us) for key, us in command.phases.items()}
-        arrived_us = phases["delay_us"] - phases["node_us"]
-        return dict.fromkeys(range(1, int(plain(cycle.network.nodes)) + 1), arrived_us)
+        return plain(command.phases["delay_us"]) - plain(command.phases["node_us"])
 
     def sampled_us(self, cycle: BusCycle) -> float:
         """All nodes sample at once, early enough for the slowest of them [us]."""

@@ -11,7 +11,6 @@ from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (
     cables_us,
-    data_bytes,
     devices,
     devices_doubts,
     devices_us,
@@ -134,18 +133,17 @@ class EthercatCycle(BusCycle):
 
     def _frames(self) -> Iterator[BusEvent]:
         """What each frame has beside its data, then the data of each of its devices."""
-        sizes = [
-            plain(data_bytes(one, self.network)) for one in self.network.groups for _ in range(int(plain(one.nodes)))
-        ]
-        for number, one in enumerate(frames(self.network), start=1):
-            own = [(device, sizes[device - 1]) for device in one.devices]
-            overhead = plain(frame_bytes(one.datagrams_bytes)) - sum(size for _, size in own)
-            yield BusEvent(
-                "overhead", "cycle_frames_us", plain(sending_us(overhead)), f"headers of frame {number}", None, "frame"
-            )
-            for device, size in own:
-                us = plain(sending_us(size))
-                yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
+        sizes = [plain(own.data_bytes) for own in self._devices for _ in range(int(plain(own.number)))]
+        number = 0
+        for run in frames(self.network):
+            for own in run.each():
+                number += 1
+                overhead = plain(frame_bytes(run.datagrams_bytes)) - sum(sizes[device - 1] for device in own)
+                us, label = plain(sending_us(overhead)), f"headers of frame {number}"
+                yield BusEvent("overhead", "cycle_frames_us", us, label, None, "frame")
+                for device in own:
+                    us = plain(sending_us(sizes[device - 1]))
+                    yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
 
     def _way(self) -> Iterator[BusEvent]:
         """The last byte to each device and through it."""

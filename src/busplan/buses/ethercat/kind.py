@@ -10,7 +10,7 @@ from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
 from busplan.buses.ethercat.equations import room_bytes
 from busplan.buses.ethercat.latency import loop_periods
 from busplan.buses.ethercat.limits import LIMITS
-from busplan.buses.ethercat.traffic import arrivals_us, datagrams, layout
+from busplan.buses.ethercat.traffic import arrival_us, datagrams, layout
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
 from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
@@ -150,9 +150,9 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         """The nodes' time is in every latency."""
         return True
 
-    def arrivals_us(self, cycle: "BusCycle") -> Mapping[int, float]:
-        """When the last byte of its frame has reached each device [us]."""
-        return arrivals_us(cycle.network)
+    def arrival_us(self, cycle: "BusCycle", node: int) -> float:
+        """When the last byte of its frame has reached a device [us]."""
+        return arrival_us(cycle.network, node)
 
     def loop_periods(self, network: Network, *, at_sync: bool) -> int:
         """The master's pipeline, and the cycles that feedback and command wait for a frame and for SYNC0."""

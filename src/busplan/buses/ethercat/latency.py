@@ -11,7 +11,7 @@ from busplan.buses.cycle import BusLatency
 from busplan.buses.ethercat.constants import BYTE_BIAS_UNCERTAINTY_US
 from busplan.buses.ethercat.figures import LATENCY_TABLE
 from busplan.buses.ethercat.traffic import (
-    arrivals_us,
+    arrival_us,
     cables_us,
     devices,
     devices_doubts,
@@ -141,7 +141,7 @@ def loop_periods(network: Network, *, at_sync: bool) -> int:
     """
     bus, period_us = network.profile.bus, plain(network.period_us)
     shift_us = plain(sync0_us(network)) if at_sync else 0.0
-    last_us = max(arrivals_us(network).values())
+    last_us = arrival_us(network, int(plain(network.nodes)))
 
     def of(group: Group) -> float:
         extra_us = plain(group.worst_extra_us)

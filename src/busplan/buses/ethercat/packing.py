@@ -84,16 +84,27 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     return Packing(frames, whole, padding + padding_bytes(present), present, before)
 
 
-class Frame(NamedTuple):
-    """One frame of plain numbers."""
+class Frames(NamedTuple):
+    """Frames one behind the other that hold as many devices of one size, of plain numbers."""
 
-    devices: tuple[int, ...]
-    """Devices whose data it holds, from 1; none where only the clocks' datagram had room."""
+    first: int
+    """First device of the first of them, from 1."""
+    devices: int
+    """Devices in each; none where only the clocks' datagram had room."""
     datagrams_bytes: float
+    """Datagrams of each [bytes]."""
+    frames: int = 1
+    """How many [1]."""
+
+    def each(self) -> Iterator[range]:
+        """Devices of each frame."""
+        for frame in range(self.frames):
+            first = self.first + frame * self.devices
+            yield range(first, first + self.devices)
 
 
-def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Iterator[Frame]:
-    """The same frames one by one, of plain numbers.
+def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Iterator[Frames]:
+    """The same frames in their order, of plain numbers; a few entries for each group, however many its devices.
 
     Parameters
     ----------
@@ -101,13 +112,18 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
         As `pack` takes them.
     """
     room, headers = room_bytes(datagrams), datagrams * float(DATAGRAM_BYTES)
-    held: list[int] = []
-    opened, filled = first_bytes, 0.0
-    sizes = [plain(one.data_bytes) for one in devices for _ in range(int(plain(one.number)))]
-    for device, size in enumerate(sizes, start=1):
-        if filled + size > room - opened and (held or opened):
-            yield Frame(tuple(held), opened + bool(held) * headers + filled)
-            held, opened, filled = [], 0.0, 0.0
-        held.append(device)
-        filled += size
-    yield Frame(tuple(held), opened + headers + filled)
+    first, held, opened, filled = 1, 0, first_bytes, 0.0
+    for group in devices:
+        size, left = plain(group.data_bytes), int(plain(group.number))
+        fitting = max(int((room - opened - filled) // size), 0 if held or opened else 1)
+        beside = min(left, fitting)
+        held, filled, left = held + beside, filled + beside * size, left - beside
+        if left:
+            yield Frames(first, held, opened + bool(held) * headers + filled)
+            first, each = first + held, max(int(room // size), 1)
+            full = (left - 1) // each
+            if full:
+                yield Frames(first, each, headers + each * size, full)
+            first, held, opened = first + full * each, left - full * each, 0.0
+            filled = held * size
+    yield Frames(first, held, opened + headers + filled)

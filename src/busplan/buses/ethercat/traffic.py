@@ -23,7 +23,7 @@ from busplan.buses.ethercat.equations import (
     overhead_bytes,
     sending_us,
 )
-from busplan.buses.ethercat.packing import Devices, Frame, Packing, frames_of, pack
+from busplan.buses.ethercat.packing import Devices, Frames, Packing, frames_of, pack
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, alike, larger, named, plain, square_root, total
 
@@ -89,8 +89,8 @@ def packing(network: Network, each: Sequence[Devices]) -> Packing:
     )
 
 
-def frames(network: Network) -> tuple[Frame, ...]:
-    """The same frames one by one, of plain numbers."""
+def frames(network: Network) -> tuple[Frames, ...]:
+    """The same frames in their order, of plain numbers."""
     return tuple(
         frames_of(devices(network), datagrams=datagrams(network), first_bytes=plain(housekeeping_bytes(network)))
     )
@@ -145,21 +145,29 @@ def mailbox_frame_us(network: Network) -> Number:
     return sending_us(frame_bytes(datagram_bytes(network.profile.bus.mailbox_bytes)))
 
 
-def arrivals_us(network: Network) -> dict[int, float]:
-    """When each device has its command, by its number from 1; of plain numbers [us].
+def arrival_us(network: Network, device: int) -> float:
+    """When a device has its command, from the start of a cycle of plain numbers [us].
 
-    A device acts when the last byte of its frame has come: a check behind the data says whether the frame is whole.
-    The frames start as late as the master's jitter lets them.
+    It acts when the last byte of its frame has come: a check behind the data says whether the frame is whole. The
+    frames start as late as the master's jitter lets them.
+
+    Parameters
+    ----------
+    network
+        The network.
+    device
+        Number of the device, from 1.
     """
-    now_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
-    sent_us: dict[int, float] = {}
-    for one in frames(network):
-        now_us += plain(sending_us(frame_bytes(one.datagrams_bytes)))
-        sent_us |= dict.fromkeys(one.devices, now_us)
-    found, way_us, device = {}, 0.0, 0
-    for one_hop in map(hop, network.groups):
-        for _ in range(int(plain(one_hop.nodes))):
-            device += 1
-            way_us += plain(one_hop.device_us + one_hop.cable_us) / 2
-            found[device] = sent_us[device] + way_us
-    return found
+    sent_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
+    for run in frames(network):
+        frame_us, before = plain(sending_us(frame_bytes(run.datagrams_bytes))), device - run.first
+        if before < run.devices * run.frames:
+            sent_us += (before // run.devices + 1) * frame_us
+            break
+        sent_us += run.frames * frame_us
+    way_us, left = 0.0, device
+    for step in map(hop, network.groups):
+        passed = min(left, int(plain(step.nodes)))
+        way_us += passed * plain(step.device_us + step.cable_us) / 2
+        left -= passed
+    return sent_us + way_us
