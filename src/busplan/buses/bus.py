@@ -195,12 +195,7 @@ class Bus(ABC):
         node
             Number of the node, from 1.
         """
-        arrived_us, now_us = None, 0.0
-        for event in cycle.events():
-            now_us += event.us
-            if (event.transaction, event.kind) in self.command_events and event.node in (None, node):
-                arrived_us = now_us
-        return now_us if arrived_us is None else arrived_us
+        return cycle.arrival_us(node, self.command_events)
 
     def taking_us(self, group: Group, network: Network) -> float:  # noqa: ARG002 - most take commands alike
         """From a command's arrival at a node of a group to its effect: the slowest execution of a write [us]."""

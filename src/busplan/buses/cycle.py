@@ -1,13 +1,23 @@
-"""What a cycle of any bus is: terms that add up, events that add up to them, latencies, and what is not known."""
+"""A cycle of any bus: counted events in the order of the wire, which terms and the timeline come from.
+
+Each kind writes its cycle once, as runs of events. Terms are their sums: a run counts its events, so that a million
+nodes take no longer to add up than one. The timeline lays the same runs out, event by event.
+"""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import NamedTuple
+from itertools import chain
+from typing import ClassVar, Final, Literal, NamedTuple, TypeAlias
 
-from busplan.buses.figure import REQUIRED
+from busplan.buses.figure import REQUIRED, Figure
 from busplan.buses.network import Network
-from busplan.elementwise import Number, total
+from busplan.elementwise import Number, is_off, plain, total
+
+Rounds: TypeAlias = Literal["all", "first", "but first"]
+ALL: Final[Rounds] = "all"
+FIRST: Final[Rounds] = "first"
+BUT_FIRST: Final[Rounds] = "but first"
 
 
 class Term(NamedTuple):
@@ -32,15 +42,70 @@ class BusEvent(NamedTuple):
     """Key of its `EventKind`."""
     term: str
     """Key of the term that it is a part of."""
-    us: float
+    us: Number
+    """How long it takes [us]: a plain number where it is laid out, of any sort in a run."""
     label: str
     """What it is, and who is at work."""
     node: int | None = None
-    """Whose it is, from 1; None for what belongs to all."""
+    """Whose it is where it is laid out, from 1; None for what belongs to all."""
     transaction: str | None = None
-    """What it belongs to at a coarse look: the key of an `EventKind` for stretches."""
+    """What it belongs to at a coarse look: the key of an `EventKind` for stretches. Where nodes take turns, what
+    belongs to none is between them."""
     packet: str | None = None
     """Which packet of the transaction it belongs to."""
+    rests_on: str = ""
+    """Dotted key of the profile that it comes from, where that is one alone."""
+    rounds: Rounds = ALL
+    """Rounds of its run that have it."""
+
+
+class Run(NamedTuple):
+    """Events one behind the other, in one round or several."""
+
+    events: tuple[BusEvent, ...]
+    """Those of a round; of the mean round where rounds differ."""
+    count: Number | None = None
+    """Rounds [1]; None for one alone."""
+    group: int | None = None
+    """Place of the group of nodes that take turns, each with as many rounds; None for what belongs to all."""
+    laid_out: Callable[[Number], Iterable[BusEvent]] | None = None
+    """From the number of a round, from 0, to its events where a timeline shows them finer, or where rounds differ.
+
+    Over all rounds they add up to `events`. Of rounds that differ, it takes a mean number, too.
+    """
+
+
+def summed(runs: Iterable[Run], keys: Iterable[str]) -> dict[str, Number]:
+    """What each term takes: the sums of its events in the order of the runs, 0.0 of one without events [us].
+
+    Parameters
+    ----------
+    runs
+        The runs; a KeyError tells of an event whose term is none of `keys`.
+    keys
+        Keys of the terms, in their order.
+    """
+    sums: dict[str, Number | None] = dict.fromkeys(keys)
+    for run in runs:
+        parts: dict[tuple[str, Rounds], list[Number]] = {}
+        for event in run.events:
+            if not is_off(event.us):
+                parts.setdefault((event.term, event.rounds), []).append(event.us)
+        for (term, rounds), parts_us in parts.items():
+            for us in _times(parts_us, run.count, rounds):
+                before_us = sums[term]
+                sums[term] = us if before_us is None else before_us + us
+    return {term: 0.0 if us is None else us for term, us in sums.items()}
+
+
+def _times(parts_us: list[Number], count: Number | None, rounds: Rounds) -> list[Number]:
+    """Parts of a round as often as it comes; equal ones as a product, which a derivation shows shorter [us]."""
+    if count is None or rounds == FIRST:
+        return parts_us
+    first_us = parts_us[0]
+    are_one = all(us is first_us for us in parts_us)
+    round_us = len(parts_us) * first_us if are_one else total(parts_us)
+    return [(count if rounds == ALL else count - 1) * round_us]
 
 
 class Doubt(NamedTuple):
@@ -85,20 +150,36 @@ class BusCycle(ABC):
     """
 
     network: Network
+    term_figures: ClassVar[tuple[Figure, ...]]
+    """One for each term, in their order."""
 
     @abstractmethod
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire: every term always, 0.0 where it is off."""
+    def written(self) -> Iterator[BusEvent | Run]:
+        """The cycle in the order of the wire: single events, and runs. What is off takes 0.0, or is not there."""
+
+    @cached_property
+    def runs(self) -> tuple[Run, ...]:
+        """The cycle, written once: a derivation names the very numbers that are added up."""
+        return tuple(part if isinstance(part, Run) else Run((part,)) for part in self.written())
+
+    @cached_property
+    def by_term(self) -> Mapping[str, Number]:
+        """What each term takes, by its key in the order of the terms [us]."""
+        return summed(self.runs, (figure.key for figure in self.term_figures))
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """The terms, computed once: a derivation names the very numbers that are added up."""
-        return self.computed_terms()
+        """The terms in their order: every one always, 0.0 where it is off."""
+        keys: dict[str, set[str]] = {}
+        for event in chain.from_iterable(run.events for run in self.runs):
+            keys.setdefault(event.term, set()).add(event.rests_on)
+        alone = {term: min(own) for term, own in keys.items() if len(own) == 1}
+        return tuple(Term(key, us, alone.get(key, "")) for key, us in self.by_term.items())
 
     @property
     def required_us(self) -> Number:
         """What the whole cycle needs, the sum of its terms: N times (2) [us]."""
-        return total(term.us for term in self.terms)
+        return total(self.by_term.values())
 
     @property
     def most_required_us(self) -> Number:
@@ -129,9 +210,62 @@ class BusCycle(ABC):
         """What the cycle could have and the profile does not say."""
         return ()
 
-    @abstractmethod
     def events(self) -> Iterator[BusEvent]:
         """The same cycle laid out, of plain numbers only."""
+        return chain.from_iterable(self.rounds())
+
+    def rounds(self) -> Iterator[Iterable[BusEvent]]:
+        """The events of each round, which nothing interrupts; of plain numbers only."""
+        for run in self.runs:
+            count = 1 if run.count is None else int(plain(run.count))
+            first, each = self._turns(run)
+            for number in range(count):
+                yield _round(run, number, None if run.group is None else first + number // each)
+
+    def _turns(self, run: Run) -> tuple[int, int]:
+        """First node of a run, and the rounds that each of its nodes has; of plain numbers."""
+        if run.group is None:
+            return 1, 1
+        nodes = [int(plain(group.nodes)) for group in self.network.groups]
+        return sum(nodes[: run.group]) + 1, int(plain(run.count or 1)) // nodes[run.group]
+
+    def arrival_us(self, node: int, commands: Container[tuple[str | None, str]]) -> float:
+        """When the last event of a node's command ends, from the start of a cycle of plain numbers [us].
+
+        Parameters
+        ----------
+        node
+            Number of the node, from 1.
+        commands
+            Transaction and kind of the events of a command; those of no one node are the command of all.
+
+        Returns
+        -------
+        float
+            The end of the whole cycle where it has no such events.
+        """
+        arrived_us, now_us = None, 0.0
+        for run in self.runs:
+            first, each = self._turns(run)
+            count = 1 if run.count is None else int(plain(run.count))
+            before = (node - first + 1) * each - 1 if run.group is not None else count - 1
+            if 0 <= before < count:
+                until_us = _until_us(run, before, commands)
+                if until_us is not None:
+                    begins_us = now_us + _rounds_us(run, before)
+                    arrived_us = begins_us + self.added_before_us(begins_us) + until_us
+            now_us += _rounds_us(run, count)
+        return now_us + self.added_before_us(now_us) if arrived_us is None else arrived_us
+
+    def added_before_us(self, sent_us: float) -> float:  # noqa: ARG002 - most runs go one behind the other
+        """What goes between the rounds of others before these have taken some time, in plain numbers [us].
+
+        Parameters
+        ----------
+        sent_us
+            What the runs take up to the round in question [us].
+        """
+        return 0.0
 
     def figures(self) -> Mapping[str, Number | None]:
         """The kind's own figures beside the terms, by key; None for one that these groups of nodes do not have."""
@@ -141,3 +275,36 @@ class BusCycle(ABC):
         """How long things take; a kind without transactions has its cycle."""
         phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}
         return (BusLatency("cycle", None, phases),)
+
+
+def _round(run: Run, number: int, node: int | None) -> Iterator[BusEvent]:
+    """The events of a round, of plain numbers."""
+    for event in run.events if run.laid_out is None else run.laid_out(number):
+        if event.rounds == ALL or (event.rounds == FIRST) == (number == 0):
+            has_node = node is not None and event.transaction is not None
+            yield event._replace(us=plain(event.us), node=node if has_node else event.node)
+
+
+def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]) -> float | None:
+    """From the start of a round to the end of the last event of a command [us]; None without one."""
+    if not any((event.transaction, event.kind) in commands for event in run.events):
+        return None
+    if len(run.events) == 1:
+        return plain(run.events[0].us)
+    until_us = now_us = 0.0
+    for event in _round(run, number, None):
+        now_us += plain(event.us)
+        if (event.transaction, event.kind) in commands:
+            until_us = now_us
+    return until_us
+
+
+def _rounds_us(run: Run, count: int) -> float:
+    """What the first rounds of a run take, of plain numbers [us]: as often as the mean one."""
+    if not count:
+        return 0.0
+    events: Iterable[BusEvent] = run.events
+    if run.laid_out is not None and run.group is not None and len(run.events) > 1:  # rounds may differ
+        events = run.laid_out((count - 1) / 2)
+    times = {ALL: count, FIRST: 1, BUT_FIRST: count - 1}
+    return sum(times[event.rounds] * plain(event.us) for event in events)

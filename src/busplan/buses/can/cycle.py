@@ -2,17 +2,18 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, lru_cache, partial, reduce
-from itertools import chain, islice
+from itertools import islice
 from math import inf
 from typing import Final, Literal
 
 from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
+from busplan.buses.can.figures import TERMS
 from busplan.buses.can.response import Response
 from busplan.buses.can.streams import Stream, frame_sizes, streams
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
 from busplan.buses.can.waiting import is_higher, last_cyclic, response, waits
-from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.network import Group, Network
 from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, named, plain, rounded_up, total
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
@@ -20,8 +21,6 @@ from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
-_RESTS_ON: Final = {"cycle_host_us": "bus.host_us"}
-"""The key that a term comes from alone."""
 
 
 class CanCycle(BusCycle):
@@ -31,6 +30,8 @@ class CanCycle(BusCycle):
     Before SYNC, the last feedback and the commands a frame of a lower priority may be on the wire; frames of higher
     priorities go whenever they are queued.
     """
+
+    term_figures = TERMS
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
@@ -69,9 +70,6 @@ class CanCycle(BusCycle):
             for one in self.traffic.messages
         )
 
-    def _all_us(self, kind: TransactionKind) -> Number:
-        return total(one.pdos * us for one, us in self._pdos if one.kind == kind)
-
     @cached_property
     def sync_us(self) -> Number:
         """SYNC [us]."""
@@ -81,24 +79,74 @@ class CanCycle(BusCycle):
         """The slowest execution of any node, with some standard uncertainties of each [us]."""
         return reduce(larger, (_execution_us(one, kind, uncertainties) for one in self.network.groups))
 
+    def _frames(self, kind: TransactionKind) -> Iterator[Run]:
+        """All PDOs of one direction, node by node; a timeline shows their frames."""
+        name, own = NAMES[kind], (pair for pair in self._pdos if pair[0].kind == kind)
+        for place, (pdos, us) in enumerate(own):
+            pdo = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
+            yield Run((pdo,), pdos.pdos, place, partial(self._of_pdo, pdo, pdos))
+
+    def _of_pdo(self, pdo: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
+        return (pdo._replace(us=self._frame_us(size)) for size in frame_sizes(pdos))
+
+    @cached_property
+    def _opening(self) -> tuple[Run, ...]:
+        """SYNC, and the wait for the slowest feedback."""
+        sync = BusEvent("sync", "cycle_sync_us", self.sync_us, "SYNC")
+        wait = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest feedback")
+        return Run((sync,)), Run((wait,))
+
+    @cached_property
+    def _feedback(self) -> tuple[Run, ...]:
+        """All feedback, and the host."""
+        host = BusEvent("host", "cycle_host_us", self.traffic.host_us, "host", rests_on="bus.host_us")
+        return (*self._frames("read"), Run((host,)))
+
+    @cached_property
+    def _commands(self) -> tuple[Run, ...]:
+        """All commands, and the wait for the slowest execution."""
+        slowest = "wait for the slowest execution of a command"
+        return (*self._frames("write"), Run((BusEvent("wait", "cycle_wait_us", self._wait_us("write"), slowest),)))
+
+    def written(self) -> Iterator[BusEvent | Run]:
+        """The cycle node by node, with other messages as late for the commands as they can be."""
+        blocking_us, counts = self._own_waits
+        blocking = BusEvent("blocking", "cycle_blocking_us", blocking_us, "messages of a lower priority")
+        yield Run((blocking,), laid_out=lambda _: self._blocks(blocking, 0, 1))
+        yield from self._opening
+        yield Run((), laid_out=lambda _: self._blocks(blocking, 1, 2))
+        yield from self._feedback
+        yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
+        for count, (message, us) in zip(counts, self._messages, strict=True):
+            yield Run((BusEvent("message", "cycle_interference_us", us, f"message {message.name}"),), count)
+        yield from self._commands
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
+
+    def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
+        """Some of the frames of lower priorities: one before SYNC, one before the feedback, the others behind it."""
+        found = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
+        for message in islice(found.blocks(), first, end):
+            label = f"message {message.name} of a lower priority"
+            yield blocking._replace(us=plain(message.frame_us), label=label)
+
     @cached_property
     def _own(self) -> dict[str, Number]:
-        """The terms that no other message is in."""
-        return {
-            "cycle_sync_us": self.sync_us,
-            "cycle_wait_us": total(self._wait_us(kind) for kind in TRANSACTION_KINDS),
-            "cycle_feedback_us": self._all_us("read"),
-            "cycle_host_us": self.traffic.host_us,
-            "cycle_command_us": self._all_us("write"),
-        }
+        """The terms that no other message is in, which these wait beside."""
+        keys = ("cycle_sync_us", "cycle_wait_us", "cycle_feedback_us", "cycle_host_us", "cycle_command_us")
+        return summed((*self._opening, *self._feedback, *self._commands), keys)
+
+    @cached_property
+    def by_term(self) -> Mapping[str, Number]:
+        """What each term takes, by its key [us]."""
+        rest = (run for run in self.runs if not any(event.term in self._own for event in run.events))
+        return summed(rest, (figure.key for figure in TERMS)) | self._own
 
     @cached_property
     def _on_bus_us(self) -> Number:
         """From SYNC to the end of the last command, but for other messages [us]."""
-        waits_us = {"cycle_wait_us": self._wait_us("read")}
-        return total((self._own | waits_us).values())
+        return total((self._own | {"cycle_wait_us": self._wait_us("read")}).values())
 
-    def _waits_us(self, extra_us: Number = 0.0) -> tuple[Number, Number]:
+    def _waits_us(self, extra_us: Number) -> Number:
         """Blocking by frames of lower priorities, and interference by those of higher ones [us].
 
         Parameters
@@ -106,16 +154,18 @@ class CanCycle(BusCycle):
         extra_us
             By how much the rest takes longer [us].
         """
-        return self._own_waits_us if is_off(extra_us) else self._waits_beside_us(self._on_bus_us + extra_us)
+        found = self._own_waits if is_off(extra_us) else self._waits_beside(self._on_bus_us + extra_us)
+        blocking_us, counts = found
+        return blocking_us + total(count * us for count, (_, us) in zip(counts, self._messages, strict=True))
 
     @cached_property
-    def _own_waits_us(self) -> tuple[Number, Number]:
-        """The same where nothing takes longer [us]."""
-        return self._waits_beside_us(self._on_bus_us + 0.0)
+    def _own_waits(self) -> tuple[Number, tuple[Number, ...]]:
+        return self._waits_beside(self._on_bus_us + 0.0)
 
-    def _waits_beside_us(self, others_us: Number) -> tuple[Number, Number]:
+    def _waits_beside(self, others_us: Number) -> tuple[Number, tuple[Number, ...]]:
+        """Blocking [us], and how many frames of each message go before the last PDO [1]."""
         if not self._messages:
-            return 0.0, 0.0
+            return 0.0, ()
         others_us = named(others_us, "others_us", "others")
 
         def found(key: str, words: str) -> Number:
@@ -124,8 +174,7 @@ class CanCycle(BusCycle):
         words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
         lasts_us = named(found("lasts_us", words), "busy_us", "w")
         blocking_us = found("blocking_us", "the 3 longest frames of a lower priority that can be there in w")
-        counts = self._higher(lasts_us)
-        return blocking_us, total(count * us for count, (_, us) in zip(counts, self._messages, strict=True))
+        return blocking_us, tuple(self._higher(lasts_us))
 
     def _higher(self, lasts_us: Number) -> Iterator[Number]:
         """How many frames of each message go before the last PDO in a span of time [1]."""
@@ -140,21 +189,11 @@ class CanCycle(BusCycle):
         sent, words = Sent(without_times(self.traffic)), "the largest identifier of SYNC and all PDOs"
         return named(sent.of(_last, words=words), "last_identifier", "id_last")
 
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire."""
-        blocking_us, interference_us = self._waits_us()
-        return (
-            *(Term(key, us, _RESTS_ON.get(key, "")) for key, us in self._own.items()),
-            Term("cycle_blocking_us", blocking_us),
-            Term("cycle_interference_us", interference_us),
-            Term("nonperiodic_us", self.network.nonperiodic_us),
-        )
-
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """What the cycle grows by if its nodes take longer: more messages may arrive, too [us]."""
         if not self._messages:
             return extra_us
-        return extra_us + total(self._waits_us(after_us + extra_us)) - total(self._waits_us(after_us))
+        return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The execution time, what two standard uncertainties more change, halved, and the host's own time."""
@@ -176,41 +215,6 @@ class CanCycle(BusCycle):
         others = () if self._messages or self.network.nonperiodic_us else (LeftOut("other messages", "message"),)
         return (*host, *slowest, *others)
 
-    def events(self) -> Iterator[BusEvent]:
-        """The cycle node by node, with other messages as late for the commands as they can be."""
-        found = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
-        blocks = (
-            BusEvent("blocking", "cycle_blocking_us", one.frame_us, f"message {one.name} of a lower priority")
-            for one in found.blocks()
-        )
-        yield from islice(blocks, 1)
-        yield BusEvent("sync", "cycle_sync_us", plain(self.sync_us), "SYNC")
-        yield BusEvent("wait", "cycle_wait_us", plain(self._wait_us("read")), "wait for the slowest feedback")
-        yield from islice(blocks, 1)
-        yield from self._frames("read")
-        yield BusEvent("host", "cycle_host_us", plain(self.traffic.host_us), "host")
-        yield from blocks
-        for count, (one, us) in zip(self._higher(found.lasts_us), self._messages, strict=True):
-            for _ in range(int(plain(count))):
-                yield BusEvent("message", "cycle_interference_us", plain(us), f"message {one.name}")
-        yield from self._frames("write")
-        waiting_us = plain(self._wait_us("write"))
-        yield BusEvent("wait", "cycle_wait_us", waiting_us, "wait for the slowest execution of a command")
-        yield BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window")
-
-    def _frames(self, kind: TransactionKind) -> Iterator[BusEvent]:
-        """All frames of one direction, node by node."""
-        name, node = NAMES[kind], 0
-        own = (one for one, _ in self._pdos if one.kind == kind)
-        for group, one in zip(self.network.groups, own, strict=True):
-            nodes = int(plain(group.nodes))
-            pdos = int(plain(one.pdos)) // nodes
-            for _ in range(nodes):
-                node += 1
-                for size in chain.from_iterable(frame_sizes(one) for _ in range(pdos)):
-                    us = plain(self._frame_us(size))
-                    yield BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", node, name)
-
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
         least, most = (CanCycle(self.network, model).load for model in (NONE, WORST))
@@ -227,7 +231,7 @@ class CanCycle(BusCycle):
 
     @property
     def _in_cycle_us(self) -> Number:
-        return self.sync_us + self._all_us("read") + self._all_us("write")
+        return self.sync_us + self._own["cycle_feedback_us"] + self._own["cycle_command_us"]
 
     @property
     def _messages_load(self) -> Number:
@@ -248,14 +252,14 @@ class CanCycle(BusCycle):
 
     def _loop(self) -> dict[str, Number]:
         """Parts of the way from SYNC to the last executed command that rests on it."""
-        blocking_us, interference_us = self._waits_us()
+        us = self.by_term
         parts_us = {
             "jitter_us": 0.0,
-            "blocking_us": blocking_us,
-            "interference_us": interference_us,
+            "blocking_us": us["cycle_blocking_us"],
+            "interference_us": us["cycle_interference_us"],
             "backlog_us": 0.0,
             "frame_us": self._in_cycle_us,
-            "execution_us": self._own["cycle_wait_us"] + self.traffic.host_us,
+            "execution_us": us["cycle_wait_us"] + self.traffic.host_us,
             "pipeline_us": self.network.profile.bus.pipeline_cycles * self.network.period_us,
         }
         return _numbered(parts_us, identifier=inf, data_bytes=inf, instance=inf, deadline_us=inf)

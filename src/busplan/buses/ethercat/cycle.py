@@ -4,9 +4,10 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run
 from busplan.buses.ethercat.constants import BYTE_BIAS_UNCERTAINTY_US, BYTE_BIAS_US
 from busplan.buses.ethercat.equations import device_us, frame_bytes, overhead_bytes, sending_us
+from busplan.buses.ethercat.figures import TERMS
 from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (
@@ -17,7 +18,6 @@ from busplan.buses.ethercat.traffic import (
     frames,
     hop,
     mailbox_frame_us,
-    mailbox_us,
     packing,
 )
 from busplan.buses.network import Network
@@ -38,6 +38,8 @@ _LEFT_OUT: Final = {
 
 class EthercatCycle(BusCycle):
     """The master's time and jitter, frames, devices and cables there and back, and the window."""
+
+    term_figures = TERMS
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
@@ -83,19 +85,23 @@ class EthercatCycle(BusCycle):
         lost_us = choose(self.packing.before_bytes > 0, larger(before_us - 2 * last_us, 0.0), 0.0)
         return self.required_us + choose(polls > 0, 0.0, lost_us)
 
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire."""
-        return (
-            Term("cycle_master_us", self.network.profile.bus.master_us, "bus.master_us"),
-            Term("cycle_jitter_us", self.network.profile.bus.master_jitter_us, "bus.master_jitter_us"),
-            Term("cycle_frames_us", sending_us(self._overhead_bytes)),
-            Term("cycle_data_us", sending_us(self.process_bytes)),
-            Term("cycle_mailbox_us", mailbox_us(self.network), "bus.mailbox_polls"),
-            Term("cycle_devices_us", devices_us(self.network)),
-            Term("cycle_cable_us", cables_us(self.network)),
-            Term("cycle_receive_us", self._receive_us),
-            Term("nonperiodic_us", self.network.nonperiodic_us),
-        )
+    def written(self) -> Iterator[BusEvent | Run]:
+        """The master, its frames, the last byte through all devices and back, and the window."""
+        bus = self.network.profile.bus
+        yield BusEvent("master", "cycle_master_us", bus.master_us, "master", rests_on="bus.master_us")
+        late_us, late = bus.master_jitter_us, "latest start of the frames"
+        yield BusEvent("jitter", "cycle_jitter_us", late_us, late, rests_on="bus.master_jitter_us")
+        headers = BusEvent("overhead", "cycle_frames_us", sending_us(self._overhead_bytes), "headers")
+        data = BusEvent("data", "cycle_data_us", sending_us(self.process_bytes), "data")
+        yield Run((headers, data), laid_out=lambda _: self._frames())
+        poll_us = mailbox_frame_us(self.network)
+        poll = BusEvent("mailbox", "cycle_mailbox_us", poll_us, "mailbox", rests_on="bus.mailbox_polls")
+        yield Run((poll,), bus.mailbox_polls, laid_out=lambda number: [poll._replace(label=f"mailbox {number + 1}")])
+        cables = BusEvent("cable", "cycle_cable_us", cables_us(self.network), "cables")
+        hops = BusEvent("device", "cycle_devices_us", devices_us(self.network), "devices")
+        yield Run((cables, hops), laid_out=lambda _: self._way())
+        yield BusEvent("receive", "cycle_receive_us", self._receive_us, "last frame again")
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def bias_us(self) -> Number:
         """What process data take beyond the wire: about a copy in the host [us]."""
@@ -117,20 +123,6 @@ class EthercatCycle(BusCycle):
         found |= {one.key("cable_m"): one.node.cable_m for one in self.network.groups if one.node.port != "E-bus"}
         return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in found.items() if not value)
 
-    def events(self) -> Iterator[BusEvent]:
-        """Frame by frame with the data of each device, then the last byte through all devices and back."""
-        bus = self.network.profile.bus
-        yield BusEvent("master", "cycle_master_us", plain(bus.master_us), "master")
-        yield BusEvent("jitter", "cycle_jitter_us", plain(bus.master_jitter_us), "latest start of the frames")
-        yield from self._frames()
-        for number in range(1, int(plain(bus.mailbox_polls)) + 1):
-            yield BusEvent("mailbox", "cycle_mailbox_us", plain(mailbox_frame_us(self.network)), f"mailbox {number}")
-        way = list(self._way())
-        yield from way
-        yield from reversed([one._replace(label=one.label.replace("to", "back from", 1)) for one in way])
-        yield BusEvent("receive", "cycle_receive_us", plain(self._receive_us), "last frame again")
-        yield BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window")
-
     def _frames(self) -> Iterator[BusEvent]:
         """What each frame has beside its data, then the data of each of its devices."""
         sizes = [plain(own.data_bytes) for own in self._devices for _ in range(int(plain(own.number)))]
@@ -146,14 +138,18 @@ class EthercatCycle(BusCycle):
                     yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
 
     def _way(self) -> Iterator[BusEvent]:
-        """The last byte to each device and through it."""
-        device = 0
-        for one in map(hop, self.network.groups):
-            for _ in range(int(plain(one.nodes))):
+        """The last byte to each device and through it, and back."""
+        way, device = [], 0
+        for one_hop in map(hop, self.network.groups):
+            for _ in range(int(plain(one_hop.nodes))):
                 device += 1
-                cable_us, device_us = plain(one.cable_us) / 2, plain(one.device_us) / 2
-                yield BusEvent("cable", "cycle_cable_us", cable_us, f"cable to device {device}", device, "way")
-                yield BusEvent("device", "cycle_devices_us", device_us, f"way to device {device}", device, "way")
+                cable_us, device_us = plain(one_hop.cable_us) / 2, plain(one_hop.device_us) / 2
+                way += [
+                    BusEvent("cable", "cycle_cable_us", cable_us, f"cable to device {device}", device, "way"),
+                    BusEvent("device", "cycle_devices_us", device_us, f"way to device {device}", device, "way"),
+                ]
+        yield from way
+        yield from (part._replace(label=part.label.replace("to", "back from", 1)) for part in reversed(way))
 
     def figures(self) -> Mapping[str, Number | None]:
         """Frames and process data, and whether commands come before SYNC0."""

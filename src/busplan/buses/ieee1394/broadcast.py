@@ -1,17 +1,16 @@
-"""A cycle of the broadcast schedule as latencies and as events; `broadcast_terms` says what the schedule is."""
+"""The latencies of a cycle of the broadcast schedule; `broadcast_terms` says what the schedule is."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 
-from busplan.buses.cycle import BusEvent, BusLatency
+from busplan.buses.cycle import BusLatency
 from busplan.buses.ieee1394 import figures
-from busplan.buses.ieee1394.broadcast_terms import BroadcastTerms, Idle, hub_block_bytes, write_block_bytes
+from busplan.buses.ieee1394.broadcast_terms import BroadcastTerms, hub_block_bytes, write_block_bytes
 from busplan.buses.ieee1394.constants import (
     BLOCK_READ_REQUEST_BYTES,
     BLOCK_READ_RESPONSE_OVERHEAD_BYTES,
     BLOCK_WRITE_REQUEST_OVERHEAD_BYTES,
 )
-from busplan.buses.network import Group
-from busplan.elementwise import Number, plain
+from busplan.elementwise import Number
 
 
 class BroadcastCycle(BroadcastTerms):
@@ -92,58 +91,6 @@ class BroadcastCycle(BroadcastTerms):
                 BusLatency("write", group.write_bytes, write, group.name),
             )
         )
-
-    def stretches(self) -> Iterator[Sequence[BusEvent]]:
-        """What no cycle start interrupts: the query, each broadcast, the read of the hub, and the write."""
-        yield [BusEvent("sync", "sync_us", plain(self.query_us), "query to all nodes")]
-        node, waits_us = 0, plain(self.first_wait_us)
-        for group in self.network.groups:
-            for _ in range(int(group.nodes)):
-                node += 1
-                yield list(self._broadcast_events(group, node, waits_us))
-                waits_us = plain(self.slot_wait_us(group))
-        yield [*_waits(self.hub_wait, "before the hub is read"), *self._hub_events()]
-        yield [*_waits(self.idle, "behind the hub's block"), *self._write_events()]
-        yield _waits(self.idle, "behind the write")
-
-    def _broadcast_events(self, group: Group, node: int, waits_us: float) -> Iterator[BusEvent]:
-        def event(kind: str, term: str, us: Number, label: str) -> BusEvent:
-            return BusEvent(kind, f"cycle_{term}_us", plain(us), label, node, "read", "response")
-
-        yield event("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast")
-        yield event("node_wait", "idle", waits_us, "wait of the node")
-        yield event("arbitration", "arbitration", self.arbitration_us, "node arbitration")
-        yield event("response_data", "data", self.broadcast_us(group), "node broadcast")
-
-    def _hub_events(self) -> Iterator[BusEvent]:
-        own, sent = self.delays, self.packets
-
-        def event(kind: str, term: str, us: Number, label: str, packet: str) -> BusEvent:
-            return BusEvent(kind, f"cycle_{term}_us", plain(us), label, None, "read", packet)
-
-        yield event("arbitration", "arbitration", own.arbitration_us, "host arbitration", "request")
-        yield event("request_data", "data", sent.hub_request_us, "host request to the hub", "request")
-        yield event("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge", "request")
-        yield event("response_data", "data", sent.hub_block_us, "hub's block of all data", "response")
-        yield event("acknowledge", "acknowledge", own.acknowledge_us, "host acknowledge", "response")
-
-    def _write_events(self) -> Iterator[BusEvent]:
-        own = self.delays
-
-        def event(kind: str, term: str, us: Number, label: str) -> BusEvent:
-            return BusEvent(kind, f"cycle_{term}_us", plain(us), label, None, "write", "request")
-
-        yield event("arbitration", "arbitration", own.arbitration_us, "host arbitration")
-        yield event("request_data", "data", self.packets.write_us, "commands to all nodes")
-        yield event("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge")
-
-
-def _waits(idle: Idle, where: str) -> list[BusEvent]:
-    """Idle bus before a request, as events."""
-    return [
-        BusEvent("arbitration_reset_gap", "cycle_idle_us", plain(idle.gap_us), f"arbitration reset gap {where}"),
-        BusEvent("host", "cycle_host_us", plain(idle.host_us), f"host's own time {where}"),
-    ]
 
 
 def _in_order(phases: Mapping[str, Number]) -> dict[str, Number]:

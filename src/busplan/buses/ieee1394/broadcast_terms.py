@@ -11,10 +11,11 @@ Z. Chen, P. Kazanzides, "Multi-Kilohertz Control of Multiple Robots via IEEE-139
 mechatronics-firmware and mechatronics-software.
 """
 
-from functools import cached_property
+from collections.abc import Iterator
+from functools import cached_property, partial
 from typing import NamedTuple
 
-from busplan.buses.cycle import Doubt, Term
+from busplan.buses.cycle import BUT_FIRST, FIRST, BusEvent, Doubt, Run
 from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
     BASE_RATE_MBIT_S,
@@ -240,22 +241,40 @@ class BroadcastTerms(CycleWithStarts):
         """Data phase of the write [us]."""
         return self.packets.write_us
 
-    @cached_property
-    def other_terms(self) -> tuple[Term, ...]:
-        """All terms but the cycle starts; the query is the synchronous packet, at which the nodes sample."""
-        own, sent, nodes = self.delays, self.packets, self.network.nodes
-        broadcasts_us = total(group.nodes * self.broadcast_us(group) for group in self.network.groups)
-        return (
-            Term("sync_us", self.query_us),
-            Term("cycle_arbitration_us", nodes * self.arbitration_us + 2 * own.arbitration_us),
-            Term("cycle_data_us", broadcasts_us + sent.hub_request_us + sent.hub_block_us + sent.write_us),
-            Term("cycle_acknowledge_us", 3 * own.acknowledge_us),
-            *(Term(f"cycle_{name}_us", 0.0) for name in ("hold", "execution", "worst_extra")),
-            Term("cycle_idle_us", self.node_waits_us + self.hub_wait.gap_us + 2 * self.idle.gap_us),
-            Term("cycle_host_us", self.hub_wait.host_us + 2 * self.idle.host_us, "host.transaction_us"),
-            Term("retries_us", self.retries_us),
-            Term("nonperiodic_us", self.network.nonperiodic_us),
+    def schedule(self) -> Iterator[BusEvent | Run]:
+        """The query, at which the nodes sample, each broadcast, the read of the hub, and the write."""
+        own, sent, waits_us = self.delays, self.packets, self.first_wait_us
+        yield BusEvent("sync", "sync_us", self.query_us, "query to all nodes")
+        for place, group in enumerate(self.network.groups):
+            part = partial(_part, "read", "response")
+            wait, next_us = part("node_wait", "idle", waits_us, "wait of the node"), self.slot_wait_us(group)
+            events = (
+                part("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast"),
+                wait._replace(rounds=FIRST),
+                wait._replace(us=next_us, rounds=BUT_FIRST),
+                part("arbitration", "arbitration", self.arbitration_us, "node arbitration"),
+                part("response_data", "data", self.broadcast_us(group), "node broadcast"),
+            )
+            yield Run(events, group.nodes, place)
+            waits_us = next_us
+        request, response, write = (
+            partial(_part, *of) for of in (("read", "request"), ("read", "response"), ("write", "request"))
         )
+        read_hub = (
+            request("arbitration", "arbitration", own.arbitration_us, "host arbitration"),
+            request("request_data", "data", sent.hub_request_us, "host request to the hub"),
+            request("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge"),
+            response("response_data", "data", sent.hub_block_us, "hub's block of all data"),
+            response("acknowledge", "acknowledge", own.acknowledge_us, "host acknowledge"),
+        )
+        write_hub = (
+            write("arbitration", "arbitration", own.arbitration_us, "host arbitration"),
+            write("request_data", "data", sent.write_us, "commands to all nodes"),
+            write("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge"),
+        )
+        yield Run((*_waits(self.hub_wait, "before the hub is read"), *read_hub))
+        yield Run((*_waits(self.idle, "behind the hub's block"), *write_hub))
+        yield Run(_waits(self.idle, "behind the write"))
 
     # --- what is not known ----------------------------------------------------------------------------------
 
@@ -296,3 +315,16 @@ class BroadcastTerms(CycleWithStarts):
 
         above_us, own_us, below_us = (waits_us(self.host_us + steps * step_us) for steps in (2, 0, -2))
         return larger(above_us - own_us, own_us - below_us) / 2
+
+
+def _part(transaction: str, packet: str, kind: str, term: str, us: Number, label: str) -> BusEvent:
+    return BusEvent(kind, f"cycle_{term}_us", us, label, transaction=transaction, packet=packet)
+
+
+def _waits(idle: Idle, where: str) -> tuple[BusEvent, BusEvent]:
+    """Idle bus before a request, as events."""
+    host = f"host's own time {where}"
+    return (
+        BusEvent("arbitration_reset_gap", "cycle_idle_us", idle.gap_us, f"arbitration reset gap {where}"),
+        BusEvent("host", "cycle_host_us", idle.host_us, host, rests_on="host.transaction_us"),
+    )

@@ -1,11 +1,11 @@
 """What every schedule of an IEEE 1394 bus has: its delays, its busy retries, the cycle starts between its packets."""
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from itertools import chain, repeat
+from itertools import repeat
 
-from busplan.buses.cycle import BusCycle, BusEvent, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, LeftOut, Run, summed
 from busplan.buses.ieee1394 import equations
 from busplan.buses.ieee1394.constants import (
     CYCLE_START_BYTES,
@@ -14,10 +14,11 @@ from busplan.buses.ieee1394.constants import (
     LEAST_ASYNCHRONOUS_US,
     safe_gap_count,
 )
+from busplan.buses.ieee1394.figures import TERMS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Link, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, link_of
 from busplan.buses.network import Network
-from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, total
+from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, smaller, total
 
 
 class CycleWithStarts(BusCycle):
@@ -28,6 +29,7 @@ class CycleWithStarts(BusCycle):
     Linux, drivers/firewire/core.h: a cycle start goes each 125 us.
     """
 
+    term_figures = TERMS
     model: TimingModelName
 
     def __init__(self, network: Network, model: TimingModelName) -> None:
@@ -35,19 +37,14 @@ class CycleWithStarts(BusCycle):
         self.model = model
         self.link = link_of(network)
 
-    @cached_property
     @abstractmethod
-    def other_terms(self) -> tuple[Term, ...]:
-        """All terms but the cycle starts, whose number follows from them."""
+    def schedule(self) -> Iterator[BusEvent | Run]:
+        """The cycle in the order of its protocol, without retries and the window, which are behind it."""
 
     @property
     @abstractmethod
     def longest_request_us(self) -> Number:
         """Data phase of the longest packet that the host sends to one node [us]."""
-
-    @abstractmethod
-    def stretches(self) -> Iterable[Sequence[BusEvent]]:
-        """The cycle in the order of its protocol, by what no cycle start interrupts."""
 
     @cached_property
     def delays(self) -> Delays:
@@ -74,15 +71,6 @@ class CycleWithStarts(BusCycle):
         ):
             named(number, key, LATENCY_SYMBOLS[key])
         return found
-
-    @cached_property
-    def retries_us(self) -> Number:
-        """Busy retries of the longest request, each with an arbitration reset gap [us]."""
-        retries: Number = self.network.profile.cycle.retries
-        if self.model == "paper" or is_off(retries):
-            return 0.0
-        own, longest_us = self.delays, self.longest_request_us
-        return retries * (own.arbitration_us + longest_us + own.acknowledge_us + own.gaps.arbitration_reset_us)
 
     @cached_property
     def cycle_start_us(self) -> Number:
@@ -113,18 +101,37 @@ class CycleWithStarts(BusCycle):
         return self.model != "paper" and bool(self.network.profile.bus.cycle_master)
 
     @cached_property
+    def _others_by_term(self) -> dict[str, Number]:
+        return summed(self.runs, (figure.key for figure in TERMS))
+
+    @cached_property
     def _others_us(self) -> Number:
-        return total(one.us for one in self.other_terms)
+        return total(self._others_by_term.values())
 
     @cached_property
     def number_of_starts(self) -> Number:
         """Cycle starts in the cycle [1]."""
         return self.starts(self._others_us) if self._has_starts else 0
 
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire."""
-        starts_us = self.number_of_starts * self.cycle_start_us if self._has_starts else 0.0
-        return (Term("cycle_starts_us", starts_us), *self.other_terms)
+    def written(self) -> Iterator[BusEvent | Run]:
+        """What goes one behind the other; cycle starts go between its rounds, and their number rests on it."""
+        yield from self.schedule()
+        retries: Number = self.network.profile.cycle.retries
+        if self.model != "paper" and not is_off(retries):
+            own, longest_us = self.delays, self.longest_request_us
+            retry_us = own.arbitration_us + longest_us + own.acknowledge_us + own.gaps.arbitration_reset_us
+            yield Run((BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request"),), retries)
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
+
+    @property
+    def _start(self) -> BusEvent:
+        return BusEvent("cycle_start", "cycle_starts_us", self.cycle_start_us, "cycle start")
+
+    @cached_property
+    def by_term(self) -> Mapping[str, Number]:
+        """What each term takes, by its key [us]."""
+        starts = (Run((self._start,), self.number_of_starts),) if self._has_starts else ()
+        return self._others_by_term | summed(starts, (self._start.term,))
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """What the cycle grows by if its transactions take longer: there may be more cycle starts, too [us]."""
@@ -153,27 +160,21 @@ class CycleWithStarts(BusCycle):
         """What the cycle could have and does not say: host time."""
         return () if self.network.profile.host.transaction_us else (LeftOut("host time", "host.transaction_us"),)
 
-    def events(self) -> Iterator[BusEvent]:
+    def rounds(self) -> Iterator[Iterable[BusEvent]]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
-        starts = self.number_of_starts
+        starts, start_us = int(plain(self.number_of_starts)), plain(self.cycle_start_us)
+        start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
-        start = BusEvent("cycle_start", "cycle_starts_us", plain(self.cycle_start_us) if starts else 0.0, "cycle start")
-        for stretch in chain(self.stretches(), self._behind()):
+        for others in map(tuple, super().rounds()):
             while sent < starts and now_us >= sent * CYCLE_US:
                 yield start
-                sent, now_us = sent + 1, now_us + start.us
-            for event in stretch:
-                yield event
-                now_us += event.us
-        for _ in range(int(starts) - sent):
-            yield start
+                sent, now_us = sent + 1, now_us + start_us
+            yield others
+            for event in others:
+                now_us += plain(event.us)
+        yield from repeat(start, starts - sent)
 
-    def _behind(self) -> Iterator[tuple[BusEvent]]:
-        """Retries and the non-periodic window, behind what a schedule sends."""
-        retries = 0 if self.model == "paper" else self.network.profile.cycle.retries
-        if retries:
-            retry_us = plain(self.retries_us) / retries
-            yield from repeat(
-                (BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request"),), retries
-            )
-        yield (BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window"),)
+    def added_before_us(self, sent_us: float) -> float:
+        """The cycle starts that are due before a round [us]."""
+        due = smaller(self.starts(sent_us), self.number_of_starts)
+        return plain(due) * plain(self.cycle_start_us)

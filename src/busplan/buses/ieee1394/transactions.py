@@ -125,16 +125,6 @@ def farthest_link(network: Network, name: str) -> Link:
     return link_of(network, ways(network)[place].last)
 
 
-class TransactionPart(NamedTuple):
-    """A stretch of a transaction, as a `BusEvent` has it; the time may be of any sort."""
-
-    kind: str
-    term: str
-    us: Number
-    label: str
-    packet: str | None = None
-
-
 class Exchange(NamedTuple):
     """The same transaction with each node of a group."""
 
@@ -147,7 +137,7 @@ class Exchange(NamedTuple):
     execution_uncertainty_us: Number
     """Standard uncertainty of the execution time [us]."""
     phases: Phases
-    parts: tuple[TransactionPart, ...]
+    parts: tuple[BusEvent, ...]
     """What the transaction is made of, in the order of the wire; what the answer does not have is not there.
 
     The idle bus of the gaps is one part here; `events` divides it.
@@ -210,7 +200,7 @@ def exchange(
     )
     uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
     phases = _with_names(phases, suffix)
-    return Exchange(kind, group, link, size, responder, uncertainty_us, phases, tuple(_parts(phases, answer)))
+    return Exchange(kind, group, link, size, responder, uncertainty_us, phases, tuple(_parts(kind, phases, answer)))
 
 
 def _with_names(phases: Phases, suffix: str) -> Phases:
@@ -228,34 +218,28 @@ PACKET_PARTS: Final = (ARBITRATION, "cycle_data_us", "cycle_acknowledge_us")
 """Terms whose parts are one packet's way over the hops."""
 
 
-def _parts(phases: Phases, answer: "Answer") -> Iterator[TransactionPart]:
-    yield from _packet(phases, "request", "host", arbitrates=True)
+def _parts(kind: TransactionKind, phases: Phases, answer: "Answer") -> Iterator[BusEvent]:
+    def part(name: str, term: str, us: Number, label: str, **more: str) -> BusEvent:
+        return BusEvent(name, f"cycle_{term}_us", us, label, transaction=kind, **more)
+
+    def packet(name: str, sender: Who, *, arbitrates: bool) -> Iterator[BusEvent]:
+        data_us = phases.request_data_us if name == "request" else phases.response_data_us
+        receiver: Who = "node" if sender == "host" else "host"
+        if arbitrates:
+            yield part("arbitration", "arbitration", phases.arbitration_us, f"{sender} arbitration", packet=name)
+        yield part(f"{name}_data", "data", data_us, f"{sender} data", packet=name)
+        yield part("acknowledge", "acknowledge", phases.acknowledge_us, f"{receiver} acknowledge", packet=name)
+
+    yield from packet("request", "host", arbitrates=True)
     if answer == "split":
-        yield TransactionPart("execution", "cycle_execution_us", phases.execution_us, "node execution")
-        yield TransactionPart("worst_extra", "cycle_worst_extra_us", phases.worst_extra_us, "slowest execution")
+        yield part("execution", "execution", phases.execution_us, "node execution")
+        yield part("worst_extra", "worst_extra", phases.worst_extra_us, "slowest execution")
     if answer == "concatenated":
-        yield TransactionPart("hold", "cycle_hold_us", phases.hold_us, "node holds the bus")
+        yield part("hold", "hold", phases.hold_us, "node holds the bus")
     if answer != "unified":
-        yield from _packet(phases, "response", "node", arbitrates=answer == "split")
-    yield TransactionPart("idle", "cycle_idle_us", phases.idle_us, "idle bus of the gaps")
-    yield TransactionPart("host", "cycle_host_us", phases.host_us, "host's own time beyond the gaps")
-
-
-def _packet(phases: Phases, packet: str, sender: Who, *, arbitrates: bool) -> Iterator[TransactionPart]:
-    receiver: Who = "node" if sender == "host" else "host"
-    data_us = phases.request_data_us if packet == "request" else phases.response_data_us
-    if arbitrates:
-        yield TransactionPart(
-            "arbitration",
-            "cycle_arbitration_us",
-            phases.arbitration_us,
-            f"{sender} arbitration",
-            packet=packet,
-        )
-    yield TransactionPart(f"{packet}_data", "cycle_data_us", data_us, f"{sender} data", packet=packet)
-    yield TransactionPart(
-        "acknowledge", "cycle_acknowledge_us", phases.acknowledge_us, f"{receiver} acknowledge", packet=packet
-    )
+        yield from packet("response", "node", arbitrates=answer == "split")
+    yield part("idle", "idle", phases.idle_us, "idle bus of the gaps")
+    yield part("host", "host", phases.host_us, "host's own time beyond the gaps", rests_on="host.transaction_us")
 
 
 def events(one: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
@@ -263,11 +247,11 @@ def events(one: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
     before, behind = _added_up(one.phases) if model == "paper" else _by_idle_period(one)
     for part in one.parts:
         if part.kind == "idle":
-            yield from behind
+            yield from (gap._replace(transaction=one.kind) for gap in behind)
         else:
-            yield BusEvent(part.kind, part.term, plain(part.us), part.label, packet=part.packet)
+            yield part
             if part.kind == "worst_extra":
-                yield from before
+                yield from (gap._replace(transaction=one.kind) for gap in before)
 
 
 _Divided = tuple[tuple[BusEvent, ...], tuple[BusEvent, ...]]

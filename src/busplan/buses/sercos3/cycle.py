@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Run
 from busplan.buses.network import Network
 from busplan.buses.sercos import SercosCycle, delays
 from busplan.buses.sercos3.constants import (
@@ -26,6 +26,7 @@ from busplan.buses.sercos3.equations import (
     sync_jitter_us,
     telegrams_us,
 )
+from busplan.buses.sercos3.figures import TERMS
 from busplan.buses.sercos3.telegrams import SORTS, Telegrams, telegrams_of
 from busplan.elementwise import Number, choose, larger, named, plain, smaller, total
 from busplan.sections.transactions import TransactionKind
@@ -33,8 +34,6 @@ from busplan.sections.transactions import TransactionKind
 TimingModelName = Literal["window", "telegrams"]
 WINDOW: Final[TimingModelName] = "window"
 TELEGRAMS: Final[TimingModelName] = "telegrams"
-_RESTS_ON: Final = {"cycle_wait_us": "bus.at_start_us", "cycle_master_us": "bus.master_delay_us"}
-"""The key that a term comes from alone."""
 
 
 class Sercos3Cycle(SercosCycle):
@@ -43,6 +42,8 @@ class Sercos3Cycle(SercosCycle):
     The window is that of CoSeMa: by the timing method it asks that the channel for other frames ends before the next
     cycle begins, or before the AT do. What the nodes execute runs beside the telegrams.
     """
+
+    term_figures = TERMS
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
@@ -110,21 +111,30 @@ class Sercos3Cycle(SercosCycle):
         before_us = self.network.nonperiodic_us if self._has_ring else 0.0
         return self._telegrams_us("write") + before_us + self._jitters[0] * self.jitter_us
 
-    @cached_property
-    def _sent_us(self) -> dict[str, Number]:
-        return {
-            "cycle_mdt_us": self._telegrams_us("write"),
-            "cycle_wait_us": self._start_wait_us,
-            "cycle_at_us": self._telegrams_us("read"),
-            "cycle_jitter_us": self._jitters[1] * self.jitter_us if self.is_window else 0.0,
-            "cycle_master_us": self._master_us,
-            "cycle_ring_us": self.ring_us if self._has_ring else 0.0,
-            "nonperiodic_us": self.network.nonperiodic_us,
-        }
-
-    def computed_terms(self) -> tuple[Term, ...]:
+    def written(self) -> Iterator[BusEvent | Run]:
         """The telegrams, the wait of the devices, and what the window keeps free."""
-        return tuple(Term(key, us, _RESTS_ON.get(key, "")) for key, us in self._sent_us.items())
+        other = BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "channel for other frames")
+        is_last = self.method == "mdt-at-ucc"
+        jitter_us = self._jitters[1] * self.jitter_us if self.is_window else 0.0
+        yield self._run("write")
+        if not is_last:
+            yield other
+        wait = "wait of the devices before the AT"
+        yield BusEvent("wait", "cycle_wait_us", self._start_wait_us, wait, rests_on="bus.at_start_us")
+        yield self._run("read")
+        ring_us = self.ring_us if self._has_ring else 0.0
+        yield BusEvent("ring", "cycle_ring_us", ring_us, "the last telegram goes round the ring")
+        if is_last:
+            yield other
+        yield BusEvent("jitter", "cycle_jitter_us", jitter_us, "allowances for the jitter")
+        master = "the master's own time before the next cycle"
+        yield BusEvent("master", "cycle_master_us", self._master_us, master, rests_on="bus.master_delay_us")
+
+    def _run(self, kind: TransactionKind) -> Run:
+        """All telegrams of one sort, which a timeline shows device by device."""
+        sort = SORTS[kind]
+        telegrams = BusEvent(f"{sort}_frame", f"cycle_{sort}_us", self._telegrams_us(kind), sort.upper())
+        return Run((telegrams,), laid_out=lambda _: self._telegrams(kind))
 
     def doubts(self) -> tuple[Doubt, ...]:
         """What is published as a range alone: the delay of a device, the master's jitter, and the gap.
@@ -167,7 +177,7 @@ class Sercos3Cycle(SercosCycle):
     @property
     def feedback_due_us(self) -> Number:
         """The first AT begins then; by the last method it ends with the cycle [us]."""
-        mdt_us, sent = self._telegrams_us("write"), self._sent_us
+        mdt_us, sent = self._telegrams_us("write"), self.by_term
         if not self.is_window:
             return mdt_us
         if self.method == "at-last":
@@ -185,22 +195,6 @@ class Sercos3Cycle(SercosCycle):
             feedback_us=(0.0, self._telegrams_us("read")),
             command_us=(self._start_us(), self._telegrams_us("write")),
             ring_us=self.ring_us,
-        )
-
-    def events(self) -> Iterator[BusEvent]:
-        """Telegram by telegram and device by device."""
-        us = {key: plain(one) for key, one in self._sent_us.items()}
-        other = BusEvent("nonperiodic", "nonperiodic_us", us["nonperiodic_us"], "channel for other frames")
-        is_last = self.method == "mdt-at-ucc"
-        yield from self._telegrams("write")
-        yield from () if is_last else (other,)
-        yield BusEvent("wait", "cycle_wait_us", us["cycle_wait_us"], "wait of the devices before the AT")
-        yield from self._telegrams("read")
-        yield BusEvent("ring", "cycle_ring_us", us["cycle_ring_us"], "the last telegram goes round the ring")
-        yield from (other,) if is_last else ()
-        yield BusEvent("jitter", "cycle_jitter_us", us["cycle_jitter_us"], "allowances for the jitter")
-        yield BusEvent(
-            "master", "cycle_master_us", us["cycle_master_us"], "the master's own time before the next cycle"
         )
 
     def _telegrams(self, kind: TransactionKind) -> Iterator[BusEvent]:
