@@ -64,7 +64,7 @@ class Run(NamedTuple):
 
     events: tuple[BusEvent, ...]
     """Those of a round; of the mean round where rounds differ."""
-    count: Number | None = None
+    times: Number | None = None
     """Rounds [1]; None for one alone."""
     group: int | None = None
     """Place of the group of nodes that take turns, each with as many rounds; None for what belongs to all."""
@@ -73,6 +73,23 @@ class Run(NamedTuple):
 
     Over all rounds they add up to `events`. Of rounds that differ, it takes a mean number, too.
     """
+
+    def events_us(self) -> Iterator[tuple[str, Number]]:
+        """Each event that is not off, as its term and what it takes [us]."""
+        return ((event.term, event.us) for event in self.events if not is_off(event.us))
+
+    def counted_us(self, times: Number) -> Iterator[tuple[str, Number]]:
+        """The same of several rounds, with the events of a term together."""
+        parts: dict[tuple[str, Rounds], list[Number]] = {}
+        for event in self.events:
+            if not is_off(event.us):
+                parts.setdefault((event.term, event.rounds), []).append(event.us)
+        for (term, rounds), parts_us in parts.items():
+            first_us = parts_us[0]
+            # Equal ones are a product, which a derivation shows shorter.
+            are_equal = len(parts_us) > 1 and all(us is first_us for us in parts_us)
+            round_us = len(parts_us) * first_us if are_equal else total(parts_us)
+            yield term, round_us if rounds == FIRST else (times if rounds == ALL else times - 1) * round_us
 
 
 def summed(runs: Iterable[Run], keys: Iterable[str]) -> dict[str, Number]:
@@ -87,25 +104,10 @@ def summed(runs: Iterable[Run], keys: Iterable[str]) -> dict[str, Number]:
     """
     sums: dict[str, Number | None] = dict.fromkeys(keys)
     for run in runs:
-        parts: dict[tuple[str, Rounds], list[Number]] = {}
-        for event in run.events:
-            if not is_off(event.us):
-                parts.setdefault((event.term, event.rounds), []).append(event.us)
-        for (term, rounds), parts_us in parts.items():
-            for us in _times(parts_us, run.count, rounds):
-                before_us = sums[term]
-                sums[term] = us if before_us is None else before_us + us
+        for term, us in run.events_us() if run.times is None else run.counted_us(run.times):
+            before_us = sums[term]
+            sums[term] = us if before_us is None else before_us + us
     return {term: 0.0 if us is None else us for term, us in sums.items()}
-
-
-def _times(parts_us: list[Number], count: Number | None, rounds: Rounds) -> list[Number]:
-    """Parts of a round as often as it comes; equal ones as a product, which a derivation shows shorter [us]."""
-    if count is None or rounds == FIRST:
-        return parts_us
-    first_us = parts_us[0]
-    are_one = all(us is first_us for us in parts_us)
-    round_us = len(parts_us) * first_us if are_one else total(parts_us)
-    return [(count if rounds == ALL else count - 1) * round_us]
 
 
 class Doubt(NamedTuple):
@@ -212,12 +214,12 @@ class BusCycle(ABC):
 
     def events(self) -> Iterator[BusEvent]:
         """The same cycle laid out, of plain numbers only."""
-        return chain.from_iterable(self.rounds())
+        return chain.from_iterable(self.each_round())
 
-    def rounds(self) -> Iterator[Iterable[BusEvent]]:
+    def each_round(self) -> Iterator[Iterable[BusEvent]]:
         """The events of each round, which nothing interrupts; of plain numbers only."""
         for run in self.runs:
-            count = 1 if run.count is None else int(plain(run.count))
+            count = 1 if run.times is None else int(plain(run.times))
             first, each = self._turns(run)
             for number in range(count):
                 yield _round(run, number, None if run.group is None else first + number // each)
@@ -227,7 +229,7 @@ class BusCycle(ABC):
         if run.group is None:
             return 1, 1
         nodes = [int(plain(group.nodes)) for group in self.network.groups]
-        return sum(nodes[: run.group]) + 1, int(plain(run.count or 1)) // nodes[run.group]
+        return sum(nodes[: run.group]) + 1, int(plain(run.times or 1)) // nodes[run.group]
 
     def arrival_us(self, node: int, commands: Container[tuple[str | None, str]]) -> float:
         """When the last event of a node's command ends, from the start of a cycle of plain numbers [us].
@@ -247,7 +249,7 @@ class BusCycle(ABC):
         arrived_us, now_us = None, 0.0
         for run in self.runs:
             first, each = self._turns(run)
-            count = 1 if run.count is None else int(plain(run.count))
+            count = 1 if run.times is None else int(plain(run.times))
             before = (node - first + 1) * each - 1 if run.group is not None else count - 1
             if 0 <= before < count:
                 until_us = _until_us(run, before, commands)
@@ -306,5 +308,5 @@ def _rounds_us(run: Run, count: int) -> float:
     events: Iterable[BusEvent] = run.events
     if run.laid_out is not None and run.group is not None and len(run.events) > 1:  # rounds may differ
         events = run.laid_out((count - 1) / 2)
-    times = {ALL: count, FIRST: 1, BUT_FIRST: count - 1}
-    return sum(times[event.rounds] * plain(event.us) for event in events)
+    counts = {ALL: count, FIRST: 1, BUT_FIRST: count - 1}
+    return sum(counts[event.rounds] * plain(event.us) for event in events)

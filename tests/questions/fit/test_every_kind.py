@@ -9,8 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from busplan.buses import kind_names
-from busplan.elementwise import Traced
+from busplan.buses import kind_named, kind_names
+from busplan.elementwise import Traced, plain
+from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override
 from busplan.questions.fit.certainty import FITS, certainty, limits_to_be_safe
 from busplan.questions.fit.cycle import cycle_of, limits_with_time
@@ -41,10 +42,45 @@ def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
         of_events: dict[str, list[float]] = defaultdict(list)
         for event in cycle.events():
             assert bus.event_kind(event.kind).key == event.kind
-            of_events[event.term].append(event.us)
+            of_events[event.term].append(plain(event.us))
         for term in cycle.terms:
             assert fsum(of_events.pop(term.key, [])) == pytest.approx(term.us, rel=1e-12, abs=1e-12)
         assert not of_events
+
+
+@KINDS
+def test_every_term_has_an_event(kind: str, profiles_by_kind: Profiles) -> None:
+    written: set[str] = set()
+
+    @SOME
+    @given(profiles_by_kind[kind])
+    def look(profile: Profile) -> None:
+        cycle = cycle_of(profile, model=bus_of(profile).deciding_model)
+        assert {term.rests_on for term in cycle.terms} - {""} <= set(cycle_keys(profile))
+        written.update(event.term for event in cycle.events())
+
+    look()
+    assert written == {figure.key for figure in kind_named(kind).term_figures}
+
+
+@KINDS
+@SOME
+@given(data=st.data())
+def test_a_command_arrives_when_its_last_event_has_ended(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    bus = bus_of(profile)
+    cycle = cycle_of(profile, model=bus.deciding_model)
+    ends_us: dict[int | None, float] = {}
+    now_us = 0.0
+    for event in cycle.events():
+        now_us += plain(event.us)
+        if not bus.command_events or (event.transaction, event.kind) in bus.command_events:
+            ends_us[event.node if bus.command_events else None] = now_us
+    for node in {1, data.draw(st.integers(1, int(cycle.network.nodes))), int(cycle.network.nodes)}:
+        found_us = cycle.arrival_us(node, bus.command_events)
+        assert found_us == pytest.approx(ends_us.get(node, ends_us.get(None)), rel=1e-12)
 
 
 @KINDS
@@ -96,10 +132,10 @@ def test_a_traced_number_has_the_same_value(kind: str, data: st.DataObject, prof
     nodes = data.draw(st.integers(1, 100))
     for model in model_names(profile):
         bus = bus_of(profile)
-        plain = bus.cycle(network.with_nodes(nodes), model=model).required_us
+        own = bus.cycle(network.with_nodes(nodes), model=model).required_us
         traced = bus.cycle(network.with_nodes(Traced(float(nodes))), model=model).required_us
         assert isinstance(traced, Traced)
-        assert traced.value == plain
+        assert traced.value == own
 
 
 @KINDS

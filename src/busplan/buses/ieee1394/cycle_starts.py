@@ -160,12 +160,12 @@ class CycleWithStarts(BusCycle):
         """What the cycle could have and does not say: host time."""
         return () if self.network.profile.host.transaction_us else (LeftOut("host time", "host.transaction_us"),)
 
-    def rounds(self) -> Iterator[Iterable[BusEvent]]:
+    def each_round(self) -> Iterator[Iterable[BusEvent]]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
         starts, start_us = int(plain(self.number_of_starts)), plain(self.cycle_start_us)
         start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
-        for others in map(tuple, super().rounds()):
+        for others in map(tuple, super().each_round()):
             while sent < starts and now_us >= sent * CYCLE_US:
                 yield start
                 sent, now_us = sent + 1, now_us + start_us

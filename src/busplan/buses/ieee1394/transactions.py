@@ -97,8 +97,8 @@ class Ways(NamedTuple):
     last: Number
     """Of the last node of the group."""
 
-    def of_node(self, place: int) -> Number:
-        """Of the node at a place in its group, from 0."""
+    def of_node(self, place: Number) -> Number:
+        """Of the node at a place in its group, from 0; at the mean of places the mean of their hops."""
         return self.first if self.first is self.last else self.first + place
 
 
@@ -219,16 +219,16 @@ PACKET_PARTS: Final = (ARBITRATION, "cycle_data_us", "cycle_acknowledge_us")
 
 
 def _parts(kind: TransactionKind, phases: Phases, answer: "Answer") -> Iterator[BusEvent]:
-    def part(name: str, term: str, us: Number, label: str, **more: str) -> BusEvent:
-        return BusEvent(name, f"cycle_{term}_us", us, label, transaction=kind, **more)
+    def part(name: str, term: str, us: Number, label: str, packet: str | None = None) -> BusEvent:
+        return BusEvent(name, f"cycle_{term}_us", us, label, transaction=kind, packet=packet)
 
     def packet(name: str, sender: Who, *, arbitrates: bool) -> Iterator[BusEvent]:
         data_us = phases.request_data_us if name == "request" else phases.response_data_us
         receiver: Who = "node" if sender == "host" else "host"
         if arbitrates:
-            yield part("arbitration", "arbitration", phases.arbitration_us, f"{sender} arbitration", packet=name)
-        yield part(f"{name}_data", "data", data_us, f"{sender} data", packet=name)
-        yield part("acknowledge", "acknowledge", phases.acknowledge_us, f"{receiver} acknowledge", packet=name)
+            yield part("arbitration", "arbitration", phases.arbitration_us, f"{sender} arbitration", name)
+        yield part(f"{name}_data", "data", data_us, f"{sender} data", name)
+        yield part("acknowledge", "acknowledge", phases.acknowledge_us, f"{receiver} acknowledge", name)
 
     yield from packet("request", "host", arbitrates=True)
     if answer == "split":
@@ -239,7 +239,8 @@ def _parts(kind: TransactionKind, phases: Phases, answer: "Answer") -> Iterator[
     if answer != "unified":
         yield from packet("response", "node", arbitrates=answer == "split")
     yield part("idle", "idle", phases.idle_us, "idle bus of the gaps")
-    yield part("host", "host", phases.host_us, "host's own time beyond the gaps", rests_on="host.transaction_us")
+    host = part("host", "host", phases.host_us, "host's own time beyond the gaps")
+    yield host._replace(rests_on="host.transaction_us")
 
 
 def events(one: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:

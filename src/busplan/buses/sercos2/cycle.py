@@ -44,7 +44,7 @@ class Sercos2Cycle(SercosCycle):
         said: Number | None = bus.at_start_us
         return start_us(bus.data_rate_mbit_s) if said is None else said
 
-    def written(self) -> Iterator[Run]:
+    def written(self) -> Iterator[BusEvent | Run]:
         """MST, the telegrams of all drives, the MDT and its records, with the waits and gaps between them."""
         bus = self.network.profile.bus
         yield BusEvent("mst", "cycle_mst_us", self._telegram_us(MST_BYTES), "MST")

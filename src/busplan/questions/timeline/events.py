@@ -1,7 +1,7 @@
 """One communication cycle as a schedule: each event begins where the one before it ends.
 
-This is an independent way to the time that a cycle needs: `capacity` has a closed form, here the events of the bus are
-added one by one, and the end of the last one must be the same.
+`capacity` counts the events of the cycle by runs; here they are laid out and added one by one, and the end of the last
+one must be the same.
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 from busplan.buses.cycle import BusEvent
 from busplan.buses.figure import Figure
 from busplan.buses.parts import IDLE
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.questions.fit.cycle import cycle_of, fits_in
 from busplan.questions.fit.figures import CapacityFigures, figures
@@ -206,7 +207,8 @@ def _laid_out(parts: Iterable[BusEvent]) -> Iterator[Event]:
     """
     total_us = lost_us = start_us = 0.0
     for one in parts:
-        larger_us, smaller_us = max(total_us, one.us), min(total_us, one.us)
+        us = plain(one.us)
+        larger_us, smaller_us = max(total_us, us), min(total_us, us)
         total_us = larger_us + smaller_us
         lost_us += (larger_us - total_us) + smaller_us
         end_us = total_us + lost_us
