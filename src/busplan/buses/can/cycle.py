@@ -8,19 +8,40 @@ from typing import Final, Literal
 
 from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
-from busplan.buses.can.figures import TERMS
+from busplan.buses.can.figures import BUS_LOAD, TERMS
 from busplan.buses.can.response import Response
 from busplan.buses.can.streams import Stream, frame_sizes, streams
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
 from busplan.buses.can.waiting import is_higher, last_cyclic, response, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
+from busplan.buses.parts import EventKind
 from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, named, plain, rounded_up, total
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
+
+
+_DAVIS: Final = BUS_LOAD.reference
+EVENTS: Final = (
+    EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
+    EventKind("wait", "wait for nodes", "profile", "=", "work"),
+    EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "response"),
+    EventKind("command_frame", "command PDO", _DAVIS, ">", "request"),
+    EventKind("host", "host", "profile", "h", "idle"),
+    EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
+    EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),
+    EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (
+    EventKind("feedback", "feedback", "", "F", "in"),
+    EventKind("command", "command", "", "C", "out"),
+)
+"""What several events make together."""
 
 
 class CanCycle(BusCycle):

@@ -14,11 +14,11 @@ from busplan.buses.can.constants import (
     PIPELINE_CYCLES,
     SYNC_IDENTIFIER,
 )
-from busplan.buses.can.cycle import NONE, WORST, CanCycle
+from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle
 from busplan.buses.can.limits import LIMITS
-from busplan.buses.figure import NONPERIODIC, Figure
+from busplan.buses.figure import Figure
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.elementwise import Number, larger, plain
 from busplan.sourced import Sourced
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from busplan.buses.can.section import CanProfile
     from busplan.buses.published import EvidenceSection
 
-_DAVIS: Final = figures.BUS_LOAD.reference
 _HOST_STEP_US: Final = 10.0
 
 
@@ -64,20 +63,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         base="from SYNC to a queued feedback PDO, and from a command PDO to its effect",
     )
     command_events = (("command", "command_frame"),)
-    event_kinds = (
-        EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
-        EventKind("wait", "wait for nodes", "profile", "=", "work"),
-        EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "response"),
-        EventKind("command_frame", "command PDO", _DAVIS, ">", "request"),
-        EventKind("host", "host", "profile", "h", "idle"),
-        EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
-        EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("feedback", "feedback", "", "F", "in"),
-        EventKind("command", "command", "", "C", "out"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
     key_sources: ClassVar[Mapping[str, Sourced]] = {
         "bus.pipeline_cycles": PIPELINE_CYCLES,

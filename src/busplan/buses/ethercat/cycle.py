@@ -7,7 +7,7 @@ from typing import Final, Literal
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run
 from busplan.buses.ethercat.constants import BYTE_BIAS_UNCERTAINTY_US, BYTE_BIAS_US
 from busplan.buses.ethercat.equations import device_us, frame_bytes, overhead_bytes, sending_us
-from busplan.buses.ethercat.figures import TERMS
+from busplan.buses.ethercat.figures import FRAME, TERMS
 from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (
@@ -20,12 +20,33 @@ from busplan.buses.ethercat.traffic import (
     mailbox_frame_us,
     packing,
 )
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind
 from busplan.elementwise import Number, choose, larger, named, plain, total
 
 TimingModelName = Literal["last-byte", "vendors"]
 LAST_BYTE: Final[TimingModelName] = "last-byte"
 VENDORS: Final[TimingModelName] = "vendors"
+
+
+EVENTS: Final = (
+    EventKind("master", "master", "profile", "M", "contention"),
+    EventKind("jitter", "master's jitter", "profile", "j", "contention"),
+    EventKind("overhead", "frame overhead", FRAME, "f", "gap"),
+    EventKind("data", "process data", FRAME, ">", "request"),
+    EventKind("mailbox", "mailbox poll", FRAME, "b", "acknowledge"),
+    EventKind("cable", "cable", "SOEM", "-", "sync"),
+    EventKind("device", "device", "DC time stamps", "=", "work"),
+    EventKind("receive", "receiving again", "acontis", "<", "response"),
+    EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (
+    EventKind("frame", "frames", "", "F", "out"),
+    EventKind("way", "way through the devices", "", "W", "in"),
+)
+"""What several events make together."""
 
 
 _LEFT_OUT: Final = {

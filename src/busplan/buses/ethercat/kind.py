@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from busplan.buses.bus import Bus
 from busplan.buses.ethercat import figures, rules
 from busplan.buses.ethercat.constants import CONSTANTS, MAILBOX_BYTES, PIPELINE_CYCLES, SEPARATE, SHARED, SYNC_SHIFT
-from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
+from busplan.buses.ethercat.cycle import EVENTS, LAST_BYTE, STRETCHES, VENDORS, EthercatCycle
 from busplan.buses.ethercat.equations import room_bytes
 from busplan.buses.ethercat.latency import loop_periods
 from busplan.buses.ethercat.limits import LIMITS
 from busplan.buses.ethercat.traffic import arrival_us, datagrams, layout
-from busplan.buses.figure import NONPERIODIC, Figure
+from busplan.buses.figure import Figure
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Cost, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.sourced import Sourced
@@ -72,21 +72,8 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         measure="measure both on a drive: SYNC0 to its feedback, frame to command taken; no frame waits for them",
         base="from SYNC0 to feedback, and from the frame to a command that is taken",
     )
-    event_kinds = (
-        EventKind("master", "master", "profile", "M", "contention"),
-        EventKind("jitter", "master's jitter", "profile", "j", "contention"),
-        EventKind("overhead", "frame overhead", figures.FRAME, "f", "gap"),
-        EventKind("data", "process data", figures.FRAME, ">", "request"),
-        EventKind("mailbox", "mailbox poll", figures.FRAME, "b", "acknowledge"),
-        EventKind("cable", "cable", "SOEM", "-", "sync"),
-        EventKind("device", "device", "DC time stamps", "=", "work"),
-        EventKind("receive", "receiving again", "acontis", "<", "response"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("frame", "frames", "", "F", "out"),
-        EventKind("way", "way through the devices", "", "W", "in"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
     key_sources: ClassVar[Mapping[str, Sourced]] = {
         "bus.sync_shift": SYNC_SHIFT,

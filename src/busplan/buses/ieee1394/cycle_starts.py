@@ -4,8 +4,10 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from itertools import repeat
+from typing import Final
 
 from busplan.buses.cycle import BusCycle, BusEvent, LeftOut, Run, summed
+from busplan.buses.figure import NONPERIODIC, Ink, by_key
 from busplan.buses.ieee1394 import equations
 from busplan.buses.ieee1394.constants import (
     CYCLE_START_BYTES,
@@ -14,11 +16,44 @@ from busplan.buses.ieee1394.constants import (
     LEAST_ASYNCHRONOUS_US,
     safe_gap_count,
 )
-from busplan.buses.ieee1394.figures import TERMS
+from busplan.buses.ieee1394.figures import LATENCY, SYNC, TERMS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Link, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, link_of
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind
 from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, smaller, total
+
+_PHASES: Final = by_key(LATENCY)
+
+
+def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
+    return EventKind(key, label, _PHASES[phase].reference, mark, ink)
+
+
+EVENTS: Final = (
+    EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
+    EventKind("sync", "synchronous packet", SYNC.reference, "S", "sync"),
+    _kind("arbitration", "arbitration", "arbitration_us", "a", "contention"),
+    _kind("request_data", "request data", "request_data_us", ">", "request"),
+    _kind("acknowledge", "acknowledge", "acknowledge_us", "k", "acknowledge"),
+    _kind("hold", "bus held for the response", "hold_us", "h", "response"),
+    _kind("execution", "execution", "execution_us", "=", "work"),
+    _kind("worst_extra", "slowest execution", "worst_extra_us", "x", "work"),
+    _kind("response_data", "response data", "response_data_us", "<", "response"),
+    _kind("subaction_gap", "subaction gap", "subaction_gap_us", ".", "gap"),
+    _kind("arbitration_reset_gap", "arbitration reset gap", "arbitration_reset_gap_us", ":", "long-gap"),
+    EventKind("node_wait", "wait of a node", "broadcast", "w", "gap"),
+    EventKind("allowance", "allowance for a faster node", "idle", "+", "gap"),
+    _kind("host", "host", "host_us", "o", "contention"),
+    EventKind("retry", "busy retry", "profile", "r", "request"),
+    EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (
+    EventKind("read", "reads", "", "R", "in"),
+    EventKind("write", "writes", "", "W", "out"),
+)
+"""What several events make together."""
 
 
 class CycleWithStarts(BusCycle):

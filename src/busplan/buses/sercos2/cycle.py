@@ -5,17 +5,37 @@ from functools import cached_property
 from typing import Final, Literal
 
 from busplan.buses.cycle import ALL, BUT_FIRST, BusEvent, BusLatency, Doubt, LeftOut, Run
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind
 from busplan.buses.sercos import SercosCycle, delays, word_bytes
 from busplan.buses.sercos2.constants import GAP_SHARE, MST_BYTES, RECORD_BYTES
 from busplan.buses.sercos2.equations import start_us, telegram_us
-from busplan.buses.sercos2.figures import TERMS
+from busplan.buses.sercos2.figures import MDT_BYTES, TERMS
 from busplan.elementwise import Number, named, plain, total
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
 _GAP: Final = "gap between the AT of two drives"
+
+
+_TELEGRAMS: Final = MDT_BYTES.reference
+EVENTS: Final = (
+    EventKind("mst", "MST", _TELEGRAMS, "S", "sync"),
+    EventKind("wait", "wait for drives", "profile", "=", "work"),
+    EventKind("at", "AT of a drive", _TELEGRAMS, "<", "response"),
+    EventKind("gap", "gap between two drives", "profile", ".", "gap"),
+    EventKind("record", "record of a drive", _TELEGRAMS, ">", "out"),
+    EventKind("mdt", "MDT, all but the records", _TELEGRAMS, "m", "request"),
+    EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (
+    EventKind("at_stretch", "AT", "", "A", "in"),
+    EventKind("mdt_stretch", "MDT", "", "M", "out"),
+)
+"""What several events make together."""
 
 
 class Sercos2Cycle(SercosCycle):

@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
+from busplan.buses.parts import Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.buses.sercos import BASE, DELAYS, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
 from busplan.buses.sercos2 import figures, rules
 from busplan.buses.sercos2.constants import CONSTANTS, MOST_DRIVE_BYTES, PERIODS, TURNAROUND_US
-from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
+from busplan.buses.sercos2.cycle import EVENTS, NONE, STRETCHES, WORST, Sercos2Cycle
 from busplan.buses.sercos2.limits import LIMITS
 from busplan.elementwise import plain
 from busplan.sourced import Grade, Sourced
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
     from busplan.buses.sercos2.section import Sercos2Profile
 
-_TELEGRAMS: Final = figures.MDT_BYTES.reference
 _FASTEST: Final = 16
 
 
@@ -53,19 +51,8 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         measure=MEASURE,
         base=BASE,
     )
-    event_kinds = (
-        EventKind("mst", "MST", _TELEGRAMS, "S", "sync"),
-        EventKind("wait", "wait for drives", "profile", "=", "work"),
-        EventKind("at", "AT of a drive", _TELEGRAMS, "<", "response"),
-        EventKind("gap", "gap between two drives", "profile", ".", "gap"),
-        EventKind("record", "record of a drive", _TELEGRAMS, ">", "out"),
-        EventKind("mdt", "MDT, all but the records", _TELEGRAMS, "m", "request"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("at_stretch", "AT", "", "A", "in"),
-        EventKind("mdt_stretch", "MDT", "", "M", "out"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
     key_sources: ClassVar[Mapping[str, Sourced]] = {
         "bus.turnaround_us": TURNAROUND_US,

@@ -5,7 +5,9 @@ from functools import cached_property
 from typing import Final, Literal
 
 from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Run
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind
 from busplan.buses.sercos import SercosCycle, delays
 from busplan.buses.sercos3.constants import (
     BYTE_US,
@@ -26,7 +28,7 @@ from busplan.buses.sercos3.equations import (
     sync_jitter_us,
     telegrams_us,
 )
-from busplan.buses.sercos3.figures import TERMS
+from busplan.buses.sercos3.figures import MDT_TELEGRAMS, TERMS
 from busplan.buses.sercos3.telegrams import SORTS, Telegrams, telegrams_of
 from busplan.elementwise import Number, choose, larger, named, plain, smaller, total
 from busplan.sections.transactions import TransactionKind
@@ -34,6 +36,24 @@ from busplan.sections.transactions import TransactionKind
 TimingModelName = Literal["window", "telegrams"]
 WINDOW: Final[TimingModelName] = "window"
 TELEGRAMS: Final[TimingModelName] = "telegrams"
+
+
+_COSEMA: Final = MDT_TELEGRAMS.reference
+EVENTS: Final = (
+    EventKind("mdt_frame", "MDT, its own fields", _COSEMA, "m", "request"),
+    EventKind("mdt_data", "data to a device", _COSEMA, ">", "out"),
+    EventKind("wait", "wait of the devices", _COSEMA, "w", "sync"),
+    EventKind("at_frame", "AT, its own fields", _COSEMA, "a", "response"),
+    EventKind("at_data", "data of a device", _COSEMA, "<", "in"),
+    EventKind("gap", "gap and padding", _COSEMA, ".", "gap"),
+    EventKind("ring", "ring delay", _COSEMA, "o", "long-gap"),
+    EventKind("jitter", "jitter allowance", _COSEMA, "j", "contention"),
+    EventKind("master", "master", _COSEMA, "=", "work"),
+    EventKind("nonperiodic", "channel for other frames", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
+"""What several events make together."""
 
 
 class Sercos3Cycle(SercosCycle):

@@ -3,9 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Cost, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.buses.sercos import BASE, DELAYS, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
 from busplan.buses.sercos3 import figures, rules
@@ -22,7 +21,7 @@ from busplan.buses.sercos3.constants import (
     MOST_TELEGRAMS,
     PERIODS,
 )
-from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
+from busplan.buses.sercos3.cycle import EVENTS, STRETCHES, TELEGRAMS, WINDOW, Sercos3Cycle
 from busplan.buses.sercos3.limits import LIMITS
 from busplan.elementwise import plain
 from busplan.sourced import Sourced
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
     from busplan.buses.sercos3.section import Sercos3Profile
 
-_COSEMA: Final = figures.MDT_TELEGRAMS.reference
 _METHOD: Final = "bus.timing_method"
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
 
@@ -65,19 +63,8 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         measure=MEASURE,
         base=BASE,
     )
-    event_kinds = (
-        EventKind("mdt_frame", "MDT, its own fields", _COSEMA, "m", "request"),
-        EventKind("mdt_data", "data to a device", _COSEMA, ">", "out"),
-        EventKind("wait", "wait of the devices", _COSEMA, "w", "sync"),
-        EventKind("at_frame", "AT, its own fields", _COSEMA, "a", "response"),
-        EventKind("at_data", "data of a device", _COSEMA, "<", "in"),
-        EventKind("gap", "gap and padding", _COSEMA, ".", "gap"),
-        EventKind("ring", "ring delay", _COSEMA, "o", "long-gap"),
-        EventKind("jitter", "jitter allowance", _COSEMA, "j", "contention"),
-        EventKind("master", "master", _COSEMA, "=", "work"),
-        EventKind("nonperiodic", "channel for other frames", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
     key_sources: ClassVar[Mapping[str, Sourced]] = {
         "bus.gap_bytes": DEFAULT_GAP_BYTES,
