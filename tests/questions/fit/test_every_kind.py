@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from busplan.buses import kind_named, kind_names
 from busplan.elementwise import Traced, plain
 from busplan.profile.kinds import cycle_keys
+from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.questions.fit.certainty import FITS, certainty, limits_to_be_safe
 from busplan.questions.fit.cycle import cycle_of, limits_with_time
@@ -50,17 +51,22 @@ def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
 
 @KINDS
 def test_every_term_has_an_event(kind: str, profiles_by_kind: Profiles) -> None:
+    bus = kind_named(kind)
     written: set[str] = set()
 
-    @SOME
-    @given(profiles_by_kind[kind])
     def look(profile: Profile) -> None:
-        cycle = cycle_of(profile, model=bus_of(profile).deciding_model)
+        cycle = cycle_of(profile, model=bus.deciding_model)
         assert {term.rests_on for term in cycle.terms} - {""} <= set(cycle_keys(profile))
         written.update(event.term for event in cycle.events())
 
-    look()
-    assert written == {figure.key for figure in kind_named(kind).term_figures}
+    for profile in (load(name).profile for name in shipped_names()):
+        if profile.bus.kind == kind:
+            look(profile)
+            for setting in bus.settings(network_of(profile)):
+                for changes in setting.values:
+                    look(override(profile, changes))
+    settings(SOME, derandomize=True)(given(profiles_by_kind[kind])(look))()
+    assert written == {figure.key for figure in bus.term_figures}
 
 
 @KINDS

@@ -60,7 +60,7 @@ class CanCycle(BusCycle):
 
     @cached_property
     def traffic(self) -> Traffic:
-        """What the network sends."""
+        """SYNC, PDOs and other messages."""
         return traffic_of(self.network)
 
     @cached_property
@@ -74,21 +74,21 @@ class CanCycle(BusCycle):
     def _frame_us(self, data_bytes: Number) -> Number:
         return frame_us(data_bytes, **self._wire, is_stuffed=self.is_stuffed)
 
-    def _pdo_us(self, one: Pdos) -> Number:
-        found = payload_us(one.payload_bytes, **self._wire, is_stuffed=self.is_stuffed)
-        return named(found, f"{one.name}_us", f"PDO,{one.name}{one.group and f',{one.group}'}")
+    def _pdo_us(self, pdos: Pdos) -> Number:
+        pdo_us = payload_us(pdos.payload_bytes, **self._wire, is_stuffed=self.is_stuffed)
+        return named(pdo_us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
 
     @cached_property
     def _pdos(self) -> tuple[tuple[Pdos, Number], ...]:
         """All PDOs, each with its time."""
-        return tuple((one, self._pdo_us(one)) for one in self.traffic.pdos)
+        return tuple((pdos, self._pdo_us(pdos)) for pdos in self.traffic.pdos)
 
     @cached_property
     def _messages(self) -> tuple[tuple[Message, Number], ...]:
         """All other messages, each with the time of its frame."""
         return tuple(
-            (one, named(self._frame_us(one.payload_bytes), f"{one.name}_us", f"C,{one.name}"))
-            for one in self.traffic.messages
+            (message, named(self._frame_us(message.payload_bytes), f"{message.name}_us", f"C,{message.name}"))
+            for message in self.traffic.messages
         )
 
     @cached_property
@@ -98,7 +98,7 @@ class CanCycle(BusCycle):
 
     def _wait_us(self, kind: TransactionKind, *, uncertainties: int = 0) -> Number:
         """The slowest execution of any node, with some standard uncertainties of each [us]."""
-        return reduce(larger, (_execution_us(one, kind, uncertainties) for one in self.network.groups))
+        return reduce(larger, (_execution_us(group, kind, uncertainties) for group in self.network.groups))
 
     def _frames(self, kind: TransactionKind) -> Iterator[Run]:
         """All PDOs of one direction, node by node; a timeline shows their frames."""
@@ -145,8 +145,8 @@ class CanCycle(BusCycle):
 
     def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
         """Some of the frames of lower priorities: one before SYNC, one before the feedback, the others behind it."""
-        found = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
-        for message in islice(found.blocks(), first, end):
+        waited = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
+        for message in islice(waited.blocks(), first, end):
             label = f"message {message.name} of a lower priority"
             yield blocking._replace(us=plain(message.frame_us), label=label)
 
@@ -158,7 +158,7 @@ class CanCycle(BusCycle):
 
     @cached_property
     def by_term(self) -> Mapping[str, Number]:
-        """What each term takes, by its key [us]."""
+        """Time of each term, by its key [us]."""
         rest = (run for run in self.runs if not any(event.term in self._own for event in run.events))
         return summed(rest, (figure.key for figure in TERMS)) | self._own
 
@@ -175,8 +175,8 @@ class CanCycle(BusCycle):
         extra_us
             By how much the rest takes longer [us].
         """
-        found = self._own_waits if is_off(extra_us) else self._waits_beside(self._on_bus_us + extra_us)
-        blocking_us, counts = found
+        is_own = is_off(extra_us)
+        blocking_us, counts = self._own_waits if is_own else self._waits_beside(self._on_bus_us + extra_us)
         return blocking_us + total(count * us for count, (_, us) in zip(counts, self._messages, strict=True))
 
     @cached_property
@@ -189,20 +189,20 @@ class CanCycle(BusCycle):
             return 0.0, ()
         others_us = named(others_us, "others_us", "others")
 
-        def found(key: str, words: str) -> Number:
+        def figure(key: str, words: str) -> Number:
             return self._sent.of(partial(_waits, self.is_stuffed, key), others_us, words=words)
 
         words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
-        lasts_us = named(found("lasts_us", words), "busy_us", "w")
-        blocking_us = found("blocking_us", "the 3 longest frames of a lower priority that can be there in w")
+        lasts_us = named(figure("lasts_us", words), "busy_us", "w")
+        blocking_us = figure("blocking_us", "the 3 longest frames of a lower priority that can be there in w")
         return blocking_us, tuple(self._higher(lasts_us))
 
     def _higher(self, lasts_us: Number) -> Iterator[Number]:
         """How many frames of each message go before the last PDO in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
-        for one, _ in self._messages:
-            count = rounded_up((window_us + one.jitter_us) / one.period_us)
-            yield choose(is_higher(one.identifier, self._last), count, 0)
+        for message, _ in self._messages:
+            count = rounded_up((window_us + message.jitter_us) / message.period_us)
+            yield choose(is_higher(message.identifier, self._last), count, 0)
 
     @cached_property
     def _last(self) -> Number:
@@ -211,7 +211,7 @@ class CanCycle(BusCycle):
         return named(sent.of(_last, words=words), "last_identifier", "id_last")
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
-        """What the cycle grows by if its nodes take longer: more messages may arrive, too [us]."""
+        """Growth of the cycle if its nodes take longer: more messages may arrive, too [us]."""
         if not self._messages:
             return extra_us
         return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
@@ -256,7 +256,7 @@ class CanCycle(BusCycle):
 
     @property
     def _messages_load(self) -> Number:
-        return total(us / one.period_us for one, us in self._messages)
+        return total(us / message.period_us for message, us in self._messages)
 
     @property
     def load_period_us(self) -> Number:
@@ -266,10 +266,10 @@ class CanCycle(BusCycle):
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
-        pdos = ((one.name, one.group) for one in self.traffic.pdos)
-        names = ((SYNC, ""), *pdos, *((one.name, "") for one in self.traffic.messages))
-        found = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
-        return (*found, BusLatency(LOOP, None, self._loop()))
+        ends = ((pdos.name, pdos.group) for pdos in self.traffic.pdos)
+        names = ((SYNC, ""), *ends, *((message.name, "") for message in self.traffic.messages))
+        each = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
+        return (*each, BusLatency(LOOP, None, self._loop()))
 
     def _loop(self) -> dict[str, Number]:
         """Parts of the way from SYNC to the last executed command that rests on it."""
@@ -294,15 +294,15 @@ class CanCycle(BusCycle):
     def _phases(self, place: int, name: str) -> dict[str, Number]:
         """Figures of the stream at a place among those that end a PDO or a message."""
 
-        def found(key: str, words: str) -> Number:
+        def figure(key: str, words: str) -> Number:
             return self._sent.of_points(partial(_phase, self.is_stuffed, place, key), words=words)
 
-        jitter_us = found("jitter_us", f"how late {name} may be queued")
-        frame_us_ = found("frame_us", f"the last frame of {name}")
-        blocking_us = found("blocking_us", f"the longest frame of a lower priority than {name}")
-        interference_us = found("interference_us", f"frames of higher priorities before {name}, in its worst instance")
-        instance = found("instance", f"the worst instance of {name} in the busy period, from 0")
-        period_us = named(found("period_us", f"period of {name}"), "period_us", "T")
+        jitter_us = figure("jitter_us", f"how late {name} may be queued")
+        frame_us_ = figure("frame_us", f"the last frame of {name}")
+        blocking_us = figure("blocking_us", f"the longest frame of a lower priority than {name}")
+        interference_us = figure("interference_us", f"frames of higher priorities before {name}, in its worst instance")
+        instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")
+        period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
         backlog_us = choose(instance < inf, instance * frame_us_ - instance * period_us, instance)
         parts_us = {
             "jitter_us": named(jitter_us, "jitter_us", "J"),
@@ -315,10 +315,10 @@ class CanCycle(BusCycle):
         }
         return _numbered(
             parts_us,
-            identifier=found("last", f"identifier of {name}"),
-            data_bytes=found("data_bytes", f"data of {name}"),
+            identifier=figure("last", f"identifier of {name}"),
+            data_bytes=figure("data_bytes", f"data of {name}"),
             instance=instance,
-            deadline_us=found("deadline_us", f"deadline of {name}"),
+            deadline_us=figure("deadline_us", f"deadline of {name}"),
         )
 
 
@@ -340,13 +340,13 @@ def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Nu
 
 def _waits(is_stuffed: bool, key: str, traffic: Traffic, others_us: Number) -> Number:
     """One figure of what a cycle waits for."""
-    found: Number = getattr(waits(traffic, others_us, is_stuffed=is_stuffed), key)
-    return found
+    number: Number = getattr(waits(traffic, others_us, is_stuffed=is_stuffed), key)
+    return number
 
 
 def _last(traffic: Traffic) -> Number:
-    found: Number = last_cyclic(streams(traffic, is_stuffed=True))
-    return found
+    last: Number = last_cyclic(streams(traffic, is_stuffed=True))
+    return last
 
 
 def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:
@@ -362,5 +362,5 @@ def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:
 @lru_cache(maxsize=1024)
 def _answer(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[Stream, Response | None]:
     """The stream at a place among those that end a PDO or a message, with its response."""
-    own = next(islice((one for one in streams(traffic, is_stuffed=is_stuffed) if one.is_end), place, None))
+    own = next(islice((stream for stream in streams(traffic, is_stuffed=is_stuffed) if stream.is_end), place, None))
     return own, response(own, traffic, is_stuffed=is_stuffed)

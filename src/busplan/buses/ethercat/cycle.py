@@ -78,13 +78,13 @@ class EthercatCycle(BusCycle):
     @cached_property
     def process_bytes(self) -> Number:
         """Process data of all devices [bytes]."""
-        return named(total(one.number * one.data_bytes for one in self._devices), "process_bytes", "D")
+        return named(total(own.number * own.data_bytes for own in self._devices), "process_bytes", "D")
 
     @cached_property
     def _overhead_bytes(self) -> Number:
-        found = self.packing
-        headers = found.datagrams_bytes - self.process_bytes
-        return found.frames * overhead_bytes(found.frames) + headers + found.padding_bytes
+        packed = self.packing
+        headers = packed.datagrams_bytes - self.process_bytes
+        return packed.frames * overhead_bytes(packed.frames) + headers + packed.padding_bytes
 
     @cached_property
     def _receive_us(self) -> Number:
@@ -100,7 +100,8 @@ class EthercatCycle(BusCycle):
         if not self.counts_reception:
             return self.required_us
         last_us, before_us = (
-            sending_us(frame_bytes(one)) for one in (self.packing.last_bytes, self.packing.before_bytes)
+            sending_us(frame_bytes(datagrams_bytes))
+            for datagrams_bytes in (self.packing.last_bytes, self.packing.before_bytes)
         )
         polls = self.network.profile.bus.mailbox_polls
         lost_us = choose(self.packing.before_bytes > 0, larger(before_us - 2 * last_us, 0.0), 0.0)
@@ -125,12 +126,12 @@ class EthercatCycle(BusCycle):
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def bias_us(self) -> Number:
-        """What process data take beyond the wire: about a copy in the host [us]."""
+        """Time of process data beyond the wire: about a copy in the host [us]."""
         return self.process_bytes * BYTE_BIAS_US
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The delays of devices, the master's own time, and what bytes take beyond the wire."""
-        devices = (Doubt(one.key, one.label, device_us(one.one_way_us)) for one in devices_doubts(self.network))
+        devices = (Doubt(doubt.key, doubt.label, device_us(doubt.one_way_us)) for doubt in devices_doubts(self.network))
         return (
             *devices,
             Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
@@ -140,12 +141,14 @@ class EthercatCycle(BusCycle):
     def left_out(self) -> tuple[LeftOut, ...]:
         """The master's own time and jitter, mailbox polls, and cables without a length."""
         bus = self.network.profile.bus
-        found = {key: getattr(bus, key.removeprefix("bus.")) for key in _LEFT_OUT}
-        found |= {one.key("cable_m"): one.node.cable_m for one in self.network.groups if one.node.port != "E-bus"}
-        return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in found.items() if not value)
+        keys = {key: getattr(bus, key.removeprefix("bus.")) for key in _LEFT_OUT}
+        keys |= {
+            group.key("cable_m"): group.node.cable_m for group in self.network.groups if group.node.port != "E-bus"
+        }
+        return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in keys.items() if not value)
 
     def _frames(self) -> Iterator[BusEvent]:
-        """What each frame has beside its data, then the data of each of its devices."""
+        """All of each frame but its data, then the data of each of its devices."""
         sizes = [plain(own.data_bytes) for own in self._devices for _ in range(int(plain(own.number)))]
         number = 0
         for run in frames(self.network):

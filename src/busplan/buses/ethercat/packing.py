@@ -25,7 +25,7 @@ class Packing(NamedTuple):
     datagrams_bytes: Number
     """All their datagrams, headers and data [bytes]."""
     padding_bytes: Number
-    """What fills short frames [bytes]."""
+    """Filling of short frames [bytes]."""
     last_bytes: Number
     """Datagrams of the last frame [bytes]."""
     before_bytes: Number
@@ -69,18 +69,18 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
         present = first_bytes + choose(has_room, headers, 0.0)
         whole = present
         frames = 1
-    for one in devices:
-        beside = smaller(one.number, rounded_down(free / one.data_bytes))
-        behind = one.number - beside
-        present, free = present + beside * one.data_bytes, free - beside * one.data_bytes
-        each = larger(rounded_down(room / one.data_bytes), 1)
+    for group in devices:
+        beside = smaller(group.number, rounded_down(free / group.data_bytes))
+        behind = group.number - beside
+        present, free = present + beside * group.data_bytes, free - beside * group.data_bytes
+        each = larger(rounded_down(room / group.data_bytes), 1)
         new = rounded_up(behind / each)
-        in_last = (behind - (larger(new, 1) - 1) * each) * one.data_bytes
+        in_last = (behind - (larger(new, 1) - 1) * each) * group.data_bytes
         opens = behind > 0
-        before = choose(opens, choose(new > 1, headers + each * one.data_bytes, present), before)
+        before = choose(opens, choose(new > 1, headers + each * group.data_bytes, present), before)
         padding = padding + choose(opens, padding_bytes(present), 0.0)
         present, free = choose(opens, headers + in_last, present), choose(opens, larger(room - in_last, 0.0), free)
-        frames, whole = frames + new, whole + new * headers + one.number * one.data_bytes
+        frames, whole = frames + new, whole + new * headers + group.number * group.data_bytes
     return Packing(frames, whole, padding + padding_bytes(present), present, before)
 
 

@@ -78,7 +78,7 @@ class Idle(NamedTuple):
     gap_us: Number
     """The arbitration reset gap."""
     host_us: Number
-    """What the host takes beyond it."""
+    """The host's own time beyond it."""
 
     @property
     def us(self) -> Number:
@@ -87,7 +87,7 @@ class Idle(NamedTuple):
 
 
 class BroadcastTerms(CycleWithStarts):
-    """What the cycle is made of, and what is not known of it.
+    """The cycle, and its uncertainty.
 
     References
     ----------
@@ -128,14 +128,14 @@ class BroadcastTerms(CycleWithStarts):
 
     @cached_property
     def first_wait_us(self) -> Number:
-        """What the first node waits behind the query, beyond its gap [us]."""
+        """Wait of the first node behind the query, beyond its gap [us]."""
         return larger(self._clocks_us(FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
 
     def _clocks_us(self, clocks: Number) -> Number:
         return alike(clocks, self.link.hops) / BROADCAST_CLOCK_MHZ
 
     def slot_wait_us(self, group: Group) -> Number:
-        """What the next node waits behind the broadcast of a node, where each has its own time [us].
+        """Wait of the next node behind the broadcast of a node, where each has its own time [us].
 
         With unlike nodes it is the most: a node that is late because of a long broadcast waits less.
 
@@ -151,7 +151,7 @@ class BroadcastTerms(CycleWithStarts):
 
     @cached_property
     def slot_waits_us(self) -> Number:
-        """What all nodes wait for their times behind the first; nobody waits behind the last [us]."""
+        """Wait of all nodes for their times behind the first; nobody waits behind the last [us]."""
         groups = self.network.groups
         return total(group.nodes * self.slot_wait_us(group) for group in groups) - self.slot_wait_us(groups[-1])
 
@@ -214,7 +214,7 @@ class BroadcastTerms(CycleWithStarts):
 
     @cached_property
     def late_us(self) -> Number:
-        """What is left of the host's wait when the last broadcast ends [us]."""
+        """Rest of the host's wait when the last broadcast ends [us]."""
         wait_us = alike(HUB_WAIT_US, self.network.nodes) + HUB_WAIT_PER_NODE_US * self.network.nodes
         return named(larger(wait_us - self.boards_us, 0.0), "late_us", "late")
 
@@ -226,8 +226,8 @@ class BroadcastTerms(CycleWithStarts):
     @property
     def host_us(self) -> Number:
         """The host's own time before each of its requests [us]."""
-        found: Number = self.network.profile.host.transaction_us
-        return found
+        host_us: Number = self.network.profile.host.transaction_us
+        return host_us
 
     def _idle(self, host_us: Number, *, late_us: Number = 0.0) -> Idle:
         """Idle bus before a request of the host, whose own time overlaps the gap."""
@@ -279,11 +279,11 @@ class BroadcastTerms(CycleWithStarts):
     # --- what is not known ----------------------------------------------------------------------------------
 
     def bias_us(self) -> Number | None:
-        """What the packets take beyond the model, on the mean [us]."""
+        """Time of the packets beyond the model, on the mean [us]."""
         return doubts.broadcast_bias_us(self.halves, with_gap=self.with_gap, gap_count=self.link.gap_count)
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """What is not known exactly."""
+        """Inputs that are not known exactly."""
         retries, nodes = self.network.profile.cycle.retries, self.network.nodes
         return doubts.of_broadcast(
             self.halves,
@@ -305,7 +305,7 @@ class BroadcastTerms(CycleWithStarts):
         return 4 + self.network.profile.cycle.retries if self._is_isochronous else self.halves
 
     def _host_swing_us(self) -> Number:
-        """What one standard uncertainty of the host changes, as the larger of two steps of two: up and down [us]."""
+        """Change by one standard uncertainty of the host, as the larger of two steps of two: up and down [us]."""
         step_us: Number = self.network.profile.host.standard_uncertainty_us
         if is_off(step_us):
             return 0.0

@@ -62,9 +62,9 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def _own_delays(self, link: Link) -> Delays:
         """Delays over a node's own way; its arbitration goes to the root, wherever that is."""
-        found = self.delays_of(link, self.delays)
+        own = self.delays_of(link, self.delays)
         is_at_host = self.network.profile.bus.root == "host"
-        return found if is_at_host else found._replace(arbitration_us=self.delays.arbitration_us)
+        return own if is_at_host else own._replace(arbitration_us=self.delays.arbitration_us)
 
     @cached_property
     def sync_us(self) -> Number:
@@ -86,29 +86,29 @@ class Ieee1394Cycle(CycleWithStarts):
     @property
     def longest_request_us(self) -> Number:
         """Data phase of the longest request, to the farthest node of its group [us]."""
-        return reduce(larger, (one.phases.request_data_us for one in self._farthest))
+        return reduce(larger, (transaction.phases.request_data_us for transaction in self._farthest))
 
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The synchronous packet, and each transaction of every node."""
         yield BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")
         for kind in TRANSACTION_KINDS:
-            for place, one in enumerate(each for each in self.exchanges if each.kind == kind):
-                yield Run(one.parts, one.nodes, place, partial(self._laid_out, one, place))
+            for place, transaction in enumerate(each for each in self.exchanges if each.kind == kind):
+                yield Run(transaction.parts, transaction.nodes, place, partial(self._laid_out, transaction, place))
 
-    def _laid_out(self, one: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
+    def _laid_out(self, transaction: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
         """The transaction with a node of a group, by the node's number in it from 0."""
         if charges_own_hops(self.network):
-            one = self._exchange(place, one.kind, self._ways[place].of_node(number))
-        return events(one, model=self.model)
+            transaction = self._exchange(place, transaction.kind, self._ways[place].of_node(number))
+        return events(transaction, model=self.model)
 
     def bias_us(self) -> Number | None:
-        """What the transactions take beyond the model, on the mean [us]."""
+        """Time of the transactions beyond the model, on the mean [us]."""
         if not self.is_known:
             return None
         return doubts.bias_us(self.exchanges, self.network, gap_count=self.link.gap_count)
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """What is not known exactly."""
+        """Inputs that are not known exactly."""
         if not self.is_known:
             return ()
         # The hops of the synchronous packet, of retries and of cycle starts; those of transactions come to them.
@@ -144,8 +144,8 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def _longest(self, kind: TransactionKind) -> dict[str, Number]:
         """Each of these times of the transactions of one kind with the farthest node of each group, the longest."""
-        each = [one.phases for one in self._farthest if one.kind == kind]
-        return {key: reduce(larger, (getattr(one, key) for one in each)) for key in _SHOWN}
+        each = [transaction.phases for transaction in self._farthest if transaction.kind == kind]
+        return {key: reduce(larger, (getattr(phases, key) for phases in each)) for key in _SHOWN}
 
     @cached_property
     def _farthest(self) -> tuple[Exchange, ...]:
@@ -161,20 +161,26 @@ class Ieee1394Cycle(CycleWithStarts):
     def latencies(self) -> tuple[BusLatency, ...]:
         """One read and one write of the farthest node of each group."""
         places = range(len(self.network.groups))
-        found = (self._exchange(place, kind, self._ways[place].last) for place in places for kind in TRANSACTION_KINDS)
+        farthest = (
+            self._exchange(place, kind, self._ways[place].last) for place in places for kind in TRANSACTION_KINDS
+        )
         return tuple(
             BusLatency(
-                one.kind,
-                one.payload_bytes,
-                {"hops": one.link.hops, "gap_count": one.link.gap_count, **one.phases._asdict()},
-                one.group.name,
+                transaction.kind,
+                transaction.payload_bytes,
+                {
+                    "hops": transaction.link.hops,
+                    "gap_count": transaction.link.gap_count,
+                    **transaction.phases._asdict(),
+                },
+                transaction.group.name,
             )
-            for one in found
+            for transaction in farthest
         )
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What the cycle could have and does not say."""
-        split = {id(one.group) for one in self.exchanges if one.responder.answer == "split"}
+        """Parts that the profile does not say."""
+        split = {id(transaction.group) for transaction in self.exchanges if transaction.responder.answer == "split"}
         return (
             *super().left_out(),
             *(

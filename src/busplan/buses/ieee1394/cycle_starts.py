@@ -1,4 +1,4 @@
-"""What every schedule of an IEEE 1394 bus has: its delays, its busy retries, the cycle starts between its packets."""
+"""Common to all schedules of an IEEE 1394 bus: delays, busy retries, and the cycle starts between packets."""
 
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
@@ -83,7 +83,7 @@ class CycleWithStarts(BusCycle):
 
     @cached_property
     def delays(self) -> Delays:
-        """What does not depend on the packet, over the hops of the farthest node."""
+        """Delays of any packet, over the hops of the farthest node."""
         return self.delays_of(self.link, None)
 
     def delays_of(self, link: Link, shared: Delays | None) -> Delays:
@@ -96,20 +96,20 @@ class CycleWithStarts(BusCycle):
         shared
             The delays over other hops of the bus, where they have been computed.
         """
-        found = delays(link, model=TIMING_MODELS[self.model], alone=self.network.nodes == 1, shared=shared)
+        own = delays(link, model=TIMING_MODELS[self.model], alone=self.network.nodes == 1, shared=shared)
         for key, number in (
-            ("arbitration_us", found.arbitration_us),
-            ("acknowledge_us", found.acknowledge_us),
-            ("subaction_gap_us", found.gaps.subaction_us),
-            ("arbitration_reset_gap_us", found.gaps.arbitration_reset_us),
-            ("gaps_us", found.gaps.both_us),
+            ("arbitration_us", own.arbitration_us),
+            ("acknowledge_us", own.acknowledge_us),
+            ("subaction_gap_us", own.gaps.subaction_us),
+            ("arbitration_reset_gap_us", own.gaps.arbitration_reset_us),
+            ("gaps_us", own.gaps.both_us),
         ):
             named(number, key, LATENCY_SYMBOLS[key])
-        return found
+        return own
 
     @cached_property
     def cycle_start_us(self) -> Number:
-        """What one cycle start costs: it destroys idle time already run, and goes at S100 [us]."""
+        """Cost of a cycle start: it destroys idle time already run, and goes at S100 [us]."""
         own, link = self.delays, self.link
         data_us = equations.data_phase_us(
             link.hops, hop_us=own.hop_us, packet_bytes=CYCLE_START_BYTES, data_rate_mbit_s=DATA_RATE_MBIT_S["S100"]
@@ -149,7 +149,7 @@ class CycleWithStarts(BusCycle):
         return self.starts(self._others_us) if self._has_starts else 0
 
     def written(self) -> Iterator[BusEvent | Run]:
-        """What goes one behind the other; cycle starts go between its rounds, and their number rests on it."""
+        """All but the cycle starts: these go between its rounds, and their number rests on it."""
         yield from self.schedule()
         retries: Number = self.network.profile.cycle.retries
         if self.model != "paper" and not is_off(retries):
@@ -164,12 +164,12 @@ class CycleWithStarts(BusCycle):
 
     @cached_property
     def by_term(self) -> Mapping[str, Number]:
-        """What each term takes, by its key [us]."""
+        """Time of each term, by its key [us]."""
         starts = (Run((self._start,), self.number_of_starts),) if self._has_starts else ()
         return self._others_by_term | summed(starts, (self._start.term,))
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
-        """What the cycle grows by if its transactions take longer: there may be more cycle starts, too [us]."""
+        """Growth of the cycle if its transactions take longer: there may be more cycle starts, too [us]."""
         if not self._has_starts:
             return extra_us
         before_us = self._others_us + after_us
@@ -188,11 +188,11 @@ class CycleWithStarts(BusCycle):
 
     @property
     def is_known(self) -> bool:
-        """Whether the error of the model is known: of the one that decides."""
+        """The error of a model is known of the one that decides."""
         return self.model == "standard"
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What the cycle could have and does not say: host time."""
+        """Host time, where the profile does not say it."""
         return () if self.network.profile.host.transaction_us else (LeftOut("host time", "host.transaction_us"),)
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:

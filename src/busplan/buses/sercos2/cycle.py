@@ -54,8 +54,10 @@ class Sercos2Cycle(SercosCycle):
     @cached_property
     def mdt_bytes(self) -> Number:
         """Data of the MDT, a record for each drive [bytes]."""
-        found = total((word_bytes(one.write_bytes) + RECORD_BYTES) * one.nodes for one in self.network.groups)
-        return named(found, "mdt_bytes", "s_MDT")
+        data_bytes = total(
+            (word_bytes(group.write_bytes) + RECORD_BYTES) * group.nodes for group in self.network.groups
+        )
+        return named(data_bytes, "mdt_bytes", "s_MDT")
 
     @cached_property
     def start_us(self) -> Number:

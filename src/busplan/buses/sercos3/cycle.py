@@ -91,13 +91,13 @@ class Sercos3Cycle(SercosCycle):
         if not self.is_window:
             return 0.0
         delay_us: Number = bus.device_delay_us
-        found = ring_delay_us(
+        around_us = ring_delay_us(
             self.network.nodes,
             device_delay_us=delay_us,
             gap_bytes=bus.gap_bytes,
             component_delay_us=bus.component_delay_us,
         )
-        return named(found, "ring_delay_us", "t_ring")
+        return named(around_us, "ring_delay_us", "t_ring")
 
     @property
     def _jitters(self) -> tuple[int, int]:
@@ -110,7 +110,7 @@ class Sercos3Cycle(SercosCycle):
 
     @cached_property
     def _master_us(self) -> Number:
-        """What the window keeps free for the master [us]."""
+        """Time that the window keeps free for the master [us]."""
         if not self.is_window:
             return 0.0
         delay_us: Number = self.network.profile.bus.master_delay_us
@@ -121,7 +121,7 @@ class Sercos3Cycle(SercosCycle):
 
     @cached_property
     def _start_wait_us(self) -> Number:
-        """What the devices make the AT wait [us]."""
+        """Wait of the AT for the devices [us]."""
         least_us: Number | None = self.network.profile.bus.at_start_us
         return 0.0 if least_us is None or not self.is_window else start_wait_us(least_us, earliest_us=self._earliest_us)
 
@@ -157,7 +157,7 @@ class Sercos3Cycle(SercosCycle):
         return Run((telegrams,), laid_out=lambda _: self._telegrams(kind))
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """What is published as a range alone: the delay of a device, the master's jitter, and the gap.
+        """Inputs that are published as a range alone: the delay of a device, the master's jitter, and the gap.
 
         Each is the same in the whole cycle. A wait of the devices may hide some of it.
         """
@@ -165,7 +165,7 @@ class Sercos3Cycle(SercosCycle):
         if not self.is_window or bus.ring_grade == "measured":
             return ()
         jitters, rings = self._jitters[1], 1 if self._has_ring else 0
-        count = total(one.telegrams for one in self.fillings.values())
+        count = total(filling.telegrams for filling in self.fillings.values())
         gap_us: Number = bus.gap_bytes * BYTE_US * (count + (jitters + rings) / 2)
         delays_us: Number = 2 * rings * self.network.nodes * bus.device_delay_us
         return (
@@ -181,7 +181,7 @@ class Sercos3Cycle(SercosCycle):
         least = LeftOut("the devices' least time before the AT, S-0-1006", "bus.at_start_us")
         other = LeftOut("the channel for other frames", "cycle.nonperiodic_us")
         said = ((self.network.profile.bus.at_start_us is not None, least), (self.network.nonperiodic_us, other))
-        return tuple(one for is_said, one in said if not is_said)
+        return tuple(left for is_said, left in said if not is_said)
 
     def figures(self) -> Mapping[str, Number | None]:
         """How many telegrams there are."""
@@ -235,18 +235,18 @@ class Sercos3Cycle(SercosCycle):
 
 def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:
     """The pieces of each telegram of plain numbers: bytes, and the device whose data they are; 0 for other fields."""
-    found = [[(plain(telegrams.first_bytes), 0)]]
+    laid_out = [[(plain(telegrams.first_bytes), 0)]]
     used, node = plain(telegrams.first_bytes), 0
     for place, items in enumerate(telegrams.items):
         size, has_owner = plain(items.size_bytes), place >= _FIELDS
         for _ in range(int(plain(items.pieces))):
             if used + size > MOST_BYTES:
                 used = plain(telegrams.next_bytes)
-                found.append([(used, 0)])
+                laid_out.append([(used, 0)])
             node += has_owner
-            found[-1].append((size, node if has_owner else 0))
+            laid_out[-1].append((size, node if has_owner else 0))
             used += size
-    return found
+    return laid_out
 
 
 _FIELDS: Final = 2
