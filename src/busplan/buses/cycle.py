@@ -31,7 +31,7 @@ class Term(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What it is called beside the other terms."""
+        """Name beside the other terms."""
         return self.key.removeprefix("cycle_").removesuffix("_us")
 
 
@@ -45,12 +45,12 @@ class BusEvent(NamedTuple):
     us: Number
     """How long it takes [us]: a plain number where it is laid out, of any sort in a run."""
     label: str
-    """What it is, and who is at work."""
+    """Name, and who is at work."""
     node: int | None = None
     """Whose it is where it is laid out, from 1; None for what belongs to all."""
     transaction: str | None = None
-    """What it belongs to at a coarse look: the key of an `EventKind` for stretches. Where nodes take turns, what
-    belongs to none is between them."""
+    """The stretch that it belongs to: the key of an `EventKind`. Where nodes take turns, an event without one is no
+    node's own."""
     packet: str | None = None
     """Which packet of the transaction it belongs to."""
     rests_on: str = ""
@@ -93,7 +93,7 @@ class Run(NamedTuple):
 
 
 def summed(runs: Iterable[Run], keys: Iterable[str]) -> dict[str, Number]:
-    """What each term takes: the sums of its events in the order of the runs, 0.0 of one without events [us].
+    """Time of each term: the sum of its events in the order of the runs, 0.0 of one without events [us].
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Doubt(NamedTuple):
 
 
 class LeftOut(NamedTuple):
-    """What a cycle could have and a profile does not say: no verdict has it."""
+    """A part that a cycle could have and a profile does not say: no verdict has it."""
 
     label: str
     key: str
@@ -140,7 +140,7 @@ class BusLatency(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What it is called beside the others."""
+        """Name beside the others."""
         return f"{self.group} {self.name}" if self.group else self.name
 
 
@@ -166,7 +166,7 @@ class BusCycle(ABC):
 
     @cached_property
     def by_term(self) -> Mapping[str, Number]:
-        """What each term takes, by its key in the order of the terms [us]."""
+        """Time of each term, by its key in the order of the terms [us]."""
         return summed(self.runs, (figure.key for figure in self.term_figures))
 
     @cached_property
@@ -180,16 +180,16 @@ class BusCycle(ABC):
 
     @property
     def required_us(self) -> Number:
-        """What the whole cycle needs, the sum of its terms: N times (2) [us]."""
+        """Time that the whole cycle needs, the sum of its terms: N times (2) [us]."""
         return total(self.by_term.values())
 
     @property
     def most_required_us(self) -> Number:
-        """No less than it needs with any number of nodes up to its own, where one more can make it shorter [us]."""
+        """Upper bound over all smaller node counts, where one node more can make a cycle shorter [us]."""
         return self.required_us
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:  # noqa: ARG002 - most just grow by it
-        """What the whole cycle grows by if what it transmits takes longer [us].
+        """Growth of the whole cycle if its transmissions take longer [us].
 
         Parameters
         ----------
@@ -201,15 +201,15 @@ class BusCycle(ABC):
         return extra_us
 
     def bias_us(self) -> Number | None:
-        """What the bus takes beyond the timing model, on the mean [us]; None where nobody has measured it."""
+        """Time of the bus beyond the timing model, on the mean [us]; None where nobody has measured it."""
         return None
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """What is not known exactly; different inputs are independent."""
+        """Inputs that are not known exactly; different ones are independent."""
         return ()
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What the cycle could have and the profile does not say."""
+        """Parts that the cycle could have and the profile does not say."""
         return ()
 
     def events(self) -> Iterator[BusEvent]:
@@ -260,12 +260,12 @@ class BusCycle(ABC):
         return now_us + self.added_before_us(now_us) if arrived_us is None else arrived_us
 
     def added_before_us(self, sent_us: float) -> float:  # noqa: ARG002 - most runs go one behind the other
-        """What goes between the rounds of others before these have taken some time, in plain numbers [us].
+        """Time of events between the rounds, before the runs have taken some time, in plain numbers [us].
 
         Parameters
         ----------
         sent_us
-            What the runs take up to the round in question [us].
+            Time of the runs up to the round in question [us].
         """
         return 0.0
 
@@ -302,7 +302,7 @@ def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]
 
 
 def _rounds_us(run: Run, count: int) -> float:
-    """What the first rounds of a run take, of plain numbers [us]: as often as the mean one."""
+    """Time of the first rounds of a run, of plain numbers [us]: as many times their mean."""
     if not count:
         return 0.0
     events: Iterable[BusEvent] = run.events

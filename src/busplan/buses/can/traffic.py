@@ -1,4 +1,4 @@
-"""What a network sends: SYNC, the PDOs of its nodes, and other messages."""
+"""All that a network sends: SYNC, the PDOs of its nodes, and other messages."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache, reduce
@@ -36,7 +36,7 @@ class Pdos(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What they are called."""
+        """Name: feedback or command."""
         return NAMES[self.kind]
 
 
@@ -68,17 +68,17 @@ class Traffic(NamedTuple):
 
     def numbers(self) -> tuple[Number, ...]:
         """All its numbers in one row, as `with_numbers` takes them."""
-        pdos = (number for one in self.pdos for number in one[_PDO_WORDS:])
+        pdos = (number for each in self.pdos for number in each[_PDO_WORDS:])
         own: tuple[Any, ...] = self[:_OWN_NUMBERS]
-        return (*own, *pdos, *(number for one in self.messages for number in one[_MESSAGE_WORDS:]))
+        return (*own, *pdos, *(number for message in self.messages for number in message[_MESSAGE_WORDS:]))
 
     def with_numbers(self, *numbers: Number) -> "Traffic":
         """The same senders with other numbers, in the order of `numbers`."""
         rest: Iterator[Any] = iter(numbers)
         own = tuple(islice(rest, _OWN_NUMBERS))
-        pdos = tuple(Pdos(one.kind, one.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for one in self.pdos)
+        pdos = tuple(Pdos(each.kind, each.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for each in self.pdos)
         count = len(Message._fields) - _MESSAGE_WORDS
-        messages = tuple(Message(one.name, *islice(rest, count)) for one in self.messages)
+        messages = tuple(Message(message.name, *islice(rest, count)) for message in self.messages)
         return Traffic._make((*own, pdos, messages))
 
 
@@ -132,10 +132,10 @@ class Sent:
     def is_ordered(self) -> bool:
         """Whether identifiers and sizes of messages are plain, and no number is traced."""
         traffic = self.traffic
-        messages = (number for one in traffic.messages for number in (one.identifier, one.payload_bytes))
-        order = (traffic.sync_identifier, *(one.identifier for one in traffic.pdos), *messages)
-        return all(isinstance(one, int | float) for one in order) and not any(
-            isinstance(one, Traced) for one in traffic.numbers()
+        messages = (number for message in traffic.messages for number in (message.identifier, message.payload_bytes))
+        order = (traffic.sync_identifier, *(pdos.identifier for pdos in traffic.pdos), *messages)
+        return all(isinstance(number, int | float) for number in order) and not any(
+            isinstance(number, Traced) for number in traffic.numbers()
         )
 
     @cached_property
@@ -163,40 +163,40 @@ class _Senders(NamedTuple):
 
 
 def traffic_of(network: Network) -> Traffic:
-    """What a network sends."""
+    """All that a network sends."""
     senders = [
         _Senders(
-            one.name,
-            one.said,
-            one.nodes,
-            one.axes,
-            {"read": one.read_bytes, "write": one.write_bytes},
-            one.read_execution_us + one.worst_extra_us,
+            group.name,
+            group.said,
+            group.nodes,
+            group.axes,
+            {"read": group.read_bytes, "write": group.write_bytes},
+            group.read_execution_us + group.worst_extra_us,
         )
-        for one in network.groups
+        for group in network.groups
     ]
     return _traffic(network.profile, senders, network.period_us)
 
 
 def traffic_of_profile(profile: Any) -> Traffic:
-    """What the network of a profile sends, for who has no network."""
+    """All that the network of a profile sends, where no network has been made of it."""
     senders = [
         _Senders(
-            one.name,
-            one,
-            one.nodes,
-            one.node.axes,
-            {kind: one.bytes_of(kind) for kind in TRANSACTION_KINDS},
-            one.node.execution.execution_us(one.bytes_of("read")) + one.node.execution.worst_extra_us,
+            group.name,
+            group,
+            group.nodes,
+            group.node.axes,
+            {kind: group.bytes_of(kind) for kind in TRANSACTION_KINDS},
+            group.node.execution.execution_us(group.bytes_of("read")) + group.node.execution.worst_extra_us,
         )
-        for one in profile.alike_nodes
+        for group in profile.alike_nodes
     ]
     return _traffic(profile, senders, profile.cycle.period_us)
 
 
 def without_times(traffic: Traffic) -> Traffic:
     """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
-    messages = tuple(one._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for one in traffic.messages)
+    messages = tuple(message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for message in traffic.messages)
     return traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, read_us=0.0, host_us=0.0, messages=messages)
 
 
@@ -219,32 +219,32 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number) -> Tr
         identifier_bits=bus.identifier_bits,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
-        read_us=reduce(larger, (one.read_us for one in senders)),
+        read_us=reduce(larger, (sender.read_us for sender in senders)),
         host_us=host_us(bus),
-        pdos=tuple(_pdos(one, kind, place) for kind in TRANSACTION_KINDS for place, one in enumerate(senders)),
+        pdos=tuple(_pdos(sender, kind, place) for kind in TRANSACTION_KINDS for place, sender in enumerate(senders)),
         messages=tuple(
             Message(
-                one.name,
-                one.identifier,
-                one.payload_bytes,
-                one.period_us,
-                one.jitter_us,
-                one.period_us if one.deadline_us is None else one.deadline_us,
+                message.name,
+                message.identifier,
+                message.payload_bytes,
+                message.period_us,
+                message.jitter_us,
+                message.period_us if message.deadline_us is None else message.deadline_us,
             )
-            for one in profile.message
+            for message in profile.message
         ),
     )
 
 
-def _pdos(one: _Senders, kind: TransactionKind, place: int) -> Pdos:
-    payload = one.said.payload
+def _pdos(sender: _Senders, kind: TransactionKind, place: int) -> Pdos:
+    payload = sender.said.payload
     said = getattr(payload, f"{NAMES[kind]}_identifier")
     first = FOLLOWS if place else int(_FIRST[kind])
-    each = larger(one.axes, 1) if payload.pdo_per == "axis" else 1
+    each = larger(sender.axes, 1) if payload.pdo_per == "axis" else 1
     return Pdos(
         kind,
-        one.name,
+        sender.name,
         first if said is None else said,
-        one.nodes * each,
-        share_bytes(one.payloads_bytes[kind], pdos=each),
+        sender.nodes * each,
+        share_bytes(sender.payloads_bytes[kind], pdos=each),
     )

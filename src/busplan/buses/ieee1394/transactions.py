@@ -121,7 +121,9 @@ def ways(network: Network) -> tuple[Ways, ...]:
 
 def farthest_link(network: Network, name: str) -> Link:
     """The way that the farthest node of a group is charged, by the name of the group."""
-    place = next(place for place, group in enumerate(network.groups) if name in [one.name for one in group.members])
+    place = next(
+        place for place, group in enumerate(network.groups) if name in [member.name for member in group.members]
+    )
     return link_of(network, ways(network)[place].last)
 
 
@@ -243,16 +245,16 @@ def _parts(kind: TransactionKind, phases: Phases, answer: "Answer") -> Iterator[
     yield host._replace(rests_on="host.transaction_us")
 
 
-def events(one: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
+def events(exchanged: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
     """The parts of one transaction, of plain numbers; its idle bus is divided by idle period and gap."""
-    before, behind = _added_up(one.phases) if model == "paper" else _by_idle_period(one)
-    for part in one.parts:
+    before, behind = _added_up(exchanged.phases) if model == "paper" else _by_idle_period(exchanged)
+    for part in exchanged.parts:
         if part.kind == "idle":
-            yield from (gap._replace(transaction=one.kind) for gap in behind)
+            yield from (gap._replace(transaction=exchanged.kind) for gap in behind)
         else:
             yield part
             if part.kind == "worst_extra":
-                yield from (gap._replace(transaction=one.kind) for gap in before)
+                yield from (gap._replace(transaction=exchanged.kind) for gap in before)
 
 
 _Divided = tuple[tuple[BusEvent, ...], tuple[BusEvent, ...]]
@@ -270,12 +272,12 @@ def _added_up(phases: Phases) -> _Divided:
     return (), (subaction, _gap("arbitration_reset_gap", reset_us, "arbitration reset gap"))
 
 
-def _by_idle_period(one: Exchange) -> _Divided:
+def _by_idle_period(exchanged: Exchange) -> _Divided:
     """The gap that each idle period waits for, and what a faster node would take beyond."""
-    phases = one.phases
+    phases = exchanged.phases
     sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
     idle_us = plain(phases.idle_us)
-    if one.responder.answer != "split":
+    if exchanged.responder.answer != "split":
         return (), (_gap("arbitration_reset_gap", idle_us, "arbitration reset gap behind the transaction"),)
     execution_us = plain(phases.execution_us) + plain(phases.worst_extra_us)
     before_us = max(sub_us - execution_us, 0.0)

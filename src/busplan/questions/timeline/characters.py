@@ -49,7 +49,7 @@ def timeline_lines(schedule: Schedule, *, width: int) -> list[Line]:
     Parameters
     ----------
     schedule
-        The schedule, narrowed to its window.
+        The cycle, narrowed to its window.
     width
         Width of the drawing, in columns.
     """
@@ -62,14 +62,14 @@ def timeline_lines(schedule: Schedule, *, width: int) -> list[Line]:
 def _strip(schedule: Schedule, *, width: int) -> Iterator[Line]:
     """The whole period in one row, transaction by transaction, the time beyond its slice, and a row for each model."""
     parts, behind, bars = stretches(schedule.cycle_events), rest(schedule), model_bars(schedule)
-    styles = {one.kind: kind_of(schedule.profile, one.kind) for one in parts}
-    rows = {"cycle": [(styles[one.kind].mark, one.event) for one in parts]}
+    styles = {part.kind: kind_of(schedule.profile, part.kind) for part in parts}
+    rows = {"cycle": [(styles[part.kind].mark, part.event) for part in parts]}
     legend = [f"{style.mark} {style.label}" for style in styles.values()]
     if behind is not None:
         rows["cycle"].append((_PERIOD_MARKS[REST], behind))
-    for one in bars:
-        rows[one.timing_model] = [(_PERIOD_MARKS[part.label], _event(schedule, part)) for part in one.spans]
-    shown = {part.label for one in bars for part in one.spans}
+    for bar in bars:
+        rows[bar.timing_model] = [(_PERIOD_MARKS[part.label], _event(schedule, part)) for part in bar.spans]
+    shown = {part.label for bar in bars for part in bar.spans}
     if overruns(schedule):
         rows["over"] = [(_OVER, beyond(schedule))]
     legend += [f"{mark} {label}" for label, mark in _PERIOD_MARKS.items() if label in shown]
@@ -77,11 +77,11 @@ def _strip(schedule: Schedule, *, width: int) -> Iterator[Line]:
         rows["window"] = [(_WINDOW, _event(schedule, PeriodPart("", schedule.from_us, schedule.to_us)))]
         legend.append(f"{_WINDOW} shown below")
     gutter = max(map(len, rows))
-    bar = _Bar(0.0, period_end_us(schedule, bars), width - gutter - 3)
-    yield Line(f"{period_title(schedule)}, {bar.per_column}", "heading")
+    scale = _Bar(0.0, period_end_us(schedule, bars), width - gutter - 3)
+    yield Line(f"{period_title(schedule)}, {scale.per_column}", "heading")
     for label, row in rows.items():
-        yield Line(f"{label:<{gutter}} |{bar.cells(row)}|", "fails" if label == "over" else "drawn")
-    yield bar.scale(gutter + 2)
+        yield Line(f"{label:<{gutter}} |{scale.cells(row)}|", "fails" if label == "over" else "drawn")
+    yield scale.scale(gutter + 2)
     yield from legend_lines(legend, width=width)
 
 

@@ -206,12 +206,12 @@ def _laid_out(parts: Iterable[BusEvent]) -> Iterator[Event]:
     Compensated summation (Neumaier) keeps rounding from growing with the number of events.
     """
     total_us = lost_us = start_us = 0.0
-    for one in parts:
-        us = plain(one.us)
+    for part in parts:
+        us = plain(part.us)
         larger_us, smaller_us = max(total_us, us), min(total_us, us)
         total_us = larger_us + smaller_us
         lost_us += (larger_us - total_us) + smaller_us
         end_us = total_us + lost_us
         if end_us > start_us:
-            yield Event(one.kind, one.node, one.transaction, one.packet, start_us, end_us, one.term, one.label)
+            yield Event(part.kind, part.node, part.transaction, part.packet, start_us, end_us, part.term, part.label)
             start_us = end_us

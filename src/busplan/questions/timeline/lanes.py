@@ -103,13 +103,13 @@ def event_lanes(schedule: Schedule) -> tuple[Lane, ...]:
 
 def stretches(events: Sequence[Event]) -> tuple[Stretch, ...]:
     """Merge the events of each transaction."""
-    found: list[Stretch] = []
+    merged: list[Stretch] = []
     owner: tuple[object, object] | None = None
     for event in events:
         if event.transaction is not None and (event.node, event.transaction) == owner:
-            whole = found[-1].event._replace(end_us=event.end_us)
-            found[-1] = found[-1]._replace(event=whole)
+            whole = merged[-1].event._replace(end_us=event.end_us)
+            merged[-1] = merged[-1]._replace(event=whole)
             continue
         owner = (event.node, event.transaction)
-        found.append(Stretch(event.transaction or event.kind, event))
-    return tuple(found)
+        merged.append(Stretch(event.transaction or event.kind, event))
+    return tuple(merged)

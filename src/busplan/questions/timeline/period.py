@@ -26,7 +26,7 @@ class PeriodPart(NamedTuple):
 
 
 class ModelBar(NamedTuple):
-    """What one timing model needs of the slice."""
+    """Time of the slice that a timing model needs."""
 
     timing_model: str
     figures: CapacityFigures
@@ -52,12 +52,12 @@ class ModelBar(NamedTuple):
 
 
 def model_bars(schedule: Schedule) -> tuple[ModelBar, ...]:
-    """What each timing model that can express the profile needs of its slice.
+    """Time of the slice that each timing model needs which can express the profile.
 
     Parameters
     ----------
     schedule
-        The schedule, under one of them.
+        The cycle, under one of them.
     """
     drawn = schedule.figures
     return tuple(
@@ -68,7 +68,7 @@ def model_bars(schedule: Schedule) -> tuple[ModelBar, ...]:
 
 def period_end_us(schedule: Schedule, bars: tuple[ModelBar, ...]) -> float:
     """End of the period, or of a cycle that takes longer [us]."""
-    return max(schedule.figures.period_us, schedule.end_us, *(one.figures.required_us for one in bars))
+    return max(schedule.figures.period_us, schedule.end_us, *(bar.figures.required_us for bar in bars))
 
 
 def rest(schedule: Schedule) -> Event | None:

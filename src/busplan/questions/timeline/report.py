@@ -84,7 +84,7 @@ def timeline_chart(schedule: Schedule) -> Chart:
     Parameters
     ----------
     schedule
-        The schedule, narrowed to its window.
+        The cycle, narrowed to its window.
     """
     window = drawn_window(schedule)
     caption = joined(_most(window), charged(window), by="; ")
@@ -97,10 +97,10 @@ def timeline_chart(schedule: Schedule) -> Chart:
 def _most(window: Schedule) -> Sentence:
     """Say what takes most of the window."""
     model = f"by the {window.figures.timing_model} model"
-    busy = [one for one in totals(window) if one.kind != IDLE.key]
+    busy = [each for each in totals(window) if each.kind != IDLE.key]
     if not busy:
         return Sentence((f"Nothing but idle time {model}",))
-    most = max(busy, key=lambda one: one.total_us)
+    most = max(busy, key=lambda each: each.total_us)
     label = kind_of(window.profile, most.kind).label
     taken = ShownValue(most.total_us, TOTAL.key, "us", TOTAL.decimals)
     return sentence(f"Mostly {label}, {{}} {model}", taken)
@@ -109,8 +109,8 @@ def _most(window: Schedule) -> Sentence:
 def margins_sentence(schedule: Schedule) -> Sentence:
     """Say what each timing model leaves of the slice."""
     margins = (
-        sentence(f"{{}} by the {one.timing_model} model", figure_value(MARGIN, one.figures.margin_us))
-        for one in model_bars(schedule)
+        sentence(f"{{}} by the {bar.timing_model} model", figure_value(MARGIN, bar.figures.margin_us))
+        for bar in model_bars(schedule)
     )
     return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
 
@@ -121,7 +121,7 @@ def totals_table(schedule: Schedule) -> Table:
     Parameters
     ----------
     schedule
-        The schedule, narrowed to its window.
+        The cycle, narrowed to its window.
     """
     whole = "the cycle" if overruns(schedule) else "the slice"
     part = whole if schedule.is_whole else "the window"
@@ -130,14 +130,14 @@ def totals_table(schedule: Schedule) -> Table:
             *(TableColumn("kind", kind="words"), TableColumn("eq", kind="words", rank=1)),
             *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
-        tuple(_total_row(schedule, one) for one in totals(schedule)),
+        tuple(_total_row(schedule, each) for each in totals(schedule)),
         sentence(f"What takes {part}, {{}}", ShownValue(schedule.to_us - schedule.from_us, "duration_us", "us", 3)),
     )
 
 
-def _total_row(schedule: Schedule, one: Total) -> TableRow:
-    kind = kind_of(schedule.profile, one.kind)
-    values = (attribute_value(figure, one) for figure in _TOTAL_FIGURES)
+def _total_row(schedule: Schedule, total: Total) -> TableRow:
+    kind = kind_of(schedule.profile, total.kind)
+    values = (attribute_value(figure, total) for figure in _TOTAL_FIGURES)
     return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 
@@ -173,10 +173,10 @@ def _facts(schedule: Schedule) -> JsonDocument:
 def timeline_document(schedule: Schedule) -> JsonDocument:
     """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
     margins = [
-        {"timing_model": one.timing_model, REQUIRED.key: one.figures.required_us, MARGIN.key: one.figures.margin_us}
-        for one in model_bars(schedule)
+        {"timing_model": bar.timing_model, REQUIRED.key: bar.figures.required_us, MARGIN.key: bar.figures.margin_us}
+        for bar in model_bars(schedule)
     ]
-    totals_ = [one._asdict() for one in totals(schedule)]
+    totals_ = [each._asdict() for each in totals(schedule)]
     return {**_facts(schedule), "margins": margins, "events": _event_records(schedule), "totals": totals_}
 
 

@@ -65,7 +65,7 @@ def timeline_svg(schedule: Schedule, *, title: str, inline: bool = False) -> str
     Parameters
     ----------
     schedule
-        The schedule, narrowed to its window.
+        The cycle, narrowed to its window.
     title
         Title: its message in a sentence.
     inline
@@ -112,24 +112,24 @@ def _strip(body: Element, schedule: Schedule, window: Schedule, *, y: int) -> in
         shown_part = schedule.cycle_events[0]._replace(start_us=window.from_us, end_us=window.to_us)
         scale.rect(body, shown_part, y=y - 2, height=_BAR + 4, css="window", title=_tip("drawn below", shown_part))
     top, y, ends = y + _BAR, y + _BAR + 4, []
-    for one in bars:
-        y = _model(body, one, scale, y=y)
+    for bar in bars:
+        y = _model(body, bar, scale, y=y)
         ends.append(y)
     if behind is not None or overruns(schedule):
         x = f"{scale.percent(schedule.figures.available_us):.5g}%"
         css = "edge" if overruns(schedule) else "end"
         # Not through the words between the bars.
-        for from_, to in ((top - _BAR - 3, top + 3), *((one - _THIN - 4, one) for one in ends)):
+        for from_, to in ((top - _BAR - 3, top + 3), *((end - _THIN - 4, end) for end in ends)):
             SubElement(body, "line", {"x1": x, "x2": x, "y1": str(from_), "y2": str(to), "class": css})
     return scale.marks(body, top=y, bottom=y)
 
 
-def _model(body: Element, one: ModelBar, scale: Scale, *, y: int) -> int:
+def _model(body: Element, bar: ModelBar, scale: Scale, *, y: int) -> int:
     """Draw what a timing model needs and leaves of the slice, and return the y below it."""
-    text_at(body, f"{one.timing_model}: {one.words}", x="0", y=y + 14, css="small")
-    for part in one.spans:
+    text_at(body, f"{bar.timing_model}: {bar.words}", x="0", y=y + 14, css="small")
+    for part in bar.spans:
         css = _PERIOD_CSS[part.label]
-        tip = f"{part.label} by the {one.timing_model} model, {time_text(part.end_us - part.start_us)} us"
+        tip = f"{part.label} by the {bar.timing_model} model, {time_text(part.end_us - part.start_us)} us"
         scale.rect(body, part, y=y + LINE, height=_THIN, css=css, title=tip)
     return y + LINE + _THIN + 2
 
@@ -138,9 +138,9 @@ def _strip_legend(
     body: Element, schedule: Schedule, parts: Iterable[Stretch], bars: Iterable[ModelBar], *, y: int
 ) -> int:
     """Draw the colours of the strip and of the models, wrapped for a phone, and return the y below them."""
-    kinds = (kind_of(schedule.profile, one.kind) for one in parts)
+    kinds = (kind_of(schedule.profile, part.kind) for part in parts)
     colours: dict[str, str] = {kind.label: kind.ink for kind in kinds}
-    colours |= {part.label: _PERIOD_CSS[part.label] for one in bars for part in one.spans}
+    colours |= {part.label: _PERIOD_CSS[part.label] for bar in bars for part in bar.spans}
     x = 0
     for label, css in colours.items():
         width = 30 + 7 * len(label)
@@ -181,10 +181,10 @@ class _Bars(NamedTuple):
             for event in events:
                 self._bar(event.kind, event_title(event), event, y=y, height=height)
             return
-        for one in stretches(events):
-            label = kind_of(self.schedule.profile, one.kind).label
-            owner = label if one.event.node is None else f"{one.kind} of node {one.event.node}"
-            self._bar(one.kind, owner, one.event, y=y, height=height)
+        for stretch in stretches(events):
+            label = kind_of(self.schedule.profile, stretch.kind).label
+            owner = label if stretch.event.node is None else f"{stretch.kind} of node {stretch.event.node}"
+            self._bar(stretch.kind, owner, stretch.event, y=y, height=height)
 
     def _bar(self, kind: str, title: str, event: Event, *, y: int, height: int) -> None:
         css = kind_of(self.schedule.profile, kind).ink
@@ -242,11 +242,11 @@ def _legend(body: Element, schedule: Schedule, *, y: int) -> int:
     text_at(body, "kind", x="20", y=y + 15, css="head")
     text_at(body, "us", x="240", y=y + 15, css="head", anchor="end")
     text_at(body, "share, %", x="310", y=y + 15, css="head", anchor="end")
-    for one in totals(schedule):
+    for total in totals(schedule):
         y += LINE
-        kind = kind_of(schedule.profile, one.kind)
+        kind = kind_of(schedule.profile, total.kind)
         SubElement(body, "rect", {"class": kind.ink, "y": str(y + 4), "width": "12", "height": "12"})
         text_at(body, kind.label, x="20", y=y + 15)
-        text_at(body, time_text(one.total_us), x="240", y=y + 15, anchor="end")
-        text_at(body, figure_text(figure_value(SHARE, one.share)), x="310", y=y + 15, anchor="end")
+        text_at(body, time_text(total.total_us), x="240", y=y + 15, anchor="end")
+        text_at(body, figure_text(figure_value(SHARE, total.share)), x="310", y=y + 15, anchor="end")
     return y + LINE
