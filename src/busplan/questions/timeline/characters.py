@@ -9,13 +9,13 @@ from busplan.forms.lines import BLANK, Line
 from busplan.forms.scale import ticks
 from busplan.questions.fit.network import bus_of
 from busplan.questions.timeline.events import Event, Schedule
-from busplan.questions.timeline.kinds import kind_of
 from busplan.questions.timeline.lanes import (
     Lane,
     beyond,
     drawn_window,
     event_lanes,
     has_event_lanes,
+    kind_of,
     node_lanes,
     only_owner,
     overruns,

@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from busplan.buses.parts import EventKind
 from busplan.forms.blocks import Sentence, ShownValue, count_value, figure_value, joined, sentence
 from busplan.forms.numbers import figure_text, nouns
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.timeline.events import TOTAL, Event, Schedule
-from busplan.questions.timeline.kinds import event_title
+from busplan.sections.profile import Profile
 
 MOST_EVENT_LANES: Final = 20
 """Up to this many events have a row each; more are drawn in a row for each node. A cycle of one node has 20."""
@@ -27,6 +28,17 @@ class Stretch(NamedTuple):
     """Kind of the transaction or of the event."""
     event: Event
     """Event from the start to the end of the stretch."""
+
+
+def kind_of(profile: Profile, key: str) -> EventKind:
+    """Name and style of an event, or of a stretch of events, on the profile's kind of bus."""
+    return bus_of(profile).event_kind(key)
+
+
+def event_title(event: Event) -> str:
+    """Name of an event with its transaction."""
+    owner = f"{event.transaction} of node {event.node}: " if event.node is not None else ""
+    return f"{owner}{event.label}"
 
 
 def time_text(time_us: float) -> str:

@@ -32,8 +32,7 @@ from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.network import bus_of
 from busplan.questions.timeline.characters import timeline_lines
 from busplan.questions.timeline.events import EVENTS, SHARE, TOTAL, Schedule, Total, totals
-from busplan.questions.timeline.kinds import kind_of
-from busplan.questions.timeline.lanes import charged, drawn_window, overruns
+from busplan.questions.timeline.lanes import charged, drawn_window, kind_of, overruns
 from busplan.questions.timeline.period import model_bars
 from busplan.questions.timeline.svg import STYLE, is_coarse, timeline_svg
 from busplan.questions.words.documents import document

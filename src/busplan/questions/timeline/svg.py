@@ -10,14 +10,15 @@ from busplan.forms.numbers import figure_text
 from busplan.forms.picture import styled
 from busplan.forms.svg import LINE, PHONE, Scale, drawing, inside, markup, paragraph, text_at
 from busplan.questions.timeline.events import SHARE, Event, Schedule, totals
-from busplan.questions.timeline.kinds import event_title, kind_of
 from busplan.questions.timeline.lanes import (
     Stretch,
     beyond,
     charged,
     drawn_window,
     event_lanes,
+    event_title,
     has_event_lanes,
+    kind_of,
     node_lanes,
     only_owner,
     overruns,
