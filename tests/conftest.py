@@ -6,47 +6,72 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import chdir
+from functools import partial
 from io import BufferedWriter, BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
+from shutil import copytree
 from threading import Thread
 from typing import IO, Any
 from unittest import mock
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from busplan.cli import run as run_command_line
 
 Git = Callable[..., bytes]
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
-# Hundreds of runs of the program compile its modules once, as those of a user do, and not in each run again.
+# Modules, and tests with their assertions, are compiled once and not in each process again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 # Matrices are small, and every processor has a test of its own.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Few examples in each run, and new ones in the next; a slow one is no failure where the machine is shared.
+# After a change of a computation: pytest --hypothesis-profile=thorough
+EASY = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+settings.register_profile("quick", EASY, max_examples=20)
+settings.register_profile("thorough", EASY, max_examples=500)
+settings.load_profile("quick")
+
+
+collect_ignore = ["oracles", "attacks/fuzz.py", "readme/refresh.py"]
+"""Modules without a test or a doctest, which would load their libraries in every worker."""
+
+
+def run_git(*arguments: str, cwd: Path) -> bytes:
+    """Run git, untouched by the user's own settings; gives what it writes."""
+    outside = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
+    settings = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1"}
+    author = ("-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "init.defaultBranch=main")
+    return subprocess.run(
+        ["git", *author, *arguments], check=True, cwd=cwd, env={**outside, **settings}, capture_output=True
+    ).stdout
 
 
 @pytest.fixture
 def git(tmp_path: Path) -> Git:
-    """Run git in a new repository, untouched by the user's own settings; gives what it writes."""
+    """Run git in a new repository."""
     folder = tmp_path / "repository"
     folder.mkdir()
-    outside = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
-    settings = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1"}
-    author = ("-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "init.defaultBranch=main")
-
-    def call(*arguments: str, cwd: Path = folder) -> bytes:
-        return subprocess.run(
-            ["git", *author, *arguments], check=True, cwd=cwd, env={**outside, **settings}, capture_output=True
-        ).stdout
-
-    call("init", "--quiet")
-    return call
+    run_git("init", "--quiet", "--template=", cwd=folder)
+    return partial(run_git, cwd=folder)
 
 
 @pytest.fixture
-def repository(git: Git, tmp_path: Path) -> Path:
+def repository(git: Git, committed: Path, tmp_path: Path) -> Path:
+    """A repository of the test's own, with what is committed in every one."""
+    del git  # which has made the folder
+    return Path(copytree(committed, tmp_path / "repository", symlinks=True, dirs_exist_ok=True))
+
+
+@pytest.fixture(scope="session")
+def committed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A repository with two commits: profiles/line.toml at 4 ms, then at 1 ms, tagged v1 and main; and odd files."""
-    folder = tmp_path / "repository"
+    folder = tmp_path_factory.mktemp("committed")
+    git = partial(run_git, cwd=folder)
+    git("init", "--quiet", "--template=")
     line = folder / "profiles" / "line.toml"
     line.parent.mkdir()
     line.write_text(LINE, encoding="utf-8")

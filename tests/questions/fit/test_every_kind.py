@@ -6,7 +6,7 @@ from math import fsum
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.buses import kind_named, kind_names
@@ -22,8 +22,8 @@ from busplan.questions.fit.node_limit import most_nodes, safe_nodes
 from busplan.sections.profile import Profile
 
 Profiles = Mapping[str, st.SearchStrategy[Profile]]
-SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 KINDS = pytest.mark.parametrize("kind", kind_names())
+SOME = settings(max_examples=10)  # of each kind
 PLACES = st.lists(st.integers(2, 68), min_size=4, max_size=4).map(lambda places: {0, 1, *places})
 """Some of an array, the first two always."""
 
