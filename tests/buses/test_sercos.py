@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named
-from busplan.buses.periods import ANY_PERIOD, Periods
+from busplan.buses.limits import ANY_PERIOD, Periods
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.fit.figures import figures

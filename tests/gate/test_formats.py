@@ -31,7 +31,7 @@ from busplan.gate.gate import FileResult, check_document
 from busplan.gate.registry import all_rules
 from busplan.gate.report import CheckReport
 from busplan.profile.document import Document, Spot
-from busplan.profile.schema import profile_schema
+from busplan.profile.kinds import profile_schema
 from busplan.profile.shipped import load, shipped_names
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -10,8 +10,8 @@ from functools import cached_property
 from itertools import chain
 from typing import ClassVar, Final, Literal, NamedTuple, TypeAlias
 
-from busplan.buses.figure import REQUIRED, Figure
-from busplan.buses.network import Network
+from busplan.buses.figure import REQUIRED, Figure, term_name
+from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, is_off, plain, total
 
 Rounds: TypeAlias = Literal["all", "first", "but first"]
@@ -32,7 +32,7 @@ class Term(NamedTuple):
     @property
     def name(self) -> str:
         """Name beside the other terms."""
-        return self.key.removeprefix("cycle_").removesuffix("_us")
+        return term_name(self.key)
 
 
 class BusEvent(NamedTuple):
@@ -154,6 +154,9 @@ class BusCycle(ABC):
     network: Network
     term_figures: ClassVar[tuple[Figure, ...]]
     """One for each term, in their order."""
+    command_events: ClassVar[tuple[tuple[str | None, str], ...]] = ()
+    """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
+    cycle. Those of no one node are the command of all."""
 
     @abstractmethod
     def written(self) -> Iterator[BusEvent | Run]:
@@ -204,6 +207,29 @@ class BusCycle(ABC):
         """Time of the bus beyond the timing model, on the mean [us]; None where nobody has measured it."""
         return None
 
+    def sync_jitter_us(self) -> Number:
+        """Jitter of the synchronous packet that the cycle's own traffic makes, either way of its mean [us]."""
+        return 0.0
+
+    def taking_us(self, group: Group) -> float:
+        """From a command's arrival at a node of a group to its effect: the slowest execution of a write [us]."""
+        return plain(group.write_execution_us + group.worst_extra_us)
+
+    def sampled_us(self) -> float:
+        """When nodes sample the feedback that a cycle carries, from its start; of plain numbers [us]."""
+        return 0.0
+
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """Whole periods inside a loop on the host, from the cycle of a sample to that of its command [1].
+
+        Parameters
+        ----------
+        at_sync
+            Whether commands take effect at the next synchronous point, which is counted; otherwise they do when they
+            arrive, which comes on top.
+        """
+        return 1 if at_sync else 0
+
     def doubts(self) -> tuple[Doubt, ...]:
         """Inputs that are not known exactly; different ones are independent."""
         return ()
@@ -231,20 +257,13 @@ class BusCycle(ABC):
         nodes = [int(plain(group.nodes)) for group in self.network.groups]
         return sum(nodes[: run.group]) + 1, int(plain(run.times or 1)) // nodes[run.group]
 
-    def arrival_us(self, node: int, commands: Container[tuple[str | None, str]]) -> float:
-        """When the last event of a node's command ends, from the start of a cycle of plain numbers [us].
+    def arrival_us(self, node: int) -> float:
+        """When a node has its command, from the start of a cycle of plain numbers [us].
 
         Parameters
         ----------
         node
             Number of the node, from 1.
-        commands
-            Transaction and kind of the events of a command; those of no one node are the command of all.
-
-        Returns
-        -------
-        float
-            The end of the whole cycle where it has no such events.
         """
         arrived_us, now_us = None, 0.0
         for run in self.runs:
@@ -252,7 +271,7 @@ class BusCycle(ABC):
             count = 1 if run.times is None else int(plain(run.times))
             before = (node - first + 1) * each - 1 if run.group is not None else count - 1
             if 0 <= before < count:
-                until_us = _until_us(run, before, commands)
+                until_us = _until_us(run, before, self.command_events)
                 if until_us is not None:
                     begins_us = now_us + _rounds_us(run, before)
                     arrived_us = begins_us + self.added_before_us(begins_us) + until_us

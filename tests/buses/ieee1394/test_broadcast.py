@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
+from busplan.buses.ieee1394.kind import packets_of
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
@@ -227,7 +228,7 @@ def test_no_execution_time_and_no_answer_of_a_node_plays_a_part() -> None:
     assert required_us(override(DVRK, slow)) == required_us(DVRK)
     assert not bus_of(DVRK).has_execution(network_of(DVRK))
     with pytest.raises(BusplanError, match="so none can be found"):
-        bus_of(DVRK).halves(network_of(DVRK), group="full", model="standard", kind="read", payload_bytes=4)
+        packets_of(network_of(DVRK), "full", "standard", "read", 4)
 
 
 def test_the_paper_cannot_express_it() -> None:

@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.buses.sercos2.constants import PERIODS
-from busplan.buses.sercos2.equations import start_us, telegram_bits, telegram_us
+from busplan.buses.sercos2.equations import PERIODS, start_us, telegram_bits, telegram_us
 
 FLAG = [0, 1, 1, 1, 1, 1, 1, 0]
 

@@ -8,8 +8,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from busplan.buses import kind_named
-from busplan.buses.sercos3.constants import PERIODS
 from busplan.buses.sercos3.cycle import TELEGRAMS, Sercos3Cycle
+from busplan.buses.sercos3.equations import PERIODS
 from busplan.buses.sercos3.evidence import most_drives
 from busplan.buses.sercos3.section import Sercos3Profile
 from busplan.elementwise import plain

@@ -39,7 +39,7 @@ PLACES = {"paper": "first", "standard": "second"}
 """Where each timing model stands, which its colour goes by."""
 SVG = "{http://www.w3.org/2000/svg}"
 BASE = load("paper-4ms").profile
-TERMS = kind_named("ieee1394").term_figures
+TERMS = kind_named("ieee1394").figures.terms
 NAMES = (
     "</title><script>alert(1)</script> \"><img src=x onerror=alert(1)> ' autofocus onfocus='alert(1)",
     "]]>--><!-- ${x} {{7*7}} {% raw %} #{x} </style></svg><b>&amp;&#60;",

@@ -68,7 +68,7 @@ def assert_rows_are_those_of_capacity(
 ) -> None:
     points = 0
     models = grid_models(profile, grid, None if model is None else (model,), name="--timing")
-    sorts = {figure.key: figure.sort for figure in bus_of(profile).capacity_figures}
+    sorts = {figure.key: figure.sort for figure in bus_of(profile).figures.capacity}
 
     def written(name: str, wanted: object) -> str:
         # A number that a timing model does not have is NaN in an array.

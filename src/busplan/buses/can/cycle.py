@@ -53,6 +53,7 @@ class CanCycle(BusCycle):
     """
 
     term_figures = TERMS
+    command_events = (("command", "command_frame"),)
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
@@ -284,6 +285,14 @@ class CanCycle(BusCycle):
             "pipeline_us": self.network.profile.bus.pipeline_cycles * self.network.period_us,
         }
         return _numbered(parts_us, identifier=inf, data_bytes=inf, instance=inf, deadline_us=inf)
+
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """The host's pipeline, and the period to the next SYNC."""
+        return super().loop_periods(at_sync=at_sync) + int(plain(self.network.profile.bus.pipeline_cycles))
+
+    def sync_jitter_us(self) -> Number:
+        """Half of what messages may hold SYNC up [us]."""
+        return self.sync_spread_us / 2
 
     @cached_property
     def sync_spread_us(self) -> Number:

@@ -9,8 +9,7 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind
 from busplan.buses.sercos import SercosCycle, delays, word_bytes
-from busplan.buses.sercos2.constants import GAP_SHARE, MST_BYTES, RECORD_BYTES
-from busplan.buses.sercos2.equations import start_us, telegram_us
+from busplan.buses.sercos2.equations import GAP_SHARE, MST_BYTES, RECORD_BYTES, start_us, telegram_us
 from busplan.buses.sercos2.figures import MDT_BYTES, TERMS
 from busplan.elementwise import Number, named, plain, total
 

@@ -9,7 +9,7 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind
 from busplan.buses.sercos import SercosCycle, delays
-from busplan.buses.sercos3.constants import (
+from busplan.buses.sercos3.equations import (
     BYTE_US,
     CHANNEL_US,
     DEVICE_DELAY_SHARE,
@@ -19,8 +19,6 @@ from busplan.buses.sercos3.constants import (
     MASTER_JITTER_SHARE,
     MOST_BYTES,
     OVERHEAD_BYTES,
-)
-from busplan.buses.sercos3.equations import (
     Filling,
     padded_bytes,
     ring_delay_us,

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.node_time import NODE_LIMIT
+from busplan.buses.limits import NODE_LIMIT
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.compare.kinds import compare
