@@ -30,8 +30,8 @@ from busplan.questions.plan.planning import plan
 from busplan.questions.plan.report import plan_report
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import sweep
+from busplan.questions.sweep.digest import Digest, default_columns
 from busplan.questions.sweep.grid import Listed, checked_grid
-from busplan.questions.sweep.top import Tally, TopRows, default_columns, sweep_report
 from busplan.questions.timeline.events import schedule
 from busplan.questions.timeline.report import timeline_report
 from busplan.sections.profile import Profile
@@ -50,11 +50,10 @@ def swept(profile: Profile) -> Report:
     models = model_names(profile)
     asked = Sweep(profile, grid, tuple(models), ())
     columns = (*grid.axes, "timing_model", *default_columns(asked))
-    rows, tally = TopRows(columns, sort_by=None, ascending=False, top=20), Tally(asked)
+    digest = Digest(asked._replace(columns=columns), top=20)
     for block in sweep(profile, grid, timing_models=models):
-        rows.add(block)
-        tally.add(block)
-    return sweep_report(rows, tally, document=dict)
+        digest.add(block)
+    return digest.report(dict)
 
 
 def several(profile: Profile) -> Report:

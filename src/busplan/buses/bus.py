@@ -6,7 +6,7 @@ numbers.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -17,7 +17,6 @@ from busplan.buses.rule import Rule
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
     from busplan.sections.profile import Profile
 from busplan.buses.cycle import BusCycle
 from busplan.buses.parts import (
@@ -70,8 +69,6 @@ class Bus(ABC):
     """What would take a term of its own out of the cycle, each new values by dotted key."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
     """Data files, in busplan/data, with figures of it that others have published or measured."""
-    evidence_profiles: ClassVar[tuple[str, ...]] = ()
-    """Shipped profiles that these figures are compared on."""
 
     def profile_model(self) -> "type[Profile]":
         """The model of its profiles: that of module `section` beside the kind's own, which loads pydantic."""
@@ -123,21 +120,9 @@ class Bus(ABC):
         """What to beware of, whatever the verdict, with each of some numbers of nodes on the bus."""
         return []
 
-    def evidence(
-        self,
-        networks: Mapping[str, Network],  # noqa: ARG002 - a kind may have none
-        published: Mapping[str, Mapping[str, Any]],  # noqa: ARG002
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare figures that others have published or measured with what its equations give.
-
-        Parameters
-        ----------
-        networks
-            Those of `evidence_profiles`, by name.
-        published
-            What each of `evidence_data` holds, by name.
-        """
-        return ()
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Functions that rows of evidence name beside its figures: of a cycle and what the row gives."""
+        return {}
 
     def limit(self, key: str) -> Limit | None:
         """The limit of a key; None for time, which is no limit of the bus."""

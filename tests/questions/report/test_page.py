@@ -164,7 +164,7 @@ def parts(report: Report) -> dict[str, Chapter]:
 def documents() -> dict[str, Any]:
     subject, _ = whole()
     found = sources(subject.answer, argument=subject.argument, changes=subject.changes)
-    return {name: source.document for name, source in found.items()}
+    return {name: source.document() for name, source in found.items()}
 
 
 def test_only_the_parts_in_their_order() -> None:

@@ -1,7 +1,7 @@
 """CAN 2.0 with a CANopen cycle, as a kind of bus."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.can import rules
@@ -20,9 +20,6 @@ from busplan.buses.can.limits import LIMITS
 from busplan.buses.network import Network
 from busplan.buses.parts import Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.elementwise import plain
-
-if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
 
 _HOST_STEP_US: Final = 10.0
 
@@ -123,15 +120,11 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         """The bit rate."""
         return (f"{network.profile.bus.bit_rate_kbit_s} kbit/s",)
 
-    def evidence(
-        self,
-        networks: Mapping[str, Network],  # noqa: ARG002 - it is asked for frames and messages alone
-        published: Mapping[str, Mapping[str, Any]],
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare published frames, loads and response times with what the equations give."""
-        from busplan.buses.can.evidence import can_sections  # one command alone asks for it
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Those of `busplan.buses.can.evidence`."""
+        from busplan.buses.can.evidence import FUNCTIONS  # one command alone asks for them
 
-        return can_sections(published["can"], published["paper"])
+        return FUNCTIONS
 
 
 def _all_nodes(network: Network) -> str:

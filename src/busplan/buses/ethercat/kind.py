@@ -1,7 +1,7 @@
 """EtherCAT, as a kind of bus."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
 
 from busplan.buses.bus import Bus
 from busplan.buses.ethercat.cycle import EVENTS, LAST_BYTE, STRETCHES, VENDORS, EthercatCycle
@@ -20,9 +20,6 @@ from busplan.buses.ethercat.traffic import datagrams, layout
 from busplan.buses.network import Network
 from busplan.buses.parts import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.elementwise import plain
-
-if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
 
 _PROCESS_DATA = "bus.process_data"
 _MASTER_STEP_US = 10.0
@@ -88,7 +85,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         {"bus.mailbox_polls": 0},
     )
     evidence_data = ("ethercat",)
-    evidence_profiles = ("ethercat-servo-8",)
 
     def cycle(self, network: Network, *, model: str) -> EthercatCycle:
         """The cycle of a network under one timing model."""
@@ -146,15 +142,11 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         clocks = ("distributed clocks",) if network.profile.bus.distributed_clocks else ()
         return (layout(network), f"{count} frame{'s' * (count != 1)}", *clocks)
 
-    def evidence(
-        self,
-        networks: Mapping[str, Network],
-        published: Mapping[str, Mapping[str, Any]],
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare what vendors and others publish with what the equations give."""
-        from busplan.buses.ethercat.evidence import sections  # one command alone asks for it
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Those of `busplan.buses.ethercat.evidence`."""
+        from busplan.buses.ethercat.evidence import FUNCTIONS  # one command alone asks for them
 
-        return sections(networks["ethercat-servo-8"], published["ethercat"])
+        return FUNCTIONS
 
 
 BUS = Ethercat()

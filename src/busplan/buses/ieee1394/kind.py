@@ -1,7 +1,7 @@
 """IEEE 1394 (FireWire) up to S400, as a kind of bus."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
@@ -39,9 +39,6 @@ from busplan.buses.parts import (
 )
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-
-if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
 
 _HOST_STEP_US: Final = 10.0
 """How much slower the host is made, to see what that does to the margin."""
@@ -170,7 +167,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         {"cycle.retries": 0},
     )
     evidence_data = ("paper", "dvrk", "ieee1394")
-    evidence_profiles = ("paper-two-node", "dvrk")
 
     def cycle(self, network: Network, *, model: str) -> CycleWithStarts:
         """The cycle of a network under one timing model, by its schedule."""
@@ -269,18 +265,11 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             )
         return found
 
-    def evidence(
-        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare what is published of the paper's bench, of the dVRK and of the bus with what the equations give."""
-        from busplan.buses.ieee1394.evidence import kit_sections, standard_sections  # one command alone asks for it
-        from busplan.buses.ieee1394.paper import bus_sections
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Those of `busplan.buses.ieee1394.evidence`."""
+        from busplan.buses.ieee1394.evidence import FUNCTIONS  # one command alone asks for them
 
-        return (
-            *bus_sections(networks["paper-two-node"], published["paper"]),
-            *kit_sections(networks["dvrk"], published["dvrk"]),
-            *standard_sections(networks["paper-two-node"], published["ieee1394"]),
-        )
+        return FUNCTIONS
 
 
 BUS: Final = Ieee1394()

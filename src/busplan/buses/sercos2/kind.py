@@ -1,7 +1,7 @@
 """SERCOS I and II, as a kind of bus."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import ClassVar, Final
 
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
@@ -19,9 +19,6 @@ from busplan.buses.sercos2.equations import (
 )
 from busplan.buses.sercos2.figures import FIGURES
 from busplan.elementwise import plain
-
-if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
 
 _FASTEST: Final = 16
 
@@ -83,8 +80,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
         "node.execution.worst_extra_us": Key("T_extra"),
     }
-    evidence_data = ("sercos2", "paper")
-    evidence_profiles = ("sercos2-servo-8",)
+    evidence_data = ("sercos2",)
 
     def cycle(self, network: Network, *, model: str) -> Sercos2Cycle:
         """The cycle of a network under one timing model."""
@@ -114,14 +110,6 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         """The data rate and the gap."""
         bus = network.profile.bus
         return (f"{bus.data_rate_mbit_s} Mbit/s", f"gap of {bus.at_gap_us:g} us between two drives (assumed)")
-
-    def evidence(
-        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
-    ) -> "tuple[EvidenceSection, ...]":
-        """Say which gap between two drives would make the published number of axes fit."""
-        from busplan.buses.sercos2.evidence import axes_of_a_ring  # one command alone asks for it
-
-        return axes_of_a_ring(networks["sercos2-servo-8"], published["sercos2"], published["paper"])
 
 
 BUS: Final = Sercos2()

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import reduce
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import ClassVar, Final
 
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
@@ -27,9 +27,6 @@ from busplan.buses.sercos3.equations import (
 from busplan.buses.sercos3.figures import FIGURES
 from busplan.buses.sercos3.telegrams import SORTS, data_bytes, telegrams_of
 from busplan.elementwise import Number, larger, plain
-
-if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
 
 _METHOD: Final = "bus.timing_method"
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
@@ -112,7 +109,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         "node.execution.worst_extra_us": Key("T_extra"),
     }
     evidence_data = ("sercos3",)
-    evidence_profiles = ("sercos3-servo-8",)
 
     def cycle(self, network: Network, *, model: str) -> Sercos3Cycle:
         """The cycle of a network under one timing model."""
@@ -158,14 +154,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
             return []
         why = f"the master opens no channel for other frames of less than {LEAST_UCC_US:g} us"
         return [f"Warning: cycle.nonperiodic_us = {given_us:g}: {why}."]
-
-    def evidence(
-        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare the drives that are published of a network with those that the telegrams carry."""
-        from busplan.buses.sercos3.evidence import performance  # one command alone asks for it
-
-        return performance(networks["sercos3-servo-8"], published["sercos3"])
 
 
 BUS: Final = Sercos3()

@@ -56,6 +56,7 @@ _MEASURED_COLUMNS: Final = {
 
 
 _WORST: Final = "worst_extra_us"
+_OF_OUTLIERS: Final = ("expected_us", "off_us")
 
 
 def execution_keys(result: Calibration) -> dict[str, object]:
@@ -183,7 +184,7 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         uncertainty_us=result.uncertainty_us,
         at_most_us=result.at_most_us,
         rms_residual_us=result.rms_residual_us,
-        largest_residual=result.largest._asdict(),
+        largest_residual={key: value for key, value in result.largest._asdict().items() if key not in _OF_OUTLIERS},
         outliers=[one._asdict() for one in result.outliers],
         worst_extra_us=result.worst_extra_us,
         unchecked_bytes=list(result.unchecked_bytes),

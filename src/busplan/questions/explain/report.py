@@ -33,11 +33,13 @@ from busplan.questions.explain.capacity import OF_DOCUMENT, OF_SENSITIVITY
 from busplan.questions.explain.derivation import Derivation, Explanation, Step
 from busplan.questions.fit.figures import capacity
 from busplan.questions.words.documents import document, with_profile
-from busplan.sourced import DIGITS, short
+from busplan.sourced import DIGITS, Input, short
 
 _NONE: Final = Words("none")
 _NAMING: Final = ("name", "source", "input", "change")
 """Keys that name a part of a value, the first that it has."""
+_MOST_REPEATED: Final = 100
+"""A longer list of inputs is not shown again: with 200 messages there are 200 of 800 rows."""
 _SYMBOL: Final = TableColumn("symbol", kind="words")
 
 
@@ -53,7 +55,7 @@ def explain_report(explanation: Explanation) -> Report:
     name = found.profile.name
     return Report(
         Sentence(("Where ", Code(found.derivations[0].figure.key), " of ", Code(name), " comes from")),
-        lambda: [_section(one, name) for one in found.derivations],
+        lambda: tuple(_sections(found)),
         partial(_explain_document, found),
         lambda: with_profile(name, [record for one in found.derivations for record in _step_records(one)]),
     )
@@ -125,8 +127,24 @@ def _step_records(one: Derivation) -> Iterator[Record]:
         }
 
 
-def _section(one: Derivation, profile: str) -> Chapter:
-    """The result, its meaning, every step to it, and the inputs."""
+def _sections(explanation: Explanation) -> Iterator[Chapter]:
+    """A section for each derivation; a long list of inputs stands once."""
+    first: dict[tuple[Input, ...], Derivation] = {}
+    for derivation in explanation.derivations:
+        earlier = first.setdefault(derivation.inputs, derivation)
+        is_shown = earlier is derivation or len(derivation.inputs) <= _MOST_REPEATED
+        below = _inputs(derivation) if is_shown else _same_inputs(derivation, earlier)
+        yield _section(derivation, explanation.profile.name, below)
+
+
+def _same_inputs(derivation: Derivation, earlier: Derivation) -> Sentence:
+    kind = f"{earlier.transaction}, " if earlier.transaction else ""
+    words = f"It starts from the {len(derivation.inputs)} inputs of {kind}{earlier.timing_model} model"
+    return Sentence((f"{words}; the least well known is {derivation.weakest_grade}.",))
+
+
+def _section(one: Derivation, profile: str, below: Block) -> Chapter:
+    """The result, its meaning, every step to it, and what stands below them: the inputs."""
     figure = one.figure
     kind = f"{one.transaction}, " if one.transaction else ""
     title = Sentence(
@@ -137,8 +155,7 @@ def _section(one: Derivation, profile: str) -> Chapter:
     )
     about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}.",))
     steps = Calculation(tuple(map(_step, one.steps)))
-    found: tuple[Block, ...] = (about, steps, _inputs(one))
-    return Chapter(title, found)
+    return Chapter(title, (about, steps, below))
 
 
 def _result_parts(one: Derivation) -> tuple[Part, ...]:

@@ -28,7 +28,7 @@ from busplan.questions.map.characters import map_lines
 from busplan.questions.map.labels import LOOKS, limit_words, looks_of, map_title, setting_words, state_words
 from busplan.questions.map.svg import STYLE, map_svg
 from busplan.questions.map.trade_off import TradeOff
-from busplan.questions.sweep.top import payload_sentences
+from busplan.questions.sweep.digest import payload_sentences
 from busplan.questions.words.documents import document, with_profile
 from busplan.questions.words.own_picture import OwnPicture
 from busplan.questions.words.sentences import refused_circle

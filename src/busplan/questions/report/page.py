@@ -114,7 +114,7 @@ def _document(subjects: Sequence[_Subject]) -> JsonDocument:
     return document(
         "report",
         profiles=[
-            {"profile": one.name, "answers": {name: source.document for name, source in one.sources.items()}}
+            {"profile": one.name, "answers": {name: source.document() for name, source in one.sources.items()}}
             for one in subjects
         ],
     )
