@@ -14,7 +14,6 @@ from busplan.buses.figure import BusFigures
 from busplan.buses.limits import ANY_PERIOD, Periods
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
-from busplan.elementwise import plain
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
@@ -58,9 +57,6 @@ class Bus(ABC):
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""
-    command_events: ClassVar[tuple[tuple[str, str], ...]] = ()
-    """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
-    cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
     """What several events make together."""
     constants: ClassVar[Mapping[str, Sourced]] = {}
@@ -99,20 +95,6 @@ class Bus(ABC):
     def key_of(self, role: KeyRole) -> str:
         """The key that stands for a part of the machine; empty where the kind has none."""
         return next((name for name, key in self.keys.items() if key.role == role), "")
-
-    def arrivals_us(self, cycle: BusCycle) -> Mapping[int, float]:
-        """When each node has its command, by its number from 1, from the start of a cycle of plain numbers [us].
-
-        The last of its `command_events` has ended then; what belongs to no one node is the command of all.
-        """
-        found: dict[int, float] = {}
-        nodes, now_us = int(plain(cycle.network.nodes)), 0.0
-        for event in cycle.events():
-            now_us += event.us
-            if (event.transaction, event.kind) in self.command_events:
-                owners = range(1, nodes + 1) if event.node is None else (event.node,)
-                found |= dict.fromkeys(owners, now_us)
-        return found or dict.fromkeys(range(1, nodes + 1), now_us)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
         """What of the bus a plan may turn; it is asked again after each change of the network."""

@@ -14,15 +14,13 @@ from busplan.buses.can.constants import (
     PIPELINE_CYCLES,
     SYNC_IDENTIFIER,
 )
-from busplan.buses.can.cycle import NONE, WORST, CanCycle
-from busplan.buses.can.figures import BUS_LOAD, FIGURES
+from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle
+from busplan.buses.can.figures import FIGURES
 from busplan.buses.can.limits import LIMITS
-from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.elementwise import plain
 
-_DAVIS: Final = BUS_LOAD.reference
 _HOST_STEP_US: Final = 10.0
 
 
@@ -54,21 +52,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         measure="measure both on a node: SYNC to its frame, command to effect",
         base="from SYNC to a queued feedback PDO, and from a command PDO to its effect",
     )
-    command_events = (("command", "command_frame"),)
-    event_kinds = (
-        EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
-        EventKind("wait", "wait for nodes", "profile", "=", "work"),
-        EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "response"),
-        EventKind("command_frame", "command PDO", _DAVIS, ">", "request"),
-        EventKind("host", "host", "profile", "h", "idle"),
-        EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
-        EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("feedback", "feedback", "", "F", "in"),
-        EventKind("command", "command", "", "C", "out"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),

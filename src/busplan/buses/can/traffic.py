@@ -1,4 +1,4 @@
-"""What a network sends: SYNC, the PDOs of its nodes, and other messages."""
+"""All that a network sends: SYNC, the PDOs of its nodes, and other messages."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache, reduce
@@ -35,7 +35,7 @@ class Pdos(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What they are called."""
+        """Name: feedback or command."""
         return NAMES[self.kind]
 
 

@@ -5,8 +5,7 @@ from math import ceil
 from typing import Any, Final
 
 from busplan.buses.ieee1394 import equations
-from busplan.buses.ieee1394.broadcast import BroadcastCycle
-from busplan.buses.ieee1394.broadcast_terms import hub_block_bytes
+from busplan.buses.ieee1394.broadcast import BroadcastCycle, hub_block_bytes
 from busplan.buses.ieee1394.constants import (
     ARBITRATION_GAP_TICKS,
     ARBITRATION_HOLD_US,

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
-from busplan.buses.figure import NONPERIODIC, Ink, by_key
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.constants import (
     CONSTANTS,
@@ -19,15 +18,14 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
-from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE, SYNC
+from busplan.buses.ieee1394.cycle_starts import EVENTS, STRETCHES, CycleWithStarts
+from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE
 from busplan.buses.ieee1394.rules import LIMITS, RULES
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
 from busplan.buses.network import Network
 from busplan.buses.parts import (
     Cost,
-    EventKind,
     Halves,
     Key,
     MeasuredLatencies,
@@ -42,13 +40,8 @@ from busplan.buses.parts import (
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 
-_PHASES: Final = by_key(FIGURES.latency)
 _HOST_STEP_US: Final = 10.0
 """How much slower the host is made, to see what that does to the margin."""
-
-
-def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
-    return EventKind(key, label, _PHASES[phase].reference, mark, ink)
 
 
 def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
@@ -146,29 +139,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         measure="measure latencies, then: busplan calibrate {file} MEASUREMENTS.csv{group} --apply",
         base="time in a node between a request and its response",
     )
-    command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
-    event_kinds = (
-        EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
-        EventKind("sync", "synchronous packet", SYNC.reference, "S", "sync"),
-        _kind("arbitration", "arbitration", "arbitration_us", "a", "contention"),
-        _kind("request_data", "request data", "request_data_us", ">", "request"),
-        _kind("acknowledge", "acknowledge", "acknowledge_us", "k", "acknowledge"),
-        _kind("hold", "bus held for the response", "hold_us", "h", "response"),
-        _kind("execution", "execution", "execution_us", "=", "work"),
-        _kind("worst_extra", "slowest execution", "worst_extra_us", "x", "work"),
-        _kind("response_data", "response data", "response_data_us", "<", "response"),
-        _kind("subaction_gap", "subaction gap", "subaction_gap_us", ".", "gap"),
-        _kind("arbitration_reset_gap", "arbitration reset gap", "arbitration_reset_gap_us", ":", "long-gap"),
-        EventKind("node_wait", "wait of a node", "broadcast", "w", "gap"),
-        EventKind("allowance", "allowance for a faster node", "idle", "+", "gap"),
-        _kind("host", "host", "host_us", "o", "contention"),
-        EventKind("retry", "busy retry", "profile", "r", "request"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("read", "reads", "", "R", "in"),
-        EventKind("write", "writes", "", "W", "out"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),

@@ -3,12 +3,11 @@
 from collections.abc import Mapping
 from typing import ClassVar, Final
 
-from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
+from busplan.buses.parts import Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
+from busplan.buses.sercos2.cycle import EVENTS, NONE, STRETCHES, WORST, Sercos2Cycle
 from busplan.buses.sercos2.equations import (
     CONSTANTS,
     MOST_DRIVE_BYTES,
@@ -18,10 +17,9 @@ from busplan.buses.sercos2.equations import (
     PERIODS_SOURCE,
     TURNAROUND_US,
 )
-from busplan.buses.sercos2.figures import FIGURES, MDT_BYTES
+from busplan.buses.sercos2.figures import FIGURES
 from busplan.elementwise import plain
 
-_TELEGRAMS: Final = MDT_BYTES.reference
 _FASTEST: Final = 16
 
 LIMITS: Final = (
@@ -69,19 +67,8 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         measure=MEASURE,
         base=BASE,
     )
-    event_kinds = (
-        EventKind("mst", "MST", _TELEGRAMS, "S", "sync"),
-        EventKind("wait", "wait for drives", "profile", "=", "work"),
-        EventKind("at", "AT of a drive", _TELEGRAMS, "<", "response"),
-        EventKind("gap", "gap between two drives", "profile", ".", "gap"),
-        EventKind("record", "record of a drive", _TELEGRAMS, ">", "out"),
-        EventKind("mdt", "MDT, all but the records", _TELEGRAMS, "m", "request"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("at_stretch", "AT", "", "A", "in"),
-        EventKind("mdt_stretch", "MDT", "", "M", "out"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second ring"),

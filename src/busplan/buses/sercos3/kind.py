@@ -4,12 +4,11 @@ from collections.abc import Mapping, Sequence
 from functools import reduce
 from typing import ClassVar, Final
 
-from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Cost, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
+from busplan.buses.sercos3.cycle import EVENTS, STRETCHES, TELEGRAMS, WINDOW, Sercos3Cycle
 from busplan.buses.sercos3.equations import (
     COMPONENT_DELAY_US,
     CONNECTION_BYTES,
@@ -25,11 +24,10 @@ from busplan.buses.sercos3.equations import (
     PERIODS,
     PERIODS_SOURCE,
 )
-from busplan.buses.sercos3.figures import FIGURES, MDT_TELEGRAMS
+from busplan.buses.sercos3.figures import FIGURES
 from busplan.buses.sercos3.telegrams import SORTS, data_bytes, telegrams_of
 from busplan.elementwise import Number, larger, plain
 
-_COSEMA: Final = MDT_TELEGRAMS.reference
 _METHOD: Final = "bus.timing_method"
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
 
@@ -94,19 +92,8 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         measure=MEASURE,
         base=BASE,
     )
-    event_kinds = (
-        EventKind("mdt_frame", "MDT, its own fields", _COSEMA, "m", "request"),
-        EventKind("mdt_data", "data to a device", _COSEMA, ">", "out"),
-        EventKind("wait", "wait of the devices", _COSEMA, "w", "sync"),
-        EventKind("at_frame", "AT, its own fields", _COSEMA, "a", "response"),
-        EventKind("at_data", "data of a device", _COSEMA, "<", "in"),
-        EventKind("gap", "gap and padding", _COSEMA, ".", "gap"),
-        EventKind("ring", "ring delay", _COSEMA, "o", "long-gap"),
-        EventKind("jitter", "jitter allowance", _COSEMA, "j", "contention"),
-        EventKind("master", "master", _COSEMA, "=", "work"),
-        EventKind("nonperiodic", "channel for other frames", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second network"),
