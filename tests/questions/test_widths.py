@@ -19,9 +19,8 @@ from busplan.questions.compare.kinds import compare
 from busplan.questions.compare.report import compare_report
 from busplan.questions.diff.difference import difference
 from busplan.questions.diff.report import diff_report
-from busplan.questions.explain.assumptions import assumptions_report
 from busplan.questions.explain.derivation import assumptions, explain
-from busplan.questions.explain.report import explain_report
+from busplan.questions.explain.report import assumptions_report, explain_report
 from busplan.questions.fit.figures import capacity
 from busplan.questions.fit.network import model_names
 from busplan.questions.latency.figures import latency
@@ -30,8 +29,8 @@ from busplan.questions.plan.planning import plan
 from busplan.questions.plan.report import plan_report
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import sweep
+from busplan.questions.sweep.digest import Digest, default_columns
 from busplan.questions.sweep.grid import Listed, checked_grid
-from busplan.questions.sweep.top import Tally, TopRows, default_columns, sweep_report
 from busplan.questions.timeline.events import schedule
 from busplan.questions.timeline.report import timeline_report
 from busplan.sections.profile import Profile
@@ -39,8 +38,6 @@ from busplan.sections.profile import Profile
 FIGURE = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
 # One of each class of bus, the one of IEEE 1394 with the longest name, and one of groups.
 PROFILES = ("paper-optimal-gap", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8")
-STEP = 47
-"""Each answer is written at every 47th width; all answers together have every width from 60 to 200."""
 
 
 def swept(profile: Profile) -> Report:
@@ -52,11 +49,10 @@ def swept(profile: Profile) -> Report:
     models = model_names(profile)
     asked = Sweep(profile, grid, tuple(models), ())
     columns = (*grid.axes, "timing_model", *default_columns(asked))
-    rows, tally = TopRows(columns, sort_by=None, ascending=False, top=20), Tally(asked)
+    digest = Digest(asked._replace(columns=columns), top=20)
     for block in sweep(profile, grid, timing_models=models):
-        rows.add(block)
-        tally.add(block)
-    return sweep_report(rows, tally, document=dict)
+        digest.add(block)
+    return digest.report(dict)
 
 
 def several(profile: Profile) -> Report:
@@ -84,6 +80,12 @@ ANSWERS: dict[str, Callable[[Profile], Report]] = {
 }
 
 
+ASKED = [
+    (name, profile) for row, name in enumerate(ANSWERS) for profile in (PROFILES[row % 5], PROFILES[(row + 2) % 5])
+]
+"""Each answer of two profiles, each at some widths; all together have every width from 60 to 200."""
+
+
 @cache
 def answer(name: str, profile: str) -> Report:
     report = ANSWERS[name](load(profile).profile)
@@ -100,13 +102,11 @@ def words_of(report: Report) -> list[Block]:
     return [block for block in report.blocks() if not isinstance(block, Chart)]
 
 
-@pytest.mark.parametrize("profile", PROFILES)
-@pytest.mark.parametrize("name", ANSWERS)
+@pytest.mark.parametrize(("name", "profile"), ASKED)
 def test_an_answer_fits_and_has_no_figure_that_is_cut_or_changed(name: str, profile: str) -> None:
     report = answer(name, profile)
     whole = figures([line.text for line in block_lines(words_of(report), is_whole=True)])
-    first = (PROFILES.index(profile) + len(PROFILES) * list(ANSWERS).index(name)) % STEP
-    for width in (80, *range(60 + first, 201, STEP)):
+    for width in (80, *range(60 + ASKED.index((name, profile)), 201, len(ASKED))):
         shown = text(report, width=width).splitlines()
         assert [line for line in shown if len(line) > width] == []
         blocks = words_of(report)

@@ -43,8 +43,8 @@ def capacity_command(
 ) -> None:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
-    A card comes first: fits, not shown to fit, or does not fit, always by the timing model that decides on this bus; how
-    much of the period is used and free, the fastest period, room for more nodes, and what to measure or change. The
+    A card comes first: fits, not shown to fit, or does not fit, always by the timing model that decides on this bus;
+    how much of the period is used and free, the fastest period, room for more nodes, and what to measure or change. The
     figures behind it follow; a low terminal shows them with --all. Times are in us. A report: it exits 0 whatever the
     verdict is.
 

@@ -3,9 +3,8 @@
 from typing import Final
 
 from busplan.forms.blocks import Card, Gauge
-from busplan.forms.columns import sentence_line
-from busplan.forms.lines import Line, Mark
-from busplan.forms.wrapping import wrapped
+from busplan.forms.lines import Line, Mark, wrapped
+from busplan.forms.numbers import sentence_line
 from busplan.printable import printable
 
 _WIDTH: Final = 80

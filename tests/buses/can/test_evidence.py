@@ -6,10 +6,9 @@ from subprocess import CompletedProcess
 import pytest
 
 from busplan.buses import kind_named
-from busplan.buses.published import EvidenceSection
-from busplan.questions.evidence.figures import bus_evidence
+from busplan.questions.evidence.rows import EvidenceSection, sections_of
 
-SECTIONS = bus_evidence(kind_named("can"))
+SECTIONS = [*sections_of(kind_named("can"), "can"), *sections_of(kind_named("can"), "paper")]
 SYSTEM = SECTIONS[-1]
 SEEN = {"CAN: bits of frames of 8 bytes that hardware counted", "CAN: the load of a log"}
 """What frames on a bus had."""
@@ -42,7 +41,7 @@ def test_what_a_bus_had_lies_between_no_stuff_bits_and_the_most() -> None:
             else:
                 assert abs(one.relative_residual) < 0.04, one.quantity
     # What verdicts say of the model.
-    assert f"takes {100 * min(over):.0f} to {100 * max(over):.0f}% more" in kind_named("can").model_error
+    assert f"takes {100 * min(over):.0f} to {100 * max(over):.0f}% more" in kind_named("can").timing_models[0].error
 
 
 def test_the_papers_can_system_spends_its_time_in_the_host() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.forms.blocks import Card, Command, Gauge
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.forms.terminal import text
 from busplan.questions.capacity import CapacityAnswer
 

@@ -13,7 +13,7 @@ from busplan.errors import BusplanError
 from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.diff.difference import ComparedFigure, Difference, difference
 from busplan.sections.profile import Profile
@@ -134,7 +134,6 @@ def test_keys_of_one_profile_alone(make: Make) -> None:
 # --- figures ----------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_the_other_way_round_everything_turns(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     a, b = data.draw(any_profile), data.draw(any_profile)
@@ -148,7 +147,7 @@ def test_the_other_way_round_everything_turns(data: st.DataObject, any_profile: 
             assert (one.difference > 0) == ((one.judgement == "better") == (one.figure.key in MORE))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_against_itself_everything_is_the_same(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     one = data.draw(any_profile)

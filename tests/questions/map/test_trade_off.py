@@ -13,12 +13,11 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.certainty import TIME
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.map.cells import Cell, NotDrawn
 from busplan.questions.map.direction import AXES, MOST_VALUES, PERIOD, Direction, checked_direction
-from busplan.questions.map.trade_off import TradeOff, trade_off
+from busplan.questions.map.trade_off import Cell, NotDrawn, TradeOff, trade_off
 from busplan.questions.sweep.grid import Listed, Steps
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
@@ -83,7 +82,6 @@ def assert_cells_are_those_of_capacity(found: TradeOff, *, step: int = 1) -> Non
         assert cell.limited_by == limits[cell.state]
 
 
-@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = data.draw(any_profile)
@@ -100,7 +98,7 @@ def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.S
     assert_cells_are_those_of_capacity(found)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(data=st.data())
 def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.gate.gate import check_document
 from busplan.profile.document import Document
 from busplan.profile.shipped import load, shipped_names
@@ -22,8 +22,8 @@ from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
 from busplan.questions.fit.figures import capacity, figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import UNTESTED_CIRCLE, Change, cure
+from busplan.questions.plan.freedoms import MOST_RATIO
 from busplan.questions.plan.planning import plan
-from busplan.questions.plan.short_numbers import MOST_RATIO
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
@@ -36,7 +36,6 @@ def is_safe(profile: Profile, change: Change) -> bool:
     return bool(gap_count_of(network) >= safe_gap_count(hops_of(network)))
 
 
-@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_after_a_change_the_verdict_is_what_it_promises(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
@@ -70,7 +69,6 @@ def within_limits(profile: Profile) -> Profile:
     return override(profile, {"bus.nodes": nodes, "bus.gap_count": "optimal", **small, **hops})
 
 
-@settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_there_is_always_a_way_where_no_limit_of_the_standard_is_broken(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]

@@ -5,7 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
@@ -17,7 +17,7 @@ from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.questions.plan.freedoms import freed
-from busplan.questions.plan.option import Option
+from busplan.questions.plan.options import Option
 from busplan.questions.plan.planning import plan
 from busplan.questions.plan.search import Search
 from busplan.sections.profile import Profile
@@ -179,7 +179,6 @@ def test_a_payload_stays_inside_the_execution_table_which_need_not_ascend(make: 
     )
 
 
-@settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_most_nodes_are_safe_for_their_gap_count(
     data: st.DataObject,

@@ -1,7 +1,7 @@
 """The plan is the least change there is, found by trying all; and what is written passes the gate."""
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import product
+from itertools import cycle, product
 from math import inf
 from typing import Any
 
@@ -18,17 +18,14 @@ from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import decode, override
 from busplan.profile.write import profile_text
 from busplan.questions.circle.check import CircleCheck
-from busplan.questions.fit.certainty import FITS, certainty
-from busplan.questions.fit.cycle import available_us, cycle_of
+from busplan.questions.fit.certainty import FITS, available_us, certainty, cycle_of
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import cure
-from busplan.questions.plan.constraints import needs
-from busplan.questions.plan.freedoms import freed
-from busplan.questions.plan.machine import with_payload_within
+from busplan.questions.plan.constraints import needs, with_payload_within
+from busplan.questions.plan.freedoms import ShortNumbers, freed
 from busplan.questions.plan.planning import plan
 from busplan.questions.plan.search import Search
-from busplan.questions.plan.short_numbers import ShortNumbers
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
@@ -59,7 +56,6 @@ limits: st.SearchStrategy[dict[str, object]] = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_what_a_plan_writes_passes_the_gate(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = override(data.draw(any_profile), data.draw(limits))
@@ -74,7 +70,7 @@ def test_what_a_plan_writes_passes_the_gate(data: st.DataObject, any_profile: st
         assert (errors == []) == (found == {})
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8)
 @given(data=st.data())
 def test_a_plan_is_that_change_and_what_would_be_enough_is_enough(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
@@ -147,7 +143,7 @@ def every_point(profile: Profile, *, periods_us: Sequence[float], names: Sequenc
             yield {**point, "bus.gap_count": safe_gap_count(hops)}
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_no_cheaper_point_of_a_grid_passes(data: st.DataObject, make: Make) -> None:
     own_us = data.draw(st.sampled_from([90.0, 200.0, 450.0, 1000.0]))
@@ -321,8 +317,7 @@ def test_a_plan_has_more_to_spare_than_it_is_unsure_of(make: Make) -> None:
         assert one.margin_corrected_us >= (one.uncertainty_us or 0)
 
 
-@pytest.mark.parametrize("name", shipped_names())
-@pytest.mark.parametrize("nodes", [3, 11])
+@pytest.mark.parametrize(("name", "nodes"), list(zip(shipped_names(), cycle([3, 11]), strict=False)))
 def test_what_is_written_for_a_shipped_profile_passes_the_gate_with_its_circle(name: str, nodes: int) -> None:
     profile = load(name).profile
     best = plan(profile, wanted={profile.alike_nodes[0].nodes_key: nodes}, circle=CircleCheck()).recommended
@@ -415,7 +410,6 @@ def test_a_grid_has_the_smallest_number_that_is_no_less(step: float, digits: int
     assert grid.number(place) < grid.number(place + 1)
 
 
-@settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_neither_period_nor_slice_ratio_changes_what_is_needed(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
@@ -428,7 +422,6 @@ def test_neither_period_nor_slice_ratio_changes_what_is_needed(
     assert needs(override(profile, other)) == needs(profile)
 
 
-@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_every_setting_of_the_bus_is_safe_and_saves_time(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]

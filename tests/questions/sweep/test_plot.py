@@ -15,9 +15,8 @@ from busplan.questions.sweep.blocks import sweep
 from busplan.questions.sweep.grid import Values, checked_grid
 from busplan.questions.sweep.panels import sweep_svg
 from busplan.questions.sweep.plot import FigureData
-from busplan.questions.sweep.scales import key_label, plot_scale, plotted_figure
+from busplan.questions.sweep.plotted import Plotted, caption, key_label, plot_scale, plotted_figure
 from busplan.questions.sweep.values import listed, stepped
-from busplan.questions.sweep.words import Plotted, caption
 
 SVG = "{http://www.w3.org/2000/svg}"
 Plots = Callable[[Element], list[Any]]
@@ -145,9 +144,9 @@ def test_whole_numbers_have_whole_ticks(nodes: Any, plots: Plots) -> None:
 
 
 def test_many_points_are_a_curve_without_marks(plots: Plots) -> None:
-    one = plotted("margin_us", cycle__nonperiodic_us=range(750))
+    one = plotted("margin_us", cycle__nonperiodic_us=range(250))
     (plot,) = plots(drawn(one))
-    assert len(plot.values("curve first")) == 750
+    assert len(plot.values("curve first")) == 250
     assert marks(plot, "rect", "mark first") == []
 
 

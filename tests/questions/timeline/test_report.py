@@ -5,14 +5,14 @@ from collections.abc import Callable, Iterator
 from xml.etree import ElementTree as ET
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses import kind_named
 from busplan.buses.parts import IDLE
 from busplan.forms import html, markdown, terminal
 from busplan.forms.blocks import Report, ShownValue
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.forms.raster import png
 from busplan.forms.scale import ticks
 from busplan.profile.shipped import load
@@ -281,7 +281,6 @@ def test_bus_lane_comes_first_and_nodes_in_their_turn() -> None:
     assert [lane.label for lane in node_lanes(zoom(one, transaction=("write", 11)))] == ["node 11"]
 
 
-@settings(max_examples=200, deadline=None)
 @given(start=st.floats(0.0, 1e6), width=st.floats(1e-3, 1e6), most=st.integers(1, 12))
 def test_ticks_are_round_inside_the_window_and_few(start: float, width: float, most: int) -> None:
     end = start + width

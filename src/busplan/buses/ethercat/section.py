@@ -1,11 +1,12 @@
 """The keys that only profiles of an EtherCAT bus have, in [bus], [node] and [[group]]."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 from pydantic import Field
 
-from busplan.buses.ethercat.constants import (
+from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
+from busplan.buses.ethercat.equations import (
     MAILBOX_BYTES,
     PIPELINE_CYCLES,
     SEPARATE,
@@ -14,9 +15,8 @@ from busplan.buses.ethercat.constants import (
     Master,
     Port,
     ProcessData,
+    room_bytes,
 )
-from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
-from busplan.buses.ethercat.equations import room_bytes
 from busplan.elementwise import Number
 from busplan.sections.base import MAX_COUNT, Count, TimeUs
 from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
@@ -148,3 +148,6 @@ class EthercatProfile(Profile):
     group: Annotated[tuple[EthercatGroup, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
+
+
+PROFILE: Final = EthercatProfile

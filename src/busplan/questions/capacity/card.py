@@ -18,8 +18,7 @@ from busplan.questions.fit.circle_refusal import circle_refusals
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.freedoms import PERIOD
-from busplan.questions.words.key_values import settings_sentence
-from busplan.questions.words.sentences import broken_limits, warnings
+from busplan.questions.words.sentences import broken_limits, change_meanings, settings_sentence, warnings
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -86,7 +85,7 @@ def _reasons(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     for words in broken_limits(figures, profile):
         yield "limit", Sentence((words,), "fails" if figures.verdict == DOES_NOT_FIT else "warns")
     if not figures.safe:
-        yield "unsafe", Sentence((bus.safety,), "fails")
+        yield "unsafe", Sentence((bus.safety.setting,), "fails")
     if figures.verdict == FITS:
         for need in verdict.missed_limits:
             words = need.words(ratio=profile.cycle.slice_ratio, most_us=verdict.period_us)
@@ -113,9 +112,9 @@ def _times(figures: CapacityFigures, profile: Profile) -> Iterator[_Line]:
 def _kept_by(figures: CapacityFigures, profile: Profile) -> str:
     """Say what keeps the period from being shorter, where that is not the time of the cycle."""
     network, bus, fastest_us = network_of(profile), bus_of(profile), figures.safe_min_period_us or 0.0
-    if plain(bus.shortest_period_us(network, figures.safe_required_us or 0.0)) >= fastest_us:
+    if plain(bus.periods.from_us((figures.safe_required_us or 0.0) / network.slice_ratio)) >= fastest_us:
         return ""
-    limits = (limit for limit in bus.limits if limit.share is not None)
+    limits = (limit for limit in bus.limits if limit.period is not None)
     holding = (limit for limit in limits if plain(limit.shown.period_us(network)) >= fastest_us * _ALMOST)
     return "".join(f", for {limit.key}" for limit in islice(holding, 1))
 
@@ -136,7 +135,7 @@ def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     if change is None:
         yield label, Sentence((f"none: {verdict.no_change}",))
         return
-    meanings = bus_of(profile).change_meanings
+    meanings = change_meanings(bus_of(profile))
     settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
     after = change.figures
     left = f", which leaves {_us(after.margin_corrected_us or 0.0, after.uncertainty_us)} us"
@@ -150,7 +149,7 @@ def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     largest: Term = max(figures.terms, key=lambda term: plain(term.us))
     yield (
         "largest part",
-        Sentence((f"{bus.term_label(largest.name)}, {_us(plain(largest.us), figures.uncertainty_us)} us",)),
+        Sentence((f"{bus.figures.term_label(largest.name)}, {_us(plain(largest.us), figures.uncertainty_us)} us",)),
     )
     for assumption in heavy_assumptions(figures, profile):
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure it first",), "warns")
@@ -173,7 +172,7 @@ def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
             said = f"{_us(other.required_us, figures.uncertainty_us)} us needed of {_us(other.available_us, None)}"
             yield f"{other.timing_model} model", Sentence((f"says otherwise, {said}, but does not decide",), "warns")
     if verdict.after_reset is not None:
-        keys = ", ".join(f"{key} = {value}" for key, value in bus.reset_changes.items())
+        keys = ", ".join(f"{key} = {value}" for key, value in bus.safety.after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
     for warning in warnings(profile, nodes=figures.nodes, most=figures.safe_nodes or 0):
         yield "beware", Sentence((warning,), "warns")

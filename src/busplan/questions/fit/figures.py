@@ -16,16 +16,18 @@ from busplan.elementwise import Number, choose, existing, larger, plain
 from busplan.profile.toml import at_periods, override
 from busplan.questions.fit.certainty import (
     FITS,
+    TIME,
     VERDICTS,
     Certainty,
     VerdictWord,
+    available_us,
     certainty,
+    fits_in,
     limit_codes,
     time_code,
     verdict_code,
 )
 from busplan.questions.fit.circle_refusal import circle_refusals
-from busplan.questions.fit.cycle import TIME, available_us, fits_in
 from busplan.questions.fit.figure_values import FigureValues
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.fit.node_limit import largest_nodes, safe_nodes
@@ -194,7 +196,7 @@ class CapacityFigures(NamedTuple):
         return None if self._whole is None else self._whole.safe_limited_by
 
     def __getattr__(self, key: str) -> Any:
-        # Only what is no field comes here.
+        # Figures of the kind and terms are attributes as all others are; only what is no field comes here.
         if not key.startswith("_"):
             if key in self.own:
                 return self.own[key]
@@ -205,7 +207,7 @@ class CapacityFigures(NamedTuple):
 
     def by_key(self) -> dict[str, Any]:
         """The figures of the document by key, in its order."""
-        found = {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).capacity_figures}
+        found = {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).figures.capacity}
         return {key: list(one) if isinstance(one, tuple) else one for key, one in found.items()}
 
 
@@ -281,8 +283,8 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     exceeded = (*broken, *((TIME,) if late else ()))
     decides = model == bus.deciding_model
     counts = (
-        GroupCapacity(one.name, int(one.nodes), int(one.nodes) * one.node.axes, one.node.axes, model, profile)
-        for one in profile.alike_nodes
+        GroupCapacity(alike.name, int(alike.nodes), int(alike.nodes) * alike.node.axes, alike.node.axes, model, profile)
+        for alike in profile.alike_nodes
     )
     return CapacityFigures(
         kind=bus.kind,
@@ -301,7 +303,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
 
 
 _UNDECIDED: Final[dict[str, Any]] = {
-    **{one.key: None for one in CERTAINTY if one.key not in COUNTS},
+    **{figure.key: None for figure in CERTAINTY if figure.key not in COUNTS},
     "doubts": (),
 }
 
@@ -318,22 +320,22 @@ def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[st
     }
 
 
-def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
+def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
     """Figures of how sure the verdict is that follow by operators alone.
 
     Parameters
     ----------
-    found
+    weighed
         The certainty of the cycle. Its numbers may be of any sort.
     cycle
         The cycle under the timing model that decides.
     """
     return {
-        "bias_us": found.bias_us,
-        "margin_corrected_us": found.margin_corrected_us,
-        "uncertainty_us": found.known_uncertainty_us,
-        "safe_required_us": found.safe_required_us,
-        "safe_min_period_us": shortest_us(cycle.network, found.safe_required_us, is_shown=True),
+        "bias_us": weighed.bias_us,
+        "margin_corrected_us": weighed.margin_corrected_us,
+        "uncertainty_us": weighed.known_uncertainty_us,
+        "safe_required_us": weighed.safe_required_us,
+        "safe_min_period_us": shortest_us(cycle.network, weighed.safe_required_us, is_shown=True),
     }
 
 
@@ -383,9 +385,9 @@ def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) 
         Whether limits must be shown to be kept; otherwise doubts of their values play no part.
     """
     bus = bus_of(network.profile)
-    found = bus.shortest_period_us(network, needed_us)
+    found = bus.periods.from_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
-        if limit.share is not None:
+        if limit.period is not None:
             found = larger(found, bus.periods.from_us((limit.shown if is_shown else limit.nominal).period_us(network)))
     return found
 
@@ -400,7 +402,7 @@ def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures 
     deciding
         Its figures under the model that decides.
     """
-    changes = bus_of(profile).reset_changes
+    changes = bus_of(profile).safety.after_reset
     if deciding.verdict != FITS or not changes:
         return None
     reset = override(profile, dict(changes))

@@ -16,16 +16,19 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Limit, Value
 from busplan.elementwise import Number
 from busplan.questions.fit.certainty import (
+    TIME,
     VERDICTS,
     certainty,
+    fits_in,
     limit_codes,
     limits_to_be_safe,
+    limits_with_time,
     time_code,
     verdict_code,
 )
 from busplan.questions.fit.circle_refusal import loop_refusals, run_refusals
-from busplan.questions.fit.cycle import TIME, fits_in, limits_with_time
 from busplan.questions.fit.figures import COUNTS, certainty_numbers, numeric_figures
+from busplan.questions.fit.loop_delays import acts_at_once
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.fit.node_limit import most_nodes
 from busplan.questions.sweep.grid import Array, Chunk, Grid
@@ -40,8 +43,6 @@ _CAUSES_KEPT: Final = 1 << 16
 Word: TypeAlias = str | float | list[str] | None
 """What stands in a column that is no array of numbers: a word, a value of a key that also takes words, a list, or
 nothing."""
-Cell: TypeAlias = Word
-"""One figure of one row."""
 
 _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
 
@@ -49,12 +50,12 @@ _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bo
 def figure_names(profile: Profile) -> tuple[str, ...]:
     """Columns of a sweep after the varied keys; `timing_model` is the first, counts of groups are the last."""
     groups = (f"group.{one.name}.{key}" for one in profile.group for key in COUNTS)
-    return (*(figure.key for figure in bus_of(profile).capacity_figures), *groups)
+    return (*(figure.key for figure in bus_of(profile).figures.capacity), *groups)
 
 
 def word_figures(profile: Profile) -> tuple[str, ...]:
     """Columns whose values are words."""
-    words = [figure.key for figure in bus_of(profile).capacity_figures if figure.sort in ("word", "words")]
+    words = [figure.key for figure in bus_of(profile).figures.capacity if figure.sort in ("word", "words")]
     return (*words, *(f"group.{one.name}.{key}" for one in profile.group for key in COUNTS if key in words))
 
 
@@ -89,13 +90,13 @@ class SweepBlock(NamedTuple):
         """One column under each timing model."""
         return [(self.varied if name in self.varied else figures)[name] for figures in self.models]
 
-    def row(self, index: int, names: Sequence[str]) -> dict[str, Cell]:
+    def row(self, index: int, names: Sequence[str]) -> dict[str, Word]:
         """One row, by its index in `rows`: a point under one timing model."""
         point, model = divmod(index, len(self.models))
         where = np.unravel_index(point, self.chunk.shape)
         return {name: self._value(self.columns(name)[model], where) for name in names}
 
-    def _value(self, column: Column, where: tuple[np.intp, ...]) -> Cell:
+    def _value(self, column: Column, where: tuple[np.intp, ...]) -> Word:
         found: float = np.broadcast_to(column.values, self.chunk.shape)[where].item()
         return found if column.words is None else column.words[int(found)]
 
@@ -204,7 +205,7 @@ def _columns(where: Profile, model: str, *, axes: int, with_counts: bool) -> dic
         "exceeded": exceeded,
         **own,
     }
-    sorts = {figure.key: figure.sort for figure in bus.capacity_figures}
+    sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
     found = {
         key: words[key] if key in words else _number(numbers[key], sorts[key])
         for key in figure_names(network.profile)
@@ -245,7 +246,7 @@ def _refused(
     causes_at
         `_causes` of the profile, which knows what it was asked before: chunks share values.
     """
-    is_apart = profile.servo.loop == "node" and bus_of(profile).acts_at_once(network_of(profile))
+    is_apart = profile.servo.loop == "node" and acts_at_once(profile)
     has_words = any(own.dtype == object for own in chunk.values.values())
     read = [
         (number, key, own.ravel().tolist())
