@@ -8,6 +8,9 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
+from busplan.errors import BusplanError
+from busplan.nearest import did_you_mean
+
 if TYPE_CHECKING:
     from busplan.buses.bus import Bus
 
@@ -35,9 +38,44 @@ def kind_named(name: str) -> "Bus":
         There is no kind of that name.
     """
     if name not in _LOADED:
-        found: Bus = import_module(_MODULES[name]).BUS
-        _LOADED[name] = found
+        bus: Bus = import_module(_MODULES[name]).BUS
+        _LOADED[name] = bus
     return _LOADED[name]
+
+
+def kind_called(word: str, *, option: str = "") -> str:
+    """Name of the kind that users call by a word: its name, its title, or another name that it declares.
+
+    Parameters
+    ----------
+    word
+        The word as typed; case, spaces and punctuation do not count.
+    option
+        The option that gives it, for the message.
+
+    Raises
+    ------
+    BusplanError
+        No kind is called so.
+
+    Examples
+    --------
+    >>> kind_called("EtherCAT"), kind_called("FireWire"), kind_called("SERCOS III")
+    ('ethercat', 'ieee1394', 'sercos3')
+    """
+    if word in _MODULES:
+        return word
+    buses = map(kind_named, kind_names())
+    kinds = {_plain(name): bus.kind for bus in buses for name in (bus.kind, bus.title, *bus.also_called)}
+    if _plain(word) in kinds:
+        return kinds[_plain(word)]
+    near = did_you_mean(_plain(word), kinds)
+    said = f"{option} {word}".strip()
+    raise BusplanError(f"{said}: no kind of bus; there are {', '.join(kind_names())}{near and f'; {near}'}")
+
+
+def _plain(name: str) -> str:
+    return "".join(filter(str.isalnum, name.casefold()))
 
 
 @contextmanager

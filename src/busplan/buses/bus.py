@@ -41,7 +41,9 @@ class Bus(ABC):
 
     kind: ClassVar[str]
     title: ClassVar[str]
-    """What the kind is called."""
+    """Name of the kind in texts."""
+    also_called: ClassVar[tuple[str, ...]] = ()
+    """Further names that users type; case, spaces and punctuation do not count."""
     timing_models: ClassVar[tuple[TimingModel, ...]]
     """In the order reports show them."""
     deciding_model: ClassVar[str]

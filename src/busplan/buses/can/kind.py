@@ -29,6 +29,7 @@ class Can(Bus):
 
     kind = "can"
     title = "CAN"
+    also_called = ("CANopen", "CAN 2.0")
     timing_models = (
         TimingModel(
             WORST,

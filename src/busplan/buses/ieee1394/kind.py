@@ -120,6 +120,7 @@ class Ieee1394(Bus):
 
     kind = "ieee1394"
     title = "IEEE 1394"
+    also_called = ("FireWire", "1394")
     timing_models = (
         TimingModel("paper", "the paper's equations as published"),
         TimingModel("standard", "the standard's clock and packets, and the gaps as the bus runs them"),

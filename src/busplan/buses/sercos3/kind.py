@@ -73,6 +73,7 @@ class Sercos3(SercosBus):
 
     kind = "sercos3"
     title = "SERCOS III"
+    also_called = ("SERCOS",)  # the newest is meant where none is said
     timing_models = (
         TimingModel(WINDOW, "telegrams, jitter, master and devices, and the ring delay where the method has it"),
         TimingModel(TELEGRAMS, "telegrams and their gaps alone, as performance tables count"),
