@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from busplan.buses.ethercat.constants import DATAGRAM_BYTES
 from busplan.buses.ethercat.equations import padding_bytes, room_bytes
-from busplan.elementwise import Number, alike, choose, is_off, larger, plain, rounded_down, rounded_up, smaller, total
+from busplan.elementwise import Number, alike, choose, is_everywhere, is_off, larger, plain, rounded_down, rounded_up, smaller, total
 
 
 class Devices(NamedTuple):
@@ -69,7 +69,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
         present = first_bytes + choose(has_room, headers, 0.0)
         whole = present
         frames = 1
-    for one in devices:
+    for one in map(_with_data, devices):
         beside = smaller(one.number, rounded_down(free / one.data_bytes))
         behind = one.number - beside
         present, free = present + beside * one.data_bytes, free - beside * one.data_bytes
@@ -82,6 +82,14 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
         present, free = choose(opens, headers + in_last, present), choose(opens, larger(room - in_last, 0.0), free)
         frames, whole = frames + new, whole + new * headers + one.number * one.data_bytes
     return Packing(frames, whole, padding + padding_bytes(present), present, before)
+
+
+def _with_data(devices: Devices) -> Devices:
+    """The same devices; couplers, which have no data and are in no frame, as none of a byte."""
+    if is_everywhere(devices.data_bytes > 0):
+        return devices
+    number = choose(devices.data_bytes > 0, devices.number, 0)
+    return Devices(number, larger(devices.data_bytes, 1))
 
 
 class Frame(NamedTuple):

@@ -1,0 +1,110 @@
+"""XML of strangers: small, shallow, without entities; every element with its line."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+from xml.parsers import expat
+
+from busplan.errors import BusplanError
+
+_MOST_DEPTH: Final = 64
+_MOST_ELEMENTS: Final = 2_000_000
+
+
+@dataclass(slots=True)
+class Element:
+    """An element of an XML file."""
+
+    tag: str
+    """Without its namespace."""
+    line: int
+    attributes: dict[str, str]
+    children: list["Element"] = field(default_factory=list)
+    text: str = ""
+
+    def all(self, path: str) -> Iterator["Element"]:
+        """Elements of a path of tags below this one, as "Config/Slave"."""
+        tag, _, rest = path.partition("/")
+        for child in self.children:
+            if child.tag == tag:
+                yield from child.all(rest) if rest else (child,)
+
+    def first(self, path: str) -> "Element | None":
+        """The first element of a path; None if there is none."""
+        return next(self.all(path), None)
+
+
+def parsed(content: bytes, *, name: str, skipped: Collection[str] = ()) -> Element:
+    """Read an XML file.
+
+    Parameters
+    ----------
+    content
+        The file.
+    name
+        Its name in messages.
+    skipped
+        Tags whose elements are left out, with all below them.
+
+    Raises
+    ------
+    BusplanError
+        It is no XML, or has a document type (which is where entities are declared), too many elements, or too many
+        inside each other; with its line.
+    """
+    reader = _Reader(name, frozenset(skipped))
+    parser = reader.parser
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as error:
+        what = expat.ErrorString(error.code)
+        raise BusplanError(f"{name}:{error.lineno}:{error.offset + 1}: not valid XML: {what}") from None
+    except (ValueError, LookupError) as error:  # an encoding that Python does not know
+        raise BusplanError(f"{name}:1: not valid XML: {error}") from None
+    return reader.root.children[0]
+
+
+class _Reader:
+    def __init__(self, name: str, skipped: frozenset[str]) -> None:
+        self.name, self.skipped = name, skipped
+        self.root = Element("", 0, {})
+        self.open = [self.root]
+        self.depth = self.elements = self.skips = 0
+        self.parser = expat.ParserCreate()
+        self.parser.buffer_text = True
+        self.parser.StartDoctypeDeclHandler = self._doctype
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._text
+
+    def _refuse(self, message: str) -> BusplanError:
+        return BusplanError(f"{self.name}:{self.parser.CurrentLineNumber}: {message}")
+
+    def _doctype(self, *_: Any) -> None:
+        raise self._refuse("a document type (<!DOCTYPE>) is not read: it can declare entities; remove it")
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.depth += 1
+        self.elements += 1
+        if self.depth > _MOST_DEPTH:
+            raise self._refuse(f"elements inside each other more than {_MOST_DEPTH} deep; no such file is a machine's")
+        if self.elements > _MOST_ELEMENTS:
+            raise self._refuse(f"more than {_MOST_ELEMENTS:,} elements; no such file is a machine's")
+        tag = tag.rpartition(":")[2]
+        if self.skips or tag in self.skipped:
+            self.skips += 1
+            return
+        element = Element(tag, self.parser.CurrentLineNumber, attributes)
+        self.open[-1].children.append(element)
+        self.open.append(element)
+
+    def _end(self, _tag: str) -> None:
+        self.depth -= 1
+        if self.skips:
+            self.skips -= 1
+        else:
+            self.open.pop()
+
+    def _text(self, text: str) -> None:
+        if not self.skips:
+            self.open[-1].text += text
