@@ -5,7 +5,19 @@ from typing import NamedTuple
 
 from busplan.buses.ethercat.constants import DATAGRAM_BYTES
 from busplan.buses.ethercat.equations import padding_bytes, room_bytes
-from busplan.elementwise import Number, alike, choose, is_everywhere, is_off, larger, plain, rounded_down, rounded_up, smaller, total
+from busplan.elementwise import (
+    Number,
+    alike,
+    choose,
+    is_everywhere,
+    is_off,
+    larger,
+    plain,
+    rounded_down,
+    rounded_up,
+    smaller,
+    total,
+)
 
 
 class Devices(NamedTuple):

@@ -1,7 +1,8 @@
 """`busplan.import_profile`: a machine from the files that its engineers already have."""
 
 import os
-from collections.abc import Iterable, Mapping
+import pathlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -10,10 +11,11 @@ from busplan.forms.blocks import Report
 from busplan.profile.toml import decode, validate
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, one_or_several
-from busplan.questions.import_ import ethercat
-from busplan.questions.import_.record import Fact, Machine, merged
+from busplan.questions.import_ import can, ethercat
+from busplan.questions.import_.record import Fact, Reading, merged
 from busplan.questions.import_.sources import machines, stem_of
-from busplan.questions.import_.text import Row, profile_text
+from busplan.questions.import_.text import ProfileLine, profile_text
+from busplan.questions.import_.update import updated
 from busplan.sections.profile import Profile
 
 _FRAMES = ("cycle_frames_us", "cycle_data_us")
@@ -38,7 +40,7 @@ class ImportAnswer(Answer):
 
     profile: Profile
     text: str
-    rows: tuple[Row, ...]
+    rows: tuple[ProfileLine, ...]
     remarks: tuple[str, ...]
 
     def sentences(self) -> tuple[str, ...]:
@@ -93,11 +95,8 @@ def import_profile(
     Examples
     --------
     >>> import busplan
-    >>> from pathlib import Path
-    >>> text = "Slave:1\n Name:Drive\n Output size: 64bits\n Input size: 96bits\n"
-    >>> _ = Path("drive.txt").write_text(text)  # doctest: +SKIP
-    >>> busplan.import_profile("drive.txt").profile.group[0].read_bytes  # doctest: +SKIP
-    12
+    >>> answer = busplan.import_profile(["machine.xml", "slaves.txt"])  # doctest: +SKIP
+    >>> busplan.capacity(answer.profile)  # doctest: +SKIP
     """
     names = [os.fspath(path) for path in one_or_several(paths, name="paths")]
     if not names or len(set(names)) < len(names):
@@ -108,11 +107,25 @@ def import_profile(
     files = [(each.file, each.title) for each in found]
     if update is None:
         return _new(machine, name=name or stem_of(names), files=files)
-    raise NotImplementedError
+    return _updated(machine, update=update, take=take)
 
 
-def _new(machine: Machine, *, name: str, files: list[tuple[str, str]]) -> ImportAnswer:
-    rows = list(ethercat.rows(machine))
+_ROWS: Mapping[str, Callable[[Reading], Iterator[ProfileLine]]] = {"ethercat": ethercat.rows, "can": can.rows}
+"""What writes the profile of each kind of bus."""
+
+
+def _updated(machine: Reading, *, update: Path, take: Literal["file", "profile"] | None) -> ImportAnswer:
+    is_part = machine.kind == "can" and not machine.nodes
+    rows = list(can.part_rows(machine) if is_part else _ROWS[machine.kind](machine))
+    name = os.fspath(update)
+    profile, text = updated(machine, rows, path=pathlib.Path(update).absolute(), name=name, take=take)
+    # What is assumed of a new profile, an old one says, or leaves to its defaults.
+    said = tuple(row for row in rows if row.fact.grade != "assumed")
+    return ImportAnswer(profile, text, said, tuple(machine.remarks))
+
+
+def _new(machine: Reading, *, name: str, files: list[tuple[str, str]]) -> ImportAnswer:
+    rows = list(_ROWS[machine.kind](machine))
     text = profile_text(rows, name=name, files=files)
     profile = _validated(text, machine)
     if "frames" in machine.bus:
@@ -122,7 +135,7 @@ def _new(machine: Machine, *, name: str, files: list[tuple[str, str]]) -> Import
     return ImportAnswer(profile, text, tuple(rows), tuple(machine.remarks))
 
 
-def _validated(text: str, machine: Machine) -> Profile:
+def _validated(text: str, machine: Reading) -> Profile:
     try:
         return validate(decode(text.encode(), name=machine.file))
     except BusplanError as error:
@@ -130,7 +143,7 @@ def _validated(text: str, machine: Machine) -> Profile:
         raise BusplanError(*(f"{machine.file}: as a profile: {problem}" for problem in problems)) from None
 
 
-def _with_exact_frames(rows: list[Row], profile: Profile, machine: Machine) -> list[Row]:
+def _with_exact_frames(rows: list[ProfileLine], profile: Profile, machine: Reading) -> list[ProfileLine]:
     """Rows with the time that the frames of a file take beyond those of the profile."""
     from busplan.questions.capacity import capacity
 
@@ -152,5 +165,5 @@ def _with_exact_frames(rows: list[Row], profile: Profile, machine: Machine) -> l
     if rows[at].key == "nonperiodic_us":
         old = rows.pop(at).fact
         note, more_us = f"{old.note}; {note}", more_us + old.value
-    row = Row("cycle", "nonperiodic_us", Fact(round(more_us, 6), fact.place, note=note))
+    row = ProfileLine("cycle", "nonperiodic_us", Fact(round(more_us, 6), fact.place, note=note))
     return [*rows[:at], row, *rows[at:]]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from math import ceil
 from typing import Final
 
-from busplan.questions.import_.record import Fact, Machine
+from busplan.questions.import_.record import Fact, Reading
 from busplan.questions.import_.xml_tree import Element, parsed
 
 TITLE: Final = "ENI"
@@ -22,7 +22,7 @@ _MOST_TIME_NS: Final = 10**12
 _MOST_DEVICES: Final = 65_535
 
 
-def read(content: bytes, name: str) -> Machine:
+def read(content: bytes, name: str) -> Reading:
     """Read an ENI file.
 
     Raises
@@ -31,7 +31,7 @@ def read(content: bytes, name: str) -> Machine:
         It is not valid, or says no machine; with its line.
     """
     root = parsed(content, name=name, skipped=("InitCmds", "StringTable"))
-    machine = Machine("ethercat", TITLE, name, rank=0)
+    machine = Reading("ethercat", TITLE, name, rank=0)
     config = root.first("Config")
     slaves = list(config.all("Slave")) if config else []
     if config is None or not slaves:
@@ -48,7 +48,7 @@ def read(content: bytes, name: str) -> Machine:
     return machine
 
 
-def number(element: Element, path: str, machine: Machine, *, most: int) -> tuple[int, int] | None:
+def number(element: Element, path: str, machine: Reading, *, most: int) -> tuple[int, int] | None:
     """A whole number of an element below another one, and its line; None where there is none.
 
     Raises
@@ -74,7 +74,7 @@ def whole_number(text: str) -> int | None:
 
 
 def _device(
-    slave: Element, images: dict[str, set[int]], outputs: list[Element], machine: Machine
+    slave: Element, images: dict[str, set[int]], outputs: list[Element], machine: Reading
 ) -> Iterator[tuple[str, Fact]]:
     """What the file says of one device."""
     info = slave.first("Info") or slave
@@ -109,19 +109,19 @@ def _device(
         if shift and shift_ns is not None:
             yield "shift_us", Fact(shift_ns / 1000, machine.place(shift.line))
     mailbox = slave.first("Mailbox/Recv")
-    length = mailbox and number(mailbox, "Length", machine, most=_MOST_BITS)
-    if mailbox and length and length[0]:
-        yield "mailbox_bytes", Fact(length[0], machine.place(length[1]))
+    size = number(mailbox, "Length", machine, most=_MOST_BITS) if mailbox else None
+    if size and size[0]:
+        yield "mailbox_bytes", Fact(size[0], machine.place(size[1]))
 
 
-def _axes(slave: Element, span: range | None, outputs: list[Element], machine: Machine) -> Fact:
+def _axes(slave: Element, span: range | None, outputs: list[Element], machine: Reading) -> Fact:
     """Axes of a device: the control words of CiA 402 in its PDOs, or among the names of its outputs."""
     words: dict[int, int] = {}
     pdos = list(slave.all("ProcessData/RxPdo"))
     for pdo in [pdo for pdo in pdos if "Sm" in pdo.attributes] or pdos:
         for entry in pdo.all("Entry/Index"):
             index = whole_number(entry.text)
-            if index in CONTROL_WORDS:
+            if index is not None and index in CONTROL_WORDS:
                 words.setdefault(index, entry.line)
     if not words and span:
         for variable in outputs:
@@ -134,7 +134,7 @@ def _axes(slave: Element, span: range | None, outputs: list[Element], machine: M
     return axes_fact(words, machine, line=line)
 
 
-def axes_fact(words: dict[int, int], machine: Machine, *, line: int | None) -> Fact:
+def axes_fact(words: dict[int, int], machine: Reading, *, line: int | None) -> Fact:
     """Axes of a device by the lines of its control words.
 
     Parameters
@@ -153,7 +153,7 @@ def axes_fact(words: dict[int, int], machine: Machine, *, line: int | None) -> F
     return Fact(len(words), machine.place(min(words.values())), "derived", "control words of CiA 402")
 
 
-def _cycle(config: Element, machine: Machine) -> None:
+def _cycle(config: Element, machine: Reading) -> None:
     """The period, and what goes in the frames of a cycle."""
     tasks = []
     for task in config.all("Cyclic"):
@@ -183,7 +183,7 @@ def _sizes(frame: list[tuple[int, int, int]]) -> list[int]:
     return [length for _, length, _ in frame]
 
 
-def _commands(frame: Element, machine: Machine) -> Iterator[tuple[int, int, int]]:
+def _commands(frame: Element, machine: Reading) -> Iterator[tuple[int, int, int]]:
     """Command, bytes of data and logical address of each datagram."""
     for command in frame.all("Cmd"):
         code = number(command, "Cmd", machine, most=255)
@@ -197,7 +197,7 @@ def _commands(frame: Element, machine: Machine) -> Iterator[tuple[int, int, int]
         yield code[0], length[0], address[0] if address else -1
 
 
-def _frames(config: Element, frames: list[list[tuple[int, int, int]]], line: int, machine: Machine) -> None:
+def _frames(config: Element, frames: list[list[tuple[int, int, int]]], line: int, machine: Reading) -> None:
     """Layout and housekeeping, so that the frames come out to the byte."""
     states = _mailbox_states(config, machine)
     process: list[tuple[int, int]] = []
@@ -235,14 +235,14 @@ def _frames(config: Element, frames: list[list[tuple[int, int, int]]], line: int
     machine.bus["frames"] = Fact([_sizes(frame) for frame in frames], place)
 
 
-def _mailbox_states(config: Element, machine: Machine) -> range:
+def _mailbox_states(config: Element, machine: Reading) -> range:
     """Logical addresses of the states of mailboxes, which no device's process data are."""
     start = number(config, "Master/MailboxStates/StartAddr", machine, most=2**32 - 1)
     count = number(config, "Master/MailboxStates/Count", machine, most=_MOST_DEVICES)
     return range(start[0], start[0] + max(count[0] if count else 1, 1)) if start else range(0)
 
 
-def _branches(slaves: list[Element], machine: Machine) -> None:
+def _branches(slaves: list[Element], machine: Reading) -> None:
     """Say where the segment is no line: a branch adds the delay of a port."""
     addresses = [number(slave, "Info/PhysAddr", machine, most=65_535) for slave in slaves]
     for place, slave in enumerate(slaves[1:], start=1):

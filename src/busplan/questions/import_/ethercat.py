@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 from busplan.buses import kind_named
 from busplan.errors import BusplanError
 from busplan.questions.import_.igh import PDOS
-from busplan.questions.import_.record import Fact, Facts, Machine
-from busplan.questions.import_.text import Row, group_name, time_us
+from busplan.questions.import_.record import Fact, Facts, Reading
+from busplan.questions.import_.text import ProfileLine, group_name, time_us
 
 _SIZES: Final = ("read_bytes", "write_bytes")
 _MOST_SHARE: Final = 0.999
@@ -32,7 +32,7 @@ class _Group(NamedTuple):
     devices: list[Facts]
 
 
-def rows(machine: Machine) -> Iterator[Row]:
+def rows(machine: Reading) -> Iterator[ProfileLine]:
     """Lines of the profile, without its head.
 
     Raises
@@ -53,19 +53,21 @@ def rows(machine: Machine) -> Iterator[Row]:
     starter = kind_named("ethercat").starter
     bus, devices = machine.bus, [machine.nodes[number] for number in sorted(machine.nodes)]
     period = bus.get("period_us") or Fact(time_us(starter.period), "", "assumed", "no file says it; usual on this bus")
-    yield Row("bus", "kind", Fact("ethercat", machine.place(1)))
+    yield ProfileLine("bus", "kind", Fact("ethercat", machine.place(1)))
     yield from _master(bus)
     yield from _clocks(devices, period)
     yield from _mailbox(devices)
     master_us = next(line for line in starter.hosts[starter.host].splitlines() if line.startswith("master_us"))
     value, _, note = master_us.partition("=")[2].partition("#")
-    yield Row("bus", "master_us", Fact(float(value), "", "assumed", note.strip().removeprefix("assumed: ")))
-    yield Row("bus", "master_grade", Fact("assumed", "", "assumed", "so half of it is its standard uncertainty"))
-    yield Row("cycle", "period_us", period)
+    yield ProfileLine("bus", "master_us", Fact(float(value), "", "assumed", note.strip().removeprefix("assumed: ")))
+    yield ProfileLine(
+        "bus", "master_grade", Fact("assumed", "", "assumed", "so half of it is its standard uncertainty")
+    )
+    yield ProfileLine("cycle", "period_us", period)
     slower_us = sum(map(frame_us, bus["slower"].value)) if "slower" in bus else 0.0
     if slower_us:
         note = "frames of slower tasks, in every cycle"
-        yield Row("cycle", "nonperiodic_us", Fact(round(slower_us, 6), bus["slower"].place, note=note))
+        yield ProfileLine("cycle", "nonperiodic_us", Fact(round(slower_us, 6), bus["slower"].place, note=note))
     taken: set[str] = set()
     for group in _groups(devices):
         yield from _group(group, group_name(_name(group.devices[0]), taken))
@@ -75,33 +77,33 @@ def _name(facts: Facts) -> str:
     return str(facts["name"].value) if "name" in facts else "device"
 
 
-def _master(bus: Facts) -> Iterator[Row]:
+def _master(bus: Facts) -> Iterator[ProfileLine]:
     """What the master sends: as the files say, else as it is known to."""
     if "process_data" in bus:
-        yield Row("bus", "process_data", bus["process_data"])
-        yield Row("bus", "housekeeping_bytes", bus["housekeeping_bytes"])
+        yield ProfileLine("bus", "process_data", bus["process_data"])
+        yield ProfileLine("bus", "housekeeping_bytes", bus["housekeeping_bytes"])
         return
     if "master" not in bus:
         return
-    yield Row("bus", "master", bus["master"])
+    yield ProfileLine("bus", "master", bus["master"])
     if "further_datagrams" in bus:
         known = kind_named("ethercat").constants
         own = (known[f"{name}[{bus['master'].value}]"] for name in ("HOUSEKEEPING_BYTES", "CLOCK_BYTES"))
         further = bus["further_datagrams"]
         sizes = [*(int(size - known["DATAGRAM_BYTES"]) for size in own), *[0] * further.value]
         note = f"those of the master, and 0 for the header of each further datagram of {further.note}"
-        yield Row("bus", "housekeeping_bytes", further._replace(value=sizes, grade="derived", note=note))
+        yield ProfileLine("bus", "housekeeping_bytes", further._replace(value=sizes, grade="derived", note=note))
 
 
-def _clocks(devices: Sequence[Facts], period: Fact) -> Iterator[Row]:
+def _clocks(devices: Sequence[Facts], period: Fact) -> Iterator[ProfileLine]:
     """Distributed clocks where a device acts at SYNC0, or may."""
     configured = [facts["clock_us"] for facts in devices if "clock_us" in facts]
     possible = [facts["has_clock"] for facts in devices if "has_clock" in facts]
     if configured:
-        yield Row("bus", "distributed_clocks", configured[0]._replace(value=True))
+        yield ProfileLine("bus", "distributed_clocks", configured[0]._replace(value=True))
     elif possible:
         note = "devices have clocks; whether they act at SYNC0 no file says"
-        yield Row("bus", "distributed_clocks", Fact(True, possible[0].place, "assumed", note))  # noqa: FBT003 - a value
+        yield ProfileLine("bus", "distributed_clocks", Fact(True, possible[0].place, "assumed", note))
     shifts = [facts["shift_us"] for facts in devices if "shift_us" in facts]
     if not shifts:
         return
@@ -111,18 +113,20 @@ def _clocks(devices: Sequence[Facts], period: Fact) -> Iterator[Row]:
     if share or soonest.grade == "derived":
         note = soonest.note or "taken to count from the master's task on"
         grade = soonest.grade if soonest.note else "assumed"
-        yield Row("bus", "sync_shift", Fact(round(share, 6), soonest.place, grade, f"{soonest.value:g} us, {note}"))
+        yield ProfileLine(
+            "bus", "sync_shift", Fact(round(share, 6), soonest.place, grade, f"{soonest.value:g} us, {note}")
+        )
     else:
         note = "ShiftTime is 0, but counts from the clocks' cycle; where the master's task lies no file says"
-        yield Row("bus", "sync_shift", Fact(0.5, soonest.place, "assumed", note))
+        yield ProfileLine("bus", "sync_shift", Fact(0.5, soonest.place, "assumed", note))
 
 
-def _mailbox(devices: Sequence[Facts]) -> Iterator[Row]:
+def _mailbox(devices: Sequence[Facts]) -> Iterator[ProfileLine]:
     """One poll of the largest mailbox."""
     mailboxes = [facts["mailbox_bytes"] for facts in devices if "mailbox_bytes" in facts]
     if mailboxes:
-        yield Row("bus", "mailbox_polls", Fact(1, "", "assumed", "one service request or answer in a cycle"))
-        yield Row("bus", "mailbox_bytes", max(mailboxes, key=lambda mailbox: mailbox.value))
+        yield ProfileLine("bus", "mailbox_polls", Fact(1, "", "assumed", "one service request or answer in a cycle"))
+        yield ProfileLine("bus", "mailbox_bytes", max(mailboxes, key=lambda mailbox: mailbox.value))
 
 
 def _groups(devices: Sequence[Facts]) -> Iterator[_Group]:
@@ -138,7 +142,7 @@ def _groups(devices: Sequence[Facts]) -> Iterator[_Group]:
         yield _Group(own[0], [devices[number] for number in own])
 
 
-def _group(group: _Group, name: str) -> Iterator[Row]:
+def _group(group: _Group, name: str) -> Iterator[ProfileLine]:
     first, last = group.devices[0], group.devices[-1]
     section = f"group.{name}"
     names = list(dict.fromkeys(map(_name, group.devices)))
@@ -146,24 +150,26 @@ def _group(group: _Group, name: str) -> Iterator[Row]:
     numbers += str(group.first + len(group.devices) - 1) if len(group.devices) > 1 else ""
     title = f"{numbers}: {', '.join(names[:4])}{', ...' if names[4:] else ''}"
     place = first["name"].place if "name" in first else ""
-    yield Row(section, "nodes", Fact(len(group.devices), place, first[_SIZES[0]].grade, title))
+    yield ProfileLine(section, "nodes", Fact(len(group.devices), place, first[_SIZES[0]].grade, title))
     axes = first.get("axes") or Fact(0, "", "assumed", "no file lists its PDOs")
-    yield Row(section, "axes", axes)
+    yield ProfileLine(section, "axes", axes)
     for key in _SIZES:
-        yield Row(section, key, first[key])
+        yield ProfileLine(section, key, first[key])
     if "port" in first:
-        yield Row(section, "port", first["port"])
+        yield ProfileLine(section, "port", first["port"])
     if "delay_us" in first:
         delays = [facts["delay_us"] for facts in group.devices]
         mean = sum(delay.value for delay in delays) / len(delays)
         least, most = (function(delay.value for delay in delays) for function in (min, max))
         note = ", ".join(filter(None, (delays[0].note, f"{least:g} to {most:g}, their mean" if least < most else "")))
         until = f" to {last['delay_us'].place}" if len(delays) > 1 else ""
-        yield Row(section, "delay_us", delays[0]._replace(value=round(mean, 6), note=note, place=delays[0].place + until))
-    yield Row(f"{section}.execution", "kind", Fact("linear", "", "assumed"))
-    yield Row(f"{section}.execution", "grade", Fact("assumed", "", "assumed"))
+        yield ProfileLine(
+            section, "delay_us", delays[0]._replace(value=round(mean, 6), note=note, place=delays[0].place + until)
+        )
+    yield ProfileLine(f"{section}.execution", "kind", Fact("linear", "", "assumed"))
+    yield ProfileLine(f"{section}.execution", "grade", Fact("assumed", "", "assumed"))
     for key, fact in _EXECUTION[axes.value > 0].items():
-        yield Row(f"{section}.execution", key, fact)
+        yield ProfileLine(f"{section}.execution", key, fact)
 
 
 def frame_us(sizes: Sequence[int]) -> float:

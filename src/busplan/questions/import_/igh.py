@@ -6,7 +6,7 @@ from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact
-from busplan.questions.import_.record import Fact, Facts, Machine
+from busplan.questions.import_.record import Fact, Facts, Reading
 
 SLAVES: Final = "ethercat slaves -v"
 PDOS: Final = "ethercat pdos"
@@ -34,7 +34,7 @@ class _Port(NamedTuple):
     line: int
 
 
-def read(text: str, name: str) -> Machine:
+def read(text: str, name: str) -> Reading:
     """Read the text of either command, or of both.
 
     Raises
@@ -45,7 +45,7 @@ def read(text: str, name: str) -> Machine:
     is_of_pdos = _SYNC_MANAGER.search(text) is not None
     is_of_slaves = re.search(r"^Port +Type", text, re.MULTILINE) is not None
     title = " and ".join([SLAVES] * is_of_slaves + [PDOS] * is_of_pdos) or SLAVES
-    machine = Machine("ethercat", title, name, rank=2)
+    machine = Reading("ethercat", title, name, rank=2)
     ports: dict[int, list[_Port]] = {}
     for number, lines in _devices(text, machine).items():
         facts = machine.nodes[number] = {}
@@ -57,7 +57,7 @@ def read(text: str, name: str) -> Machine:
     return machine
 
 
-def _devices(text: str, machine: Machine) -> dict[int, list[tuple[int, str]]]:
+def _devices(text: str, machine: Reading) -> dict[int, list[tuple[int, str]]]:
     """The numbered lines of each device."""
     found: dict[int, list[tuple[int, str]]] = {}
     masters = set()
@@ -79,7 +79,7 @@ def _devices(text: str, machine: Machine) -> dict[int, list[tuple[int, str]]]:
     return found
 
 
-def _described(lines: list[tuple[int, str]], facts: Facts, machine: Machine) -> Iterator[_Port]:
+def _described(lines: list[tuple[int, str]], facts: Facts, machine: Reading) -> Iterator[_Port]:
     """Name, clocks and mailbox of a device into its facts; gives its ports."""
     for line, content in lines:
         if match := _PORT.match(content):
@@ -92,12 +92,12 @@ def _described(lines: list[tuple[int, str]], facts: Facts, machine: Machine) -> 
             # The order number, where there is one, is the shorter name.
             facts.setdefault("name", Fact(match[2], machine.place(line)))
         elif _CLOCKS.match(content):
-            facts["has_clock"] = Fact(True, machine.place(line), "measured")  # noqa: FBT003 - a value
+            facts["has_clock"] = Fact(True, machine.place(line), "measured")
         elif (match := _MAILBOX.match(content)) and int(match[1]):
             facts["mailbox_bytes"] = Fact(int(match[1]), machine.place(line))
 
 
-def _sizes(lines: list[tuple[int, str]], machine: Machine) -> Facts:
+def _sizes(lines: list[tuple[int, str]], machine: Reading) -> Facts:
     """Bytes and axes of a device by the entries of its PDOs: each direction in whole bytes."""
     bits = {"Rx": 0, "Tx": 0}
     places = dict.fromkeys(bits, lines[0][0])
@@ -119,7 +119,7 @@ def _sizes(lines: list[tuple[int, str]], machine: Machine) -> Facts:
     return {**found, "axes": axes_fact(words, machine, line=lines[0][0])}
 
 
-def _delays(ports: Mapping[int, list[_Port]], machine: Machine) -> None:
+def _delays(ports: Mapping[int, list[_Port]], machine: Reading) -> None:
     """The measured delay of each device but the first: that of the hop to it, cable included.
 
     A hop over devices without a clock is shared out evenly among them.

@@ -5,7 +5,7 @@ from math import ceil
 from typing import Final
 
 from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact, whole_number
-from busplan.questions.import_.record import Fact, Machine
+from busplan.questions.import_.record import Fact, Reading
 from busplan.questions.import_.xml_tree import Element, parsed
 
 TITLE: Final = "ethercat-conf.xml"
@@ -14,7 +14,7 @@ _MOST_TIME_NS: Final = 10**12
 _MOST_BITS: Final = 8 * 1486
 
 
-def read(content: bytes, name: str) -> Machine:
+def read(content: bytes, name: str) -> Reading:
     """Read a configuration of linuxcnc-ethercat.
 
     Raises
@@ -23,7 +23,7 @@ def read(content: bytes, name: str) -> Machine:
         It is not valid, or has several masters; with its line.
     """
     root = parsed(content, name=name)
-    machine = Machine("ethercat", TITLE, name, rank=1, lists_all=False)
+    machine = Reading("ethercat", TITLE, name, rank=1, lists_all=False)
     masters = list(root.all("master"))
     if len(masters) != 1:
         line = masters[1].line if masters else root.line
@@ -54,7 +54,7 @@ def read(content: bytes, name: str) -> Machine:
     return machine
 
 
-def _device(slave: Element, number: int, machine: Machine) -> None:
+def _device(slave: Element, number: int, machine: Reading) -> None:
     facts = machine.nodes[number] = {}
     kind = slave.attributes.get("type", "device")
     facts["name"] = Fact(slave.attributes.get("name", kind) if kind == "generic" else kind, machine.place(slave.line))
@@ -69,7 +69,7 @@ def _device(slave: Element, number: int, machine: Machine) -> None:
                     raise machine.refusal(manager.line, f"syncManager dir {direction[:20]!r}: expected in or out")
                 bits[direction] += _number(entry, "bitLen", machine, most=_MOST_BITS) or 0
                 index = whole_number(f"0x{entry.attributes.get('idx', '')}")
-                if direction == "out" and index in CONTROL_WORDS:
+                if direction == "out" and index is not None and index in CONTROL_WORDS:
                     words.setdefault(index, entry.line)
         place = machine.place(managers[0].line)
         for direction, key in _DIRECTIONS.items():
@@ -84,7 +84,7 @@ def _device(slave: Element, number: int, machine: Machine) -> None:
         facts["shift_us"] = Fact(int(shift) / 1000, machine.place(clock.line), "derived", "from the master's task on")
 
 
-def _number(element: Element, key: str, machine: Machine, *, most: int) -> int | None:
+def _number(element: Element, key: str, machine: Reading, *, most: int) -> int | None:
     """A whole number of an attribute; None where it is missing."""
     text = element.attributes.get(key)
     if text is None:

@@ -10,8 +10,6 @@ from busplan.printable import printable
 from busplan.profile.write import short_text
 from busplan.sourced import Grade
 
-
-
 _MAY_DIFFER: Final = ("name", "master", "clock_us")
 """What files may say in different words."""
 
@@ -36,7 +34,7 @@ Facts = dict[str, Fact]
 
 
 @dataclass
-class Machine:
+class Reading:
     """What one file, or several together, say of a machine.
 
     Parameters
@@ -75,7 +73,7 @@ class Machine:
         return BusplanError(f"{self.file}:{line}: {message}")
 
 
-def merged(machines: Iterable[Machine]) -> Machine:
+def merged(machines: Iterable[Reading]) -> Reading:
     """One record of several files of one machine; where they differ, it says so.
 
     Raises
@@ -84,7 +82,7 @@ def merged(machines: Iterable[Machine]) -> Machine:
         They are of two kinds of bus, or have not the same devices.
     """
     first, *others = sorted(machines, key=lambda machine: machine.rank)
-    whole = Machine(first.kind, first.title, first.file, first.rank)
+    whole = Reading(first.kind, first.title, first.file, first.rank)
     differences: dict[str, list[str]] = {}
     for machine in (first, *others):
         if machine.kind != whole.kind:
@@ -93,6 +91,11 @@ def merged(machines: Iterable[Machine]) -> Machine:
                 "files of one"
             )
         _add(whole.bus, machine.bus, "", differences)
+        if whole.kind == "can" and (same := whole.nodes.keys() & machine.nodes.keys()):
+            raise BusplanError(
+                f"{first.file} and {machine.file} are both node {min(same)}; an EDS has no node-ID, give the DCF of "
+                "each"
+            )
         for whose, own, new in (("node", whole.nodes, machine.nodes), ("message", whole.messages, machine.messages)):
             for number, facts in new.items():
                 _add(own.setdefault(number, {}), facts, f"{whose} {number}: ", differences)
@@ -104,7 +107,7 @@ def merged(machines: Iterable[Machine]) -> Machine:
     return whole
 
 
-def _require_one_machine(machines: Sequence[Machine]) -> None:
+def _require_one_machine(machines: Sequence[Reading]) -> None:
     """Refuse files of different devices; one that needs not list all may have fewer."""
     complete = max(machines, key=lambda machine: (machine.lists_all, len(machine.nodes)))
     for machine in machines:
@@ -128,5 +131,5 @@ def _add(own: Facts, new: Mapping[str, Fact], whose: str, differences: dict[str,
         if known.grade == "assumed" != fact.grade:
             own[key] = fact
         elif known.value != fact.value and fact.grade != "assumed" and key not in _MAY_DIFFER:
-            said = f"{whose}{key} is {short_text(known.value)} at {known.place} and {short_text(fact.value)} at {fact.place}"
-            differences.setdefault(key, []).append(said)
+            values = (f"{short_text(each.value)} at {each.place}" for each in (known, fact))
+            differences.setdefault(key, []).append(f"{whose}{key} is {' and '.join(values)}")

@@ -35,7 +35,9 @@ def sentences(answer: "ImportAnswer") -> list[str]:
 
     unknown: dict[str, list[str]] = {}
     for row in assumed(answer.rows):
-        section = f"{row.section.partition('.')[0]}.*" if row.section.startswith(("group.", "message.")) else row.section
+        section = (
+            f"{row.section.partition('.')[0]}.*" if row.section.startswith(("group.", "message.")) else row.section
+        )
         inner = ".execution" if row.section.endswith(".execution") else ""
         values = unknown.setdefault(f"{section}{inner}.{row.key}", [])
         values += [value for value in [short_text(row.fact.value)] if value not in values]
@@ -67,7 +69,9 @@ def _table(records: list[Record]) -> Table:
             TableRow(
                 (
                     Code(record["key"]),
-                    ShownValue(record["value"]) if isinstance(record["value"], int | float) else short_text(record["value"]),
+                    ShownValue(record["value"])
+                    if isinstance(record["value"], int | float)
+                    else short_text(record["value"]),
                     record["grade"],
                     record["place"],
                     record["note"],

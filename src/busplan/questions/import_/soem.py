@@ -5,73 +5,79 @@ from math import ceil
 from typing import Final
 
 from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact
-from busplan.questions.import_.record import Fact, Machine
+from busplan.questions.import_.record import Fact, Reading
 
 TITLE: Final = "slaveinfo"
 _SLAVE: Final = re.compile(r"Slave:(\d{1,5})\s*$")
 _KEYS: Final = re.compile(r" (Name|Output size|Input size|Delay|Has DC|Activeports|MBX length wr): *(.*?)\s*$")
 _READ_LENGTH: Final = re.compile(r"rd: *(\d{1,5})")
 _MAPPED: Final = re.compile(r"\s+\[0x[0-9A-Fa-f]{4}\.\d\] 0x([0-9A-Fa-f]{4}):0x[0-9A-Fa-f]{2} 0x[0-9A-Fa-f]{2}")
+_DELAY: Final = re.compile(r"(\d{1,9})\[ns\]")
 _SIZES: Final = {"Output size": "write_bytes", "Input size": "read_bytes"}
 _BRANCH, _END = 3, 1
 
 
-def read(text: str, name: str) -> Machine:
+def read(text: str, name: str) -> Reading:
     """Read the text of slaveinfo.
 
     Raises
     ------
     BusplanError
-        No device, or one is left out; with its line.
+            A device is left out, or has no size; with its line.
     """
-    machine = Machine("ethercat", TITLE, name, rank=3)
+    machine = Reading("ethercat", TITLE, name, rank=3)
     totals_ns: dict[int, tuple[int, int]] = {}
     ports: dict[int, int] = {}
-    words: dict[int, int] = {}
-    number = -1
-    for line, content in enumerate(text.split("\n"), start=1):
-        if match := _SLAVE.match(content):
-            number += 1
-            if int(match[1]) != number + 1:
-                raise machine.refusal(line, f"slave {match[1]} where slave {number + 1} is due: give all of the text")
-            machine.nodes[number], words = {}, {}
-        elif number < 0:
-            continue
-        elif match := _MAPPED.match(content):
-            if int(match[1], 16) in CONTROL_WORDS:
-                words.setdefault(int(match[1], 16), line)
-                machine.nodes[number]["axes"] = axes_fact(words, machine, line=line)
-        elif match := _KEYS.match(content):
-            _described(match[1], match[2], line, machine.nodes[number], machine)
-            if match[1] == "Delay" and (delay := re.match(r"(\d{1,9})\[ns\]", match[2])):
-                totals_ns[number] = int(delay[1]), line
-            elif match[1] == "Activeports":
-                ports[number] = match[2].count("1")
-    if not machine.nodes:
-        raise machine.refusal(1, "no line Slave:1: cut off?")
-    for place, facts in machine.nodes.items():
-        missing = [key for key in _SIZES.values() if key not in facts]
-        if missing:
-            raise machine.refusal(1, f"slave {place + 1} has no {'Output' if 'write' in missing[0] else 'Input'} size")
-        facts.setdefault("axes", axes_fact({}, machine, line=None))
+    for number, lines in enumerate(_slaves(text, machine)):
+        facts = machine.nodes[number] = {}
+        words: dict[int, int] = {}
+        mapped = None
+        for line, content in lines:
+            if match := _MAPPED.match(content):
+                mapped = mapped or line
+                if int(match[1], 16) in CONTROL_WORDS:
+                    words.setdefault(int(match[1], 16), line)
+            elif match := _KEYS.match(content):
+                _described(match[1], match[2], line, facts, machine)
+                if match[1] == "Delay" and (delay := _DELAY.match(match[2])):
+                    totals_ns[number] = int(delay[1]), line
+                elif match[1] == "Activeports":
+                    ports[number] = match[2].count("1")
+        for title, key in _SIZES.items():
+            if key not in facts:
+                raise machine.refusal(lines[0][0], f"slave {number + 1} has no {title}: cut off?")
+        facts["axes"] = axes_fact(words, machine, line=mapped)
     _hops(totals_ns, ports, machine)
     machine.bus["master"] = Fact("SOEM", machine.place(1), "derived", "slaveinfo is of its tools")
     return machine
 
 
-def _described(key: str, value: str, line: int, facts: dict[str, Fact], machine: Machine) -> None:
+def _slaves(text: str, machine: Reading) -> list[list[tuple[int, str]]]:
+    """The numbered lines of each device."""
+    found: list[list[tuple[int, str]]] = []
+    for line, content in enumerate(text.split("\n"), start=1):
+        if match := _SLAVE.match(content):
+            found.append([])
+            if int(match[1]) != len(found):
+                raise machine.refusal(line, f"slave {match[1]} where slave {len(found)} is due: give all of the text")
+        if found:
+            found[-1].append((line, content))
+    return found
+
+
+def _described(key: str, value: str, line: int, facts: dict[str, Fact], machine: Reading) -> None:
     place = machine.place(line)
     if key in _SIZES and (bits := re.match(r"(\d{1,6})bits", value)):
         facts[_SIZES[key]] = Fact(ceil(int(bits[1]) / 8), place, note=f"{bits[1]} bits")
     elif key == "Name" and value:
         facts["name"] = Fact(value, place)
     elif key == "Has DC" and value == "1":
-        facts["has_clock"] = Fact(True, place, "measured")  # noqa: FBT003 - a value
+        facts["has_clock"] = Fact(True, place, "measured")
     elif key == "MBX length wr" and (length := _READ_LENGTH.search(value)) and int(length[1]):
         facts["mailbox_bytes"] = Fact(int(length[1]), place)
 
 
-def _hops(totals_ns: dict[int, tuple[int, int]], ports: dict[int, int], machine: Machine) -> None:
+def _hops(totals_ns: dict[int, tuple[int, int]], ports: dict[int, int], machine: Reading) -> None:
     """The delay of each device but the first, from the time of a frame on its way from the first clock to it.
 
     That way leads through earlier branches there and back: all devices between a device and its parent.

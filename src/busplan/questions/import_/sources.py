@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from busplan.errors import BusplanError
 from busplan.profile.toml import read_bytes
-from busplan.questions.import_.record import Machine
+from busplan.questions.import_.record import Reading
 
 MOST_BYTES: Final = 32_000_000
 """Largest file; the ENI of 500 devices has some 20 MB."""
@@ -50,7 +50,7 @@ _ELSEWHERE: Final = {
 }
 
 
-def machines(names: Sequence[str]) -> list[Machine]:
+def machines(names: Sequence[str]) -> list[Reading]:
     """Read files, in their order.
 
     Parameters
@@ -66,7 +66,7 @@ def machines(names: Sequence[str]) -> list[Machine]:
     return [_machine(name) for name in names]
 
 
-def _machine(argument: str) -> Machine:
+def _machine(argument: str) -> Reading:
     name = "<stdin>" if argument == "-" else argument
     content = read_bytes(Path(argument), name=name, limit=MOST_BYTES)
     if len(content) > MOST_BYTES:
@@ -80,7 +80,7 @@ def _machine(argument: str) -> Machine:
     return _of_text(_text(content, encoding, name), name)
 
 
-def _of_root(content: bytes, tag: str, name: str) -> Machine:
+def _of_root(content: bytes, tag: str, name: str) -> Reading:
     for known in FORMATS:
         if tag in known.roots:
             return _reader(known)(content, name)
@@ -99,7 +99,7 @@ def _text(content: bytes, encoding: str, name: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _of_text(text: str, name: str) -> Machine:
+def _of_text(text: str, name: str) -> Reading:
     found = [known for known in FORMATS if known.pattern and re.search(f"^(?:{known.pattern})", text, re.MULTILINE)]
     if not found:
         raise BusplanError(_unknown(name, ""))
@@ -109,8 +109,8 @@ def _of_text(text: str, name: str) -> Machine:
     return _reader(found[0])(text, name)
 
 
-def _reader(known: Format) -> Callable[..., Machine]:
-    read: Callable[..., Machine] = import_module(f"busplan.questions.import_.{known.module}").read
+def _reader(known: Format) -> Callable[..., Reading]:
+    read: Callable[..., Reading] = import_module(f"busplan.questions.import_.{known.module}").read
     return partial(read, dialect=known.dialect) if known.dialect else read
 
 

@@ -18,7 +18,7 @@ _LONGEST_PROFILE_NAME: Final = 100
 _UNITS: Final = {"us": 1.0, "ms": 1000.0}
 
 
-class Row(NamedTuple):
+class ProfileLine(NamedTuple):
     """A line of a profile."""
 
     section: str
@@ -37,7 +37,7 @@ class Row(NamedTuple):
         return whole(self.fact.value)
 
 
-def profile_text(rows: Sequence[Row], *, name: str, files: Sequence[tuple[str, str]]) -> str:
+def profile_text(rows: Sequence[ProfileLine], *, name: str, files: Sequence[tuple[str, str]]) -> str:
     """The text of a profile.
 
     Parameters
@@ -60,7 +60,7 @@ def profile_text(rows: Sequence[Row], *, name: str, files: Sequence[tuple[str, s
         f"name = {value_text(printable(name)[:_LONGEST_PROFILE_NAME].strip() or 'machine')}",
         f"description = {value_text(printable(f'Imported from {sources}')[:2000])}",
     ]
-    text = "\n".join([*head, *_sections(rows)]) + "\n"
+    text = "\n".join([*head, sections_text(rows)])
     text = text.encode("utf-8", "backslashreplace").decode()
     if len(text.encode()) > MAX_FILE_BYTES:
         count = sum(row.key == "nodes" for row in rows)
@@ -71,7 +71,12 @@ def profile_text(rows: Sequence[Row], *, name: str, files: Sequence[tuple[str, s
     return text
 
 
-def _sections(rows: Sequence[Row]) -> Iterator[str]:
+def sections_text(rows: Sequence[ProfileLine]) -> str:
+    """The text of sections, each behind an empty line."""
+    return "".join(f"{line}\n" for line in _sections(rows))
+
+
+def _sections(rows: Sequence[ProfileLine]) -> Iterator[str]:
     for section, own in groupby(rows, lambda row: row.section):
         yield ""
         first, _, rest = section.partition(".")
@@ -120,6 +125,6 @@ def time_us(text: str) -> float:
     return float(text[:-2]) * _UNITS[unit]
 
 
-def assumed(rows: Iterable[Row]) -> list[Row]:
+def assumed(rows: Iterable[ProfileLine]) -> list[ProfileLine]:
     """Rows that nobody has measured or configured."""
     return [row for row in rows if row.fact.grade == "assumed" and row.key not in ("grade", "kind", "master_grade")]
