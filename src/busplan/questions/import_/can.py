@@ -63,8 +63,8 @@ def _lacking(machine: Reading, messages: list[ProfileLine]) -> Iterator[str]:
     what = f"{count} message{'s' * (count != 1)} with a period"
     yield f"{machine.file}: {what}, and no profile yet: a profile of CAN has a cycle of SYNC and PDOs; what is missing:"
     yield (
-        "the nodes of the cycle and their PDOs: give the EDS or DCF of each node beside it, or --update PROFILE to bring "
-        "the messages into a profile that has nodes, as busplan init --bus can writes one"
+        "the nodes of the cycle and their PDOs: give the EDS or DCF of each node beside it, or --update PROFILE to "
+        "bring the messages into a profile that has nodes, as busplan init --bus can writes one"
     )
     if _BIT_RATE not in machine.bus:
         yield f"bus.{_BIT_RATE}: the bit rate"
