@@ -138,8 +138,3 @@ def _delays(ports: Mapping[int, list[_Port]], machine: Reading) -> None:
         for other in (*shared, number):
             machine.nodes[other]["delay_us"] = Fact(us, machine.place(before.line), "measured", note)
         waiting = [other for other in waiting if other not in shared]
-        if before.next != number - 1 and not shared:
-            machine.remarks.append(
-                f"{machine.file}:{before.line}: device {number} is on a branch from device {before.next}; its delay is "
-                "counted there and back"
-            )

@@ -12,10 +12,10 @@ from typing import Final, NamedTuple
 from busplan.errors import BusplanError
 from busplan.profile.toml import read_bytes
 from busplan.questions.import_.record import Reading
+from busplan.questions.import_.xml_tree import root_tag
 
 MOST_BYTES: Final = 32_000_000
 """Largest file; the ENI of 500 devices has some 20 MB."""
-_ROOT: Final = re.compile(rb"\s*(?:<\?[^>]*\?>|<!--.*?-->|<!DOCTYPE[^>]*>|\s)*<(?:[\w.-]+:)?([\w.-]+)", re.DOTALL)
 
 
 class Format(NamedTuple):
@@ -74,9 +74,8 @@ def _machine(argument: str) -> Reading:
     if not content.strip(b"\0 \t\r\n\xef\xbb\xbf\xff\xfe"):
         raise BusplanError(f"{name}: is empty")
     encoding = "utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8"
-    root = _ROOT.match(content.decode(encoding, "replace").lstrip("\ufeff").encode())
-    if root:
-        return _of_root(content, root[1].decode(), name)
+    if content[:1000].decode(encoding, "ignore").lstrip("\ufeff \t\r\n").startswith("<"):
+        return _of_root(content, root_tag(content, name=name), name)
     return _of_text(_text(content, encoding, name), name)
 
 

@@ -8,7 +8,8 @@ from xml.parsers import expat
 from busplan.errors import BusplanError
 
 _MOST_DEPTH: Final = 64
-_MOST_ELEMENTS: Final = 2_000_000
+_MOST_ELEMENTS: Final = 1_000_000
+_CHUNK_BYTES: Final = 4096
 
 
 @dataclass(slots=True)
@@ -21,6 +22,7 @@ class Element:
     attributes: dict[str, str]
     children: list["Element"] = field(default_factory=list)
     text: str = ""
+    """Behind its last child."""
 
     def all(self, path: str) -> Iterator["Element"]:
         """Elements of a path of tags below this one, as "Config/Slave"."""
@@ -53,15 +55,24 @@ def parsed(content: bytes, *, name: str, skipped: Collection[str] = ()) -> Eleme
         inside each other; with its line.
     """
     reader = _Reader(name, frozenset(skipped))
-    parser = reader.parser
-    try:
-        parser.Parse(content, True)
-    except expat.ExpatError as error:
-        what = expat.ErrorString(error.code)
-        raise BusplanError(f"{name}:{error.lineno}:{error.offset + 1}: not valid XML: {what}") from None
-    except (ValueError, LookupError) as error:  # an encoding that Python does not know
-        raise BusplanError(f"{name}:1: not valid XML: {error}") from None
-    return reader.root.children[0]
+    reader.read(content)
+    return next(iter(reader.root.children), reader.root)
+
+
+def root_tag(content: bytes, *, name: str) -> str:
+    """Tag of the root element of an XML file, without reading the rest.
+
+    Raises
+    ------
+    BusplanError
+        As `parsed`.
+    """
+    reader = _Reader(name, frozenset())
+    for start in range(0, len(content), _CHUNK_BYTES):
+        reader.read(content[start : start + _CHUNK_BYTES], is_last=start + _CHUNK_BYTES >= len(content))
+        if reader.root.children:
+            break
+    return reader.root.children[0].tag
 
 
 class _Reader:
@@ -69,6 +80,7 @@ class _Reader:
         self.name, self.skipped = name, skipped
         self.root = Element("", 0, {})
         self.open = [self.root]
+        self.texts: list[str] = []
         self.depth = self.elements = self.skips = 0
         self.parser = expat.ParserCreate()
         self.parser.buffer_text = True
@@ -76,6 +88,16 @@ class _Reader:
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
         self.parser.CharacterDataHandler = self._text
+
+    def read(self, content: bytes, *, is_last: bool = True) -> None:
+        """Read the file, or the next part of it."""
+        try:
+            self.parser.Parse(content, is_last)
+        except expat.ExpatError as error:
+            what = expat.ErrorString(error.code)
+            raise BusplanError(f"{self.name}:{error.lineno}:{error.offset + 1}: not valid XML: {what}") from None
+        except (ValueError, LookupError) as error:  # an encoding that Python does not know
+            raise BusplanError(f"{self.name}:1: not valid XML: {error}") from None
 
     def _refuse(self, message: str) -> BusplanError:
         return BusplanError(f"{self.name}:{self.parser.CurrentLineNumber}: {message}")
@@ -96,6 +118,7 @@ class _Reader:
             return
         element = Element(tag, self.parser.CurrentLineNumber, attributes)
         self.open[-1].children.append(element)
+        self.texts.clear()
         self.open.append(element)
 
     def _end(self, _tag: str) -> None:
@@ -103,8 +126,9 @@ class _Reader:
         if self.skips:
             self.skips -= 1
         else:
-            self.open.pop()
+            self.open.pop().text = "".join(self.texts)
+            self.texts.clear()
 
     def _text(self, text: str) -> None:
         if not self.skips:
-            self.open[-1].text += text
+            self.texts.append(text)
