@@ -91,7 +91,7 @@ def test_no_cut_and_no_change_of_a_file_crashes(path: Path, tmp_path: Path) -> N
     other = tmp_path / path.name
     for number in range(16 if is_database else 40):
         if number % 2:
-            changed = content[: chance.randrange(len(content))]
+            changed = bytearray(content[: chance.randrange(len(content))])
         else:
             changed = bytearray(content)
             for _ in range(chance.randint(1, 8)):

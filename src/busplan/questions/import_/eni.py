@@ -109,9 +109,9 @@ def _device(
         if shift and shift_ns is not None:
             yield "shift_us", Fact(shift_ns / 1000, machine.place(shift.line))
     mailbox = slave.first("Mailbox/Recv")
-    size = number(mailbox, "Length", machine, most=_MOST_BITS) if mailbox else None
-    if size and size[0]:
-        yield "mailbox_bytes", Fact(size[0], machine.place(size[1]))
+    longest = number(mailbox, "Length", machine, most=_MOST_BITS) if mailbox else None
+    if longest and longest[0]:
+        yield "mailbox_bytes", Fact(longest[0], machine.place(longest[1]))
 
 
 def _axes(slave: Element, span: range | None, outputs: list[Element], machine: Reading) -> Fact:
