@@ -1,11 +1,11 @@
 """ENI, the configuration of an EtherCAT master (ETG.2100): frames to the byte, devices, clocks and mailboxes."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import ceil
 from typing import Final
 
-from busplan.questions.import_.record import Fact, Reading
+from busplan.questions.import_.record import Fact, Line, Reading
 from busplan.questions.import_.xml_tree import Element, parsed
 
 TITLE: Final = "ENI"
@@ -48,7 +48,7 @@ def read(content: bytes, name: str) -> Reading:
     return machine
 
 
-def number(element: Element, path: str, machine: Reading, *, most: int) -> tuple[int, int] | None:
+def number(element: Element, path: str, machine: Reading, *, most: int) -> tuple[int, Line] | None:
     """A whole number of an element below another one, and its line; None where there is none.
 
     Raises
@@ -88,7 +88,8 @@ def _device(
         yield "port", Fact(_PORTS[letter], machine.place(physics.line), note=f"Physics {physics.text.strip()[:8]}")
     spans = {}
     for tag, key in (("Recv", "read_bytes"), ("Send", "write_bytes")):
-        line, size, bits = slave.line, 0, 0
+        line: Line = slave.line
+        size = bits = 0
         for part in slave.all(f"ProcessData/{tag}"):
             start = number(part, "BitStart", machine, most=_MOST_BITS)
             length = number(part, "BitLength", machine, most=8 * _MOST_BYTES)
@@ -116,7 +117,7 @@ def _device(
 
 def _axes(slave: Element, span: range | None, outputs: list[Element], machine: Reading) -> Fact:
     """Axes of a device: the control words of CiA 402 in its PDOs, or among the names of its outputs."""
-    words: dict[int, int] = {}
+    words: dict[int, Line] = {}
     pdos = list(slave.all("ProcessData/RxPdo"))
     for pdo in [pdo for pdo in pdos if "Sm" in pdo.attributes] or pdos:
         for entry in pdo.all("Entry/Index"):
@@ -130,11 +131,11 @@ def _axes(slave: Element, span: range | None, outputs: list[Element], machine: R
                 words[offset[0]] = title.line
     listed = next((pdo.line for pdo in slave.all("ProcessData/RxPdo")), None)
     # A device without outputs is no drive.
-    line = min(words.values()) if words else listed or (slave.line if span is None else None)
+    line = next(iter(words.values())) if words else listed or (slave.line if span is None else None)
     return axes_fact(words, machine, line=line)
 
 
-def axes_fact(words: dict[int, int], machine: Reading, *, line: int | None) -> Fact:
+def axes_fact(words: Mapping[int, Line], machine: Reading, *, line: Line | None) -> Fact:
     """Axes of a device by the lines of its control words.
 
     Parameters
@@ -150,7 +151,7 @@ def axes_fact(words: dict[int, int], machine: Reading, *, line: int | None) -> F
         return Fact(0, grade="assumed", note="which PDOs it has no file says")
     if not words:
         return Fact(0, machine.place(line), "derived", "no control word of CiA 402 in its PDOs")
-    return Fact(len(words), machine.place(min(words.values())), "derived", "control words of CiA 402")
+    return Fact(len(words), machine.place(next(iter(words.values()))), "derived", "control words of CiA 402")
 
 
 def _cycle(config: Element, machine: Reading) -> None:
@@ -197,7 +198,7 @@ def _commands(frame: Element, machine: Reading) -> Iterator[tuple[int, int, int]
         yield code[0], length[0], address[0] if address else -1
 
 
-def _frames(config: Element, frames: list[list[tuple[int, int, int]]], line: int, machine: Reading) -> None:
+def _frames(config: Element, frames: list[list[tuple[int, int, int]]], line: Line, machine: Reading) -> None:
     """Layout and housekeeping, so that the frames come out to the byte."""
     states = _mailbox_states(config, machine)
     process: list[tuple[int, int]] = []

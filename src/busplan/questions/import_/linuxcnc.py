@@ -5,7 +5,7 @@ from math import ceil
 from typing import Final
 
 from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact, whole_number
-from busplan.questions.import_.record import Fact, Reading
+from busplan.questions.import_.record import Fact, Line, Reading
 from busplan.questions.import_.xml_tree import Element, parsed
 
 TITLE: Final = "ethercat-conf.xml"
@@ -33,7 +33,7 @@ def read(content: bytes, name: str) -> Reading:
     if period_ns:
         machine.bus["period_us"] = Fact(period_ns / 1000, machine.place(master.line))
     machine.bus["master"] = Fact("IgH", machine.place(master.line), "derived", "the master of linuxcnc-ethercat")
-    units: dict[str, int] = {}
+    units: dict[str, Line] = {}
     for slave in master.all("slave"):
         number = _number(slave, "idx", machine, most=65_535)
         if number is None or number in machine.nodes:
@@ -49,7 +49,7 @@ def read(content: bytes, name: str) -> Reading:
     if not machine.nodes:
         raise machine.refusal(master.line, "<master> has no <slave>")
     if len(units) > 1:
-        line = max(units.values())
+        line = list(units.values())[-1]
         machine.bus["further_datagrams"] = Fact(len(units) - 1, machine.place(line), note=f"{len(units)} sync units")
     return machine
 
@@ -59,7 +59,7 @@ def _device(slave: Element, number: int, machine: Reading) -> None:
     kind = slave.attributes.get("type", "device")
     facts["name"] = Fact(slave.attributes.get("name", kind) if kind == "generic" else kind, machine.place(slave.line))
     managers = list(slave.all("syncManager"))
-    words: dict[int, int] = {}
+    words: dict[int, Line] = {}
     if any(True for manager in managers for _ in manager.all("pdo")):
         bits = dict.fromkeys(_DIRECTIONS, 0)
         for manager in managers:

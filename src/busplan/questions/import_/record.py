@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePath
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from busplan.errors import BusplanError
 from busplan.printable import printable
@@ -12,6 +12,10 @@ from busplan.sourced import Grade
 
 _MAY_DIFFER: Final = ("name", "master", "clock_us")
 """What files may say in different words."""
+
+
+Line: TypeAlias = int | str
+"""Number of a line, with ":" and the column where the file has long lines."""
 
 
 class Fact(NamedTuple):
@@ -64,11 +68,11 @@ class Reading:
     remarks: list[str] = field(default_factory=list)
     """Sentences on what the file says and a profile cannot, or what the file leaves open."""
 
-    def place(self, line: int) -> str:
+    def place(self, line: Line) -> str:
         """File and line, for comments."""
         return f"{PurePath(self.file).name}:{line}"
 
-    def refusal(self, line: int, message: str) -> BusplanError:
+    def refusal(self, line: Line, message: str) -> BusplanError:
         """Make the error for something wrong in the file."""
         return BusplanError(f"{self.file}:{line}: {message}")
 

@@ -10,6 +10,8 @@ from busplan.errors import BusplanError
 _MOST_DEPTH: Final = 64
 _MOST_ELEMENTS: Final = 1_000_000
 _CHUNK_BYTES: Final = 4096
+_FAR: Final = 300
+"""Columns that a person counts; some tools write all in one line."""
 
 
 @dataclass(slots=True)
@@ -18,7 +20,8 @@ class Element:
 
     tag: str
     """Without its namespace."""
-    line: int
+    line: int | str
+    """Its line, with the column where that is far."""
     attributes: dict[str, str]
     children: list["Element"] = field(default_factory=list)
     text: str = ""
@@ -116,7 +119,8 @@ class _Reader:
         if self.skips or tag in self.skipped:
             self.skips += 1
             return
-        element = Element(tag, self.parser.CurrentLineNumber, attributes)
+        line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber
+        element = Element(tag, f"{line}:{column + 1}" if column > _FAR else line, attributes)
         self.open[-1].children.append(element)
         self.texts.clear()
         self.open.append(element)
