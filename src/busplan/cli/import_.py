@@ -63,7 +63,7 @@ def import_command(
     The profile goes to standard output or to -o; a file that is already there stays, unless --force is given. Exits 0
     when it is written, whatever the verdict is.
 
-    Example: busplan import slaves.txt pdos.txt -o machine.toml
+    Example: busplan import machine.xml slaves.txt -o machine.toml
     """
     if update is None and take is not None:
         raise BusplanError("--take: goes with --update PROFILE")

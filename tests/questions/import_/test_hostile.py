@@ -2,6 +2,7 @@
 
 import random
 import sys
+import time
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -70,6 +71,24 @@ def test_a_hostile_file_is_one_sentence(case: str, tmp_path: Path, run: Run) -> 
         done = run("import", "machine.in", "-o", "new.toml", cwd=tmp_path)
         assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (2, "", 1)
         assert [path.name for path in tmp_path.iterdir()] == ["machine.in"]
+
+
+LONG = {
+    "spaces in a line": "[DeviceInfo]\n" + " " * 1_000_000 + "x\n",
+    "empty lines": "\n" * 1_000_000 + "[DeviceInfo]\n",
+    "spaces in a name": "=== Master 0, Slave 0 ===\n  Order number: x" + " " * 1_000_000 + "y\n",
+    "spaces behind a key": "Slave:1\n Name:x" + " " * 1_000_000 + "y\n",
+    "spaces in a message": "BO_ 1 A: 8 X\n" + " " * 1_000_000 + "SG_ " + " " * 1_000_000 + "x\n",
+}
+
+
+@pytest.mark.parametrize("case", LONG)
+def test_no_line_takes_long(case: str, tmp_path: Path) -> None:
+    (tmp_path / "machine.in").write_text(LONG[case], encoding="utf-8")
+    start_s = time.process_time()
+    with pytest.raises(busplan.BusplanError):
+        busplan.import_profile(tmp_path / "machine.in")
+    assert time.process_time() - start_s < 5
 
 
 def test_a_file_of_100_megabytes_is_refused_unread(tmp_path: Path) -> None:

@@ -33,6 +33,20 @@ def test_a_scan_has_bytes_and_measured_delays(names: tuple[str, ...]) -> None:
     assert "cycle.period_us = 1000" in answer.sentences()[-1]
 
 
+def test_an_eni_has_the_frames_and_a_scan_beside_it_the_delays() -> None:
+    answer = imported("slaves.txt", "machine.xml")
+    profile: Any = answer.profile
+    assert groups(answer) == MACHINE
+    assert [group.delay_us for group in profile.group] == [None, 0.15, 0.685]
+    assert (profile.cycle.period_us, profile.bus.sync_shift, profile.bus.mailbox_bytes) == (500, 0.25, 128)
+    # Of the ENI, though the scan is of another master's tool.
+    assert (profile.bus.master, profile.bus.process_data) == (None, "LRW-shared")
+    assert profile.bus.housekeeping_bytes == (4, 4, 1, 2)
+    # 40 bytes of a frame, 12 of each of five datagrams, and their data.
+    assert any("its frame takes 10.24 us on the wire, as those of the profile" in remark for remark in answer.remarks)
+    assert "delay_us = 0.15            # measured: cable included, slaves.txt:39" in answer.text
+
+
 def test_the_ports_of_a_scan_are_known() -> None:
     assert [group.port for group in imported("slaves.txt", "pdos.txt").profile.group] == [
         "100BASE-TX",

@@ -244,13 +244,11 @@ def _mailbox_states(config: Element, machine: Reading) -> range:
 
 
 def _branches(slaves: list[Element], machine: Reading) -> None:
-    """Say where the segment is no line: a branch adds the delay of a port."""
+    """Mark devices at whose place the segment is no line."""
     addresses = [number(slave, "Info/PhysAddr", machine, most=65_535) for slave in slaves]
     for place, slave in enumerate(slaves[1:], start=1):
         port = slave.first("PreviousPort")
         before = port and number(port, "PhysAddr", machine, most=65_535)
         own = addresses[place - 1]
         if before and own and before[0] != own[0]:
-            machine.remarks.append(
-                f"{machine.file}:{before[1]}: device {place} is on a branch: the delay of the port there is not counted"
-            )
+            machine.nodes[place]["branch"] = Fact(before[0], machine.place(before[1]))

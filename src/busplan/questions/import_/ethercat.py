@@ -50,6 +50,11 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
             f"{machine.file}: how many bytes device {', '.join(names)}{more} has in a cycle is not known (the first is "
             f"0); give the text of `{PDOS}` beside it, as in busplan import {machine.file} pdos.txt"
         )
+    for number, facts in machine.nodes.items():
+        if "branch" in facts and "delay_us" not in facts:
+            machine.remarks.append(
+                f"{facts['branch'].place}: device {number} is on a branch: the delay of the port there is not counted"
+            )
     starter = kind_named("ethercat").starter
     bus, devices = machine.bus, [machine.nodes[number] for number in sorted(machine.nodes)]
     period = bus.get("period_us") or Fact(time_us(starter.period), "", "assumed", "no file says it; usual on this bus")

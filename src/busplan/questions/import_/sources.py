@@ -18,6 +18,9 @@ MOST_BYTES: Final = 32_000_000
 """Largest file; the ENI of 500 devices has some 20 MB."""
 
 
+_LONGEST_LINE: Final = 1000
+
+
 class Format(NamedTuple):
     """A format that is read, and how it is recognised."""
 
@@ -37,12 +40,12 @@ FORMATS: Final = (
     Format("ENI (a root <EtherCATConfig>)", "eni", roots=("EtherCATConfig", "EncryptedEtherCATConfig")),
     Format("LinuxCNC's ethercat-conf.xml (a root <masters>)", "linuxcnc", roots=("masters",)),
     Format("text of `ethercat slaves -v` or `ethercat pdos` (=== Master 0, Slave 0 ===)", "igh", pattern=_IGH),
-    Format("text of SOEM's slaveinfo (Slave:1)", "soem", pattern=r"Slave:\d+\s*$"),
-    Format("DBC (BO_)", "can_database", pattern=r"\s*BO_ +\d+ ", dialect="dbc"),
-    Format("SYM (FormatVersion=)", "can_database", pattern=r"\s*FormatVersion *= *\d", dialect="sym"),
+    Format("text of SOEM's slaveinfo (Slave:1)", "soem", pattern=r"Slave:\d+[ \t]*$"),
+    Format("DBC (BO_)", "can_database", pattern=r"[ \t]*BO_ +\d+ ", dialect="dbc"),
+    Format("SYM (FormatVersion=)", "can_database", pattern=r"[ \t]*FormatVersion *= *\d", dialect="sym"),
     Format("KCD (a root <NetworkDefinition>)", "can_database", roots=("NetworkDefinition",), dialect="kcd"),
     Format("ARXML (a root <AUTOSAR>)", "can_database", roots=("AUTOSAR",), dialect="arxml"),
-    Format("CANopen EDS or DCF ([DeviceInfo])", "canopen", pattern=r"\s*\[(?i:DeviceInfo)\]"),
+    Format("CANopen EDS or DCF ([DeviceInfo])", "canopen", pattern=r"[ \t]*\[(?i:DeviceInfo)\]"),
 )
 _ELSEWHERE: Final = {
     "EtherCATInfo": "an ESI describes a kind of device and no machine; export the ENI of the machine",
@@ -105,6 +108,9 @@ def _of_text(text: str, name: str) -> Reading:
     if len(found) > 1:
         titles = " and ".join(known.title for known in found)
         raise BusplanError(f"{name}: has lines of {titles}; give a file for each")
+    if not found[0].dialect:
+        # No value stands further behind, and patterns take long for lines without an end.
+        text = "\n".join(line[:_LONGEST_LINE] for line in text.split("\n"))
     return _reader(found[0])(text, name)
 
 
