@@ -4,49 +4,75 @@ import os
 import pty
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import chdir
+from functools import partial
 from io import BufferedWriter, BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
+from shutil import copytree
 from threading import Thread
 from typing import IO, Any
 from unittest import mock
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from busplan.cli import run as run_command_line
 
 Git = Callable[..., bytes]
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
-# Hundreds of runs of the program compile its modules once, as those of a user do, and not in each run again.
+# Modules, and tests with their assertions, are compiled once and not in each process again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONUNBUFFERED", None)  # whoever tests it sets it
 # Matrices are small, and every processor has a test of its own.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Few examples in each run, and new ones in the next; a slow one is no failure where the machine is shared.
+# After a change of a computation: pytest --hypothesis-profile=thorough
+EASY = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+settings.register_profile("quick", EASY, max_examples=20)
+settings.register_profile("thorough", EASY, max_examples=500)
+settings.load_profile("quick")
+
+
+collect_ignore = ["oracles", "attacks/fuzz.py", "readme/refresh.py"]
+"""Modules without a test or a doctest, which would load their libraries in every worker."""
+
+
+def run_git(*arguments: str, cwd: Path) -> bytes:
+    """Run git, untouched by the user's own settings; gives what it writes."""
+    outside = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
+    settings = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1"}
+    author = ("-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "init.defaultBranch=main")
+    return subprocess.run(
+        ["git", *author, *arguments], check=True, cwd=cwd, env={**outside, **settings}, capture_output=True
+    ).stdout
 
 
 @pytest.fixture
 def git(tmp_path: Path) -> Git:
-    """Run git in a new repository, untouched by the user's own settings; gives what it writes."""
+    """Run git in a new repository."""
     folder = tmp_path / "repository"
     folder.mkdir()
-    outside = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
-    settings = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1"}
-    author = ("-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "init.defaultBranch=main")
-
-    def call(*arguments: str, cwd: Path = folder) -> bytes:
-        return subprocess.run(
-            ["git", *author, *arguments], check=True, cwd=cwd, env={**outside, **settings}, capture_output=True
-        ).stdout
-
-    call("init", "--quiet")
-    return call
+    run_git("init", "--quiet", "--template=", cwd=folder)
+    return partial(run_git, cwd=folder)
 
 
 @pytest.fixture
-def repository(git: Git, tmp_path: Path) -> Path:
+def repository(git: Git, committed: Path, tmp_path: Path) -> Path:
+    """A repository of the test's own, with what is committed in every one."""
+    del git  # which has made the folder
+    return Path(copytree(committed, tmp_path / "repository", symlinks=True, dirs_exist_ok=True))
+
+
+@pytest.fixture(scope="session")
+def committed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A repository with two commits: profiles/line.toml at 4 ms, then at 1 ms, tagged v1 and main; and odd files."""
-    folder = tmp_path / "repository"
+    folder = tmp_path_factory.mktemp("committed")
+    git = partial(run_git, cwd=folder)
+    git("init", "--quiet", "--template=")
     line = folder / "profiles" / "line.toml"
     line.parent.mkdir()
     line.write_text(LINE, encoding="utf-8")
@@ -110,17 +136,37 @@ def environment(**changes: str) -> dict[str, str]:
     return {**kept, "LANG": "C.UTF-8", "TERM": "xterm-256color", **changes}
 
 
+@pytest.fixture(scope="session")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """An executable `busplan`: the program as a process, without the time that an interpreter takes to load it."""
+    folder = tmp_path_factory.mktemp("program")
+    forks, path = Path(__file__).with_name("forks.py"), folder / "busplan"
+    words = ["call", str(folder / "forks")]
+    text = f"#!{sys.executable} -IS\nimport sys\nsys.argv[1:1] = {words}\nexec(open({str(forks)!r}).read())\n"
+    path.write_text(text, encoding="utf-8")
+    path.chmod(0o755)
+    serve = [sys.executable, str(forks), "serve", str(folder / "forks")]
+    with subprocess.Popen(
+        serve, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=folder, env=environment()
+    ) as server:
+        assert server.stdout is not None
+        assert server.stdout.readline() == b"ready\n"
+        yield path
+        assert server.stdin is not None
+        server.stdin.close()
+
+
 def run_busplan(
     *arguments: str,
+    program: tuple[str | Path, ...],
     cwd: Path,
     stdin: str | bytes | None = None,
     env: Mapping[str, str] | None = None,
     stdout: int | IO[bytes] = subprocess.PIPE,
-    python: tuple[str, ...] = ("-m", "busplan"),
 ) -> "subprocess.CompletedProcess[str]":
     """Run the program to its end; the streams as text, bytes that are no UTF-8 escaped."""
     done = subprocess.run(
-        [sys.executable, *python, *arguments],
+        [*program, *arguments],
         check=False,
         cwd=cwd,
         env=environment(**(env or {})),
@@ -187,7 +233,7 @@ def run_inside(
     )
 
 
-def run_line(line: str, *, cwd: Path) -> "subprocess.CompletedProcess[str]":
+def run_line(line: str, *, cwd: Path, program: Path) -> "subprocess.CompletedProcess[str]":
     """Run a line as it is typed into bash.
 
     Of a line that begins with one command of the program, bash says what its words are, and the program is called with
@@ -195,7 +241,7 @@ def run_line(line: str, *, cwd: Path) -> "subprocess.CompletedProcess[str]":
     """
 
     def bash(script: str, *, check: bool = False, stdin: str = "") -> "subprocess.CompletedProcess[bytes]":
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        path = f"{program.parent}{os.pathsep}{os.environ['PATH']}"
         return subprocess.run(
             ["bash", "-c", script],
             check=check,
@@ -220,9 +266,9 @@ def run_line(line: str, *, cwd: Path) -> "subprocess.CompletedProcess[str]":
 
 
 @pytest.fixture(scope="session")
-def shell() -> Run:
+def shell(program: Path) -> Run:
     """Run a line of documentation as it stands."""
-    return run_line
+    return partial(run_line, program=program)
 
 
 @pytest.fixture(scope="session")
@@ -235,11 +281,11 @@ def no_compiler(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
 
 
 @pytest.fixture(scope="session")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Run the program: as a process where a stream, the environment or the interpreter matters, else in this one.
+def run(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Run:
+    """Run the program: as a process where a stream or the environment matters, else in this one.
 
     The same call twice is one run, unless it names a working directory or a stream. `inside` has more arguments of
-    `run_inside`.
+    `run_inside`; `python` has those of an interpreter, where it matters, too.
     """
     home = tmp_path_factory.mktemp("cwd")
     known: dict[object, subprocess.CompletedProcess[str]] = {}
@@ -250,9 +296,13 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         stdin: str | bytes | None = None,
         env: Mapping[str, str] | None = None,
         inside: Mapping[str, Any] | None = None,
+        python: tuple[str, ...] | None = None,
         **options: object,
     ) -> "subprocess.CompletedProcess[str]":
+        if python is not None:
+            options["program"] = (sys.executable, *python)
         if options or env is not None:
+            options.setdefault("program", (request.getfixturevalue("program"),))
             return run_busplan(*arguments, cwd=cwd or home, stdin=stdin, env=env, **options)  # type: ignore[arg-type]
         if cwd is not None or stdin is not None or inside is not None:
             return run_inside(*arguments, cwd=cwd or home, stdin=stdin, **(inside or {}))
@@ -292,7 +342,7 @@ def refused(run: Run) -> Callable[..., str]:
 
 
 @pytest.fixture(scope="session")
-def on_terminal(run: Run) -> Callable[..., tuple[int, str]]:
+def on_terminal(run: Run, request: pytest.FixtureRequest) -> Callable[..., tuple[int, str]]:
     """Run the program with a terminal for its standard output and error; gives exit code and what the terminal got.
 
     In this process, as `run` does, unless a process is asked for.
@@ -308,7 +358,7 @@ def on_terminal(run: Run) -> Callable[..., tuple[int, str]]:
         try:
             if process:
                 code = subprocess.run(
-                    [sys.executable, "-m", "busplan", *arguments],
+                    [request.getfixturevalue("program"), *arguments],
                     check=False,
                     cwd=cwd,
                     env=environment(**(env or {})),

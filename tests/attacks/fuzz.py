@@ -36,7 +36,7 @@ from busplan.buses import kind_names
 from busplan.cli import run
 from busplan.cli.lazy import LazyCommands
 from busplan.errors import BusplanError
-from busplan.profile.schema import profile_schema
+from busplan.profile.kinds import profile_schema
 from busplan.profile.starter import Machine, machine_text
 from busplan.profile.toml import decode, validate
 from busplan.questions.fit.circle_move import path_steps

@@ -12,7 +12,9 @@ import pytest
 from busplan.buses import kind_names
 
 
-def _fuzz() -> ModuleType:
+@pytest.fixture(scope="module")
+def fuzz() -> ModuleType:
+    """The fuzzer, whose schema takes a while to make."""
     spec = importlib.util.spec_from_file_location("fuzz", Path(__file__).with_name("fuzz.py"))
     assert spec is not None
     assert spec.loader is not None
@@ -22,13 +24,12 @@ def _fuzz() -> ModuleType:
     return module
 
 
-fuzz = _fuzz()
 KINDS = kind_names()
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_command_keeps_what_it_promises_and_all_tell_one_story(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    kind: str, fuzz: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     # Every kind asks every command, and all kinds together every form, but for png, whose library takes seconds.

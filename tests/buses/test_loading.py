@@ -10,6 +10,7 @@ from busplan.profile.shipped import load, shipped_names
 # One interpreter, from which each profile has a process of its own.
 PROGRAM = """
 import json, os, sys
+import pydantic  # of which every process needs the same
 import busplan
 for name in sys.argv[1:]:
     child = os.fork()

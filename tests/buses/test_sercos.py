@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named
-from busplan.buses.periods import ANY_PERIOD, Periods
+from busplan.buses.limits import ANY_PERIOD, Periods
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.fit.figures import figures
@@ -22,13 +22,11 @@ from busplan.questions.map.ranges import default_direction
 from busplan.questions.report.all_answers import all_answers
 
 Run = Callable[..., Any]
-SOME = settings(max_examples=60, deadline=None)
-FEW = settings(max_examples=15, deadline=None)
+FEW = settings(max_examples=15)
 KINDS = pytest.mark.parametrize("kind", ["sercos3", "sercos2"])
 KNOWN = Periods((31.25, 62.5, 125.0, 250.0, 500.0))
 
 
-@SOME
 @given(st.floats(1.0, 600.0))
 def test_the_next_period_is_the_first_that_is_no_shorter(least_us: float) -> None:
     longer = [one for one in KNOWN.us if one >= least_us]

@@ -4,14 +4,16 @@ import csv
 import json
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from busplan.profile.shipped import load, locate, locate_measurements
+
+if TYPE_CHECKING:
+    import subprocess
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -23,9 +25,6 @@ import os, sys
 def die(*_args, **_kwargs):
     os.kill(os.getpid(), 9)
 {patch}
-sys.argv = ["busplan", "calibrate", "bench.toml", "m.csv", "--form", "linear", "--apply"]
-from busplan.cli import run
-run()
 """
 KILLS = {
     "half-written": """
@@ -238,12 +237,11 @@ def test_a_layout_that_cannot_be_edited_is_left_with_the_lines_to_change(busplan
 
 
 @pytest.mark.parametrize("moment", KILLS)
-def test_a_kill_while_writing_leaves_the_profile_whole(bench: Path, moment: str) -> None:
+def test_a_kill_while_writing_leaves_the_profile_whole(run: Run, bench: Path, moment: str) -> None:
     before = bench.read_bytes()
-    run = subprocess.run(
-        [sys.executable, "-c", KILL.format(patch=KILLS[moment])], cwd=bench.parent, check=False, capture_output=True
-    )
-    assert run.returncode == -signal.SIGKILL
+    killed = {"FORK_FIRST": KILL.format(patch=KILLS[moment])}
+    done = run("calibrate", "bench.toml", "m.csv", "--form", "linear", "--apply", cwd=bench.parent, env=killed)
+    assert done.returncode == -signal.SIGKILL
     assert bench.read_bytes() == before
     # What was being written had no name yet, where the system has such files.
     left = [path.name for path in bench.parent.iterdir() if path.name.startswith(".bench.toml.")]

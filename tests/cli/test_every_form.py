@@ -27,17 +27,13 @@ QUESTIONS = (
     ("explain", "paper-1ms", "required_us", "--timing", "both"),
     ("explain", "paper-1ms", "cheapest_change"),
     ("explain", "paper-1ms", "centre_offset_mm"),
-    ("explain", "paper-1ms", "period_us"),
-    ("calibrate", "paper-two-node", "table-1.csv"),
     ("calibrate", "paper-two-node", "table-1.csv", "--form", "linear"),
-    ("compare", "paper-1ms"),
     ("compare", "gantry-24", "--circle", "--set", "circle.radius_mm=10"),
     ("paper",),
-    ("evidence", "ieee1394"),
+    ("evidence", "can"),
     ("profiles",),
     ("rule",),
     ("rule", "bp110"),
-    ("rule", "BP001"),
 )
 
 NAME = "<script>alert(1)</script> | `x` [a](http://b) @team *c*"

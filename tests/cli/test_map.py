@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,7 +63,8 @@ def test_each_cell_is_the_verdict_of_capacity(busplan: Run, tmp_path: Path) -> N
         }
 
 
-def test_circles_are_run_in_this_or_in_other_processes(busplan: Run, tmp_path: Path) -> None:
+def test_circles_are_run_here_or_by_workers(busplan: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("busplan.cli.workers.workers", ThreadPoolExecutor)  # of processes a sweep has a test
     small = ("--set", "circle.radius_mm=20", "--set", "circle.ramp_periods=5", "--circle")
     each = [busplan("map", "paper-4ms", *FEW, *small, "--jobs", jobs, cwd=tmp_path) for jobs in (1, 2)]
     assert each[0].stdout == each[1].stdout

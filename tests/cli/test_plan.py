@@ -2,13 +2,15 @@
 
 import json
 import signal
-import subprocess
-import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    import subprocess
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -34,11 +36,9 @@ kind = "table"
 payload_bytes = [4, 64]
 time_us = [31.4, 52.4]
 """
-RUN = "from busplan.cli import run; run()"
-KILLED_WHILE_WRITING = f"import os; os.fsync = lambda _: os.kill(os.getpid(), 9); {RUN}"
+KILLED_WHILE_WRITING = "import os; os.fsync = lambda _: os.kill(os.getpid(), 9)"
 KILLED_BEFORE_RENAME = (
-    "import os, pathlib; kill = lambda *_, **__: os.kill(os.getpid(), 9); "
-    f"pathlib.Path.replace = kill; os.link = kill; {RUN}"
+    "import os, pathlib; kill = lambda *_, **__: os.kill(os.getpid(), 9); pathlib.Path.replace = kill; os.link = kill"
 )
 
 
@@ -57,17 +57,6 @@ def busplan(busplan: Run) -> Run:
         return busplan("plan", *arguments, cwd=cwd, stdin=stdin)
 
     return call
-
-
-def process(*arguments: object, cwd: Path, code: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-c", code, "plan", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        check=False,
-        timeout=60,
-    )
 
 
 def test_apply_changes_the_values_and_nothing_else(busplan: Run, profile: Path) -> None:
@@ -156,9 +145,11 @@ def test_without_a_plan_nothing_is_written(busplan: Run, profile: Path, option: 
         (["-o", "new.toml"], KILLED_BEFORE_RENAME),
     ],
 )
-def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path, option: list[str], code: str) -> None:
-    run = process(profile.name, "--nodes", 4, *option, cwd=profile.parent, code=code)
-    assert run.returncode == -signal.SIGKILL
+def test_a_process_killed_while_writing_leaves_the_original_whole(
+    run: Run, profile: Path, option: list[str], code: str
+) -> None:
+    done = run("plan", profile.name, "--nodes", "4", *option, cwd=profile.parent, env={"FORK_FIRST": code})
+    assert done.returncode == -signal.SIGKILL
     assert profile.read_text(encoding="utf-8") == PROFILE
     assert not (profile.parent / "new.toml").exists()
 
@@ -230,17 +221,12 @@ def test_only_what_is_freed_is_changed(busplan: Run, profile: Path) -> None:
         assert bool(document["relaxations"]) == (code == 1)
 
 
-def test_the_circle_is_asked_for_and_can_be_left_out(busplan: Run, tmp_path: Path) -> None:
+def test_the_circle_is_asked_for(busplan: Run, tmp_path: Path) -> None:
     circle = "[servo]\nposition_gain_per_s = 50\n[circle]\nradius_mm = 5\nfeed_mm_per_min = 3000\nramp_periods = 20\n"
     circle += "[tolerance]\nmax_contour_error_mm = 0.1\n"
     (tmp_path / "mine.toml").write_text(PROFILE + circle, encoding="utf-8")
-    run = busplan("mine.toml", "--format", "json", cwd=tmp_path)
-    assert (run.returncode, run.stderr) == (0, "")
-    options = json.loads(run.stdout)["options"]
+    done = busplan("mine.toml", "--format", "json", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    options = json.loads(done.stdout)["options"]
     assert all(option["circle_passed"] is True for option in options)
     assert next(one for one in options if one["title"] == "smallest period")["period_us"] % 100 == 0
-    loaded = f"import atexit, sys; atexit.register(lambda: print('numpy' in sys.modules, file=sys.stderr)); {RUN}"
-    without = process("mine.toml", "--no-circle", "--format", "csv", cwd=tmp_path, code=loaded)
-    # The equations need no numpy, and nobody waits for it.
-    assert (without.returncode, without.stderr) == (0, "False\n")
-    assert without.stdout.startswith("profile,title,changes,recommended,")

@@ -280,9 +280,7 @@ def test_a_suppression_works_and_is_not_idle_for_another_value(run: Run, folder:
 
 
 def test_a_key_that_one_file_refuses_does_not_stop_the_others(run: Run, folder: Path) -> None:
-    done = run(
-        "check", "mine.toml", "paper-1ms", "--no-circle", "-j", "2", "--set", "node.execution.base_us=40", cwd=folder
-    )
+    done = run("check", "mine.toml", "paper-1ms", "--no-circle", "--set", "node.execution.base_us=40", cwd=folder)
     assert done.returncode == 2
     assert done.stderr.startswith("paper-1ms.toml: --set node.execution.base_us=40: unknown key; known here: ")
     assert "checked 1 profile: 0 errors, 0 warnings; 1 could not be checked" in done.stderr

@@ -7,52 +7,73 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 PROFILE = Path(__file__).parents[2] / "profiles" / "paper-1ms.toml"
 CIRCLES = ("sweep", "p.toml", "--circle", "--jobs", "2", "--vary")
-SWEEP = (*CIRCLES, "circle.radius_mm=10,320", "--vary", "servo.position_gain_per_s=100:119")
+SWEEP = (*CIRCLES, "circle.radius_mm=5,320", "--vary", "servo.position_gain_per_s=100:119")
 """Small circles first, and large ones: rows come early, and the run has long to go."""
-# Whoever runs the tests may ignore signals, and children inherit that.
-PROGRAM = """
-import signal
-from busplan.__main__ import main
-if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.signal(signal.SIGHUP, signal.{hangup})
-    main()
+FIRST = """
+import os, signal, time
+os.setsid()
+with open("../started", "w") as file:
+    file.write(str(os.getpid()))
+{first}
 """
 
 
+class Running(NamedTuple):
+    """The program at its work, and who waits for it."""
+
+    pid: int
+    waiting: "subprocess.Popen[str]"
+
+    def end(self, *, seconds: float = 20) -> tuple[int, str, str]:
+        """Exit code, document and what is said."""
+        document, said = self.waiting.communicate(timeout=seconds)
+        return self.waiting.returncode, document, said
+
+
+Start = Callable[..., AbstractContextManager[Running]]
+
+
 @pytest.fixture
-def folder(tmp_path: Path, no_compiler: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Path:
-    for name, value in no_compiler.items():
-        monkeypatch.setenv(name, value)
-    (tmp_path / "p.toml").write_bytes(PROFILE.read_bytes())
-    return tmp_path
+def folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "work"
+    folder.mkdir()
+    (folder / "p.toml").write_bytes(PROFILE.read_bytes())
+    return folder
 
 
-@contextmanager
-def running(*arguments: str, folder: Path, hangup: str = "SIG_DFL") -> Iterator["subprocess.Popen[str]"]:
+@pytest.fixture
+def running(program: Path, folder: Path, no_compiler: Mapping[str, str]) -> Start:
     """Start the program, in a group of its own, with pipes for its streams."""
-    with subprocess.Popen(
-        [sys.executable, "-c", PROGRAM.format(hangup=hangup), *arguments],
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    ) as process:
-        try:
-            yield process
-        finally:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+
+    @contextmanager
+    def start(*arguments: str, first: str = "") -> Iterator[Running]:
+        with subprocess.Popen(
+            [program, *arguments],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, **no_compiler, "FORK_FIRST": FIRST.format(first=first)},
+        ) as process:
+            started = folder.parent / "started"
+            assert until(lambda: started.exists() and started.read_text())
+            pid = int(started.read_text())
+            try:
+                yield Running(pid, process)
+            finally:
+                with suppress(ProcessLookupError):
+                    os.killpg(pid, signal.SIGKILL)
+
+    return start
 
 
 def until(holds: Callable[[], object], *, seconds: float = 20) -> bool:
@@ -64,18 +85,18 @@ def until(holds: Callable[[], object], *, seconds: float = 20) -> bool:
     return True
 
 
-def workers_of(process: "subprocess.Popen[str]") -> list[int]:
+def workers_of(pid: int) -> list[int]:
     """Worker processes, once each of them has begun its work: it has let go of the program's streams."""
     with suppress(OSError):
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        return [int(pid) for pid in children if Path(f"/proc/{pid}/fd/1").readlink() == Path(os.devnull)]
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        return [int(child) for child in children if Path(f"/proc/{child}/fd/1").readlink() == Path(os.devnull)]
     return []
 
 
-def rows_written(process: "subprocess.Popen[str]", folder: Path) -> bool:
+def rows_written(pid: int, folder: Path) -> bool:
     """Whether bytes stand in the file in the making."""
     with suppress(OSError):
-        for path in Path(f"/proc/{process.pid}/fd").iterdir():
+        for path in Path(f"/proc/{pid}/fd").iterdir():
             # Parts are written in a folder of their own, which is open, too.
             if path.readlink().parent == folder and path.is_file() and path.stat().st_size:
                 return True
@@ -100,14 +121,16 @@ def rows(path: Path) -> int:
     # A terminal signals the whole group: the workers are to leave each signal to the parent.
     [("SIGTERM", 143, False), ("SIGHUP", 129, True), ("SIGINT", 130, True)],
 )
-def test_a_sweep_that_is_ended_keeps_its_rows(folder: Path, name: str, code: int, whole_group: bool) -> None:
-    with running(*SWEEP, "-o", "c.csv", folder=folder) as process:
-        assert until(lambda: rows_written(process, folder))
-        assert until(lambda: len(workers_of(process)) == 2)
-        started = workers_of(process)
+def test_a_sweep_that_is_ended_keeps_its_rows(
+    running: Start, folder: Path, name: str, code: int, whole_group: bool
+) -> None:
+    with running(*SWEEP, "-o", "c.csv") as process:
+        assert until(lambda: rows_written(process.pid, folder))
+        assert until(lambda: len(workers_of(process.pid)) == 2)
+        started = workers_of(process.pid)
         (os.killpg if whole_group else os.kill)(process.pid, getattr(signal, name))
-        _, said = process.communicate(timeout=20)
-    assert process.returncode == code
+        ended, _, said = process.end()
+    assert ended == code, said
     assert "kept in c.partial.csv" in said
     assert "Traceback" not in said
     assert not any(map(alive, started))
@@ -116,25 +139,25 @@ def test_a_sweep_that_is_ended_keeps_its_rows(folder: Path, name: str, code: int
     assert "circle tests are in c.csv.parts: go on with --resume" in said
 
 
-def test_a_hangup_that_nohup_ignores_stays_ignored(folder: Path) -> None:
-    short = (*CIRCLES, "circle.radius_mm=10", "--vary", "servo.position_gain_per_s=100:105")
-    with running(*short, "-o", "c.csv", folder=folder, hangup="SIG_IGN") as process:
-        assert until(lambda: workers_of(process))
+def test_a_hangup_that_nohup_ignores_stays_ignored(running: Start, folder: Path) -> None:
+    short = (*CIRCLES, "circle.radius_mm=5", "--vary", "servo.position_gain_per_s=100:105")
+    with running(*short, "-o", "c.csv", first="signal.signal(signal.SIGHUP, signal.SIG_IGN)") as process:
+        assert until(lambda: workers_of(process.pid))
         os.killpg(process.pid, signal.SIGHUP)
-        _, said = process.communicate(timeout=30)
-    assert process.returncode == 0, said
+        ended, _, said = process.end(seconds=30)
+    assert ended == 0, said
     assert rows(folder / "c.csv") == 12
 
 
 @pytest.mark.parametrize("name", ["sweep", "check"])
-def test_workers_and_files_end_with_a_process_that_is_killed(folder: Path, name: str) -> None:
-    with running(*(SWEEP if name == "sweep" else many_files(folder)), "-o", "c.csv", folder=folder) as process:
-        assert until(lambda: len(workers_of(process)) == 2)
-        started = workers_of(process)
-        process.kill()
+def test_workers_and_files_end_with_a_process_that_is_killed(running: Start, folder: Path, name: str) -> None:
+    with running(*(SWEEP if name == "sweep" else many_files(folder)), "-o", "c.csv") as process:
+        assert until(lambda: len(workers_of(process.pid)) == 2)
+        started = workers_of(process.pid)
+        os.kill(process.pid, signal.SIGKILL)
         # Both streams end: nobody holds them.
-        process.communicate(timeout=20)
-        assert process.returncode == -signal.SIGKILL
+        ended, *_ = process.end()
+        assert ended == -signal.SIGKILL
         assert until(lambda: not any(map(alive, started)), seconds=5)
     assert {path.name for path in folder.iterdir() if path.suffix != ".toml"} <= {"c.csv.parts"}
 
@@ -145,41 +168,37 @@ def many_files(folder: Path) -> tuple[str, ...]:
     return "check", ".", "--jobs", "2"
 
 
-@pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), ("SIGINT", 130)])
-def test_a_check_that_is_ended_ends_its_workers(folder: Path, name: str, code: int) -> None:
-    with running(*many_files(folder), folder=folder) as process:
-        assert until(lambda: len(workers_of(process)) == 2)
-        started = workers_of(process)
-        process.send_signal(getattr(signal, name))
-        document, said = process.communicate(timeout=20)
-    assert (process.returncode, document) == (code, "")
+def test_a_check_that_is_interrupted_ends_its_workers(running: Start, folder: Path) -> None:
+    with running(*many_files(folder)) as process:
+        assert until(lambda: len(workers_of(process.pid)) == 2)
+        started = workers_of(process.pid)
+        os.kill(process.pid, signal.SIGINT)
+        ended, document, said = process.end()
+    assert (ended, document) == (130, "")
     assert "Traceback" not in said
     assert not any(map(alive, started))
 
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
-def test_any_command_ends_with_the_code_of_its_signal(folder: Path, name: str) -> None:
-    program = "import os, time; from busplan.__main__ import main; os.fsync = lambda _: time.sleep(30); main()"
-    with subprocess.Popen(
-        [sys.executable, "-c", program, "init", "x"], cwd=folder, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert until(lambda: rows_written(process, folder))
-        process.send_signal(getattr(signal, name))
-        _, said = process.communicate(timeout=20)
-    assert (process.returncode, said) == (128 + getattr(signal, name), "")
+def test_any_command_ends_with_the_code_of_its_signal(running: Start, folder: Path, name: str) -> None:
+    with running("init", "x", first="os.fsync = lambda _: time.sleep(30)") as process:
+        assert until(lambda: rows_written(process.pid, folder))
+        os.kill(process.pid, getattr(signal, name))
+        ended, _, said = process.end()
+    assert (ended, said) == (128 + getattr(signal, name), "")
     assert not (folder / "x.toml").exists()
 
 
 @pytest.mark.parametrize("name", ["sweep", "check"])
-def test_a_worker_that_is_killed_is_said(folder: Path, name: str) -> None:
+def test_a_worker_that_is_killed_is_said(running: Start, folder: Path, name: str) -> None:
     arguments = (*SWEEP, "-o", "c.csv") if name == "sweep" else many_files(folder)
-    with running(*arguments, folder=folder) as process:
-        assert until(lambda: len(workers_of(process)) == 2)
-        assert name == "check" or until(lambda: rows_written(process, folder))
-        started = workers_of(process)
+    with running(*arguments) as process:
+        assert until(lambda: len(workers_of(process.pid)) == 2)
+        assert name == "check" or until(lambda: rows_written(process.pid, folder))
+        started = workers_of(process.pid)
         os.kill(started[0], signal.SIGKILL)
-        document, said = process.communicate(timeout=20)
-    assert (process.returncode, document) == (2, "")
+        ended, document, said = process.end()
+    assert (ended, document) == (2, "")
     assert "a worker was killed (out of memory?)" in said
     assert "busplan itself failed" not in said
     assert not any(map(alive, started))
@@ -192,8 +211,8 @@ def test_a_worker_ends_in_the_middle_of_its_work(tmp_path: Path) -> None:
     waiting = "import time; from busplan.cli.workers import workers\n"
     waiting += "with workers(1) as crew:\n    crew.submit(time.sleep, 60).result()"
     with subprocess.Popen([sys.executable, "-c", waiting], cwd=tmp_path, text=True) as process:
-        assert until(lambda: workers_of(process))
-        started = workers_of(process)
+        assert until(lambda: workers_of(process.pid))
+        started = workers_of(process.pid)
         time.sleep(0.2)
         process.kill()
         process.wait()

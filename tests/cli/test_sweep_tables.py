@@ -55,20 +55,6 @@ def test_without_pyarrow_the_extra_is_named_before_any_work(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_other_forms_and_help_do_not_load_pyarrow(tmp_path: Path) -> None:
-    program = (
-        "import sys; from busplan.__main__ import main\n"
-        "try: main()\n"
-        "except SystemExit: pass\n"
-        "sys.exit('pyarrow' in sys.modules)"
-    )
-    for line in ("--help", "paper-4ms --vary bus.nodes=1:3 --format csv"):
-        done = subprocess.run(
-            [sys.executable, "-c", program, "sweep", *line.split()], cwd=tmp_path, capture_output=True, check=False
-        )
-        assert done.returncode == 0, done.stderr
-
-
 def has_opened(pid: int, folder: Path) -> bool:
     """Whether a process has a file of a folder open, be it one without a name: then it listens to Ctrl-C."""
     with suppress(OSError):

@@ -8,7 +8,6 @@ import os
 import pty
 import struct
 import subprocess
-import sys
 import termios
 from collections.abc import Callable
 from itertools import pairwise
@@ -104,11 +103,11 @@ def test_what_cannot_be_done_is_said_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_drawing_takes_the_width_of_its_terminal(tmp_path: Path) -> None:
+def test_a_drawing_takes_the_width_of_its_terminal(program: Path, tmp_path: Path) -> None:
     leader, follower = pty.openpty()
     fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 117, 0, 0))
     environment = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "LINES")}
-    command = [sys.executable, "-m", "busplan", "timeline", "paper-4ms"]
+    command = [str(program), "timeline", "paper-4ms"]
     run = subprocess.Popen(command, stdout=follower, cwd=tmp_path, env={**environment, "NO_COLOR": "1"})
     os.close(follower)
     shown = b""
@@ -124,17 +123,3 @@ def test_a_drawing_takes_the_width_of_its_terminal(tmp_path: Path) -> None:
     assert run.wait(60) == 0
     bars = [line for line in shown.decode().splitlines() if line.count("|") == 2]
     assert {len(line) for line in bars} == {117}
-
-
-def test_no_numpy_and_no_resvg_but_for_png(tmp_path: Path) -> None:
-    program = (
-        "import sys; from busplan.__main__ import main\n"
-        "sys.argv[1:] = ['timeline', 'paper-4ms', '-o', 'a.svg']\n"
-        "try: main()\n"
-        "except SystemExit as leaving: assert not leaving.code\n"
-        "print(sorted({'numpy', 'resvg_py'} & set(sys.modules)))"
-    )
-    run = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path, check=False, timeout=60
-    )
-    assert run.stdout == "[]\n", run.stderr

@@ -1,9 +1,7 @@
 """Markdown: whatever a profile is called, a page shows those characters and does nothing else with them."""
 
-from collections.abc import Callable
 from html.parser import HTMLParser
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
@@ -41,12 +39,12 @@ def rendered(markdown: str) -> Words:
     return words
 
 
-@pytest.mark.parametrize("text", HOSTILE)
-@pytest.mark.parametrize("write", [code, escaped])
-def test_a_cell_shows_hostile_text_and_nothing_else(write: Callable[[str], str], text: str) -> None:
-    page = rendered("\n".join(table(["name", "value"], [[write(text), "1"]], left=1)))
-    assert set(page.tags) <= {"table", "thead", "tbody", "tr", "th", "td", "code"}
-    assert [cell.strip() for cell in page.cells] == ["name", "value", text, "1"]
+def test_a_cell_shows_hostile_text_and_nothing_else() -> None:
+    for text in HOSTILE:
+        for write in [code, escaped]:
+            page = rendered("\n".join(table(["name", "value"], [[write(text), "1"]], left=1)))
+            assert set(page.tags) <= {"table", "thead", "tbody", "tr", "th", "td", "code"}
+            assert [cell.strip() for cell in page.cells] == ["name", "value", text, "1"]
 
 
 @given(st.text(st.characters(codec="utf-8", categories=["L", "N", "P", "S", "Zs"]), min_size=1, max_size=30))

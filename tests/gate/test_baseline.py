@@ -180,9 +180,8 @@ def test_what_is_written_can_be_read_and_is_sorted_by_path(check: Check, clean: 
 GOOD = {"schema": 1, "command": "baseline", "profiles": {"a.toml": {"paper.max_axes": 4}}}
 
 
-@pytest.mark.parametrize(
-    "document",
-    [
+def test_what_is_no_baseline_is_refused_in_one_message() -> None:
+    for document in [
         "",
         "{",
         "[]",
@@ -212,14 +211,11 @@ GOOD = {"schema": 1, "command": "baseline", "profiles": {"a.toml": {"paper.max_a
         json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": float("nan")}}}),
         json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": float("inf")}}}),
         json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": 10**400}}}),
-    ],
-    ids=lambda text: text[:60],
-)
-def test_what_is_no_baseline_is_refused_in_one_message(document: str) -> None:
-    with pytest.raises(BusplanError, match="remove it, and record one with --update-baseline") as caught:
-        read_baseline(document, name="b.json")
-    assert len(caught.value.problems) == 1
-    assert str(caught.value).startswith("b.json: ")
+    ]:
+        with pytest.raises(BusplanError, match="remove it, and record one with --update-baseline") as caught:
+            read_baseline(document, name="b.json")
+        assert len(caught.value.problems) == 1
+        assert str(caught.value).startswith("b.json: ")
 
 
 def test_a_good_one_is_read() -> None:

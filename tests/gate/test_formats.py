@@ -31,7 +31,7 @@ from busplan.gate.gate import FileResult, check_document
 from busplan.gate.registry import all_rules
 from busplan.gate.report import CheckReport
 from busplan.profile.document import Document, Spot
-from busplan.profile.schema import profile_schema
+from busplan.profile.kinds import profile_schema
 from busplan.profile.shipped import load, shipped_names
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -102,6 +102,7 @@ def test_a_format_is_a_class_of_its_own_and_loads_alone() -> None:
     # Each in a process of its own, which has loaded what none of them goes without.
     code = (
         "import os, sys; from busplan.gate.formats import FORMATS, gate_format\n"
+        "gate_format('concise')  # whose lines all may have\n"
         "for name in FORMATS:\n"
         "    if not os.fork():\n"
         "        gate_format(name)\n"
@@ -591,10 +592,10 @@ def test_the_profile_schema_accepts_what_is_shipped(validator: Any) -> None:
         validator.validate(load(name).document.data())
 
 
-@pytest.mark.parametrize("code", [code for code in all_rules() if not code.startswith("BP0")])
-def test_the_profile_schema_accepts_what_only_the_gate_finds(validator: Any, code: str) -> None:
-    for path in (EXAMPLES / code).glob("*.toml"):
-        validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
+def test_the_profile_schema_accepts_what_only_the_gate_finds(validator: Any) -> None:
+    for code in [code for code in all_rules() if not code.startswith("BP0")]:
+        for path in (EXAMPLES / code).glob("*.toml"):
+            validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
 
 
 @pytest.mark.parametrize("code", ["BP002", "BP003", "BP004", "BP005"])

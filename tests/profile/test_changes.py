@@ -3,7 +3,7 @@
 from functools import cache
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses import kind_names
@@ -16,9 +16,8 @@ from busplan.sections.profile import Profile
 KINDS = " or ".join(f'"{one}"' for one in kind_names())
 
 
-@pytest.mark.parametrize(
-    ("written", "value"),
-    [
+def test_a_value_is_toml_and_a_word_is_text() -> None:
+    for written, value in [
         ("4000", 4000),
         ("0.5", 0.5),
         ("-1", -1),
@@ -35,12 +34,10 @@ KINDS = " or ".join(f'"{one}"' for one in kind_names())
         ('{kind = "linear", base_us = 30}', {"kind": "linear", "base_us": 30}),
         ('"a=b"', "a=b"),
         ("4 # a comment of TOML", 4),
-    ],
-)
-def test_a_value_is_toml_and_a_word_is_text(written: str, value: object) -> None:
-    (change,) = parse_set([f" bus.key = {written} "])
-    assert (change.key, change.value, change.typed) == ("bus.key", value, f"--set bus.key={written}")
-    assert type(change.value) is type(value)
+    ]:
+        (change,) = parse_set([f" bus.key = {written} "])
+        assert (change.key, change.value, change.typed) == ("bus.key", value, f"--set bus.key={written}")
+        assert type(change.value) is type(value)
 
 
 @pytest.mark.parametrize("written", ["4ms", "S200 S400", "[1, 2", "{a = 1", "4\nbus.nodes = 3", "3\n[bus]", "-", "µ"])
@@ -59,7 +56,6 @@ def test_what_is_not_key_and_value_is_refused(text: str) -> None:
     assert str(caught.value).startswith(f"--set {text}: expected KEY=VALUE")
 
 
-@settings(deadline=None)
 @given(text=st.text(max_size=30), key=st.sampled_from(["bus.nodes", "name", "node.execution", "cycle.period_us"]))
 def test_anything_typed_is_a_valid_change_or_refused_by_its_option(text: str, key: str) -> None:
     try:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import tomli_w
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
@@ -235,7 +235,6 @@ def check_lines(new: str, chunks: list[Chunk], changed: set[str]) -> None:
         assert set((name[1] or name[2] or next(iter(parts))).split(".")) <= parts, f"{line!r} is new"
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     st.sampled_from(
         [one for one in shipped_names() if not (found := load(one).profile).group and found.bus.kind == "ieee1394"]
@@ -250,13 +249,11 @@ MARKS = st.sampled_from([b"", b"\xef\xbb\xbf"])
 LINE_ENDS = st.sampled_from(["\n", "\r\n"])
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(layouts(usual=True), edits(), LINE_ENDS, MARKS)
 def test_sections_with_comments(chunks: list[Chunk], changes: dict[str, Any], line_end: str, mark: bytes) -> None:
     check(chunks, changes, usual=True, line_end=line_end, mark=mark)
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(layouts(usual=False), edits(), LINE_ENDS)
 def test_any_layout(chunks: list[Chunk], changes: dict[str, Any], line_end: str) -> None:
     check(chunks, changes, usual=False, line_end=line_end)
@@ -291,9 +288,8 @@ def edited(text: str, changes: dict[str, Any], *, notes: dict[str, str] | None =
     return edited_file(text.encode(), changes, name="x.toml", notes=notes).decode()
 
 
-@pytest.mark.parametrize(
-    ("changes", "old", "new"),
-    [
+def test_only_this_changes() -> None:
+    cases: list[tuple[dict[str, Any], str, str]] = [
         ({"bus.nodes": 2}, "", ""),
         ({"bus.max_hops": None}, "", ""),
         ({"bus.nodes": 16}, "nodes = 2    # N", "nodes = 16   # N"),
@@ -305,10 +301,9 @@ def edited(text: str, changes: dict[str, Any], *, notes: dict[str, str] | None =
         ({"node.execution.grade": "measured"}, "# by hand", '# by hand\n  grade = "measured"\n'),
         ({"limits.max_utilisation": 0.5}, "# by hand", "# by hand\n\n[limits]\nmax_utilisation = 0.5\n"),
         ({"description": 'a "b"\n'}, "# the cycle\n", '# the cycle\ndescription = "a \\"b\\"\\n"\n'),
-    ],
-)
-def test_only_this_changes(changes: dict[str, Any], old: str, new: str) -> None:
-    assert edited(PLAIN, changes) == PLAIN.replace(old, new, 1)
+    ]
+    for changes, old, new in cases:
+        assert edited(PLAIN, changes) == PLAIN.replace(old, new, 1)
 
 
 def test_a_new_kind_takes_the_old_keys_away_and_keeps_their_comments() -> None:

@@ -3,9 +3,8 @@
 import pytest
 
 from busplan.profile.document import Document
-from busplan.profile.graded import comment_grade
 from busplan.profile.shipped import load
-from busplan.profile.toml import override, validate
+from busplan.profile.toml import comment_grade, override, validate
 from busplan.questions.fit.inputs import given
 
 TEXT = """\

@@ -67,9 +67,8 @@ def test_no_bytes_lead_to_a_traceback(content: bytes) -> None:
             assert all(problem.startswith("m.csv:") for problem in error.problems)  # noqa: PT017
 
 
-@pytest.mark.parametrize(
-    ("header", "problem"),
-    [
+def test_headers_that_are_wrong() -> None:
+    for header, problem in [
         ("", f"m.csv:1:1: no header; {EXPECTED}"),
         ("4,48.7", f"m.csv:1:1: the first line has no names of columns; {EXPECTED}"),
         ("payload_bytes,latency_us", "m.csv:1:1: no measurement below the header"),
@@ -89,10 +88,8 @@ def test_no_bytes_lead_to_a_traceback(content: bytes) -> None:
         ("payload_bytes,latency_us,seconds", f"m.csv:1:26: column 'seconds': unknown; {EXPECTED}"),
         ("payload_bytes,latency_us,latency_us", "m.csv:1:26: column latency_us is there twice"),
         ("payload_bytes,transaction", f"m.csv:1:1: column latency_us is missing; {EXPECTED}"),
-    ],
-)
-def test_headers_that_are_wrong(header: str, problem: str) -> None:
-    assert refusals(header)[0].startswith(problem)
+    ]:
+        assert refusals(header)[0].startswith(problem)
 
 
 def test_a_column_in_another_unit_is_one_problem_and_not_a_missing_column_besides() -> None:

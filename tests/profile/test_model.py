@@ -25,8 +25,8 @@ from busplan.buses.ieee1394.section import (
 )
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, link_of
 from busplan.questions.fit.network import network_of
+from busplan.sections.cycle import Limits
 from busplan.sections.execution import LinearExecution, TableExecution
-from busplan.sections.limits import Limits
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 
 TABLE = {"kind": "table", "payload_bytes": [4, 16, 64], "time_us": [40.0, 34.0, 58.0]}
@@ -207,16 +207,13 @@ def test_a_key_of_the_other_form_of_execution_is_unknown() -> None:
     assert refused(node__execution__time_us=[1]) == ["Extra inputs are not permitted"]
 
 
-@pytest.mark.parametrize(
-    "key",
-    [
+def test_a_key_without_a_default_is_asked_for() -> None:
+    for key in [
         *("name", "schema_version", "bus", "bus__kind", "bus__speed", "bus__nodes", "cycle", "cycle__period_us"),
         *("payload", "node", "node__axes", "node__execution"),
         *("node__execution__base_us", "node__execution__per_byte_us"),
-    ],
-)
-def test_a_key_without_a_default_is_asked_for(key: str) -> None:
-    assert refused(**{key: ...}) == ["Field required"]
+    ]:
+        assert refused(**{key: ...}) == ["Field required"]
 
 
 def test_the_execution_time_is_asked_for_its_kind() -> None:

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.errors import PlacedError
@@ -51,7 +51,6 @@ def figures_of(one: Profile) -> Any:
     return capacity(one).results, latency(one).transactions
 
 
-@settings(max_examples=50, deadline=None)
 @given(fixed=st.integers(0, 60), per_axis=st.integers(1, 30), axes=st.integers(1, 12))
 def test_what_each_axis_adds_is_as_if_it_stood_in_the_payload(fixed: int, per_axis: int, axes: int) -> None:
     added = f"read_bytes_per_axis = {per_axis}\nwrite_bytes_per_axis = {per_axis}"

@@ -43,26 +43,26 @@ def test_the_promised_profiles_are_shipped() -> None:
     assert shipped_names() == sorted(shipped_names())
 
 
-@pytest.mark.parametrize("name", shipped_names())
-def test_a_shipped_profile_loads_under_its_own_name(name: str) -> None:
-    loaded = load(name)
-    assert loaded.profile.name == name
-    assert loaded.profile.description.strip()
-    assert loaded.document.text == text_of(name)
+def test_a_shipped_profile_loads_under_its_own_name() -> None:
+    for name in shipped_names():
+        loaded = load(name)
+        assert loaded.profile.name == name
+        assert loaded.profile.description.strip()
+        assert loaded.document.text == text_of(name)
 
 
-@pytest.mark.parametrize("name", shipped_names())
-def test_a_shipped_profile_knows_the_place_of_every_value(name: str) -> None:
-    document = load(name).document
-    for path, place in document.places.items():
-        if isinstance(path[-1], str):
-            assert document.text[place.key_start : place.key_end] == path[-1]
+def test_a_shipped_profile_knows_the_place_of_every_value() -> None:
+    for name in shipped_names():
+        document = load(name).document
+        for path, place in document.places.items():
+            if isinstance(path[-1], str):
+                assert document.text[place.key_start : place.key_end] == path[-1]
 
 
-@pytest.mark.parametrize("name", shipped_names())
-def test_a_shipped_profile_explains_its_keys(name: str) -> None:
-    assert text_of(name).count("#") >= 5
-    assert text_of(name).isascii()
+def test_a_shipped_profile_explains_its_keys() -> None:
+    for name in shipped_names():
+        assert text_of(name).count("#") >= 5
+        assert text_of(name).isascii()
 
 
 def test_the_profiles_of_the_experiment_differ_in_their_period_and_in_words_only() -> None:
@@ -190,7 +190,7 @@ def test_messages_of_a_file_call_it_as_it_was_called(work: Path) -> None:
 NEW_NAMES = ("mine", "[bold]x[/]", 'say "hi"', "back\\slash\\", "größe", "'", "x" * 100, "a # busplan: ignore[b")
 
 
-@pytest.mark.parametrize("source", shipped_names())
+@pytest.mark.parametrize("source", ["paper-4ms", "gantry-24", "can-servo-8", "sercos3-servo-8"])
 def test_a_starter_differs_from_its_source_in_the_name_and_in_what_the_gate_was_told(source: str) -> None:
     for name in NEW_NAMES:
         text = starter_text(source, name=name)

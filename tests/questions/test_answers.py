@@ -4,6 +4,7 @@ import pickle
 import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import Any
 
 import pytest
@@ -29,9 +30,14 @@ ANSWERS: dict[str, Callable[[busplan.Profile], Answer]] = {
 }
 
 
-@pytest.fixture(scope="module", params=ANSWERS)
+@cache
+def answer_of(name: str) -> Answer:
+    return ANSWERS[name](busplan.load_profile("paper-1ms"))
+
+
+@pytest.fixture(params=ANSWERS)
 def answer(request: pytest.FixtureRequest) -> Answer:
-    return ANSWERS[request.param](busplan.load_profile("paper-1ms"))
+    return answer_of(request.param)
 
 
 def test_nothing_of_an_answer_can_be_set(answer: Answer) -> None:
@@ -110,7 +116,7 @@ HEADLINES = {
 
 @pytest.mark.parametrize("name", ANSWERS)
 def test_it_shows_its_verdict(name: str) -> None:
-    assert repr(ANSWERS[name](busplan.load_profile("paper-1ms"))) == HEADLINES[name]
+    assert repr(answer_of(name)) == HEADLINES[name]
 
 
 def test_a_notebook_draws_a_map() -> None:

@@ -109,8 +109,8 @@ def printed(line: str) -> Any:
 
 @pytest.mark.parametrize(
     ("command", "name"),
-    # What command and function do alike does not hang on the bus: each is asked of two, and every bus of some.
-    [(command, name) for command, other in zip(EVERY, cycle(OTHERS), strict=False) for name in ("paper-1ms", other)],
+    # What command and function do alike does not hang on the bus: every bus is asked of some.
+    list(zip(EVERY, cycle(("paper-1ms", *OTHERS)), strict=False)),
 )
 def test_of_every_class_of_bus(command: str, name: str) -> None:
     first, *rest = command.split(" ", 1)

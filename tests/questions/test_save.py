@@ -20,7 +20,7 @@ COMMANDS: Mapping[str, Callable[[], Answer]] = {
     "circle-test paper-4ms": lambda: busplan.circle_test("paper-4ms"),
 }
 FILES = [
-    *((name, ending) for name in list(COMMANDS)[:3] for ending in (".png", ".svg", ".json")),
+    *((name, ending) for name in list(COMMANDS)[:3] for ending in (".png", ".svg")),
     *(("sweep paper-4ms --vary bus.nodes=1:9", ending) for ending in (".csv", ".json", ".jsonl", ".parquet", ".svg")),
     ("circle-test paper-4ms", ".png"),
 ]

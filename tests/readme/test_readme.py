@@ -39,6 +39,12 @@ MAX_WIDTH = 130
 MOST_README_BYTES = 12_000
 
 
+@pytest.fixture(autouse=True)
+def one_processor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No worker processes: their start takes longer than any example, and their rows are the same."""
+    monkeypatch.setattr("busplan.cli.workers.available_processors", lambda: 1)
+
+
 def shown_runs() -> Iterator[tuple[str, str]]:
     """Each `$ busplan ...` of all pages with the output printed below it."""
     for block in (one for text in PAGES.values() for one in CONSOLE.findall(text)):

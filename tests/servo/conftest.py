@@ -5,22 +5,20 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 import pytest
-from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from busplan.servo.parameters import Axis, LoopTiming
 
-# The machine is shared: a slow example is no failure.
-settings.register_profile("servo", deadline=None)
-settings.load_profile("servo")
+if TYPE_CHECKING:
+    import control
 
 Floats = NDArray[np.float64]
-Loop = Callable[[Axis, LoopTiming], control.StateSpace]
+Loop = Callable[[Axis, LoopTiming], "control.StateSpace"]
 
 
 def held(a: Floats, b: Floats, time_s: float) -> tuple[Floats, Floats]:
@@ -32,7 +30,9 @@ def held(a: Floats, b: Floats, time_s: float) -> tuple[Floats, Floats]:
     return moved[:size, :size], moved[:size, size]
 
 
-def plant(axis: Axis, *, period_s: float, delay_s: float) -> control.StateSpace:
+def plant(axis: Axis, *, period_s: float, delay_s: float) -> "control.StateSpace":
+    import control  # noqa: PLC0415 - it loads pyplot, and only its own tests pay
+
     """Drive and integrator, sampled, with the command delayed by a part of the period."""
     lag_s = axis.drive_lag_us / 1e6
     if lag_s:
@@ -48,7 +48,9 @@ def plant(axis: Axis, *, period_s: float, delay_s: float) -> control.StateSpace:
     return control.ss(transition, np.append(late, 1.0)[:, None], np.eye(1, size + 1), 0, period_s)
 
 
-def open_loop(axis: Axis, timing: LoopTiming) -> control.StateSpace:
+def open_loop(axis: Axis, timing: LoopTiming) -> "control.StateSpace":
+    import control  # noqa: PLC0415
+
     period_s = timing.control_period_us / 1e6
     delay_s = axis.delay_us / 1e6 if timing.loop == "host" else 0.0
     # A delay of whole periods and a rest: each period is a shift.

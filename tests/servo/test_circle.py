@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -324,7 +324,6 @@ def test_a_path_of_another_period_is_refused() -> None:
         simulate_circle(a_path(), x=an_axis(), y=an_axis(), timing=LoopTiming(period_us=2000.0))
 
 
-@settings(max_examples=60)
 @given(
     kp=st.floats(0, 5000),
     ki=st.floats(0, 1e5),

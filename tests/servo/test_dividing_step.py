@@ -1,7 +1,7 @@
 """The step of a simulation divides the period."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.servo.checks import dividing_step_us, no_multiple
@@ -22,7 +22,6 @@ def test_the_step_is_the_longest_that_can_be_written(period_us: float, most_us: 
     assert dividing_step_us(period_us, most_us=most_us) == pytest.approx(step_us, rel=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
 @given(period_us=st.floats(1e-2, 1e9), most_us=st.floats(1e-2, 1e9))
 def test_it_is_no_longer_than_asked_and_is_taken_as_it_is_written(period_us: float, most_us: float) -> None:
     step_us = dividing_step_us(period_us, most_us=most_us)

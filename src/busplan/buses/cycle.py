@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import NamedTuple
 
-from busplan.buses.figure import REQUIRED
-from busplan.buses.network import Network
-from busplan.elementwise import Number, total
+from busplan.buses.figure import REQUIRED, term_name
+from busplan.buses.network import Group, Network
+from busplan.elementwise import Number, plain, total
 
 
 class Term(NamedTuple):
@@ -22,7 +22,7 @@ class Term(NamedTuple):
     @property
     def name(self) -> str:
         """What it is called beside the other terms."""
-        return self.key.removeprefix("cycle_").removesuffix("_us")
+        return term_name(self.key)
 
 
 class BusEvent(NamedTuple):
@@ -120,6 +120,29 @@ class BusCycle(ABC):
     def bias_us(self) -> Number | None:
         """What the bus takes beyond the timing model, on the mean [us]; None where nobody has measured it."""
         return None
+
+    def sync_jitter_us(self) -> Number:
+        """Jitter of the synchronous packet that the cycle's own traffic makes, either way of its mean [us]."""
+        return 0.0
+
+    def taking_us(self, group: Group) -> float:
+        """From a command's arrival at a node of a group to its effect: the slowest execution of a write [us]."""
+        return plain(group.write_execution_us + group.worst_extra_us)
+
+    def sampled_us(self) -> float:
+        """When nodes sample the feedback that a cycle carries, from its start; of plain numbers [us]."""
+        return 0.0
+
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """Whole periods inside a loop on the host, from the cycle of a sample to that of its command [1].
+
+        Parameters
+        ----------
+        at_sync
+            Whether commands take effect at the next synchronous point, which is counted; otherwise they do when they
+            arrive, which comes on top.
+        """
+        return 1 if at_sync else 0
 
     def doubts(self) -> tuple[Doubt, ...]:
         """What is not known exactly; different inputs are independent."""

@@ -124,7 +124,7 @@ def by(*functions: Callable[..., object]) -> str:
     >>> by(time_slice.time_slice_us, time_slice.required_time_slice_us)
     '(1) (2)'
     """
-    numbers = dict.fromkeys(number for one in functions for number in EQUATIONS[one.__name__].numbers)
+    numbers = dict.fromkeys(number for function in functions for number in EQUATIONS[function.__name__].numbers)
     return " ".join(f"({number})" for number in numbers)
 
 
@@ -281,13 +281,7 @@ SAFE_MIN_PERIOD: Final = Figure(
     better="less",
 )
 VERDICT: Final = Figure(
-    "verdict",
-    "verdict",
-    _CERTAINTY,
-    "fits, not shown to fit, or does not fit",
-    "verdict",
-    sort="word",
-    better="more",
+    "verdict", "verdict", _CERTAINTY, "fits, not shown to fit, or does not fit", "verdict", sort="word", better="more"
 )
 NOT_SHOWN: Final = Figure(
     "not_shown",
@@ -302,13 +296,7 @@ CERTAINTY: Final = (
 )
 """Figures of the timing model that decides; under another they do not exist."""
 VERDICT_FIGURES: Final = (
-    Figure(
-        "missed_limits",
-        "missed",
-        _CYCLE,
-        "keys of [limits] that ask for more than the slice gives",
-        sort="words",
-    ),
+    Figure("missed_limits", "missed", _CYCLE, "keys of [limits] that ask for more than the slice gives", sort="words"),
     Figure(
         "models_agree",
         "models agree",
@@ -370,3 +358,53 @@ def capacity_figures(
         *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS, CIRCLE_REFUSED_BY),
         *CERTAINTY,
     )
+
+
+class BusFigures(NamedTuple):
+    """Figures of a kind of bus, and where answers show them."""
+
+    terms: tuple[Figure, ...]
+    """One for each term, in the order of the wire."""
+    capacity: tuple[Figure, ...]
+    """Of `capacity`, in the order of its document: see `capacity_figures`."""
+    setup: tuple[Figure, ...] = ()
+    """Those of them that say how the bus is set."""
+    headings: tuple[str, ...] = ()
+    """Keys of the set-up figures that a page's heading shows."""
+    table: tuple[Figure, ...] = ()
+    """Rows of the kind in the table of `capacity`."""
+    compared: tuple[Figure, ...] = ()
+    """Figures of the kind that `diff` compares under each timing model."""
+    planned: tuple[str, ...] = ()
+    """Keys of figures of the kind that a plan's options show."""
+    phases: tuple[Figure, ...] = ()
+    """Rows of the table of `latency`, where they are not the terms."""
+    latency_document: tuple[Figure, ...] = ()
+    """Of `latency`, in the order of its document, where it has more than those rows."""
+    has_many_transactions: bool = False
+    """Whether the table of `latency` has a row for each transaction, and a column for each figure."""
+
+    @property
+    def latency_table(self) -> tuple[Figure, ...]:
+        """Rows of the table of `latency`."""
+        return self.phases or (*self.terms, REQUIRED)
+
+    @property
+    def latency(self) -> tuple[Figure, ...]:
+        """Of `latency`, in the order of its document."""
+        return self.latency_document or (TIMING_MODEL, TRANSACTION, NODES, *self.latency_table)
+
+    def term_label(self, name: str | None) -> str:
+        """Label of a term in tables, by its name beside the other terms; empty without one."""
+        return next((figure.label for figure in self.terms if term_name(figure.key) == name), "")
+
+
+def term_name(key: str) -> str:
+    """Name of a term beside the other terms, by the key of its figure.
+
+    Examples
+    --------
+    >>> term_name("cycle_data_us"), term_name("sync_us")
+    ('data', 'sync')
+    """
+    return key.removeprefix("cycle_").removesuffix("_us")

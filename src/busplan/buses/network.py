@@ -41,7 +41,7 @@ class Group(NamedTuple):
     @property
     def name(self) -> str:
         """Name of the group, or names of its members; empty for the nodes of [node]."""
-        return " and ".join(one.name for one in self.members or (self.said,))
+        return " and ".join(alike.name for alike in self.members or (self.said,))
 
     def key(self, name: str) -> str:
         """Dotted key of what the profile says of its nodes.
@@ -95,12 +95,12 @@ class Network(NamedTuple):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the profile's groups, in the order of the chain; one empty name for the nodes of [node]."""
-        return tuple(one.name for one in self.alike)
+        return tuple(alike.name for alike in self.alike)
 
     @property
     def alike(self) -> tuple[AlikeNodes, ...]:
         """The profile's groups, in the order of the chain."""
-        return tuple(one for group in self.groups for one in group.members or (group.said,))
+        return tuple(nodes for group in self.groups for nodes in group.members or (group.said,))
 
     @property
     def is_uniform(self) -> bool:
@@ -110,7 +110,7 @@ class Network(NamedTuple):
     @property
     def asked_nodes(self) -> AlikeNodes:
         """The nodes that `with_nodes` changes the number of."""
-        return next(one for one in self.alike if one.name == self.asked)
+        return next(alike for alike in self.alike if alike.name == self.asked)
 
     def with_nodes(self, nodes: Number) -> "Network":
         """The same network with another number of nodes in the group that it is asked for.
@@ -124,7 +124,7 @@ class Network(NamedTuple):
 
     def _with_nodes(self, group: Group, nodes: Number) -> Group:
         members = group.members or (group.said,)
-        if all(one.name != self.asked for one in members):
+        if all(alike.name != self.asked for alike in members):
             return group
-        others = [one.nodes for one in members if one.name != self.asked]
+        others = [alike.nodes for alike in members if alike.name != self.asked]
         return group._replace(nodes=total((nodes, *others)) if others else nodes)

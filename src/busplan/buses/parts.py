@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
-from busplan.buses.figure import MARGIN, Ink
+from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Network
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, plain
+from busplan.sourced import Grade, Sourced
 
 Value = int | float | str
 """A value of a profile's key."""
@@ -17,6 +18,45 @@ class TimingModel(NamedTuple):
 
     name: str
     meaning: str
+    error: str = "how far the bus is from this timing model is not known"
+    """How far it is off, where no bias of it is known."""
+
+
+class Safety(NamedTuple):
+    """A setting of a bus that is safe or not, whether or not the cycle fits."""
+
+    setting: str = "setting"
+    """Name of the setting in sentences."""
+    figure: Figure | None = None
+    """The figure that says whether every safety limit holds."""
+    after_reset: Mapping[str, Value] = {}
+    """Keys as they are after a bus reset, until somebody sets them again."""
+
+
+KeyRole = Literal["cable", "clock", "host", "pipeline"]
+"""Part of a machine that a key of any kind stands for: the length of a cable [m], whether the nodes have a common
+clock, the host's own time in the cycle, whole periods that the host adds to a loop."""
+
+
+class Key(NamedTuple):
+    """Facts about a key of a profile that its schema does not have."""
+
+    symbol: str = ""
+    """Symbol in formulas, where it is not its name."""
+    default: Sourced | None = None
+    """Its default, where that is a figure with a source."""
+    grade: Grade | None = None
+    """How well its value can be known, where that is less than given."""
+    meaning: str = ""
+    """What a change of it means on the machine, where the key does not say so."""
+    short: str = ""
+    """How a table of plans writes it: a format of the value."""
+    chooses: bool = False
+    """Whether its word selects a formula, so that a derivation has it among its inputs."""
+    warned_at: Sourced | None = None
+    """Constant that a warning compares it with."""
+    role: KeyRole | None = None
+    """Part of the machine that it stands for, where other kinds have a key for it, too."""
 
 
 class EventKind(NamedTuple):
@@ -74,8 +114,8 @@ class Limit(NamedTuple):
     is."""
     is_slow: bool = False
     """Whether its value takes long to find: of a number of nodes it is asked last."""
-    share: Callable[[Network], Number] | None = None
-    """The share of the period that is its most, of a time that rests on no period: see `share_limit`."""
+    period: "Callable[[Limit, Network], Number] | None" = None
+    """The shortest period that keeps it, where operators alone give it; with its doubt as the limit has it [us]."""
 
     def uncertainty(self, network: Network) -> Number:
         """Expanded uncertainty U of its value, two standard uncertainties; 0 where it is exact."""
@@ -106,8 +146,8 @@ class Limit(NamedTuple):
         return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
 
     def period_us(self, network: Network) -> Number:
-        """The shortest period that keeps a limit that has a share [us]; 0 for any other."""
-        return 0.0 if self.share is None else self.least_value(network) / self.share(network)
+        """The shortest period that keeps it, where `period` gives it; otherwise 0 [us]."""
+        return 0.0 if self.period is None else self.period(self, network)
 
     def verdict_code(self, network: Network) -> Number:
         """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
@@ -150,7 +190,7 @@ def share_limit(
         value,
         lambda network: share(network) * network.period_us,
         doubt=doubt,
-        share=share,
+        period=lambda limit, network: limit.least_value(network) / share(network),
         **more,
     )
     return limit._replace(kept_from_us=lambda network: plain(limit.shown.period_us(network)))
@@ -253,3 +293,14 @@ class Halves(NamedTuple):
     def response_and_acknowledge_us(self) -> float:
         """Behind the execution."""
         return self.latency_us - self.request_and_acknowledge_us
+
+
+class MeasuredLatencies(NamedTuple):
+    """How execution times are found from latencies that were measured on a kind of bus."""
+
+    halves: Callable[[Network, str, str, str, int], Halves]
+    """What the packets of a transaction take, by network, name of the group, timing model, "read" or "write", and
+    payload [bytes]; a BusplanError where its latency could not be measured."""
+    fit_keys: Callable[[Network, str | None], dict[str, Value]]
+    """Keys of [node.execution] that say what an execution time was fitted against, by network and by timing model whose
+    packets were taken off; None where their time was measured."""

@@ -1,7 +1,7 @@
 """What a rule of the gate is, and what it may ask: figures, figures after changes, a cure."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 
 if TYPE_CHECKING:
     from busplan.sections.profile import Profile
@@ -28,71 +28,8 @@ class RuleProblem(NamedTuple):
     cure: tuple[str, ...] = ()
 
 
-class RuleFigures(Protocol):
-    """What a rule may read of the capacity under one timing model; figures of the kind are attributes, too."""
-
-    @property
-    def timing_model(self) -> str:
-        """Name of the timing model."""
-
-    @property
-    def period_us(self) -> float:
-        """The period [us]."""
-
-    @property
-    def exceeded(self) -> tuple[str, ...]:
-        """Keys of the limits that are broken."""
-
-    @property
-    def not_shown(self) -> tuple[str, ...] | None:
-        """Keys of the limits that are neither broken nor shown to be kept; of the model that decides."""
-
-    @property
-    def terms(self) -> Sequence[Any]:
-        """The parts of what the cycle needs."""
-
-    @property
-    def doubts(self) -> Sequence[Any]:
-        """What its uncertainty is made of."""
-
-    @property
-    def required_us(self) -> float:
-        """What the cycle needs [us]."""
-
-    @property
-    def available_us(self) -> float:
-        """What the slice gives it [us]."""
-
-    @property
-    def margin_us(self) -> float:
-        """What is left of the slice [us]."""
-
-    @property
-    def safe_nodes(self) -> int | None:
-        """Most nodes that are shown to fit [1]; of the model that decides, and None of groups."""
-
-    @property
-    def groups(self) -> Sequence[Any]:
-        """The counts of each group of nodes; empty where all are alike."""
-
-    @property
-    def verdict(self) -> str | None:
-        """fits, not shown to fit, or does not fit; of the model that decides."""
-
-    @property
-    def bias_us(self) -> float | None:
-        """What the bus takes beyond the model [us]; None where nobody has measured it."""
-
-    @property
-    def margin_corrected_us(self) -> float | None:
-        """What is left of the slice, less the bias [us]; of the model that decides."""
-
-    @property
-    def uncertainty_us(self) -> float | None:
-        """Expanded uncertainty of that [us]; of the model that decides."""
-
-    def __getattr__(self, key: str) -> Any:
-        """A figure of the kind."""
+RuleFigures: TypeAlias = Any
+"""Figures of `capacity` under one timing model, each an attribute by its key; those of the kind, too."""
 
 
 class RuleSubject(Protocol):
@@ -138,7 +75,7 @@ class Rule(NamedTuple):
     """Looks at a profile that could be read; None for what is found in another way."""
 
 
-def contradicts(fits: bool, one: RuleFigures) -> bool:
+def contradicts(fits: bool, figures: RuleFigures) -> bool:
     """Tell whether a timing model that does not decide contradicts the verdict.
 
     A plan that lacks its reserve alone contradicts nothing, and a broken limit is no question of timing.
@@ -147,13 +84,13 @@ def contradicts(fits: bool, one: RuleFigures) -> bool:
     ----------
     fits
         Whether required <= available under that model.
-    one
+    figures
         Figures under the model that decides.
     """
-    if set(one.exceeded) - {"time"}:
+    if set(figures.exceeded) - {"time"}:
         return False
-    is_shown = one.verdict == "fits" or (one.margin_corrected_us or 0) >= (one.uncertainty_us or 0)
-    return not is_shown if fits else one.verdict == "fits"
+    is_shown = figures.verdict == "fits" or (figures.margin_corrected_us or 0) >= (figures.uncertainty_us or 0)
+    return not is_shown if fits else figures.verdict == "fits"
 
 
 _MOST_DECIMALS: Final = 9
@@ -174,18 +111,18 @@ def told_apart(one: float, other: float) -> tuple[str, str]:
     return f"{one:.1f}", f"{other:.1f}"
 
 
-def overrun(one: RuleFigures) -> str:
+def overrun(figures: RuleFigures) -> str:
     """Say what a cycle needs of its slice, and the margin as far as it is known."""
-    needs, given = told_apart(one.required_us, one.available_us)
-    return f"needs {needs} us of {given} us, {margin(one)}"
+    needs, given = told_apart(figures.required_us, figures.available_us)
+    return f"needs {needs} us of {given} us, {margin(figures)}"
 
 
-def margin(one: RuleFigures) -> str:
+def margin(figures: RuleFigures) -> str:
     """Say how large the margin is, as far as it is known."""
-    if one.margin_corrected_us is None:
-        return f"margin {told_apart(one.margin_us, 0.0)[0]} us under the {one.timing_model} timing"
-    value = told_apart(one.margin_corrected_us, 0.0)[0]
-    if one.uncertainty_us is None:
+    if figures.margin_corrected_us is None:
+        return f"margin {told_apart(figures.margin_us, 0.0)[0]} us under the {figures.timing_model} timing"
+    value = told_apart(figures.margin_corrected_us, 0.0)[0]
+    if figures.uncertainty_us is None:
         return f"margin {value} us, no bias or uncertainty known"
-    said = f"{value} +/- {one.uncertainty_us:.1f} us"
-    return f"margin {said}, no bias known" if one.bias_us is None else f"corrected margin {said}"
+    said = f"{value} +/- {figures.uncertainty_us:.1f} us"
+    return f"margin {said}, no bias known" if figures.bias_us is None else f"corrected margin {said}"

@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusLatency
-from busplan.buses.figure import NODES, TIMING_MODEL, TRANSACTION, Figure
+from busplan.buses.figure import Figure
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, larger, plain, rounded_up, total
 from busplan.sourced import Sourced, constants
@@ -64,7 +64,6 @@ WHOLE_PERIOD: Final = "1            # assumed: the master computes beside the te
 MEASURE: Final = "it runs beside the telegrams; take it from the drives' data, S-0-0005 (SERCOS III: S-0-1005)"
 BASE: Final = "from a sample to the telegram that carries it, and from a command to its effect"
 """What a new profile says of the slice and of the execution times."""
-LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *DELAYS)
 
 
 def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Number = 0.0) -> tuple[BusLatency, ...]:
@@ -80,8 +79,8 @@ def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Nu
         Delay of the ring [us].
     """
     return (
-        _delay("feedback", slowest_us(network, lambda one: one.read_execution_us), *feedback_us, ring_us),
-        _delay("command", slowest_us(network, lambda one: one.write_execution_us), *command_us, ring_us),
+        _delay("feedback", slowest_us(network, lambda group: group.read_execution_us), *feedback_us, ring_us),
+        _delay("command", slowest_us(network, lambda group: group.write_execution_us), *command_us, ring_us),
     )
 
 
@@ -95,12 +94,12 @@ def slowest_us(network: Network, execution_us: Callable[[Group], Number]) -> Num
     execution_us
         From a group to the execution time of its nodes [us].
     """
-    return reduce(larger, (execution_us(one) + one.worst_extra_us for one in network.groups))
+    return reduce(larger, (execution_us(group) + group.worst_extra_us for group in network.groups))
 
 
 def _delay(name: str, *parts_us: Number) -> BusLatency:
     *parts, whole = DELAYS
-    phases = dict(zip((one.key for one in parts), parts_us, strict=True))
+    phases = dict(zip((figure.key for figure in parts), parts_us, strict=True))
     return BusLatency(name, None, {**phases, whole.key: total(parts_us)})
 
 
@@ -112,26 +111,30 @@ class SercosCycle(BusCycle):
     def feedback_due_us(self) -> Number:
         """When all nodes must have their feedback ready, from the start of the cycle [us]."""
 
+    def sampled_us(self) -> float:
+        """All nodes sample at once, early enough for the slowest of them [us]."""
+        return plain(self.feedback_due_us) - plain(slowest_us(self.network, lambda group: group.read_execution_us))
+
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """The master's pipeline; and where drives act at their next sample, the cycles until a command is executed."""
+        pipeline = int(self.network.profile.bus.pipeline_cycles)
+        if not at_sync:
+            return pipeline
+        _, command = self.latencies()
+        late_us = plain(command.phases["delay_us"]) - self.sampled_us()
+        return pipeline + ceil(late_us / plain(self.network.period_us))
+
 
 class SercosBus(Bus):
     """A ring of SERCOS: its drives work beside the telegrams."""
-
-    @property
-    def latency_figures(self) -> tuple[Figure, ...]:
-        """Of `latency`, in the order of its document."""
-        return LATENCY
 
     def latency_subject(self, network: Network) -> str:
         """Say whose delay it is, and how the bus is set."""
         return ", ".join(("feedback and commands of all nodes", *self.setup_words(network)))
 
-    def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
-        """It runs beside the telegrams: drives sample before their telegram, and act behind the last MDT."""
-        return False
-
-    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
-        """The nodes' time is in every latency."""
-        return True
+    def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
+        """It runs beside the telegrams, and is in every latency: drives sample before their telegram."""
+        return of_latency
 
     def arrivals_us(self, cycle: BusCycle) -> Mapping[int, float]:
         """When the last byte of the MDT has passed the ring: all nodes have their commands then [us]."""
@@ -139,18 +142,3 @@ class SercosBus(Bus):
         phases = {key: plain(us) for key, us in command.phases.items()}
         arrived_us = phases["delay_us"] - phases["node_us"]
         return dict.fromkeys(range(1, int(plain(cycle.network.nodes)) + 1), arrived_us)
-
-    def sampled_us(self, cycle: BusCycle) -> float:
-        """All nodes sample at once, early enough for the slowest of them [us]."""
-        assert isinstance(cycle, SercosCycle)  # noqa: S101 - for mypy: both kinds have one
-        return plain(cycle.feedback_due_us) - plain(slowest_us(cycle.network, lambda one: one.read_execution_us))
-
-    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
-        """The master's pipeline; and where drives act at their next sample, the cycles until a command is executed."""
-        pipeline = int(network.profile.bus.pipeline_cycles)
-        if not at_sync:
-            return pipeline
-        cycle = self.cycle(network, model=self.deciding_model)
-        _, command = cycle.latencies()
-        late_us = plain(command.phases["delay_us"]) - self.sampled_us(cycle)
-        return pipeline + ceil(late_us / plain(network.period_us))

@@ -79,6 +79,7 @@ def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..
                 _require_no_period(changes, computed)
             command(*arguments, changes=changes, **others)
 
+        # Typer reads the options of a command from its signature; without it every command would list these two.
         with_changes.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
         kept = {name: one for name, one in command.__annotations__.items() if name != "changes"}
         with_changes.__annotations__ = {**kept, **options}

@@ -12,6 +12,6 @@ def schema_command() -> None:
     Example: busplan schema > busplan.schema.json
     """
     from busplan.forms.json_document import to_json
-    from busplan.profile.schema import profile_schema
+    from busplan.profile.kinds import profile_schema
 
     emit_document(to_json(profile_schema()))

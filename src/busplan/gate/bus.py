@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from busplan.buses.node_time import NODE, busy_words, slow_groups
+from busplan.buses.limits import NODE, busy_words, slow_groups
 from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
 from busplan.questions.fit.assumed import heavy_assumptions
 from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, limits_behind

@@ -72,11 +72,11 @@ def converted(profile: Profile, kind: str) -> Conversion:
     # The host keeps its share of the period, whatever each kind has by default.
     machine["cycle"]["slice_ratio"] = profile.cycle.slice_ratio
     bus = kind_named(kind)
-    new = tomllib.loads(bus.starter.section())
+    cable_key, new = bus.key_of("cable"), tomllib.loads(bus.starter.section())
     cables_m = _cables_m(profile)
-    if cables_m and bus.cable_key:
+    if cables_m and cable_key:
         left_out = tuple(one for one in left_out if one not in cables_m)
-        section, _, name = bus.cable_key.partition(".")
+        section, _, name = cable_key.partition(".")
         for table in [machine["bus"]] if section == "bus" else [machine.get("node"), *machine.get("group", ())]:
             if table is not None:
                 table[name] = max(cables_m.values())
@@ -91,7 +91,7 @@ def converted(profile: Profile, kind: str) -> Conversion:
 
 def _cables_m(profile: Profile) -> dict[str, float]:
     """Lengths of cables that a profile says, by key [m]; a cable of no length says nothing."""
-    section, _, name = kind_named(profile.bus.kind).cable_key.partition(".")
+    section, _, name = kind_named(profile.bus.kind).key_of("cable").partition(".")
     tables = [(f"bus.{name}", profile.bus)] if section == "bus" else []
     if section == "node":
         tables = [(one.node_key(name), one.node) for one in profile.alike_nodes]

@@ -7,13 +7,16 @@ from codecs import BOM_UTF8
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias, cast, get_args
 
 from busplan.errors import PlacedError, PlacedProblem
+from busplan.sourced import Grade
 
 if TYPE_CHECKING:
     from busplan.profile.positions import KeyPath, Place
 
+GRADING: Final = re.compile(rf"#\s*({'|'.join(get_args(Grade))})\b")
+"""A comment that grades the key beside it: `master_us = 30  # measured: on the line's own host`."""
 TomlTable: TypeAlias = dict[str, Any]
 """A TOML table as Python data."""
 _TOMLLIB_MESSAGE: Final = r"(?s)(?P<what>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)\Z"
@@ -101,6 +104,27 @@ class Document:
 
         return comments(self.text)
 
+    @cached_property
+    def comments_beside(self) -> "dict[KeyPath, int]":
+        """Offset of the comment on the line of each key that has one there; that of a table is beside its header."""
+        line_of = self.lines.line_and_column
+        of_line = {line_of(offset)[0]: offset for offset in self.comments}
+        lines = {path: line_of(place.key_start)[0] for path, place in self.places.items()}
+        return {path: of_line[line] for path, line in lines.items() if line in of_line}
+
+    @cached_property
+    def grades(self) -> dict[str, Grade]:
+        """Grades that comments give values, by dotted key: that of a table is for all its keys."""
+        from busplan.profile.keys import named_path  # loads pydantic
+
+        grades: dict[str, Grade] = {}
+        for path in self.places:
+            offset = self.comments_beside.get(path, self.comments_beside.get(path[:-1]))
+            match = None if offset is None else GRADING.match(self.text, offset)
+            if match is not None:
+                grades[".".join(map(str, named_path(self.data(), path)))] = cast("Grade", match[1])
+        return grades
+
     def nearest(self, path: "KeyPath") -> "KeyPath":
         """Path of a key; if it is missing, of the nearest table around it, () at the top."""
         while path and path not in self.places:
@@ -134,13 +158,17 @@ class Document:
         return PlacedError(self.name, (PlacedProblem(line, column, "syntax", message),))
 
     def data(self) -> TomlTable:
-        """Parse the text.
+        """The parsed text, read once: copy it before a change.
 
         Raises
         ------
         PlacedError
             The text is not valid TOML, with the place of the error.
         """
+        return self._data
+
+    @cached_property
+    def _data(self) -> TomlTable:
         long_key = self._long_key()
         if long_key:
             raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")

@@ -9,14 +9,14 @@ import re
 import tomllib
 from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from typing import Any, Final
 
 import tomli_w
 
 from busplan.errors import BusplanError, PlacedError
 from busplan.printable import printable
-from busplan.profile.document import Document
-from busplan.profile.graded import GRADING, comments_beside
+from busplan.profile.document import GRADING, Document
 from busplan.profile.keys import flat, holder, path_of
 from busplan.profile.positions import KeyPath, Place
 from busplan.profile.toml import decode, validate
@@ -71,7 +71,7 @@ def edited_file(
     min_spare_nodes = 3
     """
     document, notes = decode(content, name=name), notes or {}
-    data = document.data()
+    data = deepcopy(document.data())
     before = _texts(data)
     for key, value in changes.items():
         table, last = holder(data, key)
@@ -202,7 +202,7 @@ def _without(document: Document, path: KeyPath) -> str:
 
 def _with_old_grades(document: Document, paths: set[KeyPath]) -> Document:
     """The document with "was" in the comments that grade some keys."""
-    text, beside = document.text, comments_beside(document)
+    text, beside = document.text, document.comments_beside
     for at in sorted({beside[path] for path in paths & set(beside)}, reverse=True):
         text = text[:at] + GRADING.sub(r"# was \1", text[at:], count=1) if GRADING.match(text, at) else text
     return Document(document.name, text)

@@ -13,16 +13,18 @@ from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
 from busplan.profile.document import Document, TomlTable, text_of
-from busplan.profile.graded import inherit, remember
 from busplan.profile.keys import holder
 from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
+from busplan.sourced import Grade
 
 MAX_FILE_BYTES: Final = 100_000
 """A profile is a page of text; a larger file is something else."""
 _OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
 """Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
 PERIOD_KEY: Final = "cycle.period_us"
+_SOURCE: Final = "_source"
+"""Where a profile keeps its document and the keys that are no longer as there: no field, so no part of its value."""
 
 
 class LoadedProfile(NamedTuple):
@@ -107,7 +109,7 @@ def validate(document: Document) -> Profile:
     data = document.data()
     found = _checked(data)
     if isinstance(found, Profile):
-        remember(found, document)
+        found.__dict__[_SOURCE] = document, frozenset()
         return found
     from busplan.profile.problems import refusal  # loaded only for an invalid profile
 
@@ -171,7 +173,9 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
         table[last] = value
     found = _checked(data)
     if isinstance(found, Profile):
-        inherit(found, profile, frozenset(changes))
+        if _SOURCE in profile.__dict__:
+            document, before = profile.__dict__[_SOURCE]
+            found.__dict__[_SOURCE] = document, before | set(changes)
         return found
     from busplan.profile.problems import refused_changes  # as above
 
@@ -189,3 +193,20 @@ def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Pro
     if periods_us is None:
         return [profile]
     return [override(profile, {PERIOD_KEY: one}, origin={PERIOD_KEY: f"period {one}"}) for one in periods_us]
+
+
+def comment_grade(profile: Profile, key: str) -> Grade | None:
+    """The grade that a comment of its file, at the key or at its table, gives the value of a key.
+
+    Parameters
+    ----------
+    profile
+        The profile; one that was read from no file has no comments.
+    key
+        Dotted key.
+    """
+    document, changed = profile.__dict__.get(_SOURCE, (None, ()))
+    if document is None or any(key == one or key.startswith(f"{one}.") for one in changed):
+        return None
+    grades: dict[str, Grade] = document.grades
+    return grades.get(key)

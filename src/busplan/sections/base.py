@@ -1,7 +1,7 @@
 """What all sections of a profile share: strictness, ranges, and errors in our own words."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -59,6 +59,15 @@ class Section(BaseModel):
     )
 
 
+class Extended(Section):
+    """A section with keys that no type checker sees: those of a kind of bus, or of the servo core."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any:
+            """One of those keys."""
+
+
 _Section = TypeVar("_Section", bound=Section)
 
 
@@ -79,7 +88,7 @@ def with_unchecked(section: _Section, key: str, value: object) -> _Section:
     new = value
     if isinstance(inner, tuple) and rest:
         own, _, rest = rest.partition(".")
-        new = tuple(with_unchecked(one, rest, value) if one.name == own else one for one in inner)
+        new = tuple(with_unchecked(table, rest, value) if table.name == own else table for table in inner)
     elif rest:
         new = with_unchecked(inner, rest, value)
     return section.model_copy(update={name: new})
@@ -98,7 +107,7 @@ def value_at(section: Section, key: str) -> Any:
     found: Any = section
     for part in key.split("."):
         if isinstance(found, tuple):
-            found = next((one for one in found if getattr(one, "name", None) == part), None)
+            found = next((table for table in found if getattr(table, "name", None) == part), None)
         else:
             found = getattr(found, part, None)
     return found

@@ -4,12 +4,22 @@ A kind of bus adds its own keys in a class of its own. The limits of its standar
 breaks them loads, and the analysis says why it does not fit.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import Field, model_validator
 
 from busplan.elementwise import Number
-from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
+from busplan.sections.base import (
+    MAX_COUNT,
+    MAX_TIME_US,
+    MIN_STEP_US,
+    Count,
+    Extended,
+    Problem,
+    Section,
+    TimeUs,
+    refused,
+)
 from busplan.sections.execution import Execution
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
@@ -25,16 +35,7 @@ SliceRatio = Annotated[
 ]
 
 
-class _Extended(Section):
-    """A section to which a kind of bus adds its own keys."""
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, key: str) -> Any:
-            """A key of the kind of bus, which only a run knows."""
-
-
-class BusSection(_Extended):
+class BusSection(Extended):
     """Section [bus]. Every kind of bus has `nodes` and `timing_model`, where they belong among its own keys."""
 
     kind: str = Field(description="Kind of bus", examples=["ieee1394"])
@@ -44,7 +45,7 @@ class BusSection(_Extended):
         timing_model: str
 
 
-class CycleSection(_Extended):
+class CycleSection(Extended):
     """Section [cycle]: the communication period and what of it is for communication."""
 
     period_us: Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)] = Field(
@@ -56,7 +57,7 @@ class CycleSection(_Extended):
     )
 
 
-class PayloadSection(_Extended):
+class PayloadSection(Extended):
     """Section [payload]: what is read from and written to each node in a cycle, fixed and for each of its axes."""
 
     read_bytes: Count | None = Field(
@@ -155,3 +156,27 @@ class GroupSection(NodeSection, PayloadSection):
         if empty:
             raise refused(*empty)
         return self
+
+
+SpareCount = Annotated[int, Field(ge=0, le=MAX_COUNT)]
+
+
+class Limits(Section):
+    """Section [limits]: what a plan must keep free.
+
+    `reserve` is part of every verdict. The others are for `busplan check`, which does not check what is left out.
+    """
+
+    reserve: Annotated[float, Field(ge=0, le=0.99, allow_inf_nan=False)] = Field(
+        default=0.0, description="Share of the time slice that must be free for a plan to fit, 0..0.99", examples=[0.15]
+    )
+
+    max_utilisation: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = Field(
+        default=None, description="Largest share of the time slice that may be used, 0..1", examples=[0.8]
+    )
+    min_spare_nodes: SpareCount | None = Field(
+        default=None, description="Nodes that the bus must be able to carry beyond its own", examples=[1]
+    )
+    min_spare_axes: SpareCount | None = Field(
+        default=None, description="Axes that the bus must be able to carry beyond its own", examples=[4]
+    )

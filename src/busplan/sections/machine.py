@@ -5,11 +5,12 @@ take their names, defaults, ranges and descriptions from there.
 """
 
 from collections import Counter
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from collections.abc import Callable
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, create_model
 
-from busplan.sections.base import Problem, Section, refused
+from busplan.sections.base import Extended, Problem, Section, refused
 from busplan.servo.checks import parameters
 from busplan.servo.parameters import (
     MAX_LENGTH_MM,
@@ -42,93 +43,81 @@ def _without(never: tuple[int, str]) -> AfterValidator:
 
 def _key(of: type, name: str) -> Any:
     """The key of a parameter of the servo core: its default, range, description and example."""
-    (one,) = (one for one in parameters(of) if one.name == name)
-    known = one.known
+    (parameter,) = (parameter for parameter in parameters(of) if parameter.name == name)
+    known = parameter.known
     return Field(
-        default=one.default,
+        default=parameter.default,
         description=known.description,
         examples=[known.example],
         ge=known.least,
         le=known.most,
-        allow_inf_nan=False if one.type is float else None,
+        allow_inf_nan=False if parameter.type is float else None,
     )
 
 
 def _keys(of: type) -> dict[str, Any]:
     """All of a dataclass of the servo core, as pydantic makes a model of them."""
-    return {
-        one.name: (
-            one.type if one.known.never is None else Annotated[one.type, _without(one.known.never)],
-            _key(of, one.name),
-        )
-        for one in parameters(of)
+    types = {
+        parameter.name: parameter.type
+        if parameter.known.never is None
+        else Annotated[parameter.type, _without(parameter.known.never)]
+        for parameter in parameters(of)
     }
+    return {name: (type_, _key(of, name)) for name, type_ in types.items()}
 
 
-if TYPE_CHECKING:
-    # A type checker cannot look into what is made here; it sees the attributes that it is made of.
+_Model = TypeVar("_Model", bound=Section)
 
-    class AxisKeys(Section, Axis):
-        """What can differ from one axis to the other."""
 
-    class AxisOverride(Section):
-        """Any of `AxisKeys`, each optional."""
+def _with(keys: dict[str, Any]) -> Callable[[type[_Model]], type[_Model]]:
+    """Add computed keys to a section."""
 
-    class MechanicsSection(Section, Mechanics):
-        """Section [mechanics]."""
+    def extended(section: type[_Model]) -> type[_Model]:
+        return create_model(
+            section.__name__, __base__=section, __doc__=section.__doc__, __module__=section.__module__, **keys
+        )
 
-    class DeliverySection(Section, Delivery):
-        """Section [delivery]."""
+    return extended
 
-else:
-    AxisKeys = create_model(
-        "AxisKeys",
-        __base__=Section,
-        __doc__="What can differ from one axis to the other: its controller, its drive, its encoder.",
-        **_keys(Axis),
-    )
-    # The same keys with the same ranges, none required and none with a default: what is not said is inherited.
-    AxisOverride = create_model(
-        "AxisOverride",
-        __base__=Section,
-        __doc__="What one axis has otherwise than [servo] says.",
-        **{
-            name: (field.rebuild_annotation() | None, Field(default=None, description=field.description))
-            for name, field in AxisKeys.model_fields.items()
-        },
-    )
-    MechanicsSection = create_model(
-        "MechanicsSection",
-        __base__=Section,
-        __doc__="Section [mechanics]: what lies between the encoders and the table.",
-        **_keys(Mechanics),
-    )
-    DeliverySection = create_model(
-        "DeliverySection",
-        __base__=Section,
-        __doc__="Section [delivery]: how set-points arrive at the nodes.",
-        **_keys(Delivery),
-    )
+
+@_with(_keys(Axis))
+class AxisKeys(Extended):
+    """What can differ from one axis to the other: its controller, its drive, its encoder."""
+
+
+# The same keys with the same ranges, none required and none with a default: what is not said is inherited.
+@_with(
+    {
+        name: (field.rebuild_annotation() | None, Field(default=None, description=field.description))
+        for name, field in AxisKeys.model_fields.items()
+    }
+)
+class AxisOverride(Extended):
+    """What one axis has otherwise than [servo] says."""
+
+
+@_with(_keys(Mechanics))
+class MechanicsSection(Extended):
+    """Section [mechanics]: what lies between the encoders and the table."""
+
+
+@_with(_keys(Delivery))
+class DeliverySection(Extended):
+    """Section [delivery]: how set-points arrive at the nodes."""
 
 
 _GRADED_TIMING: Final = ("interpolation", "step_us")
 """What can be measured of the timing of the loop."""
 
-if TYPE_CHECKING:
 
-    class ServoGrades(Section):
-        """Section [servo.grades]."""
-
-else:
-    ServoGrades = create_model(
-        "ServoGrades",
-        __base__=Section,
-        __doc__="Section [servo.grades]: how single values of [servo] are known.",
-        **{
-            name: (ServoGrade | None, Field(default=None, description=f"How servo.{name} is known"))
-            for name in (*AxisKeys.model_fields, *_GRADED_TIMING)
-        },
-    )
+@_with(
+    {
+        name: (ServoGrade | None, Field(default=None, description=f"How servo.{name} is known"))
+        for name in (*AxisKeys.model_fields, *_GRADED_TIMING)
+    }
+)
+class ServoGrades(Extended):
+    """Section [servo.grades]: how single values of [servo] are known."""
 
 
 class ServoSection(AxisKeys):

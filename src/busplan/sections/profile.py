@@ -16,11 +16,11 @@ from busplan.sections.cycle import (
     BusSection,
     CycleSection,
     GroupSection,
+    Limits,
     NodeSection,
     PayloadSection,
 )
 from busplan.sections.execution import TableExecution
-from busplan.sections.limits import Limits
 from busplan.sections.machine import CircleSection, DeliverySection, MechanicsSection, ServoSection, ToleranceSection
 from busplan.sections.transactions import TRANSACTION_KINDS
 
@@ -86,14 +86,14 @@ class Profile(Section):
     def alike_nodes(self) -> tuple[AlikeNodes, ...]:
         """The nodes, as groups of which each is alike, in the order of the chain."""
         if self.group:
-            return tuple(AlikeNodes(one.name, one.nodes, one, one) for one in self.group)
+            return tuple(AlikeNodes(group.name, group.nodes, group, group) for group in self.group)
         return (AlikeNodes("", self.bus.nodes, self.node, self.payload),)
 
     @model_validator(mode="after")
     def _nodes_are_said_once(self) -> Self:
         said = {"bus.nodes": self.bus.nodes, "node": self.node, "payload": self.payload, "group": self.group or None}
         problems = list(nodes_problems({key for key, value in said.items() if value is not None}))
-        names = [one.name for one in self.group]
+        names = [group.name for group in self.group]
         problems += (
             Problem("there is a group of this name", key=f"group.{place}.name", kind="inconsistent")
             for place, name in enumerate(names)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
@@ -191,7 +191,6 @@ def test_responses_are_those_by_hand_and_their_parts_add_up() -> None:
         assert one.worst_response_us == sum(getattr(one, key) for key in parts)
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.data())
 def test_the_last_pdo_of_a_group_answers_last_of_it(data: st.DataObject) -> None:
     sizes = st.integers(1, 24)

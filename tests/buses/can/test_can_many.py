@@ -66,9 +66,9 @@ def test_a_search_takes_any_number_of_arguments(count: int) -> None:
 @pytest.mark.parametrize(
     ("line", "count"),
     [
-        ("map", 100),
-        ("sweep --vary cycle.period_us=20000,40000 --vary message.m3.jitter_us=0,50", 100),
-        ("report --no-circle", 25),
+        ("map", 40),
+        ("sweep --vary cycle.period_us=20000,40000 --vary message.m3.jitter_us=0,50", 40),
+        ("report --no-circle", 10),
     ],
 )
 def test_many_messages_are_answered(run: Run, tmp_path: Path, line: str, count: int) -> None:
@@ -78,7 +78,7 @@ def test_many_messages_are_answered(run: Run, tmp_path: Path, line: str, count: 
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(("load", "slow", "seed"), [(0.995, 0.9, 1), (0.99, 0.5, 2), (0.9998, 0.8, 4)])
+@pytest.mark.parametrize(("load", "slow", "seed"), [(0.995, 0.9, 1), (0.9998, 0.8, 4)])
 def test_no_busy_period_near_a_full_bus_takes_long(load: float, slow: float, seed: int) -> None:
     profile = many(200, load=load, slow=slow, seed=seed)
     start_s = process_time()
@@ -115,9 +115,9 @@ def test_groups_have_one_set_of_columns(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("count", "load", "deadline_us"), [(3, 0.2, 4e3), (12, 0.6, 2e4), (60, 0.5, 4e4), (70, 0.8, 1e6)]
+    ("count", "load", "deadline_us", "most_steps"),
+    [(3, 0.2, 4e3, 12), (12, 0.6, 2e4, 2000), (60, 0.5, 4e4, 2000), (70, 0.8, 1e6, 12)],
 )
-@pytest.mark.parametrize("most_steps", [2000, 12])
 def test_arrays_of_points_give_what_each_point_gives(
     monkeypatch: pytest.MonkeyPatch, count: int, load: float, deadline_us: float, most_steps: int
 ) -> None:
@@ -127,15 +127,15 @@ def test_arrays_of_points_give_what_each_point_gives(
     profile = CanProfile.model_validate({**tomllib.loads(BASE), "message": late})
     periods_us, nodes, write_bytes = (
         np.array([700.0, 2500.0, 6000.0, 20000.0]).reshape(-1, 1, 1),
-        np.array([1, 2, 9, 40, 100]).reshape(-1, 1),
-        np.array([1, 8, 9, 24]),
+        np.array([1, 9, 100]).reshape(-1, 1),
+        np.array([8, 9]),
     )
     keys = {"cycle.period_us": periods_us, "bus.nodes": nodes, "payload.write_bytes": write_bytes}
     varied = profile
     for key, values in keys.items():
         varied = with_unchecked(varied, key, values.astype(float))
     together = network_of(varied)
-    shape = (4, 5, 4)
+    shape = (4, 3, 2)
     cycle = CanCycle(together, WORST)
     found: dict[str, Any] = {one.key: one.is_broken(together) for one in LIMITS}
     found |= {"required": cycle.required_us, "longer": cycle.added_us(37.0)}

@@ -42,7 +42,7 @@ def test_what_a_bus_had_lies_between_no_stuff_bits_and_the_most() -> None:
             else:
                 assert abs(one.relative_residual) < 0.04, one.quantity
     # What verdicts say of the model.
-    assert f"takes {100 * min(over):.0f} to {100 * max(over):.0f}% more" in kind_named("can").model_error
+    assert f"takes {100 * min(over):.0f} to {100 * max(over):.0f}% more" in kind_named("can").timing_models[0].error
 
 
 def test_the_papers_can_system_spends_its_time_in_the_host() -> None:

@@ -122,23 +122,24 @@ PUBLIC = {
 }
 
 
-@pytest.mark.parametrize("name", ARRAY_CASES)
-def test_arrays_broadcast_and_equal_the_scalars(name: str) -> None:
-    function = PUBLIC[name]
-    arguments = ARRAY_CASES[name]
-    random = np.random.default_rng(15)
-    # Every argument on an axis of its own: the result must have them all.
-    values = {
-        argument: random.uniform(1, 100, size=2).reshape([2 if axis == index else 1 for axis in range(len(arguments))])
-        for index, argument in enumerate(arguments)
-    }
-    result = function(**values)
-    assert result.shape == (2,) * len(arguments)
-    for index in np.ndindex(result.shape):
-        scalars = {key: float(value.ravel()[index[axis]]) for axis, (key, value) in enumerate(values.items())}
-        scalar = function(**scalars)
-        assert isinstance(scalar, float)
-        assert result[index] == scalar
+def test_arrays_broadcast_and_equal_the_scalars() -> None:
+    for name, arguments in ARRAY_CASES.items():
+        function = PUBLIC[name]
+        random = np.random.default_rng(15)
+        # Every argument on an axis of its own: the result must have them all.
+        values = {
+            argument: random.uniform(1, 100, size=2).reshape(
+                [2 if axis == index else 1 for axis in range(len(arguments))]
+            )
+            for index, argument in enumerate(arguments)
+        }
+        result = function(**values)
+        assert result.shape == (2,) * len(arguments)
+        for index in np.ndindex(result.shape):
+            scalars = {key: float(value.ravel()[index[axis]]) for axis, (key, value) in enumerate(values.items())}
+            scalar = function(**scalars)
+            assert isinstance(scalar, float)
+            assert result[index] == scalar
 
 
 def test_every_public_function_is_broadcast_tested() -> None:

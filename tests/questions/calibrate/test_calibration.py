@@ -26,7 +26,6 @@ from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 Make = Callable[..., Profile]
 MODELS: tuple[TimingModelName, ...] = ("paper", "standard")
-SOME = settings(max_examples=50, deadline=None)
 
 
 def phases(profile: Profile, kind: TransactionKind, *, model: TimingModelName, payload_bytes: int) -> Phases:
@@ -109,7 +108,6 @@ def test_what_the_model_leaves_of_table_1_is_measured_less_equation_13(model: Ti
     assert result.payloads[0].unexplained_us == pytest.approx(6 - half_us, abs=1e-9)
 
 
-@SOME
 @given(data=st.data())
 def test_latencies_of_a_profile_give_its_own_execution_time(
     any_profile: st.SearchStrategy[Profile], data: st.DataObject
@@ -149,7 +147,6 @@ def outlying(result: Calibration) -> set[int]:
 points = st.lists(st.tuples(st.integers(1, 2048), st.floats(0, 500)), min_size=2, max_size=30)
 
 
-@SOME
 @given(points=points)
 def test_lines_agree_with_scipy(make: Make, points: list[tuple[int, float]]) -> None:
     profile = make()
@@ -177,7 +174,6 @@ def test_lines_agree_with_scipy(make: Make, points: list[tuple[int, float]]) -> 
     assert (line.base_us, line.per_byte_us) == pytest.approx((base, slope), abs=2e-3)
 
 
-@SOME
 @given(points=points)
 def test_figures_by_payload_and_residuals_agree_with_numpy(make: Make, points: list[tuple[int, float]]) -> None:
     result = run(make(), of_execution(make(), points), form="table")
@@ -283,7 +279,6 @@ def test_a_fit_says_which_model_and_gap_count_it_was_fitted_against(make: Make, 
     assert result.fit_keys == {"residual": model, "measured_gap_count": 8}
 
 
-@SOME
 @given(points=points)
 def test_the_uncertainty_of_a_fit_is_the_spread_about_it(make: Make, points: list[tuple[int, float]]) -> None:
     profile = make()
@@ -299,34 +294,36 @@ def test_the_uncertainty_of_a_fit_is_the_spread_about_it(make: Make, points: lis
     assert result.uncertainty_us == pytest.approx(max(spread_us, 0.1 / np.sqrt(12)), abs=0.002)
 
 
-@pytest.mark.parametrize("halves", [True, False])
-@pytest.mark.parametrize(
-    ("index", "off_us"),
-    [(index, off_us) for index in range(8) for off_us in (-60.0, 50.0, 148.0) if off_us > 0 or index > 3],
-)
-def test_a_wild_row_of_table_1_is_told_where_it_breaks_the_order(index: int, off_us: float, halves: bool) -> None:
-    bench = load("paper-two-node").profile
-    rows = [one if halves else one._replace(request_and_acknowledge_us=None) for one in table_1()]
-    assert run(bench, rows).outliers == ()
-    wild = rows[index]
-    rows[index] = wild._replace(latency_us=wild.latency_us + off_us)
-    times_us = [36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7]
-    times_us[index] += off_us
-    before, behind = times_us[:index][-1:], times_us[index + 1 :][:1]
-    is_slow, is_fast = bool(behind and times_us[index] > behind[0]), bool(before and times_us[index] < before[0])
-    for form in ("table", "linear"):
-        result = run(bench, rows, form=form)
-        assert result.execution.grade == "measured"
-        if not (is_slow or is_fast):
-            # A slower execution of that payload, or of all larger ones; nothing says otherwise.
-            assert (result.outliers, result.worst_extra_us) == ((), None)
-            continue
-        (one,) = result.outliers
-        assert (one.line, one.off_us > 0) == (wild.line, is_slow)
-        assert [fit.left_out for fit in result.payloads] == [int(at == index) for at in range(8)]
-        assert (len(result.residuals), result.measurements) == (7, 8)
-        # The line bends less than Table I does.
-        assert result.worst_extra_us == (pytest.approx(off_us, abs=25) if is_slow else None)
+def test_a_wild_row_of_table_1_is_told_where_it_breaks_the_order() -> None:
+    for halves in [True, False]:
+        for index, off_us in [
+            (index, off_us) for index in range(8) for off_us in (-60.0, 50.0, 148.0) if off_us > 0 or index > 3
+        ]:
+            bench = load("paper-two-node").profile
+            rows = [one if halves else one._replace(request_and_acknowledge_us=None) for one in table_1()]
+            assert run(bench, rows).outliers == ()
+            wild = rows[index]
+            rows[index] = wild._replace(latency_us=wild.latency_us + off_us)
+            times_us = [36.8, 36.7, 45.4, 54.7, 84.9, 141.1, 223.2, 426.7]
+            times_us[index] += off_us
+            before, behind = times_us[:index][-1:], times_us[index + 1 :][:1]
+            is_slow, is_fast = (
+                bool(behind and times_us[index] > behind[0]),
+                bool(before and times_us[index] < before[0]),
+            )
+            for form in ("table", "linear"):
+                result = run(bench, rows, form=form)
+                assert result.execution.grade == "measured"
+                if not (is_slow or is_fast):
+                    # A slower execution of that payload, or of all larger ones; nothing says otherwise.
+                    assert (result.outliers, result.worst_extra_us) == ((), None)
+                    continue
+                (one,) = result.outliers
+                assert (one.line, one.off_us > 0) == (wild.line, is_slow)
+                assert [fit.left_out for fit in result.payloads] == [int(at == index) for at in range(8)]
+                assert (len(result.residuals), result.measurements) == (7, 8)
+                # The line bends less than Table I does.
+                assert result.worst_extra_us == (pytest.approx(off_us, abs=25) if is_slow else None)
 
 
 def test_a_tail_of_slow_executions_loses_none_of_them(make: Make) -> None:
@@ -343,7 +340,7 @@ def test_a_tail_of_slow_executions_loses_none_of_them(make: Make) -> None:
             assert all(time_us <= most_us + 1e-6 for (_, time_us), most_us in zip(rows, covered_us, strict=True))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     seed=st.integers(0, 10**6),
     repetitions=st.integers(3, 5),

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.profile.shipped import load, shipped_names
@@ -18,7 +18,6 @@ from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 
 Maker = Callable[..., Profile]
-SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 TABLE = {"kind": "table", "payload_bytes": [4, 12, 14], "time_us": [30.0, 34.0, 40.0]}
 
 
@@ -51,7 +50,6 @@ def effects(profile: Profile) -> dict[str, Effect]:
     return {one.change: one for one in sensitivity(profile).effects}
 
 
-@SOME
 @given(data=st.data(), per_axis=st.sampled_from([None, 1, 8]), reserve=st.sampled_from([0.0, 0.2]))
 def test_each_row_is_the_capacity_of_the_profile_with_that_change(
     data: st.DataObject, per_axis: int | None, reserve: float, any_profile: st.SearchStrategy[Profile]
@@ -74,7 +72,6 @@ def test_each_row_is_the_capacity_of_the_profile_with_that_change(
         assert (one.then.verdict, one.then.safe, one.then.exceeded) == (after.verdict, after.safe, after.exceeded)
 
 
-@SOME
 @given(data=st.data())
 def test_where_a_network_stands_is_what_its_capacity_says(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
@@ -84,7 +81,6 @@ def test_where_a_network_stands_is_what_its_capacity_says(
     assert now == tuple(getattr(one, key) for key in now._fields)
 
 
-@SOME
 @given(data=st.data())
 def test_the_largest_effect_comes_first_and_what_cannot_be_made_last(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
@@ -240,7 +236,6 @@ def test_a_term_goes_with_its_cause(make: Maker, changes: dict[str, Any], bindin
     assert found.next_binding_term.key != binding
 
 
-@SOME
 @given(data=st.data())
 def test_without_the_limit_the_next_one_keeps_one_node_more_off(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]

@@ -20,7 +20,6 @@ from busplan.sections.profile import Profile
 NEVER_ROUND = {"servo.step_us": 1.0, "tolerance": {"max_contour_error_mm": 0.0}, "circle.feed_mm_per_min": 4000.0}
 """No circle holds it, so that a search for one that does has no end."""
 HOSTILE = [
-    override(load("ethercat-servo-8").profile, {**NEVER_ROUND, "bus.nodes": 3}),
     override(load("ethercat-servo-8").profile, {**NEVER_ROUND, "cycle.period_us": 60.0}),
     override(
         load("paper-1ms").profile,

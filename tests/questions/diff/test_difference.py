@@ -134,7 +134,6 @@ def test_keys_of_one_profile_alone(make: Make) -> None:
 # --- figures ----------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_the_other_way_round_everything_turns(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     a, b = data.draw(any_profile), data.draw(any_profile)
@@ -148,7 +147,7 @@ def test_the_other_way_round_everything_turns(data: st.DataObject, any_profile: 
             assert (one.difference > 0) == ((one.judgement == "better") == (one.figure.key in MORE))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_against_itself_everything_is_the_same(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     one = data.draw(any_profile)

@@ -195,7 +195,7 @@ def test_what_is_worse_fails(paper: Profile) -> None:
     assert judged({"bus.gap_count": 13}) == {("better", "passes"), ("neutral", "neutral")}
 
 
-@pytest.mark.parametrize("name", ["paper-1ms", "paper-optimal-gap", "paper-dma", "paper-two-node"])
+@pytest.mark.parametrize("name", ["paper-1ms", "paper-two-node"])
 def test_every_figure_stands_at_its_place(name: str, values_of_the_document: Callable[[Report], int]) -> None:
     found = difference(load("paper-4ms").profile, load(name).profile, circle=run_circle)
     # The table shows the first 20 keys.
@@ -248,9 +248,8 @@ def test_regressions_are_named_with_the_timing_that_has_them(paper: Profile) -> 
 # --- values -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("value", "other", "shown"),
-    [
+def test_a_value_is_shown_as_toml_has_it() -> None:
+    for value, other, shown in [
         (63, "optimal", "63"),
         ("optimal", 63, '"optimal"'),
         (0.1, None, "0.1"),
@@ -270,10 +269,8 @@ def test_regressions_are_named_with_the_timing_that_has_them(paper: Profile) -> 
         ('a"b\\\n', None, r'"a\"b\\\n"'),
         ("x" * 41, None, f'"{"x" * 40}"..'),
         ("x" * 60 + "a", "x" * 60 + "b", '.."xxxxxxxxa"'),
-    ],
-)
-def test_a_value_is_shown_as_toml_has_it(value: object, other: object, shown: str) -> None:
-    assert shown_value(value, other) == shown
+    ]:
+        assert shown_value(value, other) == shown
 
 
 NUMBERS = st.lists(st.integers(0, 3), max_size=30).map(tuple)
@@ -327,7 +324,7 @@ def test_every_cell_is_shown_as_the_table_on_a_terminal_has_it(paper: Profile) -
     assert words >= {" ".join(line.split()) for line in lines if line.endswith(("worse", "better", "neutral"))}
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("name", [" ".join(HOSTILE[:8]), " ".join(HOSTILE[8:])])
 def test_hostile_names_are_shown_and_do_nothing_else(paper: Profile, name: str) -> None:
     b = override(paper, {"name": name, "description": f"{name}\n{name}", "bus.nodes": 3})
     page = Page(comment(difference(paper, b), arguments=("a.toml", f"main:{name}.toml")))

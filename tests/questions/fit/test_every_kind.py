@@ -6,7 +6,7 @@ from math import fsum
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.buses import kind_names
@@ -20,8 +20,8 @@ from busplan.questions.fit.node_limit import most_nodes, safe_nodes
 from busplan.sections.profile import Profile
 
 Profiles = Mapping[str, st.SearchStrategy[Profile]]
-SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 KINDS = pytest.mark.parametrize("kind", kind_names())
+SOME = settings(max_examples=10)  # of each kind
 PLACES = st.lists(st.integers(2, 68), min_size=4, max_size=4).map(lambda places: {0, 1, *places})
 """Some of an array, the first two always."""
 
@@ -36,7 +36,7 @@ def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
     bus = bus_of(profile)
     for model in model_names(profile):
         cycle = cycle_of(profile, model=model)
-        assert [term.key for term in cycle.terms] == [figure.key for figure in bus.term_figures]
+        assert [term.key for term in cycle.terms] == [figure.key for figure in bus.figures.terms]
         assert all(term.us >= 0 for term in cycle.terms)
         of_events: dict[str, list[float]] = defaultdict(list)
         for event in cycle.events():

@@ -3,15 +3,15 @@
 import os
 import random
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import closing
 from itertools import count
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children
 from threading import Condition, Thread
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
@@ -65,7 +65,6 @@ class Shuffled(Executor):
                     future.set_exception(error)
 
 
-@settings(max_examples=40, deadline=None)  # a thread may wait
 @given(seed=st.integers(0, 1000), number=st.integers(0, 40), most=st.integers(1, 12))
 def test_results_come_in_order_whatever_the_order_of_completion(seed: int, number: int, most: int) -> None:
     with closing(Shuffled(seed, waiting=min(most, 3))) as executor:
@@ -155,7 +154,7 @@ def test_a_worker_that_is_lost_is_said_and_none_is_left() -> None:
     assert active_children() == before
     with pytest.raises(ZeroDivisionError), workers(1) as crew:
         list(run_in_order(crew, inverse, [1, 0]))
-    with pytest.raises(WorkerLostError, match="a worker was killed"), workers(2) as crew:
+    with pytest.raises(WorkerLostError, match="a worker was killed"), workers(1) as crew:
         list(run_in_order(crew, os._exit, range(100)))
     assert active_children() == before
 
@@ -175,10 +174,9 @@ def test_a_sweep_is_the_same_on_every_executor() -> None:
     with (
         closing(Shuffled(7, waiting=5)) as shuffled,
         ThreadPoolExecutor(3) as threads,
-        ProcessPoolExecutor(1, mp_context=get_context("spawn")) as processes,
-        workers(2) as own,
+        workers(1) as own,
     ):
-        for executor in (shuffled, threads, processes, own):
+        for executor in (shuffled, threads, own):
             assert document(executor) == alone
             assert document(executor, summary=True) == summary
             # It is the caller's, and goes on.
@@ -206,10 +204,10 @@ def test_refusals(options: dict[str, Any], words: str) -> None:
         busplan.sweep("paper-1ms", vary=SMALL, **options)
 
 
-@pytest.mark.parametrize("each_s", [1e-3, 0.06, 0.4, 20.0])
-@pytest.mark.parametrize("number", [1, 10, 1000, 10**7])
-def test_a_chunk_is_about_a_second_of_work_and_a_few_tests_are_shared_out(number: int, each_s: float) -> None:
-    size = chunk_tests(number, time_s=number * each_s)
-    assert size == 1 or number / size >= 64
-    if number == 10**7 and each_s < 3:
-        assert 0.3 <= size * each_s <= 3
+def test_a_chunk_is_about_a_second_of_work_and_a_few_tests_are_shared_out() -> None:
+    for each_s in [1e-3, 0.06, 0.4, 20.0]:
+        for number in [1, 10, 1000, 10**7]:
+            size = chunk_tests(number, time_s=number * each_s)
+            assert size == 1 or number / size >= 64
+            if number == 10**7 and each_s < 3:
+                assert 0.3 <= size * each_s <= 3

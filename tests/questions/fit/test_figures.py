@@ -25,7 +25,6 @@ Carries = Callable[[Profile, int], bool]
 Around = Callable[[int, Callable[[int], bool]], list[int]]
 
 
-@settings(max_examples=200, deadline=None)
 @given(data=st.data())
 def test_max_nodes_is_the_largest_that_fits_in_exact_arithmetic(
     data: st.DataObject,
@@ -55,7 +54,6 @@ def test_max_nodes_is_the_largest_that_fits_in_exact_arithmetic(
     assert around(found, good) == [found][:found]
 
 
-@settings(max_examples=150, deadline=None)
 @given(data=st.data(), model=MODELS, nodes=st.integers(1, 62))
 def test_a_cycle_that_fits_exactly_fits(
     data: st.DataObject, model: TimingModelName, nodes: int, any_profile: st.SearchStrategy[Profile]
@@ -77,7 +75,6 @@ def test_a_cycle_that_fits_exactly_fits(
     assert largest_nodes(short, model=model)[0] < nodes
 
 
-@settings(max_examples=200, deadline=None)
 @given(data=st.data())
 def test_required_time_equals_the_exact_one(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile], exact: Exact
@@ -88,7 +85,6 @@ def test_required_time_equals_the_exact_one(
     assert found_us == pytest.approx(float(exact(profile, model, profile.alike_nodes[0].nodes)), rel=1e-13)
 
 
-@settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_the_figures_of_a_profile_agree_with_each_other(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
@@ -140,7 +136,6 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     assert (found.verdict == "fits" and found.safe) == (found.nodes <= found.safe_nodes)
 
 
-@settings(max_examples=50, deadline=None)
 @given(data=st.data(), model=MODELS)
 def test_the_smallest_period_fits_and_nothing_below_it(
     data: st.DataObject, model: TimingModelName, any_profile: st.SearchStrategy[Profile]
@@ -175,7 +170,7 @@ GROWING = {
 
 
 @pytest.mark.parametrize("key", GROWING)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=6)  # of each key
 @given(data=st.data(), model=MODELS, period_us=st.floats(50, 20_000))
 def test_max_nodes_never_grows_with_what_costs_time(
     key: str, data: st.DataObject, model: TimingModelName, period_us: float, make: Make
@@ -197,7 +192,6 @@ def test_a_payload_of_exactly_a_quadlet_is_cheaper_than_a_smaller_one(make: Make
 
 
 @given(data=st.data(), model=MODELS, periods=st.lists(st.floats(1, 50_000), min_size=2, max_size=2))
-@settings(max_examples=100, deadline=None)
 def test_max_nodes_never_shrinks_with_the_period(
     data: st.DataObject, model: TimingModelName, periods: list[float], any_profile: st.SearchStrategy[Profile]
 ) -> None:

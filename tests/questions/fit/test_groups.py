@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.constants import PHY_DELAY_HALF_WIDTH_US
@@ -32,7 +32,6 @@ from busplan.questions.sweep.grid import checked_grid
 from busplan.questions.sweep.values import listed
 from busplan.sections.profile import Profile
 
-SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 GANTRY = load("gantry-24").profile
 
 
@@ -116,7 +115,6 @@ def grouped(draw: st.DrawFn) -> Profile:
 # --- equal groups -----------------------------------------------------------------------------------------
 
 
-@SOME
 @given(data=st.data(), parts=st.lists(st.integers(1, 20), min_size=1, max_size=4), own=st.booleans())
 def test_equal_neighbours_are_the_uniform_bus_to_the_bit(
     data: st.DataObject, parts: list[int], own: bool, any_profile: st.SearchStrategy[Profile]
@@ -156,7 +154,6 @@ def test_equal_groups_that_are_no_neighbours_stay_apart() -> None:
 # --- unlike groups ----------------------------------------------------------------------------------------
 
 
-@SOME
 @given(profile=grouped())
 def test_events_add_up_to_the_terms(profile: Profile) -> None:
     for model in model_names(profile):
@@ -169,7 +166,6 @@ def test_events_add_up_to_the_terms(profile: Profile) -> None:
         assert not of_events
 
 
-@SOME
 @given(profile=grouped())
 def test_each_group_is_counted_as_a_brute_search_counts_it(profile: Profile) -> None:
     """One node more at a time, the others as they are, each a profile of its own."""
@@ -203,7 +199,6 @@ def _is_shown(profile: Profile) -> bool:
     return safe and not bus_of(profile).broken(network_of(profile)) and bool(fits_in(needed_us, available_us=given_us))
 
 
-@SOME
 @given(profile=grouped())
 def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: Profile) -> None:
     own, farthest = (override(profile, {"bus.charge_hops": word}) for word in ("own", "farthest"))
@@ -212,7 +207,6 @@ def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: Profile)
         assert plain(one.us) <= plain(other.us) + 1e-9, one.key
 
 
-@SOME
 @given(profile=grouped())
 def test_a_derivation_gives_the_figures(profile: Profile) -> None:
     for model in model_names(profile):
@@ -224,7 +218,7 @@ def test_a_derivation_gives_the_figures(profile: Profile) -> None:
                 assert value is None
 
 
-@settings(SOME, max_examples=12)
+@settings(max_examples=12)
 @given(profile=grouped(), nodes=st.lists(st.integers(1, 20), min_size=2, max_size=4, unique=True))
 def test_a_sweep_gives_what_each_profile_gives(profile: Profile, nodes: list[int]) -> None:
     name = profile.group[-1].name
@@ -314,7 +308,6 @@ def test_a_tree_charges_the_hops_of_its_groups() -> None:
     assert cycle_of(tree, model="standard").figures()["hops"] == 3
 
 
-@SOME
 @given(profile=grouped())
 def test_a_written_profile_reads_to_the_same(profile: Profile) -> None:
     assert validate(decode(profile_text(profile).encode(), name="x")) == profile
@@ -344,7 +337,7 @@ def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., Profile]) ->
 # --- what to set ------------------------------------------------------------------------------------------
 
 
-@settings(SOME, max_examples=15)
+@settings(max_examples=15)
 @given(
     profile=grouped(),
     limits=st.fixed_dictionaries(

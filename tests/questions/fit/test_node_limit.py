@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses.network import Network
@@ -39,7 +39,6 @@ def limit_of(form: str, most: Number, is_slow: bool, *, less: Number = 0) -> Lim
 limits = st.lists(st.tuples(st.sampled_from(list(FORMS)), st.integers(-1, 120), st.booleans()), min_size=1, max_size=5)
 
 
-@settings(deadline=None)
 @given(asked=limits, ceiling=st.integers(1, 40))
 def test_the_most_are_those_that_a_count_finds_and_the_first_limit_of_equal_ones_gives_its_name(
     asked: list[tuple[str, int, bool]], ceiling: int
@@ -54,7 +53,6 @@ def test_the_most_are_those_that_a_count_finds_and_the_first_limit_of_equal_ones
         assert found.limit == each.index(min(each))
 
 
-@settings(max_examples=40, deadline=None)
 @given(asked=limits, shape=st.tuples(st.integers(1, 3), st.integers(1, 40)))
 def test_an_array_is_answered_as_each_of_its_points(asked: list[tuple[str, int, bool]], shape: tuple[int, int]) -> None:
     # Values that vary are searched by halves, bounds that do are counted.

@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.timing import TimingModelName
@@ -18,7 +18,6 @@ BASE = load("paper-4ms").profile
 MODELS = st.sampled_from(["paper", "standard"])
 
 
-@settings(max_examples=80, deadline=None)
 @given(
     model=MODELS,
     period_us=st.floats(1.0, 1e6),

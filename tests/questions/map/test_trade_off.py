@@ -83,7 +83,6 @@ def assert_cells_are_those_of_capacity(found: TradeOff, *, step: int = 1) -> Non
         assert cell.limited_by == limits[cell.state]
 
 
-@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = data.draw(any_profile)
@@ -100,7 +99,7 @@ def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.S
     assert_cells_are_those_of_capacity(found)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(data=st.data())
 def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]

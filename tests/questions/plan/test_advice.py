@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.constants import safe_gap_count
@@ -36,7 +36,6 @@ def is_safe(profile: Profile, change: Change) -> bool:
     return bool(gap_count_of(network) >= safe_gap_count(hops_of(network)))
 
 
-@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_after_a_change_the_verdict_is_what_it_promises(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
@@ -70,7 +69,6 @@ def within_limits(profile: Profile) -> Profile:
     return override(profile, {"bus.nodes": nodes, "bus.gap_count": "optimal", **small, **hops})
 
 
-@settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_there_is_always_a_way_where_no_limit_of_the_standard_is_broken(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]

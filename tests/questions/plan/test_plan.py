@@ -5,7 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
@@ -179,7 +179,6 @@ def test_a_payload_stays_inside_the_execution_table_which_need_not_ascend(make: 
     )
 
 
-@settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_most_nodes_are_safe_for_their_gap_count(
     data: st.DataObject,

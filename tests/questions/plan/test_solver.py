@@ -1,7 +1,7 @@
 """The plan is the least change there is, found by trying all; and what is written passes the gate."""
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import product
+from itertools import cycle, product
 from math import inf
 from typing import Any
 
@@ -59,7 +59,6 @@ limits: st.SearchStrategy[dict[str, object]] = st.fixed_dictionaries(
 )
 
 
-@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_what_a_plan_writes_passes_the_gate(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = override(data.draw(any_profile), data.draw(limits))
@@ -74,7 +73,7 @@ def test_what_a_plan_writes_passes_the_gate(data: st.DataObject, any_profile: st
         assert (errors == []) == (found == {})
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8)
 @given(data=st.data())
 def test_a_plan_is_that_change_and_what_would_be_enough_is_enough(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
@@ -147,7 +146,7 @@ def every_point(profile: Profile, *, periods_us: Sequence[float], names: Sequenc
             yield {**point, "bus.gap_count": safe_gap_count(hops)}
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_no_cheaper_point_of_a_grid_passes(data: st.DataObject, make: Make) -> None:
     own_us = data.draw(st.sampled_from([90.0, 200.0, 450.0, 1000.0]))
@@ -321,8 +320,7 @@ def test_a_plan_has_more_to_spare_than_it_is_unsure_of(make: Make) -> None:
         assert one.margin_corrected_us >= (one.uncertainty_us or 0)
 
 
-@pytest.mark.parametrize("name", shipped_names())
-@pytest.mark.parametrize("nodes", [3, 11])
+@pytest.mark.parametrize(("name", "nodes"), list(zip(shipped_names(), cycle([3, 11]), strict=False)))
 def test_what_is_written_for_a_shipped_profile_passes_the_gate_with_its_circle(name: str, nodes: int) -> None:
     profile = load(name).profile
     best = plan(profile, wanted={profile.alike_nodes[0].nodes_key: nodes}, circle=CircleCheck()).recommended
@@ -415,7 +413,6 @@ def test_a_grid_has_the_smallest_number_that_is_no_less(step: float, digits: int
     assert grid.number(place) < grid.number(place + 1)
 
 
-@settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_neither_period_nor_slice_ratio_changes_what_is_needed(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
@@ -428,7 +425,6 @@ def test_neither_period_nor_slice_ratio_changes_what_is_needed(
     assert needs(override(profile, other)) == needs(profile)
 
 
-@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_every_setting_of_the_bus_is_safe_and_saves_time(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]

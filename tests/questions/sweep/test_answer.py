@@ -145,9 +145,8 @@ def test_the_text_is_the_table_of_the_command() -> None:
     assert lines[5].split() == ["1", "paper", "102.955", "2000.000", "1897.045", "-", "-", "64", "-", "-", "-"]
 
 
-@pytest.mark.parametrize(
-    ("vary", "options", "message"),
-    [
+def test_what_makes_no_sweep_is_refused() -> None:
+    cases: list[tuple[Any, Any, str]] = [
         ({}, {}, "vary {}: expected keys of the profile and their values"),
         ({"bus.nods": [1]}, {}, "vary bus.nods: no such key of this profile; did you mean bus.nodes?"),
         ({"bus.nodes": []}, {}, "vary bus.nodes: no values; give at least one"),
@@ -170,11 +169,10 @@ def test_the_text_is_the_table_of_the_command() -> None:
         ),
         ({"cycle.period_us": range(1, 1002)}, {"circle": True}, "that are run without force=True"),
         ({"cycle.period_us": [1050]}, {"circle": True}, "at cycle.period_us = 1050: servo.step_us = 100.0"),
-    ],
-)
-def test_what_makes_no_sweep_is_refused(vary: Any, options: Any, message: str) -> None:
-    with pytest.raises(busplan.BusplanError, match=re.escape(message)):
-        busplan.sweep("paper-4ms", vary=vary, **options)
+    ]
+    for vary, options, message in cases:
+        with pytest.raises(busplan.BusplanError, match=re.escape(message)):
+            busplan.sweep("paper-4ms", vary=vary, **options)
 
 
 def test_a_truth_that_is_missing_is_none_beside_the_others() -> None:

@@ -145,9 +145,9 @@ def test_whole_numbers_have_whole_ticks(nodes: Any, plots: Plots) -> None:
 
 
 def test_many_points_are_a_curve_without_marks(plots: Plots) -> None:
-    one = plotted("margin_us", cycle__nonperiodic_us=range(750))
+    one = plotted("margin_us", cycle__nonperiodic_us=range(250))
     (plot,) = plots(drawn(one))
-    assert len(plot.values("curve first")) == 750
+    assert len(plot.values("curve first")) == 250
     assert marks(plot, "rect", "mark first") == []
 
 

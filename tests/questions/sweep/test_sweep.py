@@ -68,7 +68,7 @@ def assert_rows_are_those_of_capacity(
 ) -> None:
     points = 0
     models = grid_models(profile, grid, None if model is None else (model,), name="--timing")
-    sorts = {figure.key: figure.sort for figure in bus_of(profile).capacity_figures}
+    sorts = {figure.key: figure.sort for figure in bus_of(profile).figures.capacity}
 
     def written(name: str, wanted: object) -> str:
         # A number that a timing model does not have is NaN in an array.
@@ -90,7 +90,7 @@ def assert_rows_are_those_of_capacity(
     assert points == grid.points
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=12)
 @given(data=st.data())
 def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = data.draw(any_profile)
@@ -109,7 +109,6 @@ def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile
     assert_rows_are_those_of_capacity(profile, grid, chunk_points=data.draw(st.integers(1, 40)))
 
 
-@settings(max_examples=60, deadline=None)
 @given(data=st.data(), nodes=st.integers(1, 20))
 def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
     data: st.DataObject, nodes: int, any_profile: st.SearchStrategy[Profile]
@@ -162,9 +161,8 @@ def test_a_chunk_of_a_huge_axis_is_no_larger_than_asked() -> None:
     assert chunk.shape == (1, 1000)
 
 
-@pytest.mark.parametrize(
-    ("axes", "message"),
-    [
+def test_what_no_profile_could_have_is_refused_in_the_profiles_own_words(make: Make) -> None:
+    cases: list[tuple[dict[str, Values], str]] = [
         ({"bus.nods": Listed((1,))}, "--vary bus.nods: no such key of this profile; did you mean bus.nodes?"),
         ({"bsu.nodes": Listed((1,))}, "--vary bsu.nodes: no such key of this profile; did you mean bus.nodes?"),
         ({"node.execution": Listed((1,))}, "--vary node.execution: is a section; expected the key of one number"),
@@ -189,14 +187,11 @@ def test_a_chunk_of_a_huge_axis_is_no_larger_than_asked() -> None:
             "cable_length_m is 6",
         ),
         ({"cycle.period_us": Steps(1, 1, 1, 10**7), "bus.nodes": Steps(1, 1, 1, 10**6)}, "vary less"),
-    ],
-)
-def test_what_no_profile_could_have_is_refused_in_the_profiles_own_words(
-    axes: dict[str, Values], message: str, make: Make
-) -> None:
-    profile = override(make(), {"node.execution": TABLE})
-    with pytest.raises(BusplanError, match=re.escape(message)):
-        checked_grid(profile, axes, with_circle=False)
+    ]
+    for axes, message in cases:
+        profile = override(make(), {"node.execution": TABLE})
+        with pytest.raises(BusplanError, match=re.escape(message)):
+            checked_grid(profile, axes, with_circle=False)
 
 
 def test_a_table_is_read_at_its_points_between_them_and_at_both_ends(make: Make) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from xml.etree import ElementTree as ET
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.buses import kind_named
@@ -281,7 +281,6 @@ def test_bus_lane_comes_first_and_nodes_in_their_turn() -> None:
     assert [lane.label for lane in node_lanes(zoom(one, transaction=("write", 11)))] == ["node 11"]
 
 
-@settings(max_examples=200, deadline=None)
 @given(start=st.floats(0.0, 1e6), width=st.floats(1e-3, 1e6), most=st.integers(1, 12))
 def test_ticks_are_round_inside_the_window_and_few(start: float, width: float, most: int) -> None:
     end = start + width

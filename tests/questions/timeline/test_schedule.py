@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
@@ -21,11 +21,9 @@ from busplan.sections.profile import Profile
 
 Maker = Callable[..., Profile]
 Exact = Callable[[Profile, str, int], Fraction]
-SOME = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 MOST_REQUIRED_US = 1e6
 
 
-@SOME
 @given(data=st.data())
 def test_the_last_event_ends_at_the_closed_forms_required_time(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile], exact: Exact
@@ -42,7 +40,6 @@ def test_the_last_event_ends_at_the_closed_forms_required_time(
         assert abs(plan.used_us - float(exact(profile, model, profile.alike_nodes[0].nodes))) <= 1e-9
 
 
-@SOME
 @given(data=st.data())
 def test_events_touch_and_cover_the_slice_or_overrun_it(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]

@@ -260,6 +260,14 @@ class CanCycle(BusCycle):
         }
         return _numbered(parts_us, identifier=inf, data_bytes=inf, instance=inf, deadline_us=inf)
 
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """The host's pipeline, and the period to the next SYNC."""
+        return super().loop_periods(at_sync=at_sync) + int(plain(self.network.profile.bus.pipeline_cycles))
+
+    def sync_jitter_us(self) -> Number:
+        """Half of what messages may hold SYNC up [us]."""
+        return self.sync_spread_us / 2
+
     @cached_property
     def sync_spread_us(self) -> Number:
         """How much later than without other messages SYNC may end, B + I [us]; infinite where it has no end."""

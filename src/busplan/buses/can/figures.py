@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.buses.figure import NODES, NONPERIODIC, TIMING_MODEL, TRANSACTION, Figure, capacity_figures
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
 
 _DAVIS: Final = "Davis 2007"
 
@@ -71,7 +71,6 @@ TERMS: Final = (
     NONPERIODIC,
 )
 """In the order of the wire."""
-CAPACITY: Final = capacity_figures(TERMS, setup=(BIT_RATE,), own=LOADS)
 
 LATENCY_TABLE: Final = (
     Figure("identifier", "id", "profile", "identifier of the last frame", "identifier", sort="count"),
@@ -94,4 +93,14 @@ LATENCY_TABLE: Final = (
     Figure("deadline_us", "D", "profile", "when it must have arrived", "deadline D"),
 )
 """In the order in which they add up."""
-LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *LATENCY_TABLE)
+FIGURES: Final = BusFigures(
+    TERMS,
+    capacity_figures(TERMS, setup=(BIT_RATE,), own=LOADS),
+    setup=(BIT_RATE,),
+    headings=(BIT_RATE.key,),
+    table=LOADS,
+    compared=LOADS,
+    planned=(BUS_LOAD.key,),
+    phases=LATENCY_TABLE,
+    has_many_transactions=True,
+)

@@ -11,8 +11,8 @@ from busplan.buses.can.response import TooManyStepsError
 from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
 from busplan.buses.can.traffic import Sent, Traffic, traffic_of, without_times
 from busplan.buses.can.waiting import Messages, messages
+from busplan.buses.limits import NODE_LIMIT
 from busplan.buses.network import Network
-from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
 from busplan.elementwise import Number, is_everywhere, larger, plain, pointwise, total
 from busplan.sections.base import MAX_TIME_US
@@ -269,6 +269,7 @@ LIMITS: Final = (
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         has_rule=True,
         says=_load_words,
+        period=lambda _limit, network: CanCycle(network, WORST).load_period_us,
         kept_from_us=lambda network: plain(CanCycle(network, WORST).load_period_us),
     ),
     Limit(

@@ -1,7 +1,7 @@
 """The keys that only profiles of a CAN bus have, in [bus], [payload], [[group]], [[message]] and [limits]."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -19,9 +19,8 @@ from busplan.buses.can.cycle import WORST, TimingModelName
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC
 from busplan.elementwise import Number
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
-from busplan.sections.cycle import BusSection, GroupAxes, GroupName, GroupSection, NodeSection, PayloadSection
+from busplan.sections.cycle import BusSection, GroupAxes, GroupName, GroupSection, Limits, NodeSection, PayloadSection
 from busplan.sections.execution import UNKNOWN_SHARE
-from busplan.sections.limits import Limits
 from busplan.sections.profile import Profile
 
 Identifier = Annotated[int, Field(ge=0, le=MAX_IDENTIFIER[29])]
@@ -211,3 +210,6 @@ class CanProfile(Profile):
                 yield f"{section}.feedback_identifier", payload.feedback_identifier
                 yield f"{section}.command_identifier", payload.command_identifier
         yield from ((f"message.{place}.identifier", one.identifier) for place, one in enumerate(self.message))
+
+
+PROFILE: Final = CanProfile

@@ -5,9 +5,15 @@ from functools import cached_property
 from typing import Final, Literal
 
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
-from busplan.buses.ethercat.constants import BYTE_BIAS_UNCERTAINTY_US, BYTE_BIAS_US
-from busplan.buses.ethercat.equations import device_us, frame_bytes, overhead_bytes, sending_us
-from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
+from busplan.buses.ethercat.equations import (
+    BYTE_BIAS_UNCERTAINTY_US,
+    BYTE_BIAS_US,
+    device_us,
+    frame_bytes,
+    overhead_bytes,
+    sending_us,
+)
+from busplan.buses.ethercat.latency import last_command_us, latencies, loop_periods, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (
     cables_us,
@@ -166,6 +172,10 @@ class EthercatCycle(BusCycle):
             "command_us": last_command_us(self.network),
             "sync0_us": sync0_us(self.network) if has_clocks else None,
         }
+
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """The master's pipeline, and the cycles that feedback and command wait for a frame and for SYNC0."""
+        return loop_periods(self.network, at_sync=at_sync)
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst case of a command, of feedback, and of both, for each group."""

@@ -1,20 +1,154 @@
-"""Length of EtherCAT frames, for numbers of any sort."""
+"""Sourced figures of EtherCAT at 100 Mbit/s, and the length of its frames, for numbers of any sort."""
 
-from typing import Final
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, Literal
 
-from busplan.buses.ethercat.constants import (
-    BYTE_US,
-    CABLE_US_PER_M,
-    CHECK_BYTES,
-    DATAGRAM_BYTES,
-    ETHERNET_BYTES,
-    GAP_BYTES,
-    HEADER_BYTES,
-    LEAST_FRAME_BYTES,
-    MOST_FRAME_BYTES,
-    PREAMBLE_BYTES,
-)
+from busplan.buses.published import Spread, published
 from busplan.elementwise import Number, alike, choose, larger, plain
+from busplan.sourced import Grade, Sourced, constants
+
+Port = Literal["100BASE-TX", "E-bus"]
+ProcessData = Literal["LRW-separate", "LRW-shared", "LRD-LWR"]
+SEPARATE: Final[ProcessData] = "LRW-separate"
+SHARED: Final[ProcessData] = "LRW-shared"
+SPLIT: Final[ProcessData] = "LRD-LWR"
+Master = Literal["SOEM", "IgH", "ethercrab", "TwinCAT", "acontis"]
+UNNAMED: Final = "unnamed"
+"""The master of a profile that names none."""
+
+_ETHERNET: Final = "IEEE 802.3"
+_ETG: Final = "ETG.1000; SOEM, ethercattype.h"
+_MEASURED: Final = published("ethercat")["delays"]
+_COPY: Final = published("ethercat")["byte_cost"]
+
+
+def _bytes(value: int, meaning: str, source: str) -> Sourced:
+    return Sourced(value, unit="bytes", grade="published", source=source, meaning=meaning)
+
+
+def _delay(spread: Spread, port: str, source: str) -> tuple[Sourced, Sourced]:
+    """The mean delay of the devices of a port, and the standard uncertainty of one more kind of device."""
+    of_mean, of_doubt = f"{source}, their mean", f"{source}, their sd sqrt(1 + 1/n)"
+    return (
+        Sourced(spread.mean, unit="us", grade="measured", source=of_mean, meaning=f"delay of a {port} device, one way"),
+        Sourced(
+            spread.uncertainty,
+            unit="us",
+            grade="derived",
+            source=of_doubt,
+            meaning=f"standard uncertainty of the delay of all {port} devices of a machine, one way",
+        ),
+    )
+
+
+def _datagrams(*sizes: int, of: str, source: str, grade: Grade) -> Sourced:
+    """Datagrams of some data sizes, headers and working counters included [bytes]."""
+    meaning = f"datagrams of the master: {of}, data {' + '.join(map(str, sizes)) or '0'}"
+    value = sum(sizes) + len(sizes) * DATAGRAM_BYTES
+    return Sourced(value, unit="bytes", grade=grade, source=source, meaning=meaning)
+
+
+BYTE_US: Final = Sourced(
+    0.08, unit="us", grade="published", source="acontis, cycle time calculator", meaning="time of a byte at 100 Mbit/s"
+)
+PREAMBLE_BYTES: Final = _bytes(8, "preamble and start of a frame", _ETHERNET)
+ETHERNET_BYTES: Final = _bytes(14, "Ethernet header: two addresses and the type", _ETHERNET)
+CHECK_BYTES: Final = _bytes(4, "frame check sequence", _ETHERNET)
+GAP_BYTES: Final = _bytes(12, "gap behind a frame", _ETHERNET)
+HEADER_BYTES: Final = _bytes(2, "EtherCAT header of a frame", _ETG)
+DATAGRAM_BYTES: Final = _bytes(12, "header of a datagram, 10, and its working counter, 2", _ETG)
+LEAST_FRAME_BYTES: Final = _bytes(84, "shortest frame on the wire, gap included; shorter ones are padded", _ETHERNET)
+MOST_FRAME_BYTES: Final = _bytes(1538, "longest frame on the wire, gap included", _ETHERNET)
+MAILBOX_BYTES: Final = _bytes(128, "data of a mailbox", "Lenze, communication manual E84AYCET: at most 128")
+MOST_DEVICES: Final = Sourced(
+    65535, unit="1", grade="published", source="ETG.1000: addresses of 16 bits", meaning="devices of one segment"
+)
+MOST_CABLE_M: Final = Sourced(
+    100, unit="m", grade="published", source=_ETHERNET, meaning="longest cable of 100BASE-TX between two devices"
+)
+CABLE_US_PER_M: Final = Sourced(
+    0.005, unit="us/m", grade="published", source="SOEM issue 585: 5 ns/m", meaning="delay of a metre of cable"
+)
+_TX, _TX_DOUBT = _delay(Spread.of(_MEASURED["tx_one_way_us"]), "100BASE-TX", _MEASURED["source"])
+_EBUS, _EBUS_DOUBT = _delay(
+    Spread(_MEASURED["e_bus_one_way_us"], _MEASURED["e_bus_uncertainty_us"]), "E-bus", _MEASURED["source"]
+)
+DELAY_US: Final[Mapping[Port, Sourced]] = MappingProxyType({"100BASE-TX": _TX, "E-bus": _EBUS})
+DELAY_UNCERTAINTY_US: Final[Mapping[Port, Sourced]] = MappingProxyType({"100BASE-TX": _TX_DOUBT, "E-bus": _EBUS_DOUBT})
+MEASURED_DELAY_UNCERTAINTY_US: Final = Sourced(
+    0.010 / 12**0.5,
+    unit="us",
+    grade="derived",
+    source="a step of 10 ns of the devices' clocks, rectangular (JCGM 100, 4.3.7)",
+    meaning="standard uncertainty of a measured delay, each device by itself",
+)
+_PER_BYTE: Final = Spread.of(_COPY["us_per_byte"])
+BYTE_BIAS_US: Final = Sourced(
+    _PER_BYTE.mean - BYTE_US,
+    unit="us",
+    grade="derived",
+    source=f"{_COPY['source']}, their mean less the time on the wire",
+    meaning="what a byte of process data takes beyond the wire, about a copy in the host",
+)
+BYTE_BIAS_UNCERTAINTY_US: Final = Sourced(
+    _PER_BYTE.uncertainty,
+    unit="us",
+    grade="derived",
+    source=f"{_COPY['source']}, their sd sqrt(1 + 1/n)",
+    meaning="standard uncertainty of that, all bytes together",
+)
+UNMEASURED_MASTER_SHARE: Final = Sourced(
+    0.5,
+    unit="1",
+    grade="assumed",
+    source="chosen: published times of like hosts differ by as much",
+    meaning="standard uncertainty of a master's time that nobody has measured, as a share of it",
+)
+_ENI: Final = "ENI files that it wrote"
+LAYOUTS: Final[Mapping[str, ProcessData]] = MappingProxyType(
+    {"SOEM": SEPARATE, "IgH": SEPARATE, "ethercrab": SEPARATE, "TwinCAT": SHARED, "acontis": SHARED, UNNAMED: SEPARATE}
+)
+"""How each master lays out its process data."""
+HOUSEKEEPING_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
+    {
+        "SOEM": _datagrams(of="none", source="SOEM, ec_main.c", grade="published"),
+        "IgH": _datagrams(2, of="BRD", source="EtherLab master, its state machine", grade="published"),
+        "ethercrab": _datagrams(of="none", source="ethercrab", grade="published"),
+        "TwinCAT": _datagrams(4, 2, 1, of="NOP, BRD, LRD", source=_ENI, grade="published"),
+        "acontis": _datagrams(4, 4, 2, of="NOP, APWR, BRD", source=_ENI, grade="published"),
+        UNNAMED: _datagrams(4, 4, 2, of="as acontis", source="chosen: the most of those known", grade="assumed"),
+    }
+)
+"""Datagrams that each master adds to the first frame of every cycle, without those of distributed clocks."""
+CLOCK_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
+    {
+        "SOEM": _datagrams(8, of="FRMW", source="SOEM, ec_main.c", grade="published"),
+        "IgH": _datagrams(4, of="FRMW", source="EtherLab master", grade="published"),
+        "ethercrab": _datagrams(8, of="FRMW", source="ethercrab", grade="published"),
+        "TwinCAT": _datagrams(4, of="ARMW", source=_ENI, grade="published"),
+        "acontis": _datagrams(4, of="ARMW", source=_ENI, grade="published"),
+        UNNAMED: _datagrams(4, of="as acontis", source="chosen: the most of those known", grade="assumed"),
+    }
+)
+"""Datagrams of distributed clocks, which each master adds to them."""
+PIPELINE_CYCLES: Final = Sourced(
+    1,
+    unit="1",
+    grade="assumed",
+    source="chosen: a frame that brings feedback cannot take the command computed from it",
+    meaning="cycles from the frame that brings feedback to the one that takes the command computed from it",
+)
+SYNC_SHIFT: Final = Sourced(
+    0.5,
+    unit="1",
+    grade="assumed",
+    source="chosen: the middle of the cycle",
+    meaning="where SYNC0 of the distributed clocks lies behind the master's task, as a share of the period",
+)
+
+CONSTANTS: Final = constants({key: one for key, one in globals().items() if not key.startswith("_")})
+
 
 _BOTH_WAYS: Final = 2
 

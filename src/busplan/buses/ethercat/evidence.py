@@ -3,9 +3,18 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from busplan.buses.ethercat.constants import CLOCK_BYTES, DELAY_US, SHARED
 from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
-from busplan.buses.ethercat.equations import cable_us, datagram_bytes, device_us, frame_bytes, room_bytes, sending_us
+from busplan.buses.ethercat.equations import (
+    CLOCK_BYTES,
+    DELAY_US,
+    SHARED,
+    cable_us,
+    datagram_bytes,
+    device_us,
+    frame_bytes,
+    room_bytes,
+    sending_us,
+)
 from busplan.buses.ethercat.latency import latencies
 from busplan.buses.network import Network
 from busplan.buses.published import Comparison, EvidenceSection

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.buses.figure import NODES, NONPERIODIC, TIMING_MODEL, TRANSACTION, Figure, capacity_figures
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
 
 FRAME: Final = "IEEE 802.3, ETG.1000"
 
@@ -66,7 +66,6 @@ TERMS: Final = (
     NONPERIODIC,
 )
 """In the order of the wire."""
-CAPACITY: Final = capacity_figures(TERMS, own=OWN)
 
 LATENCY_TABLE: Final = (
     Figure("drive_us", "T_exec", "profile", "the device's own time", "device"),
@@ -82,4 +81,12 @@ LATENCY_TABLE: Final = (
     Figure("end_to_end_us", "L", "profile", "all of it", "end to end", better="less"),
 )
 """In the order in which they add up."""
-LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *LATENCY_TABLE)
+FIGURES: Final = BusFigures(
+    TERMS,
+    capacity_figures(TERMS, own=OWN),
+    table=OWN,
+    compared=OWN,
+    planned=(FRAMES.key,),
+    phases=LATENCY_TABLE,
+    has_many_transactions=True,
+)

@@ -4,23 +4,26 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.bus import Bus
-from busplan.buses.ethercat import figures, rules
-from busplan.buses.ethercat.constants import CONSTANTS, MAILBOX_BYTES, PIPELINE_CYCLES, SEPARATE, SHARED, SYNC_SHIFT
 from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
-from busplan.buses.ethercat.equations import room_bytes
-from busplan.buses.ethercat.latency import loop_periods
-from busplan.buses.ethercat.limits import LIMITS
+from busplan.buses.ethercat.equations import (
+    CONSTANTS,
+    MAILBOX_BYTES,
+    PIPELINE_CYCLES,
+    SEPARATE,
+    SHARED,
+    SYNC_SHIFT,
+    room_bytes,
+)
+from busplan.buses.ethercat.figures import FIGURES, FRAME
+from busplan.buses.ethercat.rules import LIMITS, RULES
 from busplan.buses.ethercat.traffic import arrivals_us, datagrams, layout
-from busplan.buses.figure import NONPERIODIC, Figure
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
-from busplan.buses.rule import Rule
+from busplan.buses.parts import Cost, EventKind, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.elementwise import plain
-from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.cycle import BusCycle
-    from busplan.buses.ethercat.section import EthercatProfile
     from busplan.buses.published import EvidenceSection
 
 _PROCESS_DATA = "bus.process_data"
@@ -45,16 +48,9 @@ class Ethercat(Bus):
         TimingModel(VENDORS, "as vendors count: sending, propagation, and reception of the last frame"),
     )
     deciding_model = LAST_BYTE
-    term_figures = figures.TERMS
-    capacity_figures = figures.CAPACITY
-    compared_figures = figures.OWN
-    table_figures = figures.OWN
-    latency_table_figures = figures.LATENCY_TABLE
-    has_many_transactions = True
-    planned_figures = ("frames",)
-    limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
-    clock_key = "bus.distributed_clocks"
+    figures = FIGURES
+    limits = LIMITS
+    rules = RULES
     starter = Starter(
         """\
 [bus]
@@ -75,9 +71,9 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     event_kinds = (
         EventKind("master", "master", "profile", "M", "contention"),
         EventKind("jitter", "master's jitter", "profile", "j", "contention"),
-        EventKind("overhead", "frame overhead", figures.FRAME, "f", "gap"),
-        EventKind("data", "process data", figures.FRAME, ">", "request"),
-        EventKind("mailbox", "mailbox poll", figures.FRAME, "b", "acknowledge"),
+        EventKind("overhead", "frame overhead", FRAME, "f", "gap"),
+        EventKind("data", "process data", FRAME, ">", "request"),
+        EventKind("mailbox", "mailbox poll", FRAME, "b", "acknowledge"),
         EventKind("cable", "cable", "SOEM", "-", "sync"),
         EventKind("device", "device", "DC time stamps", "=", "work"),
         EventKind("receive", "receiving again", "acontis", "<", "response"),
@@ -87,31 +83,20 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         EventKind("frame", "frames", "", "F", "out"),
         EventKind("way", "way through the devices", "", "W", "in"),
     )
-    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
-    key_sources: ClassVar[Mapping[str, Sourced]] = {
-        "bus.sync_shift": SYNC_SHIFT,
-        "bus.mailbox_bytes": MAILBOX_BYTES,
-        "bus.pipeline_cycles": PIPELINE_CYCLES,
+    constants = CONSTANTS
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.nodes": Key(meaning="the others on a second segment"),
+        "bus.master_us": Key("T_master", role="host"),
+        "bus.master_jitter_us": Key("J"),
+        "bus.mailbox_polls": Key("polls"),
+        "bus.mailbox_bytes": Key("B", MAILBOX_BYTES),
+        "bus.sync_shift": Key("shift", SYNC_SHIFT, meaning="drives act, and sample, later", short="SYNC0 at {}"),
+        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
+        "bus.distributed_clocks": Key(role="clock"),
+        "node.cable_m": Key("L", role="cable"),
+        "node.delay_us": Key("t_d"),
+        "node.execution.worst_extra_us": Key("T_extra"),
     }
-    key_symbols: ClassVar[Mapping[str, str]] = {
-        "bus.master_us": "T_master",
-        "bus.master_jitter_us": "J",
-        "bus.mailbox_polls": "polls",
-        "bus.mailbox_bytes": "B",
-        "bus.sync_shift": "shift",
-        "bus.pipeline_cycles": "n",
-        "node.cable_m": "L",
-        "node.delay_us": "t_d",
-        "node.execution.worst_extra_us": "T_extra",
-    }
-    loop_key = "bus.pipeline_cycles"
-    change_meanings: ClassVar[Mapping[str, str]] = {
-        "bus.nodes": "the others on a second segment",
-        "bus.sync_shift": "drives act, and sample, later",
-    }
-    change_words: ClassVar[Mapping[str, str]] = {"bus.sync_shift": "SYNC0 at {}"}
-    cable_key = "node.cable_m"
-    host_keys = ("bus.master_us",)
     term_removals: ClassVar[tuple[Mapping[str, str | float], ...]] = (
         {"bus.master_us": 0.0},
         {"bus.master_jitter_us": 0.0},
@@ -120,20 +105,9 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     evidence_data = ("ethercat",)
     evidence_profiles = ("ethercat-servo-8",)
 
-    def profile_model(self) -> "type[EthercatProfile]":
-        """The model of its profiles."""
-        from busplan.buses.ethercat.section import EthercatProfile  # the one module of the bus that loads pydantic
-
-        return EthercatProfile
-
     def cycle(self, network: Network, *, model: str) -> EthercatCycle:
         """The cycle of a network under one timing model."""
         return EthercatCycle(network, model)
-
-    @property
-    def latency_figures(self) -> tuple[Figure, ...]:
-        """Of `latency`, in the order of its document."""
-        return figures.LATENCY
 
     def latency_subject(self, network: Network) -> str:
         """Say whose latency it is, and what the master and the clocks add."""
@@ -142,25 +116,13 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         cycles = f"{bus.pipeline_cycles} cycle{'s' * (bus.pipeline_cycles != 1)} in the master"
         return f"worst case of a command, of feedback and of a loop over both, {cycles}, {clocks}"
 
-    def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - never
+    def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
         """No device keeps a frame waiting: their own time is in latencies alone."""
-        return False
-
-    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
-        """The nodes' time is in every latency."""
-        return True
+        return of_latency
 
     def arrivals_us(self, cycle: "BusCycle") -> Mapping[int, float]:
         """When the last byte of its frame has reached each device [us]."""
         return arrivals_us(cycle.network)
-
-    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
-        """The master's pipeline, and the cycles that feedback and command wait for a frame and for SYNC0."""
-        return loop_periods(network, at_sync=at_sync)
-
-    def acts_at_once(self, network: Network) -> bool:
-        """Whether it has distributed clocks."""
-        return bool(network.profile.bus.distributed_clocks)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """SYNC0 later in the cycle, for commands that come behind it."""

@@ -8,7 +8,7 @@ passed.
 from functools import reduce
 
 from busplan.buses.cycle import BusLatency
-from busplan.buses.ethercat.constants import BYTE_BIAS_UNCERTAINTY_US
+from busplan.buses.ethercat.equations import BYTE_BIAS_UNCERTAINTY_US
 from busplan.buses.ethercat.figures import LATENCY_TABLE
 from busplan.buses.ethercat.traffic import (
     arrivals_us,

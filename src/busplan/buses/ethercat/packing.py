@@ -3,8 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from busplan.buses.ethercat.constants import DATAGRAM_BYTES
-from busplan.buses.ethercat.equations import padding_bytes, room_bytes
+from busplan.buses.ethercat.equations import DATAGRAM_BYTES, padding_bytes, room_bytes
 from busplan.elementwise import (
     Number,
     alike,

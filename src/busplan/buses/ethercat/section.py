@@ -1,11 +1,12 @@
 """The keys that only profiles of an EtherCAT bus have, in [bus], [node] and [[group]]."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from busplan.buses.ethercat.constants import (
+from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
+from busplan.buses.ethercat.equations import (
     MAILBOX_BYTES,
     PIPELINE_CYCLES,
     SEPARATE,
@@ -14,9 +15,8 @@ from busplan.buses.ethercat.constants import (
     Master,
     Port,
     ProcessData,
+    room_bytes,
 )
-from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
-from busplan.buses.ethercat.equations import room_bytes
 from busplan.elementwise import Number
 from busplan.sections.base import MAX_COUNT, Bytes, Count, TimeUs
 from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
@@ -159,3 +159,6 @@ class EthercatProfile(Profile):
     group: Annotated[tuple[EthercatGroup, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
+
+
+PROFILE: Final = EthercatProfile

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from busplan.buses.ethercat.constants import (
+from busplan.buses.ethercat.equations import (
     CLOCK_BYTES,
     DELAY_UNCERTAINTY_US,
     DELAY_US,
@@ -14,8 +14,6 @@ from busplan.buses.ethercat.constants import (
     SPLIT,
     UNNAMED,
     ProcessData,
-)
-from busplan.buses.ethercat.equations import (
     cable_us,
     datagram_bytes,
     device_us,

@@ -4,6 +4,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from itertools import chain, repeat
+from math import ceil
 
 from busplan.buses.cycle import BusCycle, BusEvent, LeftOut, Term
 from busplan.buses.ieee1394 import equations
@@ -15,8 +16,8 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Link, TimingModelName, delays
-from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, link_of
-from busplan.buses.network import Network
+from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, is_broadcast, link_of
+from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, total
 
 
@@ -133,6 +134,20 @@ class CycleWithStarts(BusCycle):
         before_us = self._others_us + after_us
         more = self.starts(before_us + extra_us) - self.starts(before_us)
         return extra_us + more * self.cycle_start_us
+
+    def taking_us(self, group: Group) -> float:
+        """Nothing behind a split write, which holds the execution; else the node executes beside the bus [us]."""
+        is_split = group.node.write_response == "split" and not is_broadcast(self.network)
+        return 0.0 if is_split else super().taking_us(group)
+
+    def loop_periods(self, *, at_sync: bool) -> int:
+        """One, or more where a node has not executed its command when the next synchronous packet comes."""
+        if not at_sync:
+            return 0
+        behind_us = max(self.taking_us(group) for group in self.network.groups)
+        period_us = plain(self.network.period_us)
+        needed_us = min(plain(self.required_us), period_us)
+        return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
 
     def setup(self) -> dict[str, Number]:
         """How the bus is set, by key of its figures."""

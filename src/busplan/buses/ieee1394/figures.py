@@ -8,6 +8,7 @@ from busplan.buses.figure import (
     PAYLOAD_BYTES,
     TIMING_MODEL,
     TRANSACTION,
+    BusFigures,
     Figure,
     Ink,
     by,
@@ -121,33 +122,14 @@ NODES_EQ11: Final = Figure(
     decimals=2,
 )
 READ_TRANSACTION: Final = Figure(
-    "read_transaction_us",
-    "T_read",
-    "idle",
-    "what a read takes of the cycle",
-    "read T_lant + idle",
-    better="less",
+    "read_transaction_us", "T_read", "idle", "what a read takes of the cycle", "read T_lant + idle", better="less"
 )
 WRITE_TRANSACTION: Final = Figure(
-    "write_transaction_us",
-    "T_write",
-    "idle",
-    "what a write takes of the cycle",
-    "write T_lant + idle",
-    better="less",
+    "write_transaction_us", "T_write", "idle", "what a write takes of the cycle", "write T_lant + idle", better="less"
 )
 _PLAIN: Final = (SYNC, NONPERIODIC)
 _DOCUMENT_TERMS: Final = (*_PLAIN, *(one for one in TERMS if one not in _PLAIN))
 """In the order of the document, which is older than that of the wire."""
-CAPACITY: Final = capacity_figures(
-    _DOCUMENT_TERMS,
-    setup=SETUP,
-    own=(
-        *(READ_LATENCY, WRITE_LATENCY, READ_TRANSACTION, WRITE_TRANSACTION),
-        *(BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
-    ),
-    counted=(NODES_EQ11,),
-)
 TABLE: Final = (
     READ_LATENCY,
     WRITE_LATENCY,
@@ -199,11 +181,7 @@ LATENCY: Final = (
     Figure("request_us", "T_req", by(eq.request_us), "arbitration and data of the request", "request T_req"),
     Figure("response_us", "T_resp", by(eq.response_us), "arbitration and data of the response", "response T_resp"),
     Figure(
-        "acknowledge_us",
-        "T_ack",
-        _ACKNOWLEDGE,
-        "acknowledge of either packet, T_ack1 = T_ack2",
-        "acknowledge, each",
+        "acknowledge_us", "T_ack", _ACKNOWLEDGE, "acknowledge of either packet, T_ack1 = T_ack2", "acknowledge, each"
     ),
     Figure(
         "hold_us",
@@ -214,11 +192,7 @@ LATENCY: Final = (
     ),
     Figure("execution_us", "T_exec", "profile", "execution in the node, T3 of the bench", "execution T_exec = T3"),
     Figure(
-        "worst_extra_us",
-        "T_extra",
-        "profile",
-        "what the slowest execution takes beyond T_exec",
-        "slowest execution",
+        "worst_extra_us", "T_extra", "profile", "what the slowest execution takes beyond T_exec", "slowest execution"
     ),
     Figure(
         "latency_us",
@@ -253,13 +227,7 @@ LATENCY: Final = (
     ),
     Figure("idle_us", "idle", "idle", "idle bus of the gaps, beside execution", "idle bus"),
     Figure("host_us", "host", "profile", "the host's own time beyond the gaps", "host"),
-    Figure(
-        "transaction_us",
-        "T_trans",
-        "idle",
-        "what the transaction takes of the cycle",
-        "takes of the cycle",
-    ),
+    Figure("transaction_us", "T_trans", "idle", "what the transaction takes of the cycle", "takes of the cycle"),
 )
 """In the order of the document, which is that of the phases of a transaction."""
 LATENCY_TABLE: Final = tuple(
@@ -292,3 +260,23 @@ LATENCY_TABLE: Final = tuple(
     )
 )
 """In the order of the bench: T1+T2, T3, T4+T5, and the gaps behind them."""
+
+FIGURES: Final = BusFigures(
+    TERMS,
+    capacity_figures(
+        _DOCUMENT_TERMS,
+        setup=SETUP,
+        own=(
+            *(READ_LATENCY, WRITE_LATENCY, READ_TRANSACTION, WRITE_TRANSACTION),
+            *(BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
+        ),
+        counted=(NODES_EQ11,),
+    ),
+    setup=SETUP,
+    headings=(HOPS.key, GAP_COUNT.key),
+    table=TABLE,
+    compared=COMPARED,
+    planned=(GAP_COUNT.key, GAP_COUNT_SAFE.key),
+    phases=LATENCY_TABLE,
+    latency_document=LATENCY,
+)

@@ -1,12 +1,10 @@
 """IEEE 1394 (FireWire) up to S400, as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
-from math import ceil
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
-from busplan.buses.figure import NONPERIODIC, Figure, Ink, by_key
-from busplan.buses.ieee1394 import figures, rules
+from busplan.buses.figure import NONPERIODIC, Ink, by_key
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.constants import (
     CONSTANTS,
@@ -22,38 +20,109 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
-from busplan.buses.ieee1394.limits import LIMITS
-from busplan.buses.ieee1394.settings import gap_count, responses, schedule
+from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE, SYNC
+from busplan.buses.ieee1394.rules import LIMITS, RULES
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
-from busplan.buses.network import Group, Network
+from busplan.buses.network import Network
 from busplan.buses.parts import (
+    Cost,
     EventKind,
     Halves,
-    Limit,
+    Key,
+    MeasuredLatencies,
     PayloadRange,
     Perturbation,
+    Safety,
     Setting,
     Starter,
     TimingModel,
     Value,
 )
-from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
-    from busplan.buses.ieee1394.section import Ieee1394Profile
     from busplan.buses.published import EvidenceSection
 
-_PHASES: Final = by_key(figures.LATENCY)
+_PHASES: Final = by_key(FIGURES.latency)
 _HOST_STEP_US: Final = 10.0
 """How much slower the host is made, to see what that does to the margin."""
 
 
 def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
     return EventKind(key, label, _PHASES[phase].reference, mark, ink)
+
+
+def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
+    """What the packets of a split transaction with the farthest node of a group take.
+
+    Raises
+    ------
+    BusplanError
+        Nodes do not answer such a transaction split: then no execution time is on the bus.
+    """
+    if is_broadcast(network):
+        raise BusplanError(
+            'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
+            'calibrate with cycle.schedule = "individual"'
+        )
+    said = next(alike for alike in network.alike if alike.name == group)
+    answer, key = getattr(said.node, f"{kind}_response"), said.node_key(f"{kind}_response")
+    if answer != "split":
+        raise BusplanError(
+            f'{key} = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
+            f'be found from its latency; leave its lines out, or calibrate with {key} = "split"'
+        )
+    phases = transaction(
+        kind,  # type: ignore[arg-type]
+        model=TIMING_MODELS[model],  # type: ignore[index]
+        link=farthest_link(network, group),
+        payload_bytes=payload_bytes,
+        overhead_bytes=said.payload.overhead_bytes,
+        responder=Responder(0.0),
+    )
+    parts_us = (phases.latency_us, phases.request_and_acknowledge_us, phases.subaction_gap_us)
+    return Halves(*map(plain, parts_us))
+
+
+def fitted_against(network: Network, model: str | None) -> dict[str, Value]:
+    """The timing model and the gap count."""
+    return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
+
+
+_UNSPLIT: Final = {"read_response": "concatenated", "write_response": "unified"}
+"""Answers that need no second arbitration."""
+
+
+def _gap_count(network: Network) -> Setting:
+    """The smallest safe gap count."""
+    key = "bus.gap_count"
+    empty = Setting("gap_count", "gap count", Cost.REGISTER, (key,), ())
+    if not network.profile.bus.cable_is_standard:
+        return empty._replace(reason=f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m")
+    safe = plain(safe_gap_count(hops_of(network)))
+    return empty if gap_count_of(network) == safe else empty._replace(values=({key: safe},))
+
+
+def _schedule(network: Network) -> Setting:
+    """The other way to read and write all nodes."""
+    other = "individual" if is_broadcast(network) else "broadcast"
+    return Setting("schedule", "schedule", Cost.SCHEDULE, ("cycle.schedule",), ({"cycle.schedule": other},))
+
+
+def _responses(network: Network) -> Setting:
+    """Answers without a second arbitration: of reads, of writes, of both."""
+    keys = tuple(group.key(name) for group in network.groups for name in _UNSPLIT)
+    if is_broadcast(network):
+        return Setting("responses", "responses", Cost.RESPONSES, keys, (), "no node answers a broadcast")
+    of_reads, of_writes = (
+        {group.key(name): answer for group in network.groups if getattr(group.node, name) == "split"}
+        for name, answer in _UNSPLIT.items()
+    )
+    both = {**of_reads, **of_writes} if of_reads and of_writes else {}
+    values = tuple(filter(None, (of_reads, of_writes, both)))
+    return Setting("responses", "responses", Cost.RESPONSES, keys, values, "" if values else "no node answers split")
 
 
 class Ieee1394(Bus):
@@ -66,18 +135,10 @@ class Ieee1394(Bus):
         TimingModel("standard", "the standard's clock and packets, and the gaps as the bus runs them"),
     )
     deciding_model = "standard"
-    term_figures = figures.TERMS
-    capacity_figures = figures.CAPACITY
-    setup_figures = figures.SETUP
-    compared_figures = figures.COMPARED
-    table_figures = figures.TABLE
-    latency_table_figures = figures.LATENCY_TABLE
-    planned_figures = ("gap_count", "gap_count_safe")
-    facts = ("hops", "gap_count")
-    safety = "gap count"
-    safety_figure = figures.GAP_COUNT_SAFE
-    limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    figures = FIGURES
+    safety = Safety("gap count", GAP_COUNT_SAFE, {"bus.gap_count": MAX_GAP_COUNT})
+    limits = LIMITS
+    rules = RULES
     starter = Starter(
         """\
 [bus]
@@ -91,7 +152,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
     event_kinds = (
         EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
-        EventKind("sync", "synchronous packet", figures.SYNC.reference, "S", "sync"),
+        EventKind("sync", "synchronous packet", SYNC.reference, "S", "sync"),
         _kind("arbitration", "arbitration", "arbitration_us", "a", "contention"),
         _kind("request_data", "request data", "request_data_us", ">", "request"),
         _kind("acknowledge", "acknowledge", "acknowledge_us", "k", "acknowledge"),
@@ -111,36 +172,26 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         EventKind("read", "reads", "", "R", "in"),
         EventKind("write", "writes", "", "W", "out"),
     )
-    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
-    key_sources: ClassVar[Mapping[str, Sourced]] = {
-        "bus.cable_length_m": REFERENCE_CABLE_M,
-        "cycle.slice_ratio": SLICE_RATIO,
-        "cycle.sync.ping_us": PING_US,
-        "cycle.sync.ping_per_node_us": PING_PER_NODE_US,
-        "payload.overhead_bytes": PACKET_OVERHEAD_BYTES,
+    constants = CONSTANTS
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.nodes": Key(meaning="the others on a second bus"),
+        "bus.max_hops": Key(meaning="rewired as a tree", short="tree of {} hops"),
+        "bus.speed": Key(meaning="if all nodes can", short="speed {}"),
+        "bus.gap_count": Key(short="gap count {}"),
+        "bus.cable_length_m": Key(default=REFERENCE_CABLE_M, warned_at=REFERENCE_CABLE_M, role="cable"),
+        "cycle.slice_ratio": Key(default=SLICE_RATIO),
+        "cycle.schedule": Key(meaning="if the firmware of all nodes can", short="schedule {}"),
+        "cycle.sync.ping_us": Key("ping", PING_US),
+        "cycle.sync.ping_per_node_us": Key("ping_node", PING_PER_NODE_US),
+        "host.transaction_us": Key("T_host", role="host"),
+        "payload.overhead_bytes": Key("overhead", PACKET_OVERHEAD_BYTES),
+        "node.read_response": Key(meaning="if the nodes can", short="reads {}"),
+        "node.write_response": Key(meaning="if the nodes can", short="writes {}"),
+        "node.response_us": Key("T_hold"),
+        "node.execution.worst_extra_us": Key("T_extra"),
+        "node.execution.residual": Key(chooses=True),
     }
-    key_symbols: ClassVar[Mapping[str, str]] = {
-        "payload.overhead_bytes": "overhead",
-        "host.transaction_us": "T_host",
-        "node.execution.worst_extra_us": "T_extra",
-        "node.response_us": "T_hold",
-        "cycle.sync.ping_us": "ping",
-        "cycle.sync.ping_per_node_us": "ping_node",
-    }
-    choosing_keys = ("execution.grade", "execution.residual")
-    warning_keys = ("bus.cable_length_m",)
-    warning_constants = (REFERENCE_CABLE_M,)
-    change_meanings: ClassVar[Mapping[str, str]] = {
-        "bus.max_hops": "rewired as a tree",
-        "bus.nodes": "the others on a second bus",
-        "bus.speed": "if all nodes can",
-        "cycle.schedule": "if the firmware of all nodes can",
-        "node.read_response": "if the nodes can",
-        "node.write_response": "if the nodes can",
-    }
-    reset_changes: ClassVar[Mapping[str, Value]] = {"bus.gap_count": MAX_GAP_COUNT}
-    cable_key = "bus.cable_length_m"
-    host_keys = ("host.transaction_us",)
+    calibration = MeasuredLatencies(packets_of, fitted_against)
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
         {"bus.cycle_master": False, "bus.isochronous_us": 0.0},
         {"host.transaction_us": 0.0},
@@ -148,30 +199,11 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     )
     evidence_data = ("paper", "dvrk", "ieee1394")
     evidence_profiles = ("paper-two-node", "dvrk")
-    change_words: ClassVar[Mapping[str, str]] = {
-        "bus.gap_count": "gap count {}",
-        "bus.max_hops": "tree of {} hops",
-        "bus.speed": "speed {}",
-        "cycle.schedule": "schedule {}",
-        "node.read_response": "reads {}",
-        "node.write_response": "writes {}",
-    }
-
-    def profile_model(self) -> "type[Ieee1394Profile]":
-        """The model of its profiles."""
-        from busplan.buses.ieee1394.section import Ieee1394Profile  # the one module of the bus that loads pydantic
-
-        return Ieee1394Profile
 
     def cycle(self, network: Network, *, model: str) -> CycleWithStarts:
         """The cycle of a network under one timing model, by its schedule."""
         schedule = BroadcastCycle if is_broadcast(network) else Ieee1394Cycle
         return schedule(network, model)  # type: ignore[arg-type]
-
-    @property
-    def latency_figures(self) -> tuple[Figure, ...]:
-        """Of `latency`, in the order of its document."""
-        return figures.LATENCY
 
     def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:
         """Keys that the paper's equations have no term for."""
@@ -184,10 +216,10 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             "cycle.retries": profile.cycle.retries,
             "host.transaction_us": profile.host.transaction_us,
         }
-        for one in network.alike:
-            own[one.node_key("read_response")] = one.node.read_response != "split"
-            own[one.node_key("write_response")] = one.node.write_response != "split"
-            own[one.node_key("execution.worst_extra_us")] = one.node.execution.worst_extra_us
+        for alike in network.alike:
+            own[alike.node_key("read_response")] = alike.node.read_response != "split"
+            own[alike.node_key("write_response")] = alike.node.write_response != "split"
+            own[alike.node_key("execution.worst_extra_us")] = alike.node.execution.worst_extra_us
         return tuple(key for key, is_set in own.items() if is_set) if model == "paper" else ()
 
     def latency_subject(self, network: Network) -> str:
@@ -198,64 +230,15 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         farthest = f"farthest of {nodes}" if network.is_uniform else "the farthest node of each group"
         return ", ".join((farthest, *self.setup_words(network)))
 
-    def halves(self, network: Network, *, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
-        """What the packets of a split transaction with the farthest node of a group take.
-
-        Raises
-        ------
-        BusplanError
-            Nodes do not answer such a transaction split: then no execution time is on the bus.
-        """
-        if is_broadcast(network):
-            raise BusplanError(
-                'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
-                'calibrate with cycle.schedule = "individual"'
-            )
-        said = next(one for one in network.alike if one.name == group)
-        answer, key = getattr(said.node, f"{kind}_response"), said.node_key(f"{kind}_response")
-        if answer != "split":
-            raise BusplanError(
-                f'{key} = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
-                f'be found from its latency; leave its lines out, or calibrate with {key} = "split"'
-            )
-        phases = transaction(
-            kind,  # type: ignore[arg-type]
-            model=TIMING_MODELS[model],  # type: ignore[index]
-            link=farthest_link(network, group),
-            payload_bytes=payload_bytes,
-            overhead_bytes=said.payload.overhead_bytes,
-            responder=Responder(0.0),
-        )
-        parts_us = (phases.latency_us, phases.request_and_acknowledge_us, phases.subaction_gap_us)
-        return Halves(*map(plain, parts_us))
-
-    def fit_keys(self, network: Network, *, model: str | None) -> dict[str, Value]:
-        """The timing model and the gap count."""
-        return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
-
-    def taking_us(self, group: Group, network: Network) -> float:
-        """Nothing behind a split write, which holds the execution; else the node executes beside the bus [us]."""
-        is_split = group.node.write_response == "split" and not is_broadcast(network)
-        return 0.0 if is_split else super().taking_us(group, network)
-
-    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
-        """One, or more where a node has not executed its command when the next synchronous packet comes."""
-        if not at_sync:
-            return 0
-        behind_us = max(self.taking_us(one, network) for one in network.groups)
-        period_us = plain(network.period_us)
-        needed_us = min(plain(self.cycle(network, model=self.deciding_model).required_us), period_us)
-        return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
-
-    def has_execution(self, network: Network) -> bool:
+    def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - latencies, too
         """Whether a transaction is split: other answers keep the execution off the bus, and so do broadcasts."""
         return not is_broadcast(network) and any(
-            "split" in (one.node.read_response, one.node.write_response) for one in network.groups
+            "split" in (group.node.read_response, group.node.write_response) for group in network.groups
         )
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The gap count, one register in each node, how the nodes answer, and the other schedule."""
-        return (gap_count(network), responses(network), schedule(network))
+        return (_gap_count(network), _responses(network), _schedule(network))
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """One hop, one busy retry, and a slower host."""
@@ -298,12 +281,12 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """An unsafe gap count, and cables that the table does not hold for."""
         bus, found = network.profile.bus, []
         limit = "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
-        for one in [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]:
-            if not self.is_safe(one):
-                hops, given = hops_of(one), gap_count_of(one)
+        for asked in [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]:
+            if not self.is_safe(asked):
+                hops, given = hops_of(asked), gap_count_of(asked)
                 found.append(
                     f"Warning: gap count {given} is unsafe for {hops} hop{'s' * (hops != 1)} "
-                    f"({one.nodes} node{'s' * (one.nodes != 1)}); "
+                    f"({asked.nodes} node{'s' * (asked.nodes != 1)}); "
                     f"the smallest safe one is {safe_gap_count(hops)}{limit}."
                 )
                 break

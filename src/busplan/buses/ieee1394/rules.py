@@ -1,11 +1,19 @@
-"""Rules of the gate that only an IEEE 1394 bus has: its limits, its gap count, its packets, its two timing models."""
+"""Limits of IEEE 1394, and the rules of the gate that only this bus has.
+
+A gap count below the table fits, but is not safe.
+"""
 
 from collections.abc import Iterator
 from functools import partial
 from itertools import product
+from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
+from busplan.buses.ieee1394.broadcast_terms import hub_block_bytes, write_block_bytes
 from busplan.buses.ieee1394.constants import (
+    CYCLE_US,
+    LEAST_ASYNCHRONOUS_US,
+    MAX_BROADCAST_NODES,
     MAX_GAP_COUNT,
     MAX_HOPS,
     MAX_NODES,
@@ -13,12 +21,94 @@ from busplan.buses.ieee1394.constants import (
     QUADLET_BYTES,
     REFERENCE_CABLE_M,
     padded_bytes,
+    safe_gap_count,
 )
+from busplan.buses.ieee1394.cycle import Ieee1394Cycle
+from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
+from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, margin, told_apart
+from busplan.elementwise import Number
 from busplan.sections.transactions import TRANSACTION_KINDS
 
 if TYPE_CHECKING:
     from busplan.buses.ieee1394.section import Ieee1394Bus
+
+
+def _most_payload(network: Network) -> Number:
+    return MAX_PAYLOAD_BYTES[network.profile.bus.speed]
+
+
+def _cycle_start_us(network: Network) -> Number:
+    is_sent = network.profile.bus.cycle_master
+    return Ieee1394Cycle(network, "standard").cycle_start_us if is_sent else 0.0
+
+
+_ONE_BY_ONE: Final = 'cycle.schedule = "individual" has no such limit'
+
+LIMITS: Final = (
+    Limit(
+        "payload",
+        "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
+        lambda network: network.largest_payload_bytes,
+        _most_payload,
+        way_out="a faster bus or a smaller payload would do",
+        failure="payload_bytes",
+        has_rule=True,
+    ),
+    Limit(
+        "nodes",
+        "{value:.0f} nodes are over the {most:.0f} of one bus",
+        lambda network: network.nodes,
+        lambda _network: MAX_NODES,
+        way_out=f"a second bus has {MAX_NODES:g} more",
+        has_rule=True,
+    ),
+    Limit(
+        "hops",
+        "{value:.0f} hops are over the {most:.0f} of one bus",
+        hops_of,
+        lambda _network: MAX_HOPS,
+        way_out=f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes",
+        has_rule=True,
+    ),
+    Limit(
+        "broadcasting nodes",
+        "{value:.0f} nodes are over the {most:.0f} that a hub collects data of",
+        lambda network: network.nodes if is_broadcast(network) else 0,
+        lambda network: MAX_BROADCAST_NODES if is_broadcast(network) else inf,
+        way_out=_ONE_BY_ONE,
+    ),
+    Limit(
+        "hub block",
+        "the hub's block of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
+        lambda network: hub_block_bytes(network) if is_broadcast(network) else 0,
+        _most_payload,
+        way_out=f"less read from each node, or {_ONE_BY_ONE}",
+    ),
+    Limit(
+        "write block",
+        "the write of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
+        lambda network: write_block_bytes(network) if is_broadcast(network) else 0,
+        _most_payload,
+        way_out=f"less written to each node, or {_ONE_BY_ONE}",
+    ),
+    Limit(
+        "cycle starts",
+        "a cycle start takes {value:.3f} us, over {most:.3f} us: no time is left for the nodes until the next one",
+        _cycle_start_us,
+        lambda _network: CYCLE_US - LEAST_ASYNCHRONOUS_US,
+        way_out="less bus.isochronous_us, or no cycle master, leaves time",
+    ),
+    Limit(
+        "gap table",
+        "gap count {most:.0f} is unsafe for the hops; the smallest safe one is {value:.0f}",
+        lambda network: safe_gap_count(hops_of(network)),
+        gap_count_of,
+        way_out=f"for cables of more than {REFERENCE_CABLE_M:g} m none is known to be safe",
+        is_safety=True,
+    ),
+)
 
 
 def _bus(subject: RuleSubject) -> "Ieee1394Bus":
@@ -37,13 +127,13 @@ def paper_disagrees(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The plan rests on a gap count that a bus reset takes away."""
-    one = subject.deciding
-    if one.verdict == "fits" and one.gap_count < MAX_GAP_COUNT:
+    figures = subject.deciding
+    if figures.verdict == "fits" and figures.gap_count < MAX_GAP_COUNT:
         after = subject.after({"bus.gap_count": MAX_GAP_COUNT})
         if after.verdict != "fits":
             yield RuleProblem(
                 "bus.gap_count",
-                f"fits at {one.gap_count}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: {margin(after)}",
+                f"fits at {figures.gap_count}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: {margin(after)}",
                 "have the bus manager write the gap count after each reset",
             )
 
@@ -52,7 +142,7 @@ def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More nodes than one bus has addresses for."""
     if "nodes" in subject.deciding.exceeded:
         each = subject.profile.alike_nodes
-        nodes = sum(one.nodes for one in each)
+        nodes = sum(group.nodes for group in each)
         yield RuleProblem(
             each[-1].nodes_key, f"{nodes} nodes are over the {MAX_NODES:g} of one bus", "put the others on a second bus"
         )
@@ -100,12 +190,13 @@ def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
 
 def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A gap count below the table."""
-    one = subject.deciding
-    if not one.gap_count_safe:
+    figures = subject.deciding
+    if not figures.gap_count_safe:
         is_standard = _bus(subject).cable_is_standard
         yield RuleProblem(
             "bus.gap_count",
-            f"gap count {one.gap_count} is unsafe for {one.hops} hops; the smallest safe one is {one.safe_gap_count}"
+            f"gap count {figures.gap_count} is unsafe for {figures.hops} hops; "
+            f"the smallest safe one is {figures.safe_gap_count}"
             f"{'' if is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}",
             *subject.cure(),
         )
@@ -113,19 +204,20 @@ def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A gap count above the table."""
-    one = subject.deciding
-    if "cycle starts" in one.exceeded:
+    figures = subject.deciding
+    if "cycle starts" in figures.exceeded:
         return  # no time is left, so none can be saved
-    if one.gap_count > one.safe_gap_count and _bus(subject).cable_is_standard:
+    if figures.gap_count > figures.safe_gap_count and _bus(subject).cable_is_standard:
         yield RuleProblem("bus.gap_count", partial(_wasted, subject))
 
 
 def _wasted(subject: RuleSubject) -> str:
     """Say what a gap count above the table costs."""
-    one, after = subject.deciding, subject.after({"bus.gap_count": "optimal"})
-    saved, _ = told_apart(one.required_us - after.required_us, 0.0)
-    safe, nodes = one.safe_gap_count, one.safe_nodes
-    words = f"gap count {one.gap_count} is above the {safe} that {one.hops} hops need; {safe} saves {saved} us a cycle"
+    figures, after = subject.deciding, subject.after({"bus.gap_count": "optimal"})
+    saved, _ = told_apart(figures.required_us - after.required_us, 0.0)
+    safe, nodes = figures.safe_gap_count, figures.safe_nodes
+    above = f"gap count {figures.gap_count} is above the {safe} that {figures.hops} hops need"
+    words = f"{above}; {safe} saves {saved} us a cycle"
     if nodes is None:
         return words
     won = (after.safe_nodes or 0) - nodes

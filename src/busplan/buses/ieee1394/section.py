@@ -1,6 +1,6 @@
 """The keys that only profiles of an IEEE 1394 bus have, in [bus], [cycle] and [payload]."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 
@@ -307,3 +307,6 @@ class Ieee1394Profile(Profile):
         if problems:
             raise refused(*problems)
         return self
+
+
+PROFILE: Final = Ieee1394Profile

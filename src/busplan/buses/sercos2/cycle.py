@@ -7,8 +7,7 @@ from typing import Final, Literal
 from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Network
 from busplan.buses.sercos import SercosCycle, delays, word_bytes
-from busplan.buses.sercos2.constants import GAP_SHARE, MST_BYTES, RECORD_BYTES
-from busplan.buses.sercos2.equations import start_us, telegram_us
+from busplan.buses.sercos2.equations import GAP_SHARE, MST_BYTES, RECORD_BYTES, start_us, telegram_us
 from busplan.elementwise import Number, named, plain, total
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]

@@ -2,7 +2,8 @@
 
 from typing import Final
 
-from busplan.buses.figure import NONPERIODIC, Figure, capacity_figures
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.sercos import DELAYS
 
 _TELEGRAMS: Final = "IEC 61491"
 
@@ -28,4 +29,12 @@ TERMS: Final = (
     ),
     NONPERIODIC,
 )
-CAPACITY: Final = capacity_figures(TERMS, setup=(DATA_RATE,), own=(MDT_BYTES,))
+FIGURES: Final = BusFigures(
+    TERMS,
+    capacity_figures(TERMS, setup=(DATA_RATE,), own=(MDT_BYTES,)),
+    setup=(DATA_RATE,),
+    headings=(DATA_RATE.key,),
+    table=(MDT_BYTES,),
+    compared=(MDT_BYTES,),
+    phases=DELAYS,
+)

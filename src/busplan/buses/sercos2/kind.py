@@ -4,23 +4,48 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.figure import NONPERIODIC
+from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
-from busplan.buses.rule import Rule
-from busplan.buses.sercos import BASE, DELAYS, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos2 import figures, rules
-from busplan.buses.sercos2.constants import CONSTANTS, MOST_DRIVE_BYTES, PERIODS, TURNAROUND_US
+from busplan.buses.parts import EventKind, Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
+from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
 from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
-from busplan.buses.sercos2.limits import LIMITS
+from busplan.buses.sercos2.equations import (
+    CONSTANTS,
+    MOST_DRIVE_BYTES,
+    MOST_DRIVES,
+    MOST_MDT_BYTES,
+    PERIODS,
+    PERIODS_SOURCE,
+    TURNAROUND_US,
+)
+from busplan.buses.sercos2.figures import FIGURES, MDT_BYTES
 from busplan.elementwise import plain
-from busplan.sourced import Grade, Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
-    from busplan.buses.sercos2.section import Sercos2Profile
 
-_TELEGRAMS: Final = figures.MDT_BYTES.reference
+_TELEGRAMS: Final = MDT_BYTES.reference
 _FASTEST: Final = 16
+
+LIMITS: Final = (
+    period_limit(PERIODS),
+    NODE_LIMIT,
+    Limit(
+        "nodes",
+        "{value:.0f} drives are over the {most:.0f} of a ring",
+        lambda network: network.nodes,
+        lambda _network: MOST_DRIVES,
+        way_out=f"a second ring has {MOST_DRIVES:g} more",
+    ),
+    Limit(
+        "payload",
+        "the MDT has {value:.0f} bytes of data, over {most:.0f}",
+        lambda network: Sercos2Cycle(network, NONE).mdt_bytes,
+        lambda _network: MOST_MDT_BYTES,
+        way_out="a smaller payload or a second ring would do",
+        failure="payload_bytes",
+    ),
+)
 
 
 class Sercos2(SercosBus):
@@ -33,15 +58,9 @@ class Sercos2(SercosBus):
         TimingModel(NONE, "no stuff bits"),
     )
     deciding_model = WORST
-    term_figures = figures.TERMS
-    capacity_figures = figures.CAPACITY
-    setup_figures = (figures.DATA_RATE,)
-    compared_figures = (figures.MDT_BYTES,)
-    table_figures = (figures.MDT_BYTES,)
-    latency_table_figures = DELAYS
-    facts = ("data_rate_mbit_s",)
-    limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    figures = FIGURES
+    limits = LIMITS
+    rules = (period_rule("BP151", PERIODS, kind="sercos2", source=PERIODS_SOURCE),)
     periods = PERIODS
     starter = Starter(
         """\
@@ -66,30 +85,19 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         EventKind("at_stretch", "AT", "", "A", "in"),
         EventKind("mdt_stretch", "MDT", "", "M", "out"),
     )
-    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
-    key_sources: ClassVar[Mapping[str, Sourced]] = {
-        "bus.turnaround_us": TURNAROUND_US,
-        "bus.pipeline_cycles": PIPELINE_CYCLES,
+    constants = CONSTANTS
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.nodes": Key(meaning="the others on a second ring"),
+        "bus.data_rate_mbit_s": Key("f"),
+        "bus.at_gap_us": Key("t_gap", grade="assumed"),
+        "bus.at_start_us": Key("t_1"),
+        "bus.turnaround_us": Key("t_ATMT", TURNAROUND_US),
+        "bus.recovery_us": Key("t_MTSY"),
+        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
+        "node.execution.worst_extra_us": Key("T_extra"),
     }
-    key_grades: ClassVar[Mapping[str, Grade]] = {"bus.at_gap_us": "assumed"}
-    key_symbols: ClassVar[Mapping[str, str]] = {
-        "bus.data_rate_mbit_s": "f",
-        "bus.at_gap_us": "t_gap",
-        "bus.at_start_us": "t_1",
-        "bus.turnaround_us": "t_ATMT",
-        "bus.recovery_us": "t_MTSY",
-        "bus.pipeline_cycles": "n",
-        "node.execution.worst_extra_us": "T_extra",
-    }
-    change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second ring"}
     evidence_data = ("sercos2", "paper")
     evidence_profiles = ("sercos2-servo-8",)
-
-    def profile_model(self) -> "type[Sercos2Profile]":
-        """The model of its profiles."""
-        from busplan.buses.sercos2.section import Sercos2Profile  # the one module of the bus that loads pydantic
-
-        return Sercos2Profile
 
     def cycle(self, network: Network, *, model: str) -> Sercos2Cycle:
         """The cycle of a network under one timing model."""
@@ -106,7 +114,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
 
     def payloads(self, network: Network) -> PayloadRange:
         """Whole words, as many as a drive can be told to send for each of its axes."""
-        axes = min((int(plain(one.axes)) for one in network.groups), default=1)
+        axes = min((int(plain(group.axes)) for group in network.groups), default=1)
         return PayloadRange(
             int(WORD_BYTES), int(MOST_DRIVE_BYTES) * max(axes, 1), "drives", carrier="a drive's telegram"
         )

@@ -1,12 +1,12 @@
 """The keys that only profiles of SERCOS I and II have, in [bus]."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
 from busplan.buses.sercos import MOST_PIPELINE, PIPELINE_CYCLES
-from busplan.buses.sercos2.constants import TURNAROUND_US, DataRate
 from busplan.buses.sercos2.cycle import WORST, TimingModelName
+from busplan.buses.sercos2.equations import TURNAROUND_US, DataRate
 from busplan.sections.base import Count, TimeUs
 from busplan.sections.cycle import BusSection
 from busplan.sections.profile import Profile
@@ -59,3 +59,6 @@ class Sercos2Profile(Profile):
     """A whole profile: one motion network and its cycle."""
 
     bus: Sercos2Bus = Field(description="The bus")
+
+
+PROFILE: Final = Sercos2Profile

@@ -7,7 +7,7 @@ from typing import Final, Literal
 from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Network
 from busplan.buses.sercos import SercosCycle, delays
-from busplan.buses.sercos3.constants import (
+from busplan.buses.sercos3.equations import (
     BYTE_US,
     CHANNEL_US,
     DEVICE_DELAY_SHARE,
@@ -17,8 +17,6 @@ from busplan.buses.sercos3.constants import (
     MASTER_JITTER_SHARE,
     MOST_BYTES,
     OVERHEAD_BYTES,
-)
-from busplan.buses.sercos3.equations import (
     Filling,
     padded_bytes,
     ring_delay_us,

@@ -5,8 +5,8 @@ from typing import Any, Final
 
 from busplan.buses.network import Network
 from busplan.buses.published import Comparison, EvidenceSection
-from busplan.buses.sercos3.constants import DEFAULT_GAP_BYTES, LEAST_GAP_BYTES, MOST_DEVICES, MOST_TELEGRAMS
 from busplan.buses.sercos3.cycle import TELEGRAMS, Sercos3Cycle
+from busplan.buses.sercos3.equations import DEFAULT_GAP_BYTES, LEAST_GAP_BYTES, MOST_DEVICES, MOST_TELEGRAMS
 from busplan.elementwise import plain
 
 _GAPS: Final = (int(LEAST_GAP_BYTES), int(DEFAULT_GAP_BYTES))

@@ -2,7 +2,8 @@
 
 from typing import Final
 
-from busplan.buses.figure import NONPERIODIC, Figure, capacity_figures
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.sercos import DELAYS
 
 _COSEMA: Final = "CoSeMa"
 
@@ -33,4 +34,11 @@ TERMS: Final = (
 )
 """In the order of the wire, where other frames come last."""
 COUNTS: Final = (MDT_TELEGRAMS, AT_TELEGRAMS)
-CAPACITY: Final = capacity_figures(TERMS, own=COUNTS)
+FIGURES: Final = BusFigures(
+    TERMS,
+    capacity_figures(TERMS, own=COUNTS),
+    table=COUNTS,
+    compared=COUNTS,
+    planned=tuple(figure.key for figure in COUNTS),
+    phases=DELAYS,
+)

@@ -1,15 +1,16 @@
 """SERCOS III, as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.figure import NONPERIODIC
+from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
-from busplan.buses.rule import Rule
-from busplan.buses.sercos import BASE, DELAYS, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos3 import figures, rules
-from busplan.buses.sercos3.constants import (
+from busplan.buses.parts import Cost, EventKind, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
+from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
+from busplan.buses.sercos3.equations import (
     COMPONENT_DELAY_US,
     CONNECTION_BYTES,
     CONSTANTS,
@@ -19,21 +20,57 @@ from busplan.buses.sercos3.constants import (
     MASTER_DELAY_US,
     MASTER_JITTER_US,
     MOST_BYTES,
+    MOST_DEVICES,
     MOST_TELEGRAMS,
     PERIODS,
+    PERIODS_SOURCE,
 )
-from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
-from busplan.buses.sercos3.limits import LIMITS
-from busplan.elementwise import plain
-from busplan.sourced import Sourced
+from busplan.buses.sercos3.figures import FIGURES, MDT_TELEGRAMS
+from busplan.buses.sercos3.telegrams import SORTS, data_bytes, telegrams_of
+from busplan.elementwise import Number, larger, plain
 
 if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
-    from busplan.buses.sercos3.section import Sercos3Profile
 
-_COSEMA: Final = figures.MDT_TELEGRAMS.reference
+_COSEMA: Final = MDT_TELEGRAMS.reference
 _METHOD: Final = "bus.timing_method"
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
+
+
+def _most_telegrams(network: Network) -> Number:
+    return reduce(larger, (telegrams_of(network, kind).filling.telegrams for kind in SORTS))
+
+
+def _largest_telegram(network: Network) -> Number:
+    return data_bytes(network, network.largest_payload_bytes) + telegrams_of(network, "write").next_bytes
+
+
+LIMITS: Final = (
+    period_limit(PERIODS),
+    NODE_LIMIT,
+    Limit(
+        "nodes",
+        "{value:.0f} devices are over the {most:.0f} of a network",
+        lambda network: network.nodes,
+        lambda _network: MOST_DEVICES,
+        way_out=f"a second network has {MOST_DEVICES:g} more",
+    ),
+    Limit(
+        "payload",
+        "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
+        _largest_telegram,
+        lambda _network: MOST_BYTES,
+        way_out="a smaller payload would do",
+        failure="payload_bytes",
+    ),
+    Limit(
+        "telegrams",
+        "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
+        _most_telegrams,
+        lambda _network: MOST_TELEGRAMS,
+        way_out="a smaller payload or a second network would do",
+    ),
+)
 
 
 class Sercos3(SercosBus):
@@ -46,14 +83,9 @@ class Sercos3(SercosBus):
         TimingModel(TELEGRAMS, "telegrams and their gaps alone, as performance tables count"),
     )
     deciding_model = WINDOW
-    term_figures = figures.TERMS
-    capacity_figures = figures.CAPACITY
-    compared_figures = figures.COUNTS
-    table_figures = figures.COUNTS
-    latency_table_figures = DELAYS
-    planned_figures = tuple(one.key for one in figures.COUNTS)
-    limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    figures = FIGURES
+    limits = LIMITS
+    rules = (period_rule("BP141", PERIODS, kind="sercos3", source=PERIODS_SOURCE),)
     periods = PERIODS
     starter = Starter(
         """\
@@ -78,40 +110,22 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         EventKind("nonperiodic", "channel for other frames", NONPERIODIC.reference, "N", "reserve"),
     )
     stretch_kinds = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
-    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
-    key_sources: ClassVar[Mapping[str, Sourced]] = {
-        "bus.gap_bytes": DEFAULT_GAP_BYTES,
-        "bus.device_delay_us": DEVICE_DELAY_US,
-        "bus.master_jitter_us": MASTER_JITTER_US,
-        "bus.master_delay_us": MASTER_DELAY_US,
-        "bus.component_delay_us": COMPONENT_DELAY_US,
-        "bus.pipeline_cycles": PIPELINE_CYCLES,
+    constants = CONSTANTS
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.nodes": Key(meaning="the others on a second network"),
+        "bus.gap_bytes": Key("gap", DEFAULT_GAP_BYTES),
+        "bus.device_delay_us": Key("t_dev", DEVICE_DELAY_US),
+        "bus.master_jitter_us": Key("J_master", MASTER_JITTER_US),
+        "bus.master_delay_us": Key("t_master", MASTER_DELAY_US),
+        "bus.component_delay_us": Key("t_comp", COMPONENT_DELAY_US),
+        "bus.at_start_us": Key("t_1,min"),
+        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
+        _METHOD: Key(meaning="a setting of the master", short="method {}"),
+        "cycle.nonperiodic_us": Key(warned_at=LEAST_UCC_US),
+        "node.execution.worst_extra_us": Key("T_extra"),
     }
-    key_symbols: ClassVar[Mapping[str, str]] = {
-        "bus.gap_bytes": "gap",
-        "bus.device_delay_us": "t_dev",
-        "bus.master_jitter_us": "J_master",
-        "bus.master_delay_us": "t_master",
-        "bus.component_delay_us": "t_comp",
-        "bus.at_start_us": "t_1,min",
-        "bus.pipeline_cycles": "n",
-        "node.execution.worst_extra_us": "T_extra",
-    }
-    warning_keys = ("cycle.nonperiodic_us",)
-    warning_constants = (LEAST_UCC_US,)
-    change_meanings: ClassVar[Mapping[str, str]] = {
-        "bus.nodes": "the others on a second network",
-        _METHOD: "a setting of the master",
-    }
-    change_words: ClassVar[Mapping[str, str]] = {_METHOD: "method {}"}
     evidence_data = ("sercos3",)
     evidence_profiles = ("sercos3-servo-8",)
-
-    def profile_model(self) -> "type[Sercos3Profile]":
-        """The model of its profiles."""
-        from busplan.buses.sercos3.section import Sercos3Profile  # the one module of the bus that loads pydantic
-
-        return Sercos3Profile
 
     def cycle(self, network: Network, *, model: str) -> Sercos3Cycle:
         """The cycle of a network under one timing model."""
@@ -120,7 +134,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The other timing methods, in the order of CoSeMa."""
         own = network.profile.bus.timing_method
-        values = tuple({_METHOD: one} for one in _METHODS if one != own)
+        values = tuple({_METHOD: method} for method in _METHODS if method != own)
         return (Setting("timing_method", "timing method", Cost.SCHEDULE, (_METHOD,), values),)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:

@@ -1,11 +1,12 @@
 """The keys that only profiles of SERCOS III have, in [bus] and [[group]]."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
 from busplan.buses.sercos import MOST_PIPELINE, PIPELINE_CYCLES
-from busplan.buses.sercos3.constants import (
+from busplan.buses.sercos3.cycle import WINDOW, TimingModelName
+from busplan.buses.sercos3.equations import (
     COMPONENT_DELAY_US,
     DEFAULT_GAP_BYTES,
     DEVICE_DELAY_US,
@@ -16,7 +17,6 @@ from busplan.buses.sercos3.constants import (
     TimingMethod,
     Version,
 )
-from busplan.buses.sercos3.cycle import WINDOW, TimingModelName
 from busplan.sections.base import Count, TimeUs
 from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
 from busplan.sections.profile import Profile
@@ -106,3 +106,6 @@ class Sercos3Profile(Profile):
     group: Annotated[tuple[Sercos3Group, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike devices, instead of bus.nodes, [node] and [payload]"
     )
+
+
+PROFILE: Final = Sercos3Profile

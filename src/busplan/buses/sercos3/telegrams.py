@@ -4,15 +4,17 @@ from typing import Final, NamedTuple
 
 from busplan.buses.network import Group, Network
 from busplan.buses.sercos import word_bytes
-from busplan.buses.sercos3.constants import (
+from busplan.buses.sercos3.equations import (
     ALIGNED_BYTES,
     CHANNEL_BYTES,
     CONNECTION_BYTES,
     DEVICE_BYTES,
     EXTENDED_BYTES,
     HOT_PLUG_BYTES,
+    Filling,
+    Items,
+    filled,
 )
-from busplan.buses.sercos3.equations import Filling, Items, filled
 from busplan.elementwise import Number, alike
 from busplan.sections.transactions import TransactionKind
 

@@ -9,8 +9,7 @@ from typing import Any, Literal, Protocol
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
-from busplan.profile.measured_rows import measurements_from
-from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, parse_measurements
+from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, measurements_from, parse_measurements
 from busplan.profile.shipped import locate_measurements
 from busplan.profile.toml import read_bytes
 from busplan.questions.base.answer import Answer

@@ -6,7 +6,7 @@ from math import ceil, sqrt
 from statistics import fmean, median, stdev
 from typing import Final, Literal, NamedTuple
 
-from busplan.buses.parts import Halves, Value
+from busplan.buses.parts import Halves, MeasuredLatencies, Value
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement
@@ -217,7 +217,7 @@ def calibrate(
         worst_extra_us=_worst_extra_us(outliers, residuals),
         unchecked_bytes=screening.unchecked_bytes,
         uncertainty_us=_uncertainty_us(residuals, fit),
-        fit_keys=bus_of(profile).fit_keys(network_of(profile), model=model if way == "timing-model" else None),
+        fit_keys=_latencies(profile).fit_keys(network_of(profile), model if way == "timing-model" else None),
         at_most_us=max(one.shortest_us for one in halves.values()),
     )
 
@@ -240,11 +240,25 @@ def _nodes(profile: Profile, group: str | None) -> AlikeNodes:
 
 def _packets(profile: Profile, nodes: AlikeNodes, measurements: Sequence[Measurement], model: str) -> _Halves:
     """Time of the packets for every transaction and payload that was measured."""
-    bus, network = bus_of(profile), network_of(profile)
+    halves, network = _latencies(profile).halves, network_of(profile)
     return {
-        (kind, size): bus.halves(network, group=nodes.name, model=model, kind=kind, payload_bytes=size)
+        (kind, size): halves(network, nodes.name, model, kind, size)
         for kind, size in dict.fromkeys((one.transaction, one.payload_bytes) for one in measurements)
     }
+
+
+def _latencies(profile: Profile) -> MeasuredLatencies:
+    """How the kind of bus finds execution times from latencies.
+
+    Raises
+    ------
+    BusplanError
+        It has no transactions whose latency could be measured.
+    """
+    bus = bus_of(profile)
+    if bus.calibration is None:
+        raise BusplanError(f"bus.kind {bus.kind}: {bus.title} has no transactions to find an execution time from")
+    return bus.calibration
 
 
 def _with_packets(

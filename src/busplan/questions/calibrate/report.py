@@ -174,7 +174,7 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         source=source,
         timing_model=result.timing_model,
         nodes=cycle.network.nodes,
-        **{key: figures[key] for key in bus.facts},
+        **{key: figures[key] for key in bus.figures.headings},
         way=result.way,
         form=result.execution.kind,
         method=result.method,

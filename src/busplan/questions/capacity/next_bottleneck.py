@@ -53,7 +53,7 @@ def _limit(found: NextLimit) -> Sentence:
 
 
 def _term(term: Term, profile: Profile) -> str:
-    return by_key(bus_of(profile).term_figures)[term.key].label
+    return by_key(bus_of(profile).figures.terms)[term.key].label
 
 
 def next_bottleneck_record(found: NextBottleneck, profile: Profile) -> Record:

@@ -44,8 +44,8 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     yield from (_one_axis_more(network, one) for one in network.alike)
     yield _more_bytes(network)
     own = bus.perturbations(network)
-    reset = Perturbation("a bus reset", bus.reset_changes, if_nothing="it is set so already")
-    yield from (_with_keys(network.profile, one) for one in (*own, *((reset,) if bus.reset_changes else ())))
+    reset = Perturbation("a bus reset", bus.safety.after_reset, if_nothing="it is set so already")
+    yield from (_with_keys(network.profile, one) for one in (*own, *((reset,) if bus.safety.after_reset else ())))
 
 
 def _slower(network: Network, *, if_nothing: str) -> Perturbed:

@@ -170,12 +170,12 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
     )
     below = (
         *(figure.MARGIN, figure.UTILISATION, figure.TIME_SLICE, figure.REQUIRED_TIME_SLICE),
-        *bus.table_figures,
+        *bus.figures.table,
         *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES, figure.LIMITED_BY),
     )
     return [
         *((one, 0) for one in above),
-        *((one, 1) for one in bus.term_figures),
+        *((one, 1) for one in bus.figures.terms),
         *((one, 0) for one in below),
     ]
 

@@ -132,7 +132,7 @@ def _verdict(then: Standing | None, profile: Profile) -> Cell:
         return shown
     why = list(limits_behind(then))
     if not why and then.verdict == FITS and not then.safe:
-        why = [f"unsafe {bus_of(profile).safety}"]
+        why = [f"unsafe {bus_of(profile).safety.setting}"]
     return Sentence((shown, *(f", {one}" for one in why)), "neutral" if _is_well(then) else "fails")
 
 
@@ -164,7 +164,7 @@ def _after_each(found: Sensitivity) -> Iterator[Sentence]:
     if lost:
         yield Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
     if unsafe:
-        yield Sentence((f"Its {bus_of(found.profile).safety} is unsafe after {listed(unsafe, 'or')}.",))
+        yield Sentence((f"Its {bus_of(found.profile).safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
     if not lost and not unsafe:
         yield Sentence(("The cycle is shown to fit after each of them alone.",))
 
@@ -194,7 +194,7 @@ def _rows(found: Sensitivity) -> Iterator[Record]:
 
 def _record(one: Effect, profile: Profile) -> Record:
     then = one.then
-    safety = bus_of(profile).safety_figure
+    safety = bus_of(profile).safety.figure
     own: dict[str, Any] = {} if safety is None else {safety.key: None if then is None else then.safe}
     return {
         "change": one.change,

@@ -37,7 +37,7 @@ from busplan.questions.fit.figures import CapacityFigures, GroupCapacity
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import UNTESTED_CIRCLE, changeable
 from busplan.questions.plan.freedoms import PERIOD
-from busplan.questions.words.key_values import settings_sentence
+from busplan.questions.words.key_values import change_meanings, settings_sentence
 from busplan.questions.words.sentences import (
     broken_limits,
     evidence_sentence,
@@ -75,7 +75,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
     yield from reset_sentence(verdict.after_reset, profile)
     if not broken_limits(figures, profile):
         largest = max(figures.terms, key=lambda term: plain(term.us))
-        label = by_key(bus_of(profile).term_figures)[largest.key].label
+        label = by_key(bus_of(profile).figures.terms)[largest.key].label
         yield sentence(
             f"Largest term: {label}, {{}} of {{}}.",
             ShownValue(largest.us, largest.key, "us", 3),
@@ -126,7 +126,11 @@ def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
         The network.
     """
     limits = broken_limits(figures, profile)
-    safe = "" if figures.safe or figures.verdict == DOES_NOT_FIT else f", but with an unsafe {bus_of(profile).safety}"
+    safe = (
+        ""
+        if figures.safe or figures.verdict == DOES_NOT_FIT
+        else f", but with an unsafe {bus_of(profile).safety.setting}"
+    )
     why = f", {'; '.join(limits)}" if limits else ""
     state = state_of(figures.verdict == FITS and figures.safe)
     said = sentence(f"{{}}{{}}{why}.", attribute_value(VERDICT, figures)._replace(state=state), Words(safe, state))
@@ -165,7 +169,8 @@ def _margin(figures: CapacityFigures, bus: "Bus") -> Sentence:
     if figures.bias_us is not None:
         bias = attribute_value(BIAS, figures)
         return sentence("Margin {} +/- {} of {}, less a bias of {}.", margin, uncertainty, of, bias)
-    unknown = f"{bus.model_error}, so no bias"
+    (model,) = (model for model in bus.timing_models if model.name == bus.deciding_model)
+    unknown = f"{model.error}, so no bias"
     if figures.uncertainty_us is not None:
         return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown} is in it.", margin, uncertainty, of)
     return sentence(f"Margin {{}} of {{}}; {unknown} and no uncertainty are in it.", margin, of)
@@ -223,7 +228,7 @@ def _advice(verdict: Verdict, profile: Profile) -> Sentence:
     change, figures = verdict.change, verdict.deciding
     if change is None:
         return _no_advice(verdict, profile)
-    settings = settings_sentence(change.changes, meanings=bus_of(profile).change_meanings, quotes=False).parts
+    settings = settings_sentence(change.changes, meanings=change_meanings(bus_of(profile)), quotes=False).parts
     first = f"{period_must_change(profile)} " if PERIOD in change.changes else ""
     untested = f"; {UNTESTED_CIRCLE}" if change.circle_is_untested else ""
     if change.nodes > figures.nodes:

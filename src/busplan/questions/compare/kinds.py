@@ -80,10 +80,10 @@ class MachineOnKind(NamedTuple):
     @property
     def assumed_host(self) -> tuple[AssumedKey, ...]:
         """What is assumed of the host's own time, by its own profile, too: then it has no rank among known hosts."""
-        keys = kind_named(self.profile.bus.kind).host_keys
-        inputs = [given(self.profile, key) for key in keys] if self.is_own else []
+        key = kind_named(self.profile.bus.kind).key_of("host")
+        inputs = [given(self.profile, key)] if self.is_own and key else []
         own = (AssumedKey(one.name, one.value, "profile") for one in inputs if one.grade == "assumed" and one.value)
-        return (*own, *(one for one in self.assumed if one.key in keys))
+        return (*own, *(one for one in self.assumed if one.key == key))
 
 
 class NotOnKind(NamedTuple):

@@ -171,7 +171,7 @@ def _row(one: MachineOnKind | NotOnKind, *, columns: int, with_circle: bool) -> 
         f"{bus_of(one.profile).title}{', as it is' if one.is_own else ''}",
         _verdict(one),
         *(ShownValue(getattr(figures, key), key, "us", 3) for key in ("margin_corrected_us", "uncertainty_us")),
-        bus_of(one.profile).term_label(figures.binding_term),
+        bus_of(one.profile).figures.term_label(figures.binding_term),
         ShownValue(one.smallest.us, "smallest_period_us", "us", 3),
         ShownValue(one.safe.axes, SAFE_AXES.key),
         one.safe.limited_by,
@@ -183,7 +183,7 @@ def _row(one: MachineOnKind | NotOnKind, *, columns: int, with_circle: bool) -> 
 def _verdict(one: MachineOnKind) -> Words:
     figures = one.figures
     is_unsafe = not figures.safe and figures.verdict != DOES_NOT_FIT
-    unsafe = f", unsafe {bus_of(one.profile).safety}" if is_unsafe else ""
+    unsafe = f", unsafe {bus_of(one.profile).safety.setting}" if is_unsafe else ""
     refused = ", circle cannot be run" if figures.circle_refused_by else ""
     is_well = figures.verdict == FITS and figures.safe and not refused
     return Words(f"{figures.verdict}{unsafe}{refused}", state_of(is_well))

@@ -58,7 +58,7 @@ def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
     A longer period or one more node is a choice, neither good nor bad by itself. Nor are the bias and the uncertainty:
     the corrected margin and the smallest safe period have them.
     """
-    setup = by_key(figure for bus in buses for figure in bus.setup_figures)
+    setup = by_key(figure for bus in buses for figure in bus.figures.setup)
     return (
         *(known.TIMING_MODEL, known.VERDICT, SHOWN_TO_FIT, known.PERIOD, known.NODES, known.AXES),
         *setup.values(),
@@ -73,8 +73,8 @@ def cycle_figures(*buses: Bus) -> tuple[Figure, ...]:
 
     A single term is neither good nor bad: only their sum counts.
     """
-    own = by_key(figure for bus in buses for figure in bus.compared_figures)
-    terms = by_key(figure._replace(better="neither") for bus in buses for figure in bus.term_figures)
+    own = by_key(figure for bus in buses for figure in bus.figures.compared)
+    terms = by_key(figure._replace(better="neither") for bus in buses for figure in bus.figures.terms)
     return (
         *(known.FITS, known.MARGIN, known.UTILISATION, known.REQUIRED),
         *terms.values(),

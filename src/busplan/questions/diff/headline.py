@@ -50,10 +50,10 @@ def _loud_figures(found: Difference) -> dict[str, dict[Judgement, str]]:
     """Sentences for the figures that have their own, apart from whether the cycle fits."""
     loud: dict[str, dict[Judgement, str]] = {}
     for bus in (bus_of(found.a), bus_of(found.b)):
-        if bus.safety_figure is not None:
-            loud[bus.safety_figure.key] = {
-                "worse": f"B has an unsafe {bus.safety} where A has a safe one",
-                "better": f"B has a safe {bus.safety} where A has an unsafe one",
+        if bus.safety.figure is not None:
+            loud[bus.safety.figure.key] = {
+                "worse": f"B has an unsafe {bus.safety.setting} where A has a safe one",
+                "better": f"B has a safe {bus.safety.setting} where A has an unsafe one",
             }
     return {**loud, "passed": _PASSES}
 

@@ -66,7 +66,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
         **{key: number for key, number in cycle.figures().items() if number is not None},
         **numeric_figures(cycle),
     }
-    known = by_key(bus.capacity_figures)
+    known = by_key(bus.figures.capacity)
     named = {
         key: remembered(if_finite(number), key, known[key].symbol) for key, number in numbers.items() if key in known
     }
@@ -222,7 +222,7 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     bus, derived = bus_of(profile), [capacity_figures(profile, model=name) for name in model_names(profile)]
     fits = tuple(figures["fits"] for figures in derived)
     judged = tuple(figures[key] for figures in derived for key in ("verdict", "safe_nodes") if key in figures)
-    safety = () if bus.safety_figure is None else (bus.safety_figure.key,)
+    safety = () if bus.safety.figure is None else (bus.safety.figure.key,)
     safe = tuple(figures[key] for figures in derived for key in safety)
     if key == "models_agree":
         return found(verdict.models_agree, "a comparison: fits is the same under every timing model", fits)
@@ -240,5 +240,10 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
         purpose = "carries another node" if is_for_more else "holds every constraint of a plan"
         words = f"a search: the least change of {listed(changeable(profile), 'and')} that {purpose}"
         return found(None, words, (*judged, *safe))
-    warned: tuple[Number, ...] = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)
+    warned: tuple[Number, ...] = tuple(
+        number
+        for name, key in bus.keys.items()
+        if key.warned_at is not None
+        for number in (traced(profile, name), key.warned_at)
+    )
     return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *judged, *safe, *warned))

@@ -123,7 +123,8 @@ def _delay(profile: Profile, key: str, result: CircleFigures, required: Traced) 
 def _jitter(profile: Profile, result: CircleFigures) -> Traced:
     """The profile's own jitter, and what the bus adds."""
     own_us = traced(profile, "delivery.jitter_us")
-    bus_us = bus_of(profile).sync_jitter_us(network_of(traced_profile(profile)))
+    bus = bus_of(profile)
+    bus_us = bus.cycle(network_of(traced_profile(profile)), model=bus.deciding_model).sync_jitter_us()
     both_us = remembered(own_us + bus_us, JITTER.key, JITTER.symbol)
     if both_us.value == result.jitter_us:
         return both_us

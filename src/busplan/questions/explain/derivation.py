@@ -17,6 +17,7 @@ from busplan.questions.explain.formulas import formula_text
 from busplan.questions.explain.latency import TracedLatencies, latency_figures, latency_names, traced_latencies
 from busplan.questions.explain.register import CommandName, figure_named, figures_of
 from busplan.questions.explain.trace import inputs, lines
+from busplan.questions.fit.inputs import choosing_keys
 from busplan.questions.fit.network import bus_of, leading_model, model_names, network_of
 from busplan.sections.profile import Profile
 from busplan.sourced import Input
@@ -205,7 +206,7 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
         for one in simulated_inputs(profile):
             found.setdefault(one.name, one)
     # An execution time is a fact, not a choice: without a grade it is the least well known input.
-    choices = bus_of(profile).choosing_keys
+    choices = choosing_keys(bus_of(profile))
     executions = tuple(one.node_key("execution.") for one in profile.alike_nodes)
     known = (
         one

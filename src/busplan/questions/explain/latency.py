@@ -63,7 +63,7 @@ def latency_figures(
     }
     return {
         figure.key: remembered(found.get(figure.key), figure.key, figure.symbol)
-        for figure in bus_of(profile).latency_figures
+        for figure in bus_of(profile).figures.latency
     }
 
 

@@ -34,8 +34,8 @@ _HOLDERS: Final[Mapping[str, tuple[CommandName, str]]] = MappingProxyType(
 def figures_of(bus: Bus) -> dict[CommandName, dict[str, Figure]]:
     """Figures by command and key. Without a command, a key means that of the first command that has it."""
     return {
-        "capacity": by_key((*bus.capacity_figures, *VERDICT_FIGURES)),
-        "latency": by_key(bus.latency_figures),
+        "capacity": by_key((*bus.figures.capacity, *VERDICT_FIGURES)),
+        "latency": by_key(bus.figures.latency),
         "circle-test": dict(CIRCLE_BY_KEY),
     }
 

@@ -134,7 +134,7 @@ def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:
     if delay_us > most_us:
         known = f"the circle test knows {LONGEST_DELAY_PERIODS} periods"
         why = f"the bus puts {delay_us:g} us into a loop over it, and {known}"
-        key = bus_of(profile).loop_key
+        key = bus_of(profile).key_of("pipeline")
         less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
         right = f'{why}, {most_us:g} us, at most; {less}close the loop on the node, servo.loop = "node"'
         yield Refused("servo.loop", '"host"', right)
@@ -150,7 +150,7 @@ def _out_of_order(profile: Profile) -> Iterator[Refused]:
         known = f"which the circle test knows up to half the period, {period_us / 2:g} us, with jitter and skew"
         if apart_us := skew_us(profile):
             right = f"the last axis then takes its set-points {apart_us:g} us behind the first, {known}"
-            yield Refused(bus_of(profile).clock_key, "false", f"{right}; set it true if the drives have a clock")
+            yield Refused(bus_of(profile).key_of("clock"), "false", f"{right}; set it true if the drives have a clock")
         else:
             added_us = jitter_us(profile) - own.jitter_us
             right = f"the bus adds {added_us:g} us of jitter either way, {known}; a longer period has room"

@@ -42,7 +42,7 @@ class FigureValues(Mapping[str, FigureValue]):
         return len(self._values)
 
     def __getattr__(self, key: str) -> Any:
-        # Called for missing attributes only, also before `_values` is set.
+        # Figures are keys and attributes; called for missing attributes only, also before `_values` is set.
         if key.startswith("_") or key not in self._values:
             raise AttributeError(f"there is no figure {key!r}")
         return self._values[key]

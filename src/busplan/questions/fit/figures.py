@@ -194,7 +194,7 @@ class CapacityFigures(NamedTuple):
         return None if self._whole is None else self._whole.safe_limited_by
 
     def __getattr__(self, key: str) -> Any:
-        # Only what is no field comes here.
+        # Figures of the kind and terms are attributes as all others are; only what is no field comes here.
         if not key.startswith("_"):
             if key in self.own:
                 return self.own[key]
@@ -205,7 +205,7 @@ class CapacityFigures(NamedTuple):
 
     def by_key(self) -> dict[str, Any]:
         """The figures of the document by key, in its order."""
-        found = {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).capacity_figures}
+        found = {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).figures.capacity}
         return {key: list(one) if isinstance(one, tuple) else one for key, one in found.items()}
 
 
@@ -383,9 +383,9 @@ def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) 
         Whether limits must be shown to be kept; otherwise doubts of their values play no part.
     """
     bus = bus_of(network.profile)
-    found = bus.shortest_period_us(network, needed_us)
+    found = bus.periods.from_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
-        if limit.share is not None:
+        if limit.period is not None:
             found = larger(found, bus.periods.from_us((limit.shown if is_shown else limit.nominal).period_us(network)))
     return found
 
@@ -400,7 +400,7 @@ def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures 
     deciding
         Its figures under the model that decides.
     """
-    changes = bus_of(profile).reset_changes
+    changes = bus_of(profile).safety.after_reset
     if deciding.verdict != FITS or not changes:
         return None
     reset = override(profile, dict(changes))

@@ -3,9 +3,11 @@
 from types import MappingProxyType
 from typing import Any, Final
 
+from busplan.buses.bus import Bus
+from busplan.buses.parts import Key
 from busplan.elementwise import GivenTable, Traced
-from busplan.profile.graded import comment_grade
 from busplan.profile.kinds import cycle_keys, models_of
+from busplan.profile.toml import comment_grade
 from busplan.questions.fit.network import bus_of
 from busplan.sections.base import value_at, with_unchecked
 from busplan.sections.execution import TableExecution
@@ -79,17 +81,18 @@ def given(profile: Profile, key: str) -> Input:
     grade = "given" if own_grade is None or is_no_measurement else own_grade
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
     alike_key, group = _of_one_table(profile, key)
-    default = bus.key_sources.get(alike_key)
+    known = bus.keys.get(alike_key, Key())
+    default = known.default
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
     by_comment = comment_grade(profile, key) if is_set and grade == "given" else None
     if by_comment is not None:
         grade, source = by_comment, f"{source}; graded by its comment"
     else:
-        grade = bus.key_grades.get(alike_key, grade)
+        grade = known.grade or grade
     # A plain number shows no unit.
     unit = "" if unit == "1" else unit
-    symbol = _SYMBOLS.get(alike_key) or bus.key_symbols.get(alike_key) or SYMBOLS.get(name) or name
+    symbol = _SYMBOLS.get(alike_key) or known.symbol or SYMBOLS.get(name) or name
     symbol = f"{symbol},{group}" if group else symbol
     return Input(symbol, key, value, unit, grade, source, description)
 
@@ -123,8 +126,14 @@ def traced_profile(profile: Profile) -> Profile:
 
 def _chooses(profile: Profile, key: str) -> bool:
     """Whether the word of a key chooses between numbers."""
-    own = bus_of(profile).choosing_keys
-    return any(key == one.node_key(name) for one in profile.alike_nodes for name in own)
+    own = choosing_keys(bus_of(profile))
+    return any(key == alike.node_key(name) for alike in profile.alike_nodes for name in own)
+
+
+def choosing_keys(bus: Bus) -> tuple[str, ...]:
+    """Text-valued keys of a node that select a formula."""
+    own = (name.removeprefix("node.") for name, key in bus.keys.items() if key.chooses)
+    return ("execution.grade", *own)
 
 
 def _of_one_table(profile: Profile, key: str) -> tuple[str, str]:

@@ -3,7 +3,8 @@
 from busplan.buses.cycle import BusCycle
 from busplan.elementwise import plain
 from busplan.questions.fit.cycle import cycle_of
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.network import bus_of
+from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
 
@@ -21,13 +22,12 @@ def loop_delays_us(profile: Profile) -> tuple[float, float]:
     """
     if profile.servo.loop == "node":
         return 0.0, 0.0
-    own, network = bus_of(profile), network_of(profile)
+    cycle = _deciding_cycle(profile)
     at_sync = profile.servo.update == "next_sync"
-    whole_us = own.loop_periods(network, at_sync=at_sync) * profile.cycle.period_us
+    whole_us = cycle.loop_periods(at_sync=at_sync) * profile.cycle.period_us
     if at_sync:
         return whole_us, whole_us
-    cycle = cycle_of(profile, model=own.deciding_model)
-    since_us = whole_us - own.sampled_us(cycle)
+    since_us = whole_us - cycle.sampled_us()
     first_us, last_us = _first_and_last_us(cycle)
     return since_us + first_us, since_us + last_us
 
@@ -37,15 +37,25 @@ def skew_us(profile: Profile) -> float:
 
     A loop on the host has it in its delays.
     """
-    if profile.servo.loop == "host" or bus_of(profile).acts_at_once(network_of(profile)):
+    if profile.servo.loop == "host" or acts_at_once(profile):
         return 0.0
-    first_us, last_us = _first_and_last_us(cycle_of(profile, model=bus_of(profile).deciding_model))
+    first_us, last_us = _first_and_last_us(_deciding_cycle(profile))
     return last_us - first_us
+
+
+def acts_at_once(profile: Profile) -> bool:
+    """Whether the nodes take their set-points at one time; otherwise each does when it has its own."""
+    clock = bus_of(profile).key_of("clock")
+    return not clock or bool(value_at(profile, clock))
 
 
 def jitter_us(profile: Profile) -> float:
     """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds [us]."""
-    return float(profile.delivery.jitter_us + plain(bus_of(profile).sync_jitter_us(network_of(profile))))
+    return float(profile.delivery.jitter_us + plain(_deciding_cycle(profile).sync_jitter_us()))
+
+
+def _deciding_cycle(profile: Profile) -> BusCycle:
+    return cycle_of(profile, model=bus_of(profile).deciding_model)
 
 
 def _first_and_last_us(cycle: BusCycle) -> tuple[float, float]:
@@ -58,6 +68,6 @@ def _first_and_last_us(cycle: BusCycle) -> tuple[float, float]:
 
     def effect_us(node: int) -> float:
         # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
-        return min(arrived_us[node], plain(network.period_us)) + own.taking_us(groups[node - 1], network)
+        return min(arrived_us[node], plain(network.period_us)) + cycle.taking_us(groups[node - 1])
 
     return effect_us(moved[0]), effect_us(moved[-1])

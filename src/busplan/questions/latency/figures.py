@@ -28,7 +28,7 @@ class Transaction(NamedTuple):
     """Figures by their key in the register of the bus."""
 
     def __getattr__(self, key: str) -> Any:
-        # Called for missing attributes only.
+        # Phases are attributes as the fields are; only what is no field comes here.
         if not key.startswith("_") and key in self.phases:
             return self.phases[key]
         raise AttributeError(f"{self.transaction} has no figure {key!r}")

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import groupby
 
-from busplan.buses.figure import REQUIRED, Figure
+from busplan.buses.figure import Figure
 from busplan.forms.blocks import (
     Block,
     Code,
@@ -48,10 +48,11 @@ def _blocks(result: LatencyResult) -> Iterator[Block]:
 def latency_tables(result: LatencyResult) -> Iterator[Table]:
     """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
     bus = bus_of(result.profile)
-    figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
-    figures = tuple(figure for figure in figures if all(figure.key in one.phases for one in result.transactions))
+    figures = tuple(
+        figure for figure in bus.figures.latency_table if all(figure.key in one.phases for one in result.transactions)
+    )
     subject = bus.latency_subject(network_of(result.profile))
-    if bus.has_many_transactions:
+    if bus.figures.has_many_transactions:
         yield from _by_transaction(result, figures, subject)
         return
     rows = [(figure, 0) for figure in figures]

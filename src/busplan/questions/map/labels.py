@@ -93,7 +93,7 @@ def legend_of(found: TradeOff, looks: Looks) -> list[Swatch]:
 def state_words(state: State, found: TradeOff) -> str:
     """Name of a state on a map."""
     if state == "unsafe":
-        return f"unsafe {bus_of(found.profile).safety}"
+        return f"unsafe {bus_of(found.profile).safety.setting}"
     return f"{state}, and the circle passes" if state == "fits" and found.with_circle else state
 
 
@@ -102,7 +102,7 @@ def limit_words(region: Region | Cell, profile: Profile) -> str:
     words = " and ".join(region.limited_by)
     if region.limited_by != (TIME,):
         return words
-    return f"{words}, largest term {bus_of(profile).term_label(region.binding_term)}"
+    return f"{words}, largest term {bus_of(profile).figures.term_label(region.binding_term)}"
 
 
 def title_of(direction: Direction, profile: Profile) -> str:

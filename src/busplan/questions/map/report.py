@@ -132,7 +132,7 @@ def map_document(found: TradeOff) -> JsonDocument:
 
 def _record(found: TradeOff, cell: Cell) -> Record:
     """A cell as plain data, its values under the keys of the directions, as in a row of a sweep."""
-    safety = bus_of(found.profile).safety_figure
+    safety = bus_of(found.profile).safety.figure
     return {
         found.x.key: cell.x,
         found.y.key: cell.y,

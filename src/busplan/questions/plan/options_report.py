@@ -49,7 +49,7 @@ def _row(option: Option) -> TableRow:
         option.title,
         "*" * option.recommended + "?" * (not option.proven),
         _short(option.profile, option.changes),
-        bus_of(option.profile).term_label(option.deciding.binding_term),
+        bus_of(option.profile).figures.term_label(option.deciding.binding_term),
         ShownValue(option.held_by, "held_by"),
         circle,
         *option_margin(option),
@@ -96,7 +96,8 @@ def _short(profile: Profile, changes: NewValues) -> Cell:
     sizes = {key: value for key, value in changes.items() if key in _BOTH}
     alike = len(sizes) == len(_BOTH) and len(set(sizes.values())) == 1
     shown = {key: value for key, value in changes.items() if not alike or key != _BOTH[-1]}
-    words = {**_SHORT, **bus_of(profile).change_words, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
+    own = {name: key.short for name, key in bus_of(profile).keys.items() if key.short}
+    words = {**_SHORT, **own, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
     return joined(
         *(
             sentence(_counted(words[key], value), _short_value(key, value))

@@ -29,7 +29,7 @@ from busplan.questions.plan.options_report import options_table
 from busplan.questions.plan.planning import Plan
 from busplan.questions.plan.relaxations import Relaxation
 from busplan.questions.words.documents import document, with_profile
-from busplan.questions.words.key_values import NewValues, settings_sentence
+from busplan.questions.words.key_values import NewValues, change_meanings, settings_sentence
 from busplan.questions.words.sentences import margin_parts, reset_sentence, warning_sentences
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
@@ -78,7 +78,7 @@ def settings(profile: Profile, changes: NewValues) -> str:
 
 def _settings(profile: Profile, changes: NewValues) -> Sentence:
     # The number of nodes is the goal here, so the note on a second bus does not apply.
-    meanings = {key: words for key, words in bus_of(profile).change_meanings.items() if key != "bus.nodes"}
+    meanings = {key: words for key, words in change_meanings(bus_of(profile)).items() if key != "bus.nodes"}
     return settings_sentence(changes, meanings=meanings)
 
 
@@ -184,7 +184,7 @@ def _record(plan: Plan, option: Option) -> Record:
         "safe_limited_by": one.safe_limited_by,
         "period_us": one.period_us,
         "slice_ratio": profile.cycle.slice_ratio,
-        **{key: getattr(one, key) for key in bus_of(profile).planned_figures},
+        **{key: getattr(one, key) for key in bus_of(profile).figures.planned},
         **{f"{kind}_bytes": int(getattr(network_of(profile).groups[0], f"{kind}_bytes")) for kind in TRANSACTION_KINDS},
     }
 

@@ -64,7 +64,7 @@ def bus_question(answer: AllAnswers) -> Question:
     verdict = answer.verdict
     word = str(verdict.deciding.verdict).upper()
     if verdict.deciding.verdict == FITS and not verdict.deciding.safe:
-        word = f"UNSAFE {bus_of(answer.profile).safety.upper()}"
+        word = f"UNSAFE {bus_of(answer.profile).safety.setting.upper()}"
     facts = tuple(
         (figure.label, attribute_value(figure, verdict.deciding))
         for figure in (MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES, UTILISATION, BINDING_TERM)
@@ -117,7 +117,7 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """The terms of the cycle, as bars and as a table."""
     results, source = answer.capacity.results, sources["capacity"]
-    terms = (*bus_of(answer.profile).term_figures, LEFT)
+    terms = (*bus_of(answer.profile).figures.terms, LEFT)
     words = (TableColumn("term", kind="words"), TableColumn("eq", kind="words"))
     table = Table(
         (*words, *(TableColumn(one.timing_model) for one in results)),
@@ -134,7 +134,7 @@ def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
 def _largest_term(answer: AllAnswers) -> Sentence:
     """Say which term takes most, by the model that decides."""
     deciding = answer.verdict.deciding
-    term = max(bus_of(answer.profile).term_figures, key=lambda one: getattr(deciding, one.key))
+    term = max(bus_of(answer.profile).figures.terms, key=lambda one: getattr(deciding, one.key))
     return sentence(
         f"Of the {{}} that the cycle needs by the {deciding.timing_model} model, {term.label} takes the most, {{}}",
         attribute_value(REQUIRED, deciding),

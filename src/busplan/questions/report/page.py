@@ -175,7 +175,7 @@ def _assumed(answer: AllAnswers) -> Iterator[Sentence]:
 def _facts(subject: _Subject) -> Facts:
     """Settings of the bus, and the PROFILE argument."""
     bus, figures = bus_of(subject.answer.profile), subject.answer.capacity.results[0]
-    setup = (one for one in bus.setup_figures if one.key in bus.facts)
+    setup = (one for one in bus.figures.setup if one.key in bus.figures.headings)
 
     def item(name: str, figure: Figure) -> tuple[str, ShownValue]:
         unit = "us" if figure.unit == "us" else ""

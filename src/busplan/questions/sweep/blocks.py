@@ -26,6 +26,7 @@ from busplan.questions.fit.certainty import (
 from busplan.questions.fit.circle_refusal import loop_refusals, run_refusals
 from busplan.questions.fit.cycle import TIME, fits_in, limits_with_time
 from busplan.questions.fit.figures import COUNTS, certainty_numbers, numeric_figures
+from busplan.questions.fit.loop_delays import acts_at_once
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.fit.node_limit import most_nodes
 from busplan.questions.sweep.grid import Array, Chunk, Grid
@@ -49,12 +50,12 @@ _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bo
 def figure_names(profile: Profile) -> tuple[str, ...]:
     """Columns of a sweep after the varied keys; `timing_model` is the first, counts of groups are the last."""
     groups = (f"group.{one.name}.{key}" for one in profile.group for key in COUNTS)
-    return (*(figure.key for figure in bus_of(profile).capacity_figures), *groups)
+    return (*(figure.key for figure in bus_of(profile).figures.capacity), *groups)
 
 
 def word_figures(profile: Profile) -> tuple[str, ...]:
     """Columns whose values are words."""
-    words = [figure.key for figure in bus_of(profile).capacity_figures if figure.sort in ("word", "words")]
+    words = [figure.key for figure in bus_of(profile).figures.capacity if figure.sort in ("word", "words")]
     return (*words, *(f"group.{one.name}.{key}" for one in profile.group for key in COUNTS if key in words))
 
 
@@ -204,7 +205,7 @@ def _columns(where: Profile, model: str, *, axes: int, with_counts: bool) -> dic
         "exceeded": exceeded,
         **own,
     }
-    sorts = {figure.key: figure.sort for figure in bus.capacity_figures}
+    sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
     found = {
         key: words[key] if key in words else _number(numbers[key], sorts[key])
         for key in figure_names(network.profile)
@@ -245,7 +246,7 @@ def _refused(
     causes_at
         `_causes` of the profile, which knows what it was asked before: chunks share values.
     """
-    is_apart = profile.servo.loop == "node" and bus_of(profile).acts_at_once(network_of(profile))
+    is_apart = profile.servo.loop == "node" and acts_at_once(profile)
     has_words = any(own.dtype == object for own in chunk.values.values())
     read = [
         (number, key, own.ravel().tolist())

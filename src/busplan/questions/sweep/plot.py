@@ -65,7 +65,7 @@ class FigureData:
         """Add a block."""
         points = slice(block.chunk.start, block.chunk.start + block.chunk.points)
         self._values[points] = block.rows(self._name).reshape(-1, len(self._models))
-        safety = bus_of(self._profile).safety_figure
+        safety = bus_of(self._profile).safety.figure
         for number, safe in enumerate(block.columns(safety.key) if safety else ()):
             unsafe = ~safe.are_true.astype(bool) & ~safe.are_missing.astype(bool)
             self._unsafe[points, number] = np.broadcast_to(unsafe, block.chunk.shape).ravel()
@@ -98,7 +98,7 @@ class FigureData:
         if not self._is_own():
             scales = tuple(one._replace(own=None) for one in scales)
         bus = bus_of(self._profile)
-        return Plotted(figure, scales, panels, bus.deciding_model, bus.safety)
+        return Plotted(figure, scales, panels, bus.deciding_model, bus.safety.setting)
 
     def _varied(self) -> list[str]:
         """Keys with several values; the only key if none has."""

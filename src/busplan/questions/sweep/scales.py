@@ -88,7 +88,7 @@ def key_label(profile: Profile, key: str) -> str:
     >>> [key_label(profile, key) for key in ("cycle.period_us", "bus.gap_count", "payload.read_bytes")]
     ['period T_s, us', 'gap count', 'payload read, bytes']
     """
-    setup = {f"bus.{one.key}": one for one in bus_of(profile).setup_figures}
+    setup = {f"bus.{one.key}": one for one in bus_of(profile).figures.setup}
     figure = {"cycle.period_us": PERIOD, "bus.nodes": NODES, **setup}.get(key)
     if figure is not None:
         return figure_label(figure)

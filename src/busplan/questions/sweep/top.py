@@ -108,7 +108,7 @@ class Tally:
             if isinstance(keys, list) and keys:
                 self._refused += _share(np.equal(refused.values, code), points)
                 self._refused_by |= dict.fromkeys(keys)
-        safety = self.bus.safety_figure
+        safety = self.bus.safety.figure
         if safety is not None:
             # Settings of the bus are the same under every model.
             self._unsafe += points - _share(block.models[0][safety.key].values, points)
@@ -145,9 +145,9 @@ class Tally:
         if self._seeds is not None:
             yield from self._seeds.sentences()
         yield from payload_sentences(self.profile, self._varied)
-        safety = self.bus.safety_figure
+        safety = self.bus.safety.figure
         if self._unsafe and safety is not None:
-            words = f"At {{}} points the {self.bus.safety} is unsafe ({safety.key})."
+            words = f"At {{}} points the {self.bus.safety.setting} is unsafe ({safety.key})."
             yield sentence(words, count_value(self._unsafe, grouped=True), state="warns")
 
     def _fitting(self) -> Sentence:

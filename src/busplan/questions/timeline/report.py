@@ -154,7 +154,7 @@ def _facts(plan: Schedule) -> JsonDocument:
         timing_model=figures.timing_model,
         period_us=figures.period_us,
         nodes=figures.nodes,
-        **{key: getattr(figures, key) for key in bus_of(plan.profile).facts},
+        **{key: getattr(figures, key) for key in bus_of(plan.profile).figures.headings},
         required_us=figures.required_us,
         available_us=figures.available_us,
         margin_us=figures.margin_us,

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from busplan.buses.bus import Bus
 from busplan.buses.parts import Value as BusValue
 from busplan.forms.blocks import Part, Sentence, ShownValue, joined
 from busplan.profile.write import value_text
@@ -29,6 +30,11 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes
         ),
         by=", ",
     )
+
+
+def change_meanings(bus: Bus) -> dict[str, str]:
+    """What a change of a key means on the machine, for keys that do not say so."""
+    return {name: key.meaning for name, key in bus.keys.items() if key.meaning}
 
 
 def key_value(key: str, value: object) -> ShownValue:

@@ -76,8 +76,7 @@ def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterato
         Whether the figures are latencies, and not those of the cycle.
     """
     grades, bus, network = execution_grades(profile), bus_of(profile), network_of(profile)
-    has_execution = bus.latency_has_execution(network) if of_latency else bus.has_execution(network)
-    if grades is not None and has_execution:
+    if grades is not None and bus.has_execution(network, of_latency=of_latency):
         text = f"The execution time behind these figures is {grades}."
         yield sentence(text, state="warns" if "assumed" in grades else "neutral")
 
@@ -127,7 +126,7 @@ def not_applicable(profile: Profile) -> Iterator[Sentence]:
 def reset_sentence(after: CapacityFigures | None, profile: Profile) -> Iterator[Sentence]:
     """Say that a plan stops fitting at a bus reset; nothing if it does not."""
     if after is not None:
-        keys = ", ".join(f"{key} = {value}" for key, value in bus_of(profile).reset_changes.items())
+        keys = ", ".join(f"{key} = {value}" for key, value in bus_of(profile).safety.after_reset.items())
         text = f"After a bus reset, with {keys} until it is set again, the verdict is: {after.verdict}."
         yield sentence(text, state="warns")
 
@@ -167,5 +166,5 @@ def margin_parts(figures: CapacityFigures) -> tuple[Part, ...]:
 
 def safety_record(figures: CapacityFigures, profile: Profile) -> Record:
     """Whether the settings of the bus are safe, by the key of its kind; empty if the kind has none."""
-    safety = bus_of(profile).safety_figure
+    safety = bus_of(profile).safety.figure
     return {} if safety is None else {safety.key: figures.safe}

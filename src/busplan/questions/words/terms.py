@@ -76,7 +76,7 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
 
 def _drawn(one: CapacityFigures, end_us: float) -> tuple[Figure, ...]:
     """The terms, and the rest of the slice if the scale reaches its end."""
-    terms = kind_named(one.kind).term_figures
+    terms = kind_named(one.kind).figures.terms
     return (*terms, LEFT) if end_us >= one.available_us else terms
 
 
