@@ -112,6 +112,19 @@ def test_update_brings_messages_of_a_database_into_a_profile(run: Run, folder: P
     assert "changed: message.oil.period_us = 10000 in line.toml, 20000 at machine.dbc:9" in done.stderr
 
 
+def test_update_keeps_line_ends_and_mark(run: Run, folder: Path) -> None:
+    run("import", "slaves.txt", "pdos.txt", "-o", "machine.toml", cwd=folder)
+    path = folder / "machine.toml"
+    old = path.read_bytes().replace(b"\n", b"\r\n")
+    path.write_bytes(b"\xef\xbb\xbf" + old.replace(b"write_bytes = 6 ", b"write_bytes = 7 "))
+    done = run("import", "slaves.txt", "pdos.txt", "--update", "machine.toml", "--take", "file", cwd=folder)
+    assert done.returncode == 0
+    new = path.read_bytes()
+    assert new.startswith(b"\xef\xbb\xbf")
+    assert new.count(b"\r\n") == new.count(b"\n") == old.count(b"\n")
+    assert b"write_bytes = 6" in new
+
+
 def test_groups_that_do_not_match_are_refused(run: Run, folder: Path) -> None:
     run("import", "slaves.txt", "pdos.txt", "-o", "machine.toml", cwd=folder)
     path = folder / "machine.toml"

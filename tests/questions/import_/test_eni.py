@@ -223,6 +223,14 @@ def test_a_slower_task_is_counted_in_every_cycle(tmp_path: Path) -> None:
     assert any("a further task of 2000 us" in remark for remark in answer.remarks)
 
 
+def test_a_command_of_another_state_is_in_no_cycle(tmp_path: Path) -> None:
+    text = eni([Device("Axis", 48, 48, axes=1)], [(500, [[(BRD, 200), (LRW, 60)]])])
+    answer = imported(
+        text.replace("<State>OP</State><Cmd>7<", "<State>PREOP</State><State>SAFEOP</State><Cmd>7<"), tmp_path
+    )
+    assert frames_us(answer.profile) == pytest.approx(112 * 0.08)
+
+
 def test_what_only_looks_encrypted_is_read_and_a_branch_is_said(tmp_path: Path) -> None:
     text = eni(line_of(3, 4, 4), [(1000, [[(LRW, 12)]])], root="EncryptedEtherCATConfig")
     answer = imported(

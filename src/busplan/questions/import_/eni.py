@@ -185,8 +185,11 @@ def _sizes(frame: list[tuple[int, int, int]]) -> list[int]:
 
 
 def _commands(frame: Element, machine: Reading) -> Iterator[tuple[int, int, int]]:
-    """Command, bytes of data and logical address of each datagram."""
+    """Command, bytes of data and logical address of each datagram that is sent in operation."""
     for command in frame.all("Cmd"):
+        states = [state.text.strip() for state in command.all("State")]
+        if states and "OP" not in states:
+            continue
         code = number(command, "Cmd", machine, most=255)
         length = number(command, "DataLength", machine, most=_MOST_BYTES)
         data = command.first("Data")

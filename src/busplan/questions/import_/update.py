@@ -1,13 +1,13 @@
 """Values of files into an existing profile: its comments and other keys stay, and nothing is changed unasked."""
 
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, Literal
 
 from busplan.errors import BusplanError
 from busplan.profile.document import Document
 from busplan.profile.edit import edited_file
-from busplan.profile.graded import comments_beside
 from busplan.profile.keys import flat, named_tables, path_of
 from busplan.profile.toml import decode, read_bytes, validate
 from busplan.profile.write import short_text
@@ -72,13 +72,13 @@ def updated(
     machine.remarks += [f"added: {key} = {short_text(row.plain)}" for key, row in changes.items() if key not in known]
     machine.remarks += [f"added: {row.section}" for row in added if row.key == "identifier"]
     values = {key: row.plain for key, row in changes.items()}
-    text = edited_file(content, {**values, **removed}, name=name).decode("utf-8-sig")
-    text = _commented(Document(name, text), changes)
+    # With LF alone, and without a mark, offsets are those of the text.
+    text = _commented(decode(edited_file(content, {**values, **removed}, name=name), name=name), changes)
     if added:
         text = f"{text.rstrip()}\n{sections_text(added)}"
-    if "\r\n" in text:
-        text = text.replace("\r\n", "\n").replace("\n", "\r\n")
-    return validate(decode(text.encode(), name=name)), text
+    profile = validate(Document(name, text))
+    text = text.replace("\n", "\r\n") if b"\r\n" in content else text
+    return profile, f"{BOM_UTF8.decode()}{text}" if content.startswith(BOM_UTF8) else text
 
 
 def _axes(row: ProfileLine, known: Mapping[str, Any]) -> int:
@@ -120,14 +120,12 @@ def _renamed(rows: Sequence[ProfileLine], data: Mapping[str, Any], name: str) ->
 
 def _commented(document: Document, changes: Mapping[str, ProfileLine]) -> str:
     """The text with the grade and place of each new value beside it, unless the user's own comment stands there."""
-    text, beside, data = document.text, comments_beside(document), document.data()
+    text, beside, data = document.text, document.comments_beside, document.data()
     paths = {path_of(data, key): row for key, row in changes.items()}
     for path, row in sorted(paths.items(), key=lambda item: -document.places[item[0]].value_end):
         at, end = beside.get(path), document.places[path].value_end
         line_end = text.find("\n", end)
         line_end = len(text) if line_end < 0 else line_end
-        carriage = text[line_end - 1 : line_end] == "\r"
-        line_end -= carriage
         if at is None:
             text = f"{text[:end]} # {row.fact.comment}{text[line_end:]}"
         elif _OURS.match(text[at:line_end]):
