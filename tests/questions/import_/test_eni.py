@@ -207,6 +207,14 @@ def test_other_layouts_take_their_time_too(case: str, tmp_path: Path) -> None:
     assert frames_us(imported(eni([device], [(1000, frames)]), tmp_path).profile) == pytest.approx(us, abs=1e-6)
 
 
+def test_gaps_in_the_image_are_in_a_datagram(tmp_path: Path) -> None:
+    profile: Any = imported(
+        eni([Device("Axis", 48, 32, axes=1)], [(1000, FRAMES["gaps in the image"][0])]), tmp_path
+    ).profile
+    # 10 bytes of the device, 10 of gaps beside the BRD of 2.
+    assert (profile.bus.housekeeping_bytes, profile.cycle.nonperiodic_us) == ((12,), 0)
+
+
 def test_two_frames_hold_what_one_cannot(tmp_path: Path) -> None:
     devices = line_of(150, 14, 14)
     answer = imported(eni(devices, [(4000, [[*ACONTIS, (LRW, 1400)], [(LRW, 700)]])]), tmp_path)
