@@ -65,6 +65,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     >>> pack([Devices(1000, 4)], datagrams=1, first_bytes=0.0)
     Packing(frames=3, datagrams_bytes=4036.0, padding_bytes=0.0, last_bytes=1044.0, before_bytes=1496.0)
     """
+    devices = [_with_data(one) for one in devices if not is_everywhere(one.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
     headers = total([alike(DATAGRAM_BYTES, devices[0].number)] * datagrams)
     free: Number = 0.0
@@ -80,7 +81,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
         present = first_bytes + choose(has_room, headers, 0.0)
         whole = present
         frames = 1
-    for one in map(_with_data, devices):
+    for one in devices:
         beside = smaller(one.number, rounded_down(free / one.data_bytes))
         behind = one.number - beside
         present, free = present + beside * one.data_bytes, free - beside * one.data_bytes
@@ -96,7 +97,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
 
 
 def _with_data(devices: Devices) -> Devices:
-    """The same devices; couplers, which have no data and are in no frame, as none of a byte."""
+    """The same devices; where an array has couplers, which have no data and are in no frame, as none of a byte."""
     if is_everywhere(devices.data_bytes > 0):
         return devices
     number = choose(devices.data_bytes > 0, devices.number, 0)
@@ -125,8 +126,8 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
     sizes = [plain(one.data_bytes) for one in devices for _ in range(int(plain(one.number)))]
     for device, size in enumerate(sizes, start=1):
         if filled + size > room - opened and (held or opened):
-            yield Frame(tuple(held), opened + bool(held) * headers + filled)
+            yield Frame(tuple(held), opened + bool(filled) * headers + filled)
             held, opened, filled = [], 0.0, 0.0
         held.append(device)
         filled += size
-    yield Frame(tuple(held), opened + headers + filled)
+    yield Frame(tuple(held), opened + bool(filled) * headers + filled)
