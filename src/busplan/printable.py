@@ -75,3 +75,8 @@ def json_text(value: object, *, indent: int | None = None) -> str:
 
     # JSON escapes line ends inside strings; those that are left belong to the layout.
     return printable_lines(json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False), write=json_escape)
+
+
+def to_json(document: object) -> str:
+    """Write a JSON document: as `json_text`, indented, with a final newline."""
+    return json_text(document, indent=2) + "\n"

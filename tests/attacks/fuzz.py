@@ -39,7 +39,7 @@ from busplan.errors import BusplanError
 from busplan.profile.kinds import profile_schema
 from busplan.profile.starter import Machine, machine_text
 from busplan.profile.toml import decode, validate
-from busplan.questions.fit.circle_move import path_steps
+from busplan.questions.fit.circle_refusal import path_steps
 from busplan.sections.profile import Profile
 
 Data = dict[str, Any]

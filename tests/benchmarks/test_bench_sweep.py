@@ -22,8 +22,7 @@ from busplan.questions.fit.figures import figures
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import CHUNK_POINTS, figure_names, sweep
 from busplan.questions.sweep.grid import Chunk, Grid, Steps, checked_grid
-from busplan.questions.sweep.rows import TEXT_POINTS, TextForm
-from busplan.questions.sweep.writers import rows_writer
+from busplan.questions.sweep.rows import TEXT_POINTS, TextForm, rows_writer
 
 MODELS = ("paper", "standard")
 GRIDS = {

@@ -18,7 +18,7 @@ from busplan.profile.toml import override
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import model_names, network_of
 from busplan.questions.fit.node_steps import node_steps
-from busplan.questions.map.ranges import default_direction
+from busplan.questions.map.direction import default_direction
 from busplan.questions.report.all_answers import all_answers
 
 Run = Callable[..., Any]

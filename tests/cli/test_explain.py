@@ -11,7 +11,7 @@ import pytest
 from markdown_it import MarkdownIt
 
 from busplan.buses import kind_named
-from busplan.questions.explain.register import figure_named
+from busplan.questions.explain.derivation import figure_named
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]

@@ -14,8 +14,7 @@ import pytest
 from typer.main import get_command
 
 from busplan.cli import app
-from busplan.cli.help import FAILURES
-from busplan.cli.lazy import COMMANDS
+from busplan.cli.lazy import COMMANDS, FAILURES
 from busplan.profile.shipped import shipped_folder
 from busplan.questions.plan.search import MAX_CIRCLES
 

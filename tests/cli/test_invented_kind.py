@@ -20,15 +20,16 @@ from pydantic import Field
 import busplan
 from busplan.buses import kind_names, registered
 from busplan.buses.bus import Bus
-from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut
+from busplan.buses.cycle import Run as EventRun
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
 from busplan.buses.network import Network
 from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
-from busplan.elementwise import Number, plain, rounded_up, total
+from busplan.elementwise import Number, rounded_up
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.fit.certainty import cycle_of, fits_in
 from busplan.questions.fit.node_limit import largest_nodes
 from busplan.sections.base import Section
 from busplan.sections.cycle import BusSection
@@ -84,6 +85,8 @@ TERMS = (DATA, TOKEN, NONPERIODIC)
 class RingCycle(BusCycle):
     """Data of every station, and a round of the token for every few of them."""
 
+    term_figures = TERMS
+
     def __init__(self, network: Network, model: str) -> None:
         self.network, self.model = network, model
 
@@ -97,23 +100,15 @@ class RingCycle(BusCycle):
         round_us: Number = profile.bus.token_us + profile.guard.guard_us + profile.delivery.late_us
         return round_us
 
-    def computed_terms(self) -> tuple[Term, ...]:
-        bus = self.network.profile.bus
-        sizes = (group.nodes * (group.read_bytes + group.write_bytes) for group in self.network.groups)
-        return (
-            Term("cycle_data_us", 8 * total(sizes) / bus.rate_mbit_s),
-            Term("cycle_token_us", self.rounds * self.round_us),
-            Term("nonperiodic_us", self.network.nonperiodic_us),
+    def written(self) -> Iterator[BusEvent | EventRun]:
+        rate_mbit_s, (group,) = self.network.profile.bus.rate_mbit_s, self.network.groups
+        yield EventRun((BusEvent("token", "cycle_token_us", self.round_us, "token"),), self.rounds)
+        sent = (
+            BusEvent(kind, "cycle_data_us", 8 * size / rate_mbit_s, f"data {kind}", transaction="turn")
+            for kind, size in (("in", group.read_bytes), ("out", group.write_bytes))
         )
-
-    def events(self) -> Iterator[BusEvent]:
-        bus, (group,) = self.network.profile.bus, self.network.groups
-        for node in range(1, int(group.nodes) + 1):
-            if node % SHARED == 1:
-                yield BusEvent("token", "cycle_token_us", plain(self.round_us), "token")
-            for kind, size in (("in", group.read_bytes), ("out", group.write_bytes)):
-                yield BusEvent(kind, "cycle_data_us", 8 * plain(size) / bus.rate_mbit_s, f"data {kind}", node, "turn")
-        yield BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "window")
+        yield EventRun(tuple(sent), group.nodes, 0)
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "window")
 
     def figures(self) -> Mapping[str, Number]:
         return {"rounds": self.rounds}

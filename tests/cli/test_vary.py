@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from busplan.cli.vary import parse_axes
+from busplan.cli.options import parse_axes
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.questions.sweep import axis_values

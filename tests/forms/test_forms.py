@@ -37,11 +37,11 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.csv_rows import csv_cell, to_csv
-from busplan.forms.json_document import to_json
 from busplan.forms.lines import Line, Mark
 from busplan.forms.numbers import decimals_of, period, with_unit
 from busplan.forms.picture import first_picture
 from busplan.forms.terminal import block_lines
+from busplan.printable import to_json
 
 MARGIN = ShownValue(3.96912, "margin_us", "us", 3)
 FAILED = ShownValue(False, "fits", state="fails")

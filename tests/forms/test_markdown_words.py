@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from busplan.forms.markdown_words import code, escaped, table
+from busplan.forms.markdown import code, escaped, table
 
 HOSTILE = (
     "<script>alert(1)</script>", "a|b", "`x`", "```", "`", "\\", "a\\|b", "[x](http://y)", "*a* _b_", "@team #1",

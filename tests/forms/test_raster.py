@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import busplan
-from busplan.forms.inks import INKS
+from busplan.forms.picture import INKS
 from busplan.forms.raster import png
 
 SVG = "{http://www.w3.org/2000/svg}"

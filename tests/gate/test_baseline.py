@@ -6,9 +6,8 @@ from collections.abc import Callable
 import pytest
 
 from busplan.errors import BusplanError
-from busplan.gate.baseline import MODELS, Baseline, Record, read_baseline, write_baseline
+from busplan.gate.baseline import MODELS, Baseline, Record, fallen, read_baseline, write_baseline
 from busplan.gate.gate import FileResult, check_document
-from busplan.gate.regression import fallen
 from busplan.profile.document import Document
 from busplan.profile.shipped import load
 

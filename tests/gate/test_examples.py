@@ -15,11 +15,11 @@ import pytest
 from busplan.errors import PlacedError
 from busplan.gate.baseline import MODELS, read_baseline
 from busplan.gate.gate import FileResult, check_document, unreadable
-from busplan.gate.registry import all_rules
+from busplan.gate.rules import all_rules
 from busplan.profile.toml import decode, override
-from busplan.questions.circle.record import CircleTest
+from busplan.questions.circle.figures import CircleTest
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.fit.circle_move import path_steps
+from busplan.questions.fit.circle_refusal import path_steps
 from busplan.sections.profile import Profile
 
 EXAMPLES = Path(__file__).parent / "examples"

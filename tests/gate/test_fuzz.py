@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from busplan.errors import PlacedError
 from busplan.gate.baseline import Record
 from busplan.gate.finding import Finding
-from busplan.gate.formats import gate_format
+from busplan.gate.formats import FORMATS
 from busplan.gate.gate import FileResult, check_document, unreadable
-from busplan.gate.registry import all_rules
 from busplan.gate.report import CheckReport
+from busplan.gate.rules import all_rules
 from busplan.profile.shipped import shipped_folder
 from busplan.profile.toml import decode
 
@@ -176,7 +176,7 @@ def hold(content: bytes) -> FileResult:
         assert finding.code in all_rules()
     assert list(result.findings) == sorted(result.findings, key=lambda one: (one.line, one.column, one.code))
     for format_ in ("concise", "full", "github", "markdown"):
-        assert gate_format(format_).write(CheckReport((result,))).count("\n") >= len(result.findings)
+        assert FORMATS[format_].write(CheckReport((result,))).count("\n") >= len(result.findings)
     return result
 
 

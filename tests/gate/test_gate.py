@@ -10,8 +10,8 @@ import pytest
 from busplan.errors import PlacedError
 from busplan.gate.formats import FORMATS
 from busplan.gate.gate import FileResult, check_document, unreadable
-from busplan.gate.registry import all_rules, cycle_rules
 from busplan.gate.report import CheckReport
+from busplan.gate.rules import all_rules, cycle_rules
 from busplan.profile.document import Document
 from busplan.profile.toml import MAX_FILE_BYTES, decode
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.buses.ieee1394.table_1 import TABLE_1
+from busplan.buses.published import published
 from busplan.errors import BusplanError
 from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, parse_measurements
 from busplan.profile.shipped import locate_measurements
@@ -24,9 +24,10 @@ def test_the_shipped_example_is_table_1() -> None:
     path, name, shipped = locate_measurements("table-1.csv")
     found = parse_measurements(path.read_bytes(), name=name)
     assert (name, shipped) == ("table-1.csv", True)
-    assert [(one.payload_bytes, one.latency_us, one.request_and_acknowledge_us) for one in found] == [
-        (row.payload_bytes, row.latency_us, row.request_and_acknowledge_us) for row in TABLE_1
-    ]
+    _, halves, latencies, *_ = (table["rows"] for table in published("paper")["evidence"])
+    assert [one.request_and_acknowledge_us for one in found] == [row["published"] for row in halves]
+    assert [one.latency_us for one in found] == [row["published"] for row in latencies]
+    assert {f"{one.payload_bytes} bytes" for one in found} == {row["quantity"] for row in halves}
     assert {one.transaction for one in found} == {"write"}
 
 

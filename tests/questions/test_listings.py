@@ -3,25 +3,19 @@
 from collections import Counter
 from collections.abc import Callable, Iterator
 
+import busplan
 from busplan.cli.profiles_report import profiles_report
 from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, ShownValue, Snippet, Table
-from busplan.gate.registry import NEVER_SUPPRESSED, all_rules
-from busplan.gate.rules_report import rule_report, rules_report
+from busplan.gate.rules import NEVER_SUPPRESSED, all_rules, rule_report, rules_report
 from busplan.profile.shipped import load, shipped_names
-from busplan.questions.circle.roundness import circle_test
-from busplan.questions.evidence.figures import kind_evidence, paper_evidence
-from busplan.questions.evidence.paper import CIRCLE_PROFILES
-from busplan.questions.evidence.report import evidence_document, evidence_report, paper_document, paper_report
 
 ValuesIn = Callable[[object], Iterator[ShownValue]]
 
 
 def test_paper_has_every_comparison_once(values_of_the_document: Callable[[Report], int], values_in: ValuesIn) -> None:
-    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
-    sections = paper_evidence(circles=lambda: circles).sections
-    report = paper_report(sections)
-    figures = paper_document(sections)["figures"]
+    answer = busplan.evidence(paper=True)
+    sections, report, figures = answer.kinds[0].sections, answer.report(), answer.to_dict()["figures"]
     shown = [(value.key, value.value) for value in values_in(tuple(report.blocks()))]
     assert len(shown) == values_of_the_document(report)
     for key in ("computed", "residual", "relative_residual"):
@@ -32,8 +26,7 @@ def test_paper_has_every_comparison_once(values_of_the_document: Callable[[Repor
 
 
 def test_no_residual_of_the_paper_is_rounding_dust() -> None:
-    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
-    text = render(paper_report(paper_evidence(circles=lambda: circles).sections), "table")
+    text = render(busplan.evidence(paper=True).report(), "table")
     assert "e-" not in text.replace("time-", "")
     assert "-0.0 " not in text
     assert "-0.0\n" not in text
@@ -44,9 +37,8 @@ def test_no_residual_of_the_paper_is_rounding_dust() -> None:
 def test_evidence_has_every_comparison_once(
     values_of_the_document: Callable[[Report], int], values_in: ValuesIn
 ) -> None:
-    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
-    kinds = [kind_evidence("ieee1394", circles=lambda: circles)]
-    report, figures = evidence_report(kinds), evidence_document(kinds)["figures"]
+    answer = busplan.evidence("ieee1394")
+    report, figures = answer.report(), answer.to_dict()["figures"]
     shown = [value.value for value in values_in(tuple(report.blocks())) if value.key == "computed"]
     assert values_of_the_document(report) > len(shown)
     assert Counter(shown) == Counter(one["computed"] for one in figures)

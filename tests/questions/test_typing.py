@@ -10,8 +10,8 @@ from busplan.questions.compare.kinds import MachineOnKind, NotOnKind
 from busplan.questions.diff.difference import KeyDifference
 from busplan.questions.explain.derivation import Step
 from busplan.questions.fit.figures import CapacityFigures
-from busplan.questions.map.cells import Cell
-from busplan.questions.plan.option import Option
+from busplan.questions.map.trade_off import Cell
+from busplan.questions.plan.options import Option
 
 
 def test_the_types_are_seen_through_the_lazy_names() -> None:

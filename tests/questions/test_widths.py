@@ -19,9 +19,8 @@ from busplan.questions.compare.kinds import compare
 from busplan.questions.compare.report import compare_report
 from busplan.questions.diff.difference import difference
 from busplan.questions.diff.report import diff_report
-from busplan.questions.explain.assumptions import assumptions_report
 from busplan.questions.explain.derivation import assumptions, explain
-from busplan.questions.explain.report import explain_report
+from busplan.questions.explain.report import assumptions_report, explain_report
 from busplan.questions.fit.figures import capacity
 from busplan.questions.fit.network import model_names
 from busplan.questions.latency.figures import latency
@@ -30,8 +29,8 @@ from busplan.questions.plan.planning import plan
 from busplan.questions.plan.report import plan_report
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import sweep
+from busplan.questions.sweep.digest import Digest, default_columns
 from busplan.questions.sweep.grid import Listed, checked_grid
-from busplan.questions.sweep.top import Tally, TopRows, default_columns, sweep_report
 from busplan.questions.timeline.events import schedule
 from busplan.questions.timeline.report import timeline_report
 from busplan.sections.profile import Profile
@@ -50,11 +49,10 @@ def swept(profile: Profile) -> Report:
     models = model_names(profile)
     asked = Sweep(profile, grid, tuple(models), ())
     columns = (*grid.axes, "timing_model", *default_columns(asked))
-    rows, tally = TopRows(columns, sort_by=None, ascending=False, top=20), Tally(asked)
+    digest = Digest(asked._replace(columns=columns), top=20)
     for block in sweep(profile, grid, timing_models=models):
-        rows.add(block)
-        tally.add(block)
-    return sweep_report(rows, tally, document=dict)
+        digest.add(block)
+    return digest.report(dict)
 
 
 def several(profile: Profile) -> Report:

@@ -18,13 +18,13 @@ from busplan.buses import kind_named, kind_names
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.cli import app
 from busplan.cli.lazy import COMMANDS
-from busplan.forms.markdown_words import code, table
+from busplan.forms.markdown import code, table
 from busplan.manual import FOLDER, topics
 from busplan.profile.kinds import models_of
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import decode, validate
-from busplan.questions.explain.assumptions import constant_rows, equation_rows
-from busplan.questions.explain.register import figures_of
+from busplan.questions.explain.derivation import figures_of
+from busplan.questions.explain.report import constant_rows, equation_rows
 from busplan.sections.machine import AxisOverride
 from busplan.sourced import short
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from busplan.servo.contour import contour_error, covered_deg, least_squares_circle, measure_contour
+from busplan.servo.contour import contour_error, covered_deg, measure_contour
 
 ANGLE = np.linspace(0.3, 0.3 + 2 * np.pi, 70_000, endpoint=False)
 """A whole turn, in more points than one block holds."""
@@ -16,9 +16,9 @@ ANGLE = np.linspace(0.3, 0.3 + 2 * np.pi, 70_000, endpoint=False)
 def test_a_nanometre_is_found_on_a_metre(a: float, b: float, deviation: float) -> None:
     angle = ANGLE[::500]
     x, y = (1000 + deviation) * np.cos(angle) + a, (1000 + deviation) * np.sin(angle) + b
-    centre, found = least_squares_circle(x, y_mm=y, radius_mm=1000.0)
-    assert centre == pytest.approx((a, b), abs=1e-10)
-    assert found == pytest.approx(deviation, abs=1e-10)
+    found = measure_contour(x, y_mm=y, radius_mm=1000.0, part=slice(0, len(x)))
+    assert found.centre_offset_mm == pytest.approx((a, b), abs=1e-10)
+    assert found.radius_deviation_mm == pytest.approx(deviation, abs=1e-10)
 
 
 def test_the_fit_is_scipys() -> None:
@@ -27,8 +27,8 @@ def test_the_fit_is_scipys() -> None:
     angle = random.uniform(0, 4, 400)
     x, y = distance * np.cos(angle) + 1.0, distance * np.sin(angle) - 2.0
     expected = least_squares(lambda p: np.hypot(x - p[0], y - p[1]) - 20 - p[2], np.zeros(3), xtol=1e-15, ftol=1e-15)
-    centre, deviation = least_squares_circle(x, y_mm=y, radius_mm=20.0)
-    assert (*centre, deviation) == pytest.approx(expected.x, abs=1e-6)
+    found = measure_contour(x, y_mm=y, radius_mm=20.0, part=slice(0, len(x)))
+    assert (*found.centre_offset_mm, found.radius_deviation_mm) == pytest.approx(expected.x, abs=1e-6)
 
 
 def test_the_measures_of_an_oval_off_its_place() -> None:

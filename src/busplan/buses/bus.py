@@ -6,7 +6,7 @@ numbers.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -14,11 +14,9 @@ from busplan.buses.figure import BusFigures
 from busplan.buses.limits import ANY_PERIOD, Periods
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
-from busplan.elementwise import plain
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
     from busplan.sections.profile import Profile
 from busplan.buses.cycle import BusCycle
 from busplan.buses.parts import (
@@ -59,9 +57,6 @@ class Bus(ABC):
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""
-    command_events: ClassVar[tuple[tuple[str, str], ...]] = ()
-    """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
-    cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
     """What several events make together."""
     constants: ClassVar[Mapping[str, Sourced]] = {}
@@ -74,8 +69,6 @@ class Bus(ABC):
     """What would take a term of its own out of the cycle, each new values by dotted key."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
     """Data files, in busplan/data, with figures of it that others have published or measured."""
-    evidence_profiles: ClassVar[tuple[str, ...]] = ()
-    """Shipped profiles that these figures are compared on."""
 
     def profile_model(self) -> "type[Profile]":
         """The model of its profiles: that of module `section` beside the kind's own, which loads pydantic."""
@@ -103,20 +96,6 @@ class Bus(ABC):
         """The key that stands for a part of the machine; empty where the kind has none."""
         return next((name for name, key in self.keys.items() if key.role == role), "")
 
-    def arrivals_us(self, cycle: BusCycle) -> Mapping[int, float]:
-        """When each node has its command, by its number from 1, from the start of a cycle of plain numbers [us].
-
-        The last of its `command_events` has ended then; what belongs to no one node is the command of all.
-        """
-        found: dict[int, float] = {}
-        nodes, now_us = int(plain(cycle.network.nodes)), 0.0
-        for event in cycle.events():
-            now_us += event.us
-            if (event.transaction, event.kind) in self.command_events:
-                owners = range(1, nodes + 1) if event.node is None else (event.node,)
-                found |= dict.fromkeys(owners, now_us)
-        return found or dict.fromkeys(range(1, nodes + 1), now_us)
-
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
         """What of the bus a plan may turn; it is asked again after each change of the network."""
         return ()
@@ -141,21 +120,9 @@ class Bus(ABC):
         """What to beware of, whatever the verdict, with each of some numbers of nodes on the bus."""
         return []
 
-    def evidence(
-        self,
-        networks: Mapping[str, Network],  # noqa: ARG002 - a kind may have none
-        published: Mapping[str, Mapping[str, Any]],  # noqa: ARG002
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare figures that others have published or measured with what its equations give.
-
-        Parameters
-        ----------
-        networks
-            Those of `evidence_profiles`, by name.
-        published
-            What each of `evidence_data` holds, by name.
-        """
-        return ()
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Functions that rows of evidence name beside its figures: of a cycle and what the row gives."""
+        return {}
 
     def limit(self, key: str) -> Limit | None:
         """The limit of a key; None for time, which is no limit of the bus."""

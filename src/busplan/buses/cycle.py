@@ -1,13 +1,23 @@
-"""What a cycle of any bus is: terms that add up, events that add up to them, latencies, and what is not known."""
+"""A cycle of any bus: counted events in the order of the wire, which terms and the timeline come from.
+
+Each kind writes its cycle once, as runs of events. Terms are their sums: a run counts its events, so that a million
+nodes take no longer to add up than one. The timeline lays the same runs out, event by event.
+"""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from functools import cached_property
-from typing import NamedTuple
+from itertools import chain
+from typing import ClassVar, Final, Literal, NamedTuple, TypeAlias
 
-from busplan.buses.figure import REQUIRED, term_name
+from busplan.buses.figure import REQUIRED, Figure, term_name
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, plain, total
+from busplan.elementwise import Number, is_off, plain, total
+
+Rounds: TypeAlias = Literal["all", "first", "but first"]
+ALL: Final[Rounds] = "all"
+FIRST: Final[Rounds] = "first"
+BUT_FIRST: Final[Rounds] = "but first"
 
 
 class Term(NamedTuple):
@@ -21,7 +31,7 @@ class Term(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What it is called beside the other terms."""
+        """Name beside the other terms."""
         return term_name(self.key)
 
 
@@ -32,15 +42,72 @@ class BusEvent(NamedTuple):
     """Key of its `EventKind`."""
     term: str
     """Key of the term that it is a part of."""
-    us: float
+    us: Number
+    """How long it takes [us]: a plain number where it is laid out, of any sort in a run."""
     label: str
-    """What it is, and who is at work."""
+    """Name, and who is at work."""
     node: int | None = None
-    """Whose it is, from 1; None for what belongs to all."""
+    """Whose it is where it is laid out, from 1; None for what belongs to all."""
     transaction: str | None = None
-    """What it belongs to at a coarse look: the key of an `EventKind` for stretches."""
+    """The stretch that it belongs to: the key of an `EventKind`. Where nodes take turns, an event without one is no
+    node's own."""
     packet: str | None = None
     """Which packet of the transaction it belongs to."""
+    rests_on: str = ""
+    """Dotted key of the profile that it comes from, where that is one alone."""
+    rounds: Rounds = ALL
+    """Rounds of its run that have it."""
+
+
+class Run(NamedTuple):
+    """Events one behind the other, in one round or several."""
+
+    events: tuple[BusEvent, ...]
+    """Those of a round; of the mean round where rounds differ."""
+    times: Number | None = None
+    """Rounds [1]; None for one alone."""
+    group: int | None = None
+    """Place of the group of nodes that take turns, each with as many rounds; None for what belongs to all."""
+    laid_out: Callable[[Number], Iterable[BusEvent]] | None = None
+    """From the number of a round, from 0, to its events where a timeline shows them finer, or where rounds differ.
+
+    Over all rounds they add up to `events`. Of rounds that differ, it takes a mean number, too.
+    """
+
+    def events_us(self) -> Iterator[tuple[str, Number]]:
+        """Each event that is not off, as its term and what it takes [us]."""
+        return ((event.term, event.us) for event in self.events if not is_off(event.us))
+
+    def counted_us(self, times: Number) -> Iterator[tuple[str, Number]]:
+        """The same of several rounds, with the events of a term together."""
+        parts: dict[tuple[str, Rounds], list[Number]] = {}
+        for event in self.events:
+            if not is_off(event.us):
+                parts.setdefault((event.term, event.rounds), []).append(event.us)
+        for (term, rounds), parts_us in parts.items():
+            first_us = parts_us[0]
+            # Equal ones are a product, which a derivation shows shorter.
+            are_equal = len(parts_us) > 1 and all(us is first_us for us in parts_us)
+            round_us = len(parts_us) * first_us if are_equal else total(parts_us)
+            yield term, round_us if rounds == FIRST else (times if rounds == ALL else times - 1) * round_us
+
+
+def summed(runs: Iterable[Run], keys: Iterable[str]) -> dict[str, Number]:
+    """Time of each term: the sum of its events in the order of the runs, 0.0 of one without events [us].
+
+    Parameters
+    ----------
+    runs
+        The runs; a KeyError tells of an event whose term is none of `keys`.
+    keys
+        Keys of the terms, in their order.
+    """
+    sums: dict[str, Number | None] = dict.fromkeys(keys)
+    for run in runs:
+        for term, us in run.events_us() if run.times is None else run.counted_us(run.times):
+            before_us = sums[term]
+            sums[term] = us if before_us is None else before_us + us
+    return {term: 0.0 if us is None else us for term, us in sums.items()}
 
 
 class Doubt(NamedTuple):
@@ -54,7 +121,7 @@ class Doubt(NamedTuple):
 
 
 class LeftOut(NamedTuple):
-    """What a cycle could have and a profile does not say: no verdict has it."""
+    """A part that a cycle could have and a profile does not say: no verdict has it."""
 
     label: str
     key: str
@@ -73,7 +140,7 @@ class BusLatency(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What it is called beside the others."""
+        """Name beside the others."""
         return f"{self.group} {self.name}" if self.group else self.name
 
 
@@ -85,28 +152,47 @@ class BusCycle(ABC):
     """
 
     network: Network
+    term_figures: ClassVar[tuple[Figure, ...]]
+    """One for each term, in their order."""
+    command_events: ClassVar[tuple[tuple[str | None, str], ...]] = ()
+    """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
+    cycle. Those of no one node are the command of all."""
 
     @abstractmethod
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire: every term always, 0.0 where it is off."""
+    def written(self) -> Iterator[BusEvent | Run]:
+        """The cycle in the order of the wire: single events, and runs. What is off takes 0.0, or is not there."""
+
+    @cached_property
+    def runs(self) -> tuple[Run, ...]:
+        """The cycle, written once: a derivation names the very numbers that are added up."""
+        return tuple(part if isinstance(part, Run) else Run((part,)) for part in self.written())
+
+    @cached_property
+    def by_term(self) -> Mapping[str, Number]:
+        """Time of each term, by its key in the order of the terms [us]."""
+        return summed(self.runs, (figure.key for figure in self.term_figures))
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """The terms, computed once: a derivation names the very numbers that are added up."""
-        return self.computed_terms()
+        """The terms in their order: every one always, 0.0 where it is off."""
+        keys: dict[str, set[str]] = {}
+        for event in chain.from_iterable(run.events for run in self.runs):
+            keys.setdefault(event.term, set()).add(event.rests_on)
+        alone = {term: min(own) for term, own in keys.items() if len(own) == 1}
+        return tuple(Term(key, us, alone.get(key, "")) for key, us in self.by_term.items())
 
     @property
     def required_us(self) -> Number:
-        """What the whole cycle needs, the sum of its terms: N times (2) [us]."""
-        return total(term.us for term in self.terms)
+        """Time that the whole cycle needs, the sum of its terms: N times (2) [us]."""
+        return total(self.by_term.values())
 
     @property
     def most_required_us(self) -> Number:
-        """No less than it needs with any number of nodes up to its own, where one more can make it shorter [us]."""
+        """Upper bound over all smaller node counts, where one node more can make a cycle shorter [us]."""
         return self.required_us
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:  # noqa: ARG002 - most just grow by it
-        """What the whole cycle grows by if what it transmits takes longer [us].
+        """Growth of the whole cycle if its transmissions take longer [us].
 
         Parameters
         ----------
@@ -118,7 +204,7 @@ class BusCycle(ABC):
         return extra_us
 
     def bias_us(self) -> Number | None:
-        """What the bus takes beyond the timing model, on the mean [us]; None where nobody has measured it."""
+        """Time of the bus beyond the timing model, on the mean [us]; None where nobody has measured it."""
         return None
 
     def sync_jitter_us(self) -> Number:
@@ -145,16 +231,62 @@ class BusCycle(ABC):
         return 1 if at_sync else 0
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """What is not known exactly; different inputs are independent."""
+        """Inputs that are not known exactly; different ones are independent."""
         return ()
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What the cycle could have and the profile does not say."""
+        """Parts that the cycle could have and the profile does not say."""
         return ()
 
-    @abstractmethod
     def events(self) -> Iterator[BusEvent]:
         """The same cycle laid out, of plain numbers only."""
+        return chain.from_iterable(self.each_round())
+
+    def each_round(self) -> Iterator[Iterable[BusEvent]]:
+        """The events of each round, which nothing interrupts; of plain numbers only."""
+        for run in self.runs:
+            count = 1 if run.times is None else int(plain(run.times))
+            first, each = self._turns(run)
+            for number in range(count):
+                yield _round(run, number, None if run.group is None else first + number // each)
+
+    def _turns(self, run: Run) -> tuple[int, int]:
+        """First node of a run, and the rounds that each of its nodes has; of plain numbers."""
+        if run.group is None:
+            return 1, 1
+        nodes = [int(plain(group.nodes)) for group in self.network.groups]
+        return sum(nodes[: run.group]) + 1, int(plain(run.times or 1)) // nodes[run.group]
+
+    def arrival_us(self, node: int) -> float:
+        """When a node has its command, from the start of a cycle of plain numbers [us].
+
+        Parameters
+        ----------
+        node
+            Number of the node, from 1.
+        """
+        arrived_us, now_us = None, 0.0
+        for run in self.runs:
+            first, each = self._turns(run)
+            count = 1 if run.times is None else int(plain(run.times))
+            before = (node - first + 1) * each - 1 if run.group is not None else count - 1
+            if 0 <= before < count:
+                until_us = _until_us(run, before, self.command_events)
+                if until_us is not None:
+                    begins_us = now_us + _rounds_us(run, before)
+                    arrived_us = begins_us + self.added_before_us(begins_us) + until_us
+            now_us += _rounds_us(run, count)
+        return now_us + self.added_before_us(now_us) if arrived_us is None else arrived_us
+
+    def added_before_us(self, sent_us: float) -> float:  # noqa: ARG002 - most runs go one behind the other
+        """Time of events between the rounds, before the runs have taken some time, in plain numbers [us].
+
+        Parameters
+        ----------
+        sent_us
+            Time of the runs up to the round in question [us].
+        """
+        return 0.0
 
     def figures(self) -> Mapping[str, Number | None]:
         """The kind's own figures beside the terms, by key; None for one that these groups of nodes do not have."""
@@ -164,3 +296,36 @@ class BusCycle(ABC):
         """How long things take; a kind without transactions has its cycle."""
         phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}
         return (BusLatency("cycle", None, phases),)
+
+
+def _round(run: Run, number: int, node: int | None) -> Iterator[BusEvent]:
+    """The events of a round, of plain numbers."""
+    for event in run.events if run.laid_out is None else run.laid_out(number):
+        if event.rounds == ALL or (event.rounds == FIRST) == (number == 0):
+            has_node = node is not None and event.transaction is not None
+            yield event._replace(us=plain(event.us), node=node if has_node else event.node)
+
+
+def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]) -> float | None:
+    """From the start of a round to the end of the last event of a command [us]; None without one."""
+    if not any((event.transaction, event.kind) in commands for event in run.events):
+        return None
+    if len(run.events) == 1:
+        return plain(run.events[0].us)
+    until_us = now_us = 0.0
+    for event in _round(run, number, None):
+        now_us += plain(event.us)
+        if (event.transaction, event.kind) in commands:
+            until_us = now_us
+    return until_us
+
+
+def _rounds_us(run: Run, count: int) -> float:
+    """Time of the first rounds of a run, of plain numbers [us]: as many times their mean."""
+    if not count:
+        return 0.0
+    events: Iterable[BusEvent] = run.events
+    if run.laid_out is not None and run.group is not None and len(run.events) > 1:  # rounds may differ
+        events = run.laid_out((count - 1) / 2)
+    counts = {ALL: count, FIRST: 1, BUT_FIRST: count - 1}
+    return sum(counts[event.rounds] * plain(event.us) for event in events)

@@ -1,13 +1,11 @@
-"""Published figures beside computed ones."""
+"""The data files with published and measured figures."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from math import fsum, sqrt
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
-
-from busplan.sourced import Grade
+from typing import Any, Final, NamedTuple
 
 _DATA: Final = Path(__file__).resolve().parents[1] / "data"
 
@@ -22,6 +20,24 @@ def published(name: str) -> dict[str, Any]:
         Name of the file.
     """
     return tomllib.loads((_DATA / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def rows_of(name: str, part: str) -> list[dict[str, Any]]:
+    """Rows of evidence of a part of the model, in all tables of a data file.
+
+    Parameters
+    ----------
+    name
+        Name of the file.
+    part
+        The part, as the tables have it.
+
+    Examples
+    --------
+    >>> [row["published"] for row in rows_of("ethercat", "bytes")]
+    [0.0839, 0.0841, 0.0826]
+    """
+    return [row for table in published(name)["evidence"] if table.get("part") == part for row in table["rows"]]
 
 
 class Spread(NamedTuple):
@@ -46,9 +62,6 @@ class Spread(NamedTuple):
         return cls(mean, sqrt(variance * (1 + 1 / count)))
 
 
-Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
-
-
 class Tested(NamedTuple):
     """Which parts of a kind of bus figures of others set, and which they test."""
 
@@ -68,56 +81,16 @@ def parts_tested(names: Sequence[str]) -> Tested:
     names
         The files.
     """
-    files = [published(name) for name in names]
 
     def parts(table: str) -> dict[str, str]:
-        return {part: _words(part, one, file) for file in files for part, one in file.get(table, {}).items()}
+        return {part: _words(name, part, own) for name in names for part, own in published(name).get(table, {}).items()}
 
-    return Tested(parts("set_by"), parts("tested"), tuple(part for file in files for part in file.get("untested", ())))
+    untested = (part for name in names for part in published(name).get("untested", ()))
+    return Tested(parts("set_by"), parts("tested"), tuple(untested))
 
 
-def _words(part: str, one: Mapping[str, Any], file: Mapping[str, Any]) -> str:
-    """Words of one part; {count} is the length of the list that it names, or the rows of evidence of the part."""
-    found: Any = file
-    for key in one.get("of", "").split(".") if "of" in one else ():
-        found = found[key]
-    rows = [row for table in file.get("evidence", ()) if table["part"] == part for row in table["rows"]]
-    words: str = one["words"].format(count=len(found if "of" in one else rows))
+def _words(name: str, part: str, own: Mapping[str, Any]) -> str:
+    """Words of a part; {count} is the length of the list `of` [table, key], or the rows of evidence of the part."""
+    table, key = own.get("of", ("", ""))
+    words: str = own["words"].format(count=len(published(name)[table][key] if table else rows_of(name, part)))
     return words
-
-
-class Comparison(NamedTuple):
-    """One published figure and one way to compute it."""
-
-    section: str
-    quantity: str
-    unit: Unit
-    published: float | None
-    """As printed, or the quotient of two printed figures; None where the source gives a formula and no figure."""
-    method: str
-    """The equation or timing model behind the computed figure."""
-    computed: float
-    grade: Grade = "published"
-    """How well the published figure is known."""
-    uncertainty: float | None = None
-    """Expanded uncertainty of the computed figure, in `unit`; None where it is not weighed."""
-
-    @property
-    def residual(self) -> float | None:
-        """Computed less published, in `unit`."""
-        return None if self.published is None else self.computed - self.published
-
-    @property
-    def relative_residual(self) -> float | None:
-        """The residual as a share of the published figure [1]."""
-        return None if self.published is None else (self.computed - self.published) / self.published
-
-
-class EvidenceSection(NamedTuple):
-    """One table or passage of a source."""
-
-    title: str
-    note: str
-    comparisons: tuple[Comparison, ...]
-    data: str = "paper"
-    """Data file that the published figures stand in, with their sources."""

@@ -1,7 +1,7 @@
 """What SERCOS I, II and III share: whole words, the master's pipeline, and how long feedback and commands take."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import reduce
 from math import ceil
 from typing import Final, TypeAlias
@@ -111,6 +111,11 @@ class SercosCycle(BusCycle):
     def feedback_due_us(self) -> Number:
         """When all nodes must have their feedback ready, from the start of the cycle [us]."""
 
+    def arrival_us(self, node: int) -> float:  # noqa: ARG002 - all at once
+        """When the last byte of the MDT has passed the ring: all nodes have their commands then [us]."""
+        _, command = self.latencies()
+        return plain(command.phases["delay_us"]) - plain(command.phases["node_us"])
+
     def sampled_us(self) -> float:
         """All nodes sample at once, early enough for the slowest of them [us]."""
         return plain(self.feedback_due_us) - plain(slowest_us(self.network, lambda group: group.read_execution_us))
@@ -135,10 +140,3 @@ class SercosBus(Bus):
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
         """It runs beside the telegrams, and is in every latency: drives sample before their telegram."""
         return of_latency
-
-    def arrivals_us(self, cycle: BusCycle) -> Mapping[int, float]:
-        """When the last byte of the MDT has passed the ring: all nodes have their commands then [us]."""
-        _, command = cycle.latencies()
-        phases = {key: plain(us) for key, us in command.phases.items()}
-        arrived_us = phases["delay_us"] - phases["node_us"]
-        return dict.fromkeys(range(1, int(plain(cycle.network.nodes)) + 1), arrived_us)

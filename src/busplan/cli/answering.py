@@ -125,7 +125,7 @@ def _option(argument: re.Match[str]) -> str:
 
 
 def _naming(problem: str, changes: KeyChanges) -> str:
-    keys = (one.sections[-1] for one in changes.by_set)
+    keys = (change.sections[-1] for change in changes.by_set)
     is_of_profile = _KEY_AND_VALUE.search(problem) or any(key in problem for key in keys if "_" in key)
     return f"{problem} (with {changes.words})" if is_of_profile and SET not in problem else problem
 

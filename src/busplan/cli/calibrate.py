@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
@@ -17,9 +16,11 @@ from busplan.cli.options import (
     FormatOption,
     OutputOption,
     ProfileArgument,
+    option,
     timing_model,
 )
 from busplan.cli.output import say
+from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
@@ -45,21 +46,13 @@ def calibrate_command(
     ] = None,
     group: Annotated[
         str | None,
-        typer.Option(
-            "--group",
-            metavar="NAME",
-            help="The group of nodes that was measured, of a profile with groups.  [default: its one group]",
-            show_default=False,
+        option(
+            "--group NAME", "The group of nodes that was measured, of a profile with groups.  [default: its one group]"
         ),
     ] = None,
     timing: Annotated[
         str | None,
-        typer.Option(
-            "--timing",
-            metavar="MODEL",
-            help="Timing model that says what the packets take.  [default: the one that decides]",
-            show_default=False,
-        ),
+        option("--timing MODEL", "Timing model that says what the packets take.  [default: the one that decides]"),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[

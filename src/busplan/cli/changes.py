@@ -1,6 +1,6 @@
 """Options that change the profile of a command: --set, and --period with its unit."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import wraps
 from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -13,6 +13,7 @@ from busplan.profile.changes import SET, KeyChange, KeyChanges, parse_set, requi
 
 if TYPE_CHECKING:
     from busplan.sections.profile import Profile
+
 
 _PERIOD: Final = "cycle.period_us"
 PeriodsOption = Annotated[
@@ -63,12 +64,14 @@ def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..
     def replaced(command: Callable[..., None]) -> Callable[..., None]:
         own = signature(command)
         parameters: list[Parameter] = []
-        for one in own.parameters.values():
-            if one.name == "changes":
+        for parameter in own.parameters.values():
+            if parameter.name == "changes":
                 kinds = options.items()
-                parameters += [Parameter(name, one.kind, default=None, annotation=option) for name, option in kinds]
+                parameters += [
+                    Parameter(name, parameter.kind, default=None, annotation=option) for name, option in kinds
+                ]
             else:
-                parameters.append(one)
+                parameters.append(parameter)
 
         @wraps(command)
         def with_changes(*arguments: Any, set_: list[str] | None, **others: Any) -> None:
@@ -133,3 +136,33 @@ def _period_changes(text: str) -> list[KeyChange]:
         if len(parts) == 1:
             raise
         raise BusplanError(f"--period {text}: expected times with their unit between commas, as 500us,1ms") from None
+
+
+def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "list[Profile]":
+    """Read every profile.
+
+    Parameters
+    ----------
+    arguments
+        PROFILE arguments; standard input may be one of them.
+    load
+        Function that reads one.
+
+    Raises
+    ------
+    BusplanError
+        Standard input more than once; or the problems of all profiles together.
+    """
+    plans: list[Profile] = []
+    problems: list[str] = []
+    asked = list(arguments)
+    if asked.count("-") > 1:
+        raise BusplanError("-: standard input can be read once; give files for the others")
+    for argument in asked:
+        try:
+            plans.append(load(argument))
+        except BusplanError as error:
+            problems.extend(error.problems)
+    if problems:
+        raise BusplanError(*dict.fromkeys(problems))
+    return plans

@@ -9,11 +9,11 @@ import typer
 from busplan.cli.answering import columns
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import require_apart
-from busplan.cli.options import complete_profile, output_option
+from busplan.cli.options import complete_profile, option, output_option
 from busplan.cli.output import PlanFailsError, emit_text, is_styled, is_terminal, say, write_document
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
-from busplan.gate.formats import FORMATS, gate_format
+from busplan.gate.formats import FORMATS
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
@@ -50,13 +50,12 @@ def check_command(
     changes: KeyChanges = NO_CHANGES,
     format_: Annotated[
         FormatName | None,
-        typer.Option(
-            "--format",
-            envvar="BUSPLAN_FORMAT",
-            metavar="FORM",
-            help="Form of the report: concise is one line a finding, full shows the line of the file with the value "
+        option(
+            "--format FORM",
+            "Form of the report: concise is one line a finding, full shows the line of the file with the value "
             f"underlined, json is the document of all; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are "
             "for the build service.  [default: full on a terminal, otherwise concise]",
+            envvar="BUSPLAN_FORMAT",
         ),
     ] = None,
     output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
@@ -70,28 +69,22 @@ def check_command(
     ] = True,
     circle_steps: Annotated[
         int | None,
-        typer.Option(
-            "--circle-steps",
-            metavar="N",
-            min=1,
-            help="Most simulated steps of each axis of a circle; a longer one is not run, which BP204 warns of.  "
+        option(
+            "--circle-steps N",
+            "Most simulated steps of each axis of a circle; a longer one is not run, which BP204 warns of.  "
             "[default: 10000000]",
+            min=1,
         ),
     ] = None,
     baseline: Annotated[
         Path | None,
-        typer.Option(
-            "--baseline",
-            metavar="FILE",
-            help="Record that no profile may lose axes or margin against.  [default: no record]",
-        ),
+        option("--baseline FILE", "Record that no profile may lose axes or margin against.  [default: no record]"),
     ] = None,
     update_baseline: Annotated[
         bool, typer.Option("--update-baseline", help="Record what the profiles carry now in the --baseline file.")
     ] = False,
     skip_others: Annotated[
-        bool,
-        typer.Option("--skip-others", help="Skip named files that claim no `schema_version`, and count them."),
+        bool, typer.Option("--skip-others", help="Skip named files that claim no `schema_version`, and count them.")
     ] = False,
     jobs: Annotated[
         int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Number of processes to check with.")
@@ -130,7 +123,7 @@ def check_command(
             "record them again with --update-baseline"
         )
     with _executor(min(jobs, len(collection.sources))) as where:
-        answer = check(
+        report = check(
             collection,
             circle=circle,
             changes=changes,
@@ -140,7 +133,6 @@ def check_command(
             executor=where,
             **({} if circle_steps is None else {"circle_steps": circle_steps}),
         )
-    report = answer.found
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
     if verbose:
@@ -149,10 +141,10 @@ def check_command(
     if update_baseline and baseline is not None:
         _update_baseline(baseline, report, quiet=quiet)
     if not quiet:
-        from busplan.forms.columns import sentence_text
+        from busplan.forms.numbers import sentence_text
         from busplan.questions.words.documents import changes_sentences
 
-        say(*map(sentence_text, changes_sentences(changes)), answer.headline)
+        say(*map(sentence_text, changes_sentences(changes)), report.headline)
     if report.failed:
         raise typer.Exit(2)
     if not exit_zero and report.has_findings(fail_on):
@@ -215,11 +207,10 @@ def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
 def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -> None:
     """Write the report; without a format, as a person at a terminal or a program behind a pipe reads it best."""
     name = format_ or ("full" if output is None and is_terminal() else "concise")
-    chosen = gate_format(name)
-    if output is not None or FORMATS[name].reader != "people":
+    chosen = FORMATS[name]
+    if output is not None or chosen.reader != "people":
         write_document(chosen.write(report), output, quiet=True)
-    elif is_styled():
-        emit_text(chosen.on_terminal(report, width=columns()))
     else:
-        emit_text(chosen.write(report))
-    say(*chosen.log(report))
+        emit_text(chosen.write(report, width=columns() if is_styled() else None))
+    if chosen.repeats:
+        say(*FORMATS["concise"].write(report).splitlines())

@@ -14,7 +14,7 @@ from busplan.cli.changes import (
     takes_changes,
 )
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import AllOption, FormatOption, OutputOption, ProfileArgument
+from busplan.cli.options import AllOption, FormatOption, OutputOption, ProfileArgument, option
 from busplan.cli.output import PlanFailsError, say
 from busplan.cli.pictures import plot_form
 from busplan.cli.progress import progress_bar
@@ -37,23 +37,20 @@ def circle_test_command(
     ] = False,
     trace: Annotated[
         Path | None,
-        typer.Option(
-            "--trace",
-            metavar="FILE.csv",
-            help="Write time [us], commanded and actual position [mm] and contour error [mm] as CSV; an old file is "
+        option(
+            "--trace FILE.csv",
+            "Write time [us], commanded and actual position [mm] and contour error [mm] as CSV; an old file is "
             "replaced.  [default: no file]",
         ),
     ] = None,
     every: Annotated[
-        int | None,
-        typer.Option("--every", metavar="N", help="Write one of N steps of the simulation to --trace.  [default: 10]"),
+        int | None, option("--every N", "Write one of N steps of the simulation to --trace.  [default: 10]")
     ] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(
-            "--plot",
-            metavar="FILE",
-            help="Draw the magnified polar error, the error over time and the ranked error sources, with tolerances, "
+        option(
+            "--plot FILE",
+            "Draw the magnified polar error, the error over time and the ranked error sources, with tolerances, "
             "into FILE.svg or FILE.png; an old file is replaced. PNG needs the extra plot (resvg-py).  "
             "[default: no figure]",
         ),

@@ -1,27 +1,19 @@
 """`busplan compare`."""
 
-from collections.abc import Mapping
-from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
-from busplan.cli.options import AllOption, ProfileArgument, output_option
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, show_drawn
+from busplan.cli.options import AllOption, ProfileArgument, option
+from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, show_drawn
 from busplan.cli.progress import progress_bar
-from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.questions.compare import CompareAnswer
-
-CompareForm = Literal[Form, Picture]
-
-_ENDINGS: Final[Mapping[str, CompareForm]] = MappingProxyType({**ENDINGS, **PICTURES})
 
 
 def _complete_kinds(incomplete: str) -> list[str]:
@@ -40,12 +32,10 @@ def compare_command(
     profile: ProfileArgument,
     buses: Annotated[
         str | None,
-        typer.Option(
-            "--buses",
-            metavar="KIND[,KIND...]",
-            help="Kinds of bus, as bus.kind has them.  [default: all, the profile's own first]",
+        option(
+            "--buses KIND[,KIND...]",
+            "Kinds of bus, as bus.kind has them.  [default: all, the profile's own first]",
             autocompletion=_complete_kinds,
-            show_default=False,
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
@@ -58,15 +48,8 @@ def compare_command(
         ),
     ] = False,
     all_: AllOption = False,
-    format_: Annotated[
-        CompareForm | None,
-        typer.Option(
-            "--format",
-            help=PICTURE_FORMAT_HELP,
-            show_default=False,
-        ),
-    ] = None,
-    output: Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")] = None,
+    format_: DrawnFormatOption = None,
+    output: DrawnOutputOption = None,
 ) -> None:
     """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
 
@@ -77,7 +60,7 @@ def compare_command(
 
     Example: busplan compare gantry-24 --circle
     """
-    chosen = picture_form(format_, output, forms=_ENDINGS)
+    chosen = drawn_form(format_, output)
 
     def find() -> "CompareAnswer":
         from busplan.questions.compare import compare

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from busplan.cli.answering import answer, naming_option
-from busplan.cli.changes import takes_changes
+from busplan.cli.changes import load_each, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
@@ -15,11 +15,11 @@ from busplan.cli.options import (
     OutputOption,
     TimingOption,
     complete_profile,
+    option,
     timing_model,
 )
 from busplan.cli.output import PlanFailsError, say
 from busplan.cli.progress import progress_bar
-from busplan.cli.several import load_each
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
@@ -45,18 +45,16 @@ def diff_command(
     changes: KeyChanges = NO_CHANGES,
     timing: TimingOption = "both",
     circle: Annotated[
-        bool,
-        typer.Option("--circle/--no-circle", help="Run both circle tests when either profile asks for one."),
+        bool, typer.Option("--circle/--no-circle", help="Run both circle tests when either profile asks for one.")
     ] = True,
     fail_on_regression: Annotated[
         bool, typer.Option("--fail-on-regression", help="Exit 1 when a figure of B is worse.")
     ] = False,
     tolerance: Annotated[
         float | None,
-        typer.Option(
-            "--tolerance",
-            metavar="PERCENT",
-            help="With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
+        option(
+            "--tolerance PERCENT",
+            "With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
         ),
     ] = None,
     all_: AllOption = False,

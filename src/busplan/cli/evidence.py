@@ -37,5 +37,5 @@ def evidence_command(
         from busplan.questions.evidence import evidence
 
         with progress_bar("circle tests") as progress:
-            found = evidence(kind, progress=progress)
-        give(found.report())
+            known = evidence(kind, progress=progress)
+        give(known.report())

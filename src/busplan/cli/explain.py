@@ -13,6 +13,7 @@ from busplan.cli.options import (
     FormatOption,
     OutputOption,
     ProfileArgument,
+    option,
     timing_models,
 )
 from busplan.cli.progress import progress_bar
@@ -43,20 +44,17 @@ def explain_command(
     changes: KeyChanges = NO_CHANGES,
     timing: Annotated[
         str | None,
-        typer.Option(
-            "--timing",
-            metavar="MODEL|both",
-            help="Timing model; a circle test and a verdict have only the one that decides.  "
+        option(
+            "--timing MODEL|both",
+            "Timing model; a circle test and a verdict have only the one that decides.  "
             "[default: the profile's bus.timing_model]",
-            show_default=False,
         ),
     ] = None,
     transaction: Annotated[
         str | None,
-        typer.Option(
-            "--transaction",
-            metavar="NAME|both",
-            help="Which transaction or message, for a figure of latency, by its name there: as read, SYNC or loop; a "
+        option(
+            "--transaction NAME|both",
+            "Which transaction or message, for a figure of latency, by its name there: as read, SYNC or loop; a "
             "wrong one lists them; both is all of them.  [default: both]",
         ),
     ] = None,

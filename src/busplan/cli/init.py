@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from busplan.buses import kind_named, kind_names
-from busplan.cli.options import complete_profile, time_us
+from busplan.cli.options import complete_profile, option, time_us
 from busplan.cli.output import say
 from busplan.errors import BusplanError
 from busplan.files import write_file
@@ -30,55 +30,41 @@ def init_command(
     ] = "my-machine",
     bus: Annotated[
         str | None,
-        typer.Option(
-            "--bus",
-            metavar="KIND",
-            help=f"Kind of bus: {' or '.join(kind_names())}.  [default: {_KIND}]",
-            autocompletion=lambda incomplete: [one for one in kind_names() if one.startswith(incomplete)],
+        option(
+            "--bus KIND",
+            f"Kind of bus: {' or '.join(kind_names())}.  [default: {_KIND}]",
+            autocompletion=lambda incomplete: [kind for kind in kind_names() if kind.startswith(incomplete)],
         ),
     ] = None,
     nodes: Annotated[
-        int | None,
-        typer.Option("--nodes", metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4]"),
+        int | None, option("--nodes N", "Nodes of the machine, the host not counted.  [default: 4]", min=1)
     ] = None,
     axes: Annotated[
-        int | None,
-        typer.Option(
-            "--axes", metavar="N", min=1, help="Axes of the whole machine, alike on each node.  [default: 4 a node]"
-        ),
+        int | None, option("--axes N", "Axes of the whole machine, alike on each node.  [default: 4 a node]", min=1)
     ] = None,
     period: Annotated[
         str | None,
-        typer.Option(
-            "--period",
-            metavar="TIME",
-            help="Communication period with its unit, as 1ms or 500us.  [default: what is usual on the bus]",
+        option(
+            "--period TIME", "Communication period with its unit, as 1ms or 500us.  [default: what is usual on the bus]"
         ),
     ] = None,
     bytes_per_axis: Annotated[
         int | None,
-        typer.Option(
-            "--bytes-per-axis",
-            metavar="N",
-            min=1,
-            help="Payload of each axis, in either direction [bytes].  [default: 8]",
-        ),
+        option("--bytes-per-axis N", "Payload of each axis, in either direction [bytes].  [default: 8]", min=1),
     ] = None,
     host: Annotated[
         str | None,
-        typer.Option(
-            "--host",
-            metavar="HOST",
-            help="Host of the master, whose own time is assumed by it; of EtherCAT hardware, tuned, real-time or stock."
+        option(
+            "--host HOST",
+            "Host of the master, whose own time is assumed by it; of EtherCAT hardware, tuned, real-time or stock."
             "  [default: tuned]",
         ),
     ] = None,
     source: Annotated[
         str | None,
-        typer.Option(
-            "--from",
-            metavar="SHIPPED",
-            help="Copy a shipped profile instead, with its comments (see `busplan profiles`).  [default: no copy]",
+        option(
+            "--from SHIPPED",
+            "Copy a shipped profile instead, with its comments (see `busplan profiles`).  [default: no copy]",
             autocompletion=complete_profile,
         ),
     ] = None,

@@ -2,8 +2,6 @@
 
 from typing import Annotated
 
-import typer
-
 from busplan.cli.answering import answer
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
@@ -13,6 +11,7 @@ from busplan.cli.options import (
     OutputOption,
     ProfileArgument,
     TimingOption,
+    option,
     parse_sizes,
     timing_models,
 )
@@ -24,12 +23,10 @@ def latency_command(
     profile: ProfileArgument,
     payload: Annotated[
         str | None,
-        typer.Option(
-            "--payload",
-            metavar="BYTES[,BYTES...]",
-            help="Payload of both read and write in bytes, or several between commas, as 4,16,32.  "
+        option(
+            "--payload BYTES[,BYTES...]",
+            "Payload of both read and write in bytes, or several between commas, as 4,16,32.  "
             "[default: the profile's payload.read_bytes and payload.write_bytes]",
-            show_default=False,
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,

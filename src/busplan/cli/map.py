@@ -1,30 +1,21 @@
 """`busplan map`."""
 
-from collections.abc import Mapping
 from contextlib import ExitStack
-from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
-from busplan.cli.options import AllOption, ProfileArgument, output_option
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, show_drawn
+from busplan.cli.options import VALUES_HELP, AllOption, JobsOption, ProfileArgument, parse_axis
+from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, show_drawn
 from busplan.cli.progress import progress_bar
-from busplan.cli.vary import VALUES_HELP, parse_axis
 from busplan.errors import BusplanError
-from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.questions.map import MapAnswer
-
-MapForm = Literal[Form, Picture]
-
-_ENDINGS: Final[Mapping[str, MapForm]] = MappingProxyType({**ENDINGS, **PICTURES})
 
 
 def _direction(option: str, *, default: str) -> typer.models.OptionInfo:
@@ -49,25 +40,10 @@ def map_command(
     circle: Annotated[
         bool, typer.Option("--circle", help="Also run the circle test of every setting that fits, up to 1,000.")
     ] = False,
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs",
-            metavar="N",
-            help="Number of processes for --circle.  [default: one for each processor]",
-            show_default=False,
-        ),
-    ] = None,
+    jobs: JobsOption = None,
     all_: AllOption = False,
-    format_: Annotated[
-        MapForm | None,
-        typer.Option(
-            "--format",
-            help=PICTURE_FORMAT_HELP,
-            show_default=False,
-        ),
-    ] = None,
-    output: Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")] = None,
+    format_: DrawnFormatOption = None,
+    output: DrawnOutputOption = None,
 ) -> None:
     """Draw where a design fits: period against axes, or any two keys of the profile.
 
@@ -78,7 +54,7 @@ def map_command(
 
     Example: busplan map paper-4ms --y cycle.period_us=500:4000:500
     """
-    chosen = picture_form(format_, output, forms=_ENDINGS)
+    chosen = drawn_form(format_, output)
     if jobs is not None and not circle:
         raise BusplanError("--jobs: goes with --circle")
     if jobs is not None and jobs < 1:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from busplan.sections.profile import Profile
 
+
 AnyForm = TypeVar("AnyForm", bound=str)
 
 _TIME: Final = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?|\.[0-9]+)\s*(?P<unit>us|ms|s)")
@@ -116,6 +117,22 @@ def timing_model(timing: str, profile: "Profile") -> str:
     return known_model(profile, timing, name="--timing")
 
 
+def option(usage: str, words: str, **settings: Any) -> Any:
+    """Make an option whose default is said in its help, for it is None.
+
+    Parameters
+    ----------
+    usage
+        Name and value as in the help: "--jobs N".
+    words
+        Its help, with the default in brackets at the end.
+    settings
+        Further settings of typer's option.
+    """
+    name, _, value = usage.partition(" ")
+    return typer.Option(name, metavar=value, help=words, show_default=False, **settings)
+
+
 STANDARD_OUTPUT: Final = Path("-")
 
 
@@ -151,6 +168,9 @@ AllOption = Annotated[
     bool, typer.Option("--all", help="Show everything: every row, and every column on a narrow terminal, too.")
 ]
 FormatOption = Annotated[Form | None, format_option("table")]
+JobsOption = Annotated[
+    int | None, option("--jobs N", "Number of processes for --circle.  [default: one for each processor]")
+]
 OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(ENDINGS)}")]
 
 
@@ -169,3 +189,49 @@ def form_of_file(
     if chosen is None:
         raise BusplanError(f"--output {output}: {ending_expected(ending, forms, otherwise=', or --format')}")
     return chosen
+
+
+VALUES_HELP: Final = (
+    "250,500,1000 or a range A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT (evenly, both ends). Words that "
+    "the key takes, as optimal, may be among the values."
+)
+
+
+def parse_axes(texts: list[str]) -> dict[str, str]:
+    """Parse all --vary options, in order: the text of the values by key.
+
+    Raises
+    ------
+    BusplanError
+        No option, a repeated key, or not KEY=VALUES.
+    """
+    if not texts:
+        raise BusplanError("--vary: nothing to vary; give a key of the profile and its values, as bus.nodes=1:62")
+    axes: dict[str, str] = {}
+    for text in texts:
+        key, values = parse_axis(text, option="--vary")
+        if key in axes:
+            raise BusplanError(f"--vary {text}: {key} is varied already; give all its values at once")
+        axes[key] = values
+    return axes
+
+
+def parse_axis(text: str, *, option: str) -> tuple[str, str]:
+    """Parse one KEY=VALUES: the key, and the text of its values.
+
+    Parameters
+    ----------
+    text
+        Value of the option.
+    option
+        Name of the option.
+
+    Raises
+    ------
+    BusplanError
+        Not KEY=VALUES.
+    """
+    key, equals, values = (part.strip() for part in text.partition("="))
+    if not equals or not key or not values:
+        raise BusplanError(f"{option} {text}: expected KEY=VALUES, as bus.nodes=1:62 or cycle.period_us=250,500,1000")
+    return key, values

@@ -20,5 +20,5 @@ def paper_command(all_: AllOption = False, format_: FormatOption = None, output:
         from busplan.questions.evidence import evidence
 
         with progress_bar("circle tests") as progress:
-            found = evidence(paper=True, progress=progress)
-        give(found.report())
+            known = evidence(paper=True, progress=progress)
+        give(known.report())

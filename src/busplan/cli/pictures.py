@@ -2,47 +2,48 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Protocol
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Final, Literal, Protocol
+
+import typer
 
 from busplan.cli.answering import answer, naming
 from busplan.cli.destinations import require_apart
-from busplan.cli.options import AnyForm, form_of_file
+from busplan.cli.options import form_of_file, output_option
 from busplan.cli.output import refuse_terminal, write_document
 from busplan.errors import BusplanError
 from busplan.extras import require_resvg
-from busplan.forms import PICTURES, Form, Picture, ending_expected
+from busplan.forms import ENDINGS, PICTURES, Form, Picture, ending_expected
 from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Report
 
 
-PICTURE_FORMAT_HELP: Final = (
-    "Form of the answer; a table is text in lines. png is for a file or a pipe, and needs the extra plot "
-    "(resvg-py).  [default: by the ending of --output, else table]"
-)
-"""Of --format, where an answer may also be SVG or PNG."""
+DrawnForm = Literal[Form, Picture]
+_ENDINGS: Final[Mapping[str, DrawnForm]] = MappingProxyType({**ENDINGS, **PICTURES})
+DrawnFormatOption = Annotated[
+    DrawnForm | None,
+    typer.Option(
+        "--format",
+        help="Form of the answer; a table is text in lines. png is for a file or a pipe, and needs the extra plot "
+        "(resvg-py).  [default: by the ending of --output, else table]",
+        show_default=False,
+    ),
+]
+DrawnOutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")]
 
 
-def picture_form(given: AnyForm | None, output: Path | None, *, forms: Mapping[str, AnyForm]) -> AnyForm:
+def drawn_form(given: DrawnForm | None, output: Path | None) -> DrawnForm:
     """Choose the form by --format or by the ending of the file; a table without both.
-
-    Parameters
-    ----------
-    given
-        Value of --format.
-    output
-        Value of --output.
-    forms
-        Forms by ending; those with .txt and .png are among them.
 
     Raises
     ------
     BusplanError
         The ending is not known, or the form is png and resvg-py is missing or standard output is a terminal.
     """
-    chosen = form_of_file(given, output, forms=forms, default=forms[".txt"])
-    if chosen == forms[".png"]:
+    chosen = form_of_file(given, output, forms=_ENDINGS, default="table")
+    if chosen == "png":
         if output is None:
             refuse_terminal(chosen)
         require_resvg(f"--format {chosen}")
@@ -77,7 +78,7 @@ class Drawn(Protocol):
 
 def show_drawn(
     find: Callable[[], Drawn],
-    form: Form | Picture,
+    form: DrawnForm,
     output: Path | None,
     *,
     inputs: Iterable[Path],
@@ -114,7 +115,7 @@ def show_drawn(
 
 def _changes_words(changes: KeyChanges) -> str:
     """What was set, in the title of a picture that is a file of its own."""
-    from busplan.forms.columns import sentence_text
+    from busplan.forms.numbers import sentence_text
     from busplan.questions.words.documents import changes_sentences
 
     return " ".join(map(sentence_text, changes_sentences(changes)))

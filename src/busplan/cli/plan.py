@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.answering import answer, naming_option, report_with
-from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument
+from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument, option
 from busplan.cli.output import PlanFailsError, emit_document, say
 from busplan.cli.progress import progress_bar
+from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.errors import BusplanError
 from busplan.files import NewFile, new_file
 from busplan.forms import ENDINGS, Form
@@ -37,30 +37,26 @@ def plan_command(
     profile: ProfileArgument,
     nodes: Annotated[
         int | None,
-        typer.Option(
-            "--nodes",
-            metavar="N",
-            help="Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
+        option(
+            "--nodes N", "Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]"
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     axes: Annotated[
         int | None,
-        typer.Option(
-            "--axes",
-            metavar="N",
+        option(
+            "--axes N",
+            "Goal: so many axes, on the nodes they need at the profile's node.axes each; instead of --nodes.  "
+            "[default: those of the nodes]",
             min=1,
             max=_MAX_AXES,
-            help="Goal: so many axes, on the nodes they need at the profile's node.axes each; instead of --nodes.  "
-            "[default: those of the nodes]",
         ),
     ] = None,
     free: Annotated[
         str | None,
-        typer.Option(
-            "--free",
-            metavar="NAMES",
-            help="What may be changed, with commas: step (of the circle, where it does not divide the period), "
+        option(
+            "--free NAMES",
+            "What may be changed, with commas: step (of the circle, where it does not divide the period), "
             "gap_count, slice_ratio, responses (reads concatenated, writes "
             "unified), schedule (where the bus has one), payload (less), period, nodes (fewer), in the order of their "
             "cost.  [default: step,gap_count,slice_ratio,period]",
@@ -173,7 +169,7 @@ def _check_options(
 ) -> None:
     problems = []
     if axes is not None:
-        nodes = [one.typed for one in changes.each if one.key == "bus.nodes"]
+        nodes = [change.typed for change in changes.each if change.key == "bus.nodes"]
         problems += [f"{typed} and --axes {axes}: give one of them" for typed in nodes]
     if apply and new is not None:
         problems.append(f"--apply and -o {new}: give one of them; -o leaves PROFILE as it is")

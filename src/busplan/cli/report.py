@@ -6,11 +6,10 @@ from typing import Annotated, Final
 import typer
 
 from busplan.cli.answering import answer, naming
-from busplan.cli.changes import load_changed, takes_changes
+from busplan.cli.changes import load_changed, load_each, takes_changes
 from busplan.cli.destinations import profile_files
-from busplan.cli.options import OutputOption, complete_profile, format_option
+from busplan.cli.options import OutputOption, complete_profile, format_option, option
 from busplan.cli.progress import progress_bar
-from busplan.cli.several import load_each
 from busplan.errors import BusplanError
 from busplan.forms import Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -37,13 +36,7 @@ def report_command(
     format_: Annotated[Form | None, format_option("html")] = None,
     output: OutputOption = None,
     title: Annotated[
-        str | None,
-        typer.Option(
-            "--title",
-            metavar="TEXT",
-            help="Heading of the page.  [default: the profile's name, or how many profiles]",
-            show_default=False,
-        ),
+        str | None, option("--title TEXT", "Heading of the page.  [default: the profile's name, or how many profiles]")
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     circle: Annotated[

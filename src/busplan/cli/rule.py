@@ -10,7 +10,7 @@ from busplan.cli.options import AllOption, FormatOption, OutputOption
 
 def complete_code(incomplete: str) -> list[str]:
     """Complete the code of a rule for the shell."""
-    from busplan.gate.registry import all_rules
+    from busplan.gate.rules import all_rules
 
     return [code for code in all_rules() if code.startswith(incomplete)]
 
@@ -33,6 +33,6 @@ def rule_command(
     Example: busplan rule BP110
     """
     with answer(format_, output, is_whole=all_) as give:
-        from busplan.gate.rules_report import rule_answer
+        from busplan.gate.rules import rule_answer
 
         give(rule_answer(code))

@@ -11,7 +11,7 @@ def schema_command() -> None:
 
     Example: busplan schema > busplan.schema.json
     """
-    from busplan.forms.json_document import to_json
+    from busplan.printable import to_json
     from busplan.profile.kinds import profile_schema
 
     emit_document(to_json(profile_schema()))

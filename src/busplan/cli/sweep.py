@@ -12,16 +12,19 @@ from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     ALL_MODELS,
+    VALUES_HELP,
     AllOption,
+    JobsOption,
     ProfileArgument,
     TimingOption,
     form_of_file,
+    option,
     output_option,
+    parse_axes,
 )
 from busplan.cli.output import refuse_terminal
 from busplan.cli.pictures import plot_form
 from busplan.cli.sweep_run import TOP_FORMS, SweepForm, SweepJob, run_sweep
-from busplan.cli.vary import VALUES_HELP, parse_axes
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
 from busplan.files import partial_path
@@ -40,12 +43,10 @@ def sweep_command(
     profile: ProfileArgument,
     vary: Annotated[
         list[str] | None,
-        typer.Option(
-            "--vary",
-            metavar="KEY=VALUES",
-            help=f"A key of the profile in numbers, and its values in the profile's unit: {VALUES_HELP} Given several "
+        option(
+            "--vary KEY=VALUES",
+            f"A key of the profile in numbers, and its values in the profile's unit: {VALUES_HELP} Given several "
             "times, every combination is computed; the last key changes fastest.  [required]",
-            show_default=False,
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
@@ -60,46 +61,36 @@ def sweep_command(
             show_default=False,
         ),
     ] = None,
-    output: Annotated[
-        Path | None,
-        output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}"),
-    ] = None,
+    output: Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")] = None,
     columns: Annotated[
         str | None,
-        typer.Option(
-            "--columns",
-            metavar="NAMES",
-            help="Figures to write, between commas, as margin_us,safe_axes: the names in "
+        option(
+            "--columns NAMES",
+            "Figures to write, between commas, as margin_us,safe_axes: the names in "
             "`busplan capacity --format json`.  [default: all of them; of the top rows the main ones]",
         ),
     ] = None,
     sort: Annotated[
         str | None,
-        typer.Option(
-            "--sort",
-            metavar="COLUMN[:asc]",
-            help="Top rows: largest first by this column, or smallest first with :asc.  [default: order of the grid]",
+        option(
+            "--sort COLUMN[:asc]",
+            "Top rows: largest first by this column, or smallest first with :asc.  [default: order of the grid]",
         ),
     ] = None,
-    top: Annotated[
-        int | None, typer.Option("--top", metavar="N", help="Top rows: how many.  [default: 20]", show_default=False)
-    ] = None,
+    top: Annotated[int | None, option("--top N", "Top rows: how many.  [default: 20]")] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(
-            "--plot",
-            metavar="FILE",
-            help="Draw --figure into FILE.svg or FILE.png: curves where one key varies, heat maps where two do; an old "
+        option(
+            "--plot FILE",
+            "Draw --figure into FILE.svg or FILE.png: curves where one key varies, heat maps where two do; an old "
             "file is replaced. PNG needs the extra plot (resvg-py).  [default: no figure]",
         ),
     ] = None,
     figure: Annotated[
         str | None,
-        typer.Option(
-            "--figure",
-            metavar="COLUMN",
-            help="What --plot draws, by its name in --columns.  [default: safe_axes; of groups margin_corrected_us]",
-            show_default=False,
+        option(
+            "--figure COLUMN",
+            "What --plot draws, by its name in --columns.  [default: safe_axes; of groups margin_corrected_us]",
         ),
     ] = None,
     all_: AllOption = False,
@@ -117,23 +108,13 @@ def sweep_command(
             "95 % and worst of each figure of the circle, and the share of seeds that fail.",
         ),
     ] = False,
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs",
-            metavar="N",
-            help="Number of processes for --circle.  [default: one for each processor]",
-            show_default=False,
-        ),
-    ] = None,
+    jobs: JobsOption = None,
     cluster: Annotated[
         str | None,
-        typer.Option(
-            "--cluster",
-            metavar="ADDRESS",
-            help="Run the tests of --circle on the workers of a Dask scheduler, as tcp://HOST:8786. They must have the "
+        option(
+            "--cluster ADDRESS",
+            "Run the tests of --circle on the workers of a Dask scheduler, as tcp://HOST:8786. They must have the "
             "same versions of Python, busplan and numpy. Needs the extra cluster (distributed).  [default: here]",
-            show_default=False,
         ),
     ] = None,
     resume: Annotated[
@@ -168,9 +149,9 @@ def sweep_command(
     _require_needed("--output FILE, beside which the parts stand", output is not None, {"--resume": resume or None})
     if cluster is not None:
         _require_cluster(jobs)
-    for option, number in (("--top", top), ("--jobs", jobs)):
+    for name, number in (("--top", top), ("--jobs", jobs)):
         if number is not None and number < 1:
-            raise BusplanError(f"{option} {number}: must be 1 or more")
+            raise BusplanError(f"{name} {number}: must be 1 or more")
     kept = None if output is None else partial_path(output)
     outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
     require_apart(outputs, inputs=profile_files(profile))
@@ -180,9 +161,9 @@ def sweep_command(
 
     loaded = load_changed(profile, changes)
     varied = parse_axes(vary or [])
-    for one in changes.each:
+    for change in changes.each:
         for key in varied:
-            require_separate(one, key, typed=f"--vary {key}")
+            require_separate(change, key, typed=f"--vary {key}")
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
@@ -246,24 +227,24 @@ def _require_cluster(jobs: int | None) -> None:
 
 def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> None:
     """Refuse options that do not apply to the form."""
-    for option, value in (("--sort", sort), ("--top", top)):
+    for name, value in (("--sort", sort), ("--top", top)):
         if value is not None and form not in TOP_FORMS:
             forms = f"{', '.join(TOP_FORMS[:-1])} or {TOP_FORMS[-1]}"
-            raise BusplanError(f"{option}: goes with --format {forms}; {form} has every row in the order of the grid")
+            raise BusplanError(f"{name}: goes with --format {forms}; {form} has every row in the order of the grid")
 
 
 def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> None:
-    """Refuse options that need another option."""
-    for option, value in options.items():
+    """Refuse options that need another name."""
+    for name, value in options.items():
         if value is not None and not is_there:
-            raise BusplanError(f"{option}: goes with {needed}")
+            raise BusplanError(f"{name}: goes with {needed}")
 
 
 def _require_number(sweep: "Sweep", asked: dict[str, str | None]) -> None:
     """Refuse a column that does not exist or is not numeric."""
-    for option, name in asked.items():
-        if name is not None and name not in sweep.numbers:
-            raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(sweep.numbers)}")
+    for name, column in asked.items():
+        if column is not None and column not in sweep.numbers:
+            raise BusplanError(f"{name} {column}: expected a column in numbers: {', '.join(sweep.numbers)}")
 
 
 def _columns(sweep: "Sweep", asked: str | None, *, short: bool, sort_by: str) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from busplan.questions.sweep import Digest, FigureData, Work
     from busplan.questions.sweep.asked import Sweep
     from busplan.questions.sweep.blocks import SweepBlock
-    from busplan.questions.sweep.writers import RowsWriter
+    from busplan.questions.sweep.rows import RowsWriter
 
 SweepForm = Literal[Form, RowsForm]
 TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in get_args(RowsForm))
@@ -70,7 +70,7 @@ def run_sweep(job: SweepJob) -> None:
     StoppedError
         Ctrl-C, SIGTERM, SIGHUP or a lost worker. The partial output is valid and marked as partial.
     """
-    from busplan.forms.columns import sentence_text
+    from busplan.forms.numbers import sentence_text
     from busplan.questions.sweep import Digest
     from busplan.questions.words.documents import changes_sentences
 

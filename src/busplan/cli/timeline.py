@@ -1,11 +1,6 @@
 """`busplan timeline`."""
 
-from collections.abc import Mapping
-from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final, Literal
-
-import typer
+from typing import TYPE_CHECKING, Annotated
 
 from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
@@ -13,21 +8,16 @@ from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     AllOption,
     ProfileArgument,
-    output_option,
+    option,
     time_us,
     timing_model,
 )
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, show_drawn
+from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, show_drawn
 from busplan.errors import BusplanError
-from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.questions.timeline import TimelineAnswer
-
-TimelineForm = Literal[Form, Picture]
-
-_ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType({**ENDINGS, **PICTURES})
 
 
 @takes_changes(period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]")
@@ -35,55 +25,40 @@ def timeline_command(
     profile: ProfileArgument,
     from_: Annotated[
         str | None,
-        typer.Option(
-            "--from",
-            metavar="TIME",
-            help="Show the cycle from this time on, counted from its start, with its unit, as 50us or 0.1ms.  "
+        option(
+            "--from TIME",
+            "Show the cycle from this time on, counted from its start, with its unit, as 50us or 0.1ms.  "
             "[default: its start]",
-            show_default=False,
         ),
     ] = None,
     to: Annotated[
         str | None,
-        typer.Option(
-            "--to",
-            metavar="TIME",
-            help="Show the cycle up to this time, with its unit; beyond its end means its end.  [default: its end]",
-            show_default=False,
+        option(
+            "--to TIME",
+            "Show the cycle up to this time, with its unit; beyond its end means its end.  [default: its end]",
         ),
     ] = None,
     transaction: Annotated[
         str | None,
-        typer.Option(
-            "--transaction",
-            metavar="NAME:N",
-            help="Show one transaction of one node (from 1) with its gaps. NAME is what the bus calls it, as read:1, "
+        option(
+            "--transaction NAME:N",
+            "Show one transaction of one node (from 1) with its gaps. NAME is what the bus calls it, as read:1, "
             "feedback:1, frame:1 or mdt:1; a wrong one lists them. --from and --to may narrow it further.  "
             "[default: all of them]",
-            show_default=False,
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     timing: Annotated[
         str | None,
-        typer.Option(
-            "--timing",
-            metavar="MODEL",
-            help="Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard. A cycle has "
+        option(
+            "--timing MODEL",
+            "Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard. A cycle has "
             "one.  [default: the profile's bus.timing_model, where it is applicable]",
-            show_default=False,
         ),
     ] = None,
     all_: AllOption = False,
-    format_: Annotated[
-        TimelineForm | None,
-        typer.Option(
-            "--format",
-            help=PICTURE_FORMAT_HELP,
-            show_default=False,
-        ),
-    ] = None,
-    output: Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")] = None,
+    format_: DrawnFormatOption = None,
+    output: DrawnOutputOption = None,
 ) -> None:
     """Show one communication cycle as events, node by node and to scale.
 
@@ -94,7 +69,7 @@ def timeline_command(
 
     Example: busplan timeline paper-4ms --transaction read:1
     """
-    chosen = picture_form(format_, output, forms=_ENDINGS)
+    chosen = drawn_form(format_, output)
     from_us = None if from_ is None else time_us(from_, option="--from")
     to_us = None if to is None else time_us(to, option="--to")
     if from_us is not None and to_us is not None and from_us >= to_us:

@@ -68,8 +68,8 @@ def render(report: "Report", form: Form) -> str:
 
             return csv_rows.text(report)
         case "json":
-            from busplan.forms import json_document
+            from busplan.printable import to_json
 
-            return json_document.text(report)
+            return to_json(report.document())
         case _:
             assert_never(form)

@@ -1,10 +1,10 @@
-"""Bars left and right of zero, each below its name."""
+"""Bars left and right of zero: each below its name, or one in a table cell."""
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.forms.svg import LINE, Scale, text_at
+from busplan.forms.svg import LINE, Scale, drawing, markup, text_at
 
 _BAR: Final = 12
 ROW: Final = LINE + _BAR + 6
@@ -58,3 +58,28 @@ def draw_zero(parent: Element, scale: Scale, *, top: int, bottom: int, at: float
     """Draw a line through all bars, at zero or at another value."""
     x = f"{scale.percent(at):.5g}%"
     SubElement(parent, "line", {"x1": x, "x2": x, "y1": str(top), "y2": str(bottom), "class": css})
+
+
+_HEIGHT = 16
+
+
+def signed_bar(value: float, *, least: float, most: float, title: str) -> str:
+    """Draw one value as a bar on a scale.
+
+    Parameters
+    ----------
+    value
+        Value of the bar.
+    least, most
+        Ends of the scale, least <= 0 <= most.
+    title
+        Title for screen readers.
+    """
+    root = drawing(title, css="chart bars")
+    root.set("height", str(_HEIGHT))
+    zero, end = (100 * (one - least) / (most - least) for one in (0.0, value))
+    box = {"x": f"{min(zero, end):.5g}%", "width": f"{abs(end - zero):.5g}%", "y": "2", "height": str(_HEIGHT - 4)}
+    SubElement(root, "rect", {**box, "class": "takes" if value >= 0 else "hides"})
+    x = f"{zero:.5g}%"
+    SubElement(root, "line", {"x1": x, "x2": x, "y1": "0", "y2": str(_HEIGHT), "class": "zero"})
+    return markup(root)

@@ -171,6 +171,33 @@ class Drawing(ABC):
         return None
 
 
+class OwnPicture(Drawing):
+    """A picture that stands in a page and in characters.
+
+    Parameters
+    ----------
+    svg
+        Function that draws it without what the page has: style sheet, title and legend.
+    lines
+        Function that draws it in characters, `width` columns wide.
+    stylesheet
+        Its own rules, behind those of all charts.
+    """
+
+    is_text_in_markdown = True
+
+    def __init__(self, svg: Callable[[], str], lines: Callable[..., list[Line]], *, stylesheet: str) -> None:
+        self._svg, self._lines, self.stylesheet = svg, lines, stylesheet
+
+    def svg(self) -> str:
+        """Draw it for a page."""
+        return self._svg()
+
+    def characters(self, width: int) -> list[Line]:
+        """Draw it in characters."""
+        return self._lines(width=width)
+
+
 class Chart(NamedTuple):
     """A drawing with a caption."""
 
@@ -273,8 +300,8 @@ def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
 def joined(*sentences: Sentence, by: str = " ") -> Sentence:
     """Join sentences, or pieces of one, with a separator; the state is that of the first."""
     parts: list[Part] = []
-    for one in sentences:
-        parts += [by, *one.parts] if parts else one.parts
+    for words in sentences:
+        parts += [by, *words.parts] if parts else words.parts
     return Sentence(tuple(parts), sentences[0].state)
 
 

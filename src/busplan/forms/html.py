@@ -12,12 +12,10 @@ from markupsafe import Markup
 from busplan import __version__
 from busplan.buses.figure import unit_of
 from busplan.forms import blocks as made_of
+from busplan.forms.bars import signed_bar
 from busplan.forms.blocks import Bar, Block, Chapter, Chart, Command, Report, Sentence, Table
-from busplan.forms.columns import cell_text, sentence_text
-from busplan.forms.details import shown_blocks
-from busplan.forms.inks import DARK, fills
-from busplan.forms.numbers import figure_text, unit_text
-from busplan.forms.signed_bar import signed_bar
+from busplan.forms.numbers import cell_text, figure_text, sentence_text, shown_blocks, unit_text
+from busplan.forms.picture import DARK, fills
 from busplan.printable import json_text, printable_lines
 
 _TYPES: Final = ("ShownValue", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")

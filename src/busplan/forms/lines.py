@@ -1,10 +1,9 @@
-"""Lines of text, plain or coloured.
-
-Plain lines are laid out here, so that piped output does not load rich.
-"""
+"""Lines of text, plain or coloured, and wrapped at spaces: a figure stays whole and beside its unit."""
 
 import io
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from textwrap import wrap
 from typing import Final, Literal, NamedTuple
 
 from busplan.printable import printable
@@ -59,3 +58,84 @@ def styled_text(lines: Iterable[Line]) -> str:
             text.stylize(_STYLES[mark.tone], mark.start, mark.end)
         console.print(text, soft_wrap=True)
     return buffer.getvalue()
+
+
+_BREAK: Final = re.compile(r"(?<!\d)(?<!\+/-) +|(?<=\d) +(?![A-Za-z%])")
+"""Where a line may end: not between a figure and its unit, nor between +/- and its figure."""
+
+
+def wrapped(line: Line, width: int | None, *, hang: int = 0) -> list[Line]:
+    """Wrap a line at spaces; a word longer than a line is broken.
+
+    Parameters
+    ----------
+    line
+        The line.
+    width
+        Most characters of a line; None for any number.
+    hang
+        Spaces before each line but the first.
+
+    Examples
+    --------
+    >>> [one.text for one in wrapped(Line("Margin 230.064 us +/- 6.311 us of 500 us."), 20)]
+    ['Margin 230.064 us', '+/- 6.311 us of', '500 us.']
+    """
+    if width is None or len(line.text) <= width:
+        return [line]
+    found: list[Line] = []
+    for start, end in _spans(line.text, width, hang):
+        indent = hang if found else 0
+        marks = (
+            Mark(max(mark.start, start) - start + indent, min(mark.end, end) - start + indent, mark.tone)
+            for mark in line.marks
+            if mark.start < end and mark.end > start
+        )
+        found.append(Line(" " * indent + line.text[start:end], line.tone, tuple(marks)))
+    return found
+
+
+def _spans(text: str, width: int, hang: int) -> Iterator[tuple[int, int]]:
+    """Start and end of each line in the text."""
+    breaks = [(match.start(), match.end()) for match in _BREAK.finditer(text) if match.start() > hang]
+    start, room = 0, width
+    while len(text) - start > room:
+        fitting = [gap for gap in breaks if start < gap[0] <= start + room]
+        end, after = fitting[-1] if fitting else (start + room, start + room)
+        yield start, end
+        start, room = after, max(width - hang, 1)
+    yield start, len(text)
+
+
+def least_width(text: str) -> int:
+    """Width of the longest piece of a text that no line break divides.
+
+    Examples
+    --------
+    >>> least_width("ratio 0.73, 300 us")
+    6
+    """
+    return max(map(len, _BREAK.split(text)))
+
+
+_HEAD: Final = "Legend: "
+_UNBROKEN: Final = "\xa0"
+"""A space at which no line ends."""
+
+
+def legend_lines(words: Sequence[str], *, width: int) -> Iterator[Line]:
+    """Write the entries of a legend, wrapped to a width between two entries.
+
+    Parameters
+    ----------
+    words
+        The entries.
+    width
+        Most columns of a line.
+    """
+    entries = ", ".join(word.replace(" ", _UNBROKEN) for word in words)
+    indent = " " * len(_HEAD)
+    for line in wrap(
+        entries, width, initial_indent=_HEAD, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    ):
+        yield Line(line.replace(_UNBROKEN, " "), "drawn")

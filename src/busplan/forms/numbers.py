@@ -1,11 +1,13 @@
-"""Write figures: digits and unit."""
+"""Figures, cells and sentences as plain text."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import isnan
 from typing import Final
 
 from busplan.buses.figure import unit_of
-from busplan.forms.blocks import ShownValue
+from busplan.forms.blocks import Bar, Block, Cell, Chapter, Part, Report, Sentence, ShownValue, Swatch, Table, Words
+from busplan.forms.lines import Line, Mark
+from busplan.printable import printable
 
 MISSING: Final = "-"
 _DIGITS: Final = 12
@@ -152,3 +154,85 @@ def _number(value: ShownValue) -> str:
         return decimals_of(number, value.decimals, signed=value.signed)
     sign, comma = "+" if value.signed and number > 0 else "", "," if value.grouped else ""
     return f"{number:{sign}{comma}.{value.digits or _DIGITS}g}"
+
+
+def cell_text(cell: Cell) -> str:
+    """Write a cell as plain text."""
+    match cell:
+        case str():
+            return cell
+        case ShownValue():
+            return figure_text(cell)
+        case Swatch():
+            return f"{cell.letter} {cell.text}"
+        case Bar():
+            return ""
+        case Sentence():
+            return sentence_text(cell)
+        case _:
+            return cell[0]
+
+
+def sentence_text(sentence: Sentence) -> str:
+    """Write a sentence as plain text."""
+    return "".join(map(part_text, sentence.parts))
+
+
+def part_text(part: Part) -> str:
+    """Write a piece of a sentence as plain text, a figure with its unit."""
+    return with_unit(part) if isinstance(part, ShownValue) else cell_text(part)
+
+
+def sentence_line(sentence: Sentence) -> Line:
+    """Write a sentence as one line: its words of a state are marked, or all of it where no word has one."""
+    text, marks = "", list[Mark]()
+    for part in sentence.parts:
+        start, text = len(text), text + printable(part_text(part))
+        if isinstance(part, ShownValue | Words) and part.state != "neutral":
+            marks.append(Mark(start, len(text), part.state))
+    return Line(text, "neutral" if marks else sentence.state, tuple(marks))
+
+
+def shown_blocks(report: Report) -> Sequence[Block]:
+    """Content of an answer for a page or a comment, without rows of detail unless it is whole.
+
+    Parameters
+    ----------
+    report
+        The answer.
+    """
+    return report.blocks() if report.is_whole else list(_without_details(report.blocks()))
+
+
+def _without_details(blocks: Sequence[Block]) -> Iterator[Block]:
+    for block in blocks:
+        if isinstance(block, Chapter):
+            yield block._replace(blocks=tuple(_without_details(block.blocks)))
+        elif isinstance(block, Table):
+            rows = tuple(row for row in block.rows if not row.is_detail)
+            yield block._replace(rows=rows)
+            left_out = left_out_sentence(len(block.rows) - len(rows))
+            yield from [Sentence((left_out,))] if left_out else []
+        else:
+            yield block
+
+
+def left_out_sentence(rows: int, columns: Sequence[str] = ()) -> str:
+    """Say what a table leaves out, and how to see it; empty if that is nothing.
+
+    Parameters
+    ----------
+    rows
+        How many rows.
+    columns
+        Names of the columns.
+
+    Examples
+    --------
+    >>> left_out_sentence(2, ["eq", "paper"]), left_out_sentence(1), left_out_sentence(0)
+    ('Not shown: 2 rows; columns eq, paper. --all shows all.', 'Not shown: 1 row. --all shows all.', '')
+    """
+    names = list(dict.fromkeys(columns))
+    parts = [f"{rows} {nouns(rows, 'row')}"] if rows else []
+    parts += [f"{nouns(len(names), 'column')} {', '.join(names)}"] if names else []
+    return f"Not shown: {'; '.join(parts)}. --all shows all." if parts else ""

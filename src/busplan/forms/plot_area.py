@@ -123,7 +123,7 @@ def draw_plot_area(body: Element, across: Ruler, up: Ruler, *, y: int, height: i
     if up.names:
         every = -(-_NAME * len(up.names) // height)
         marks = tuple(Tick(place, name) for place, name in enumerate(up.names) if place % every == 0)
-    gutter = min(_MOST_GUTTER, 100 * (_LETTER * max(len(one.label) for one in marks) + 12) / PHONE)
+    gutter = min(_MOST_GUTTER, 100 * (_LETTER * max(len(mark.label) for mark in marks) + 12) / PHONE)
     area = inside(body, x_percent=gutter, width_percent=99 - gutter, y=0)
     width = WIDTH * (1 - 2 * MARGIN_PERCENT / 100) * (99 - gutter) / 100
     stretched = {"y": str(top), "width": "100%", "height": str(height), "preserveAspectRatio": "none"}
@@ -156,7 +156,7 @@ def draw_across(area: Element, across: Ruler, *, y: int, room: float) -> None:
         marks = tuple(Tick(place, across.names[place]) for place in shown)
     else:
         marks = across.numbers(5)
-        if max((len(one.label) for one in marks), default=0) > _SHORT:
+        if max((len(mark.label) for mark in marks), default=0) > _SHORT:
             marks = across.numbers(2)
     for mark in marks:
         share = across.share(mark.at)

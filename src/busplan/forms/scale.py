@@ -52,7 +52,9 @@ def ring_step(largest: float) -> float:
     return max(step.size for step in round_steps(largest / 2) if step.size <= largest / 2)
 
 
-def round_numbers(low: float, high: float, *, most: int) -> list[float]:
+def round_numbers(
+    low: float, high: float, *, most: int, decades: Sequence[Sequence[float]] = ((1, 2, 5), (1, 3), (1,))
+) -> list[float]:
     """Labels of a logarithmic scale: 1, 2 and 5 times powers of ten, fewer where these are too many.
 
     Parameters
@@ -61,6 +63,8 @@ def round_numbers(low: float, high: float, *, most: int) -> list[float]:
         Ends of the scale, above 0.
     most
         Largest number of labels, 1 or more.
+    decades
+        Choices of the labels between 1 and 10, the finest first; of the last one every n-th is taken.
 
     Examples
     --------
@@ -68,7 +72,7 @@ def round_numbers(low: float, high: float, *, most: int) -> list[float]:
     ([1.0, 2.0, 5.0, 10.0, 20.0], [1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
     """
     powers = range(floor(log10(low)), ceil(log10(high)) + 1)
-    for factors in ((1, 2, 5), (1, 3), (1,)):
+    for factors in decades:
         found = [float(f"{factor}e{power}") for power in powers for factor in factors]
         inside = [one for one in found if low <= one <= high]
         if len(inside) <= most:

@@ -18,11 +18,9 @@ from busplan.forms.blocks import (
     Snippet,
     Table,
 )
-from busplan.forms.columns import part_text, sentence_line
-from busplan.forms.lines import BLANK, Line, plain_text, styled_text
-from busplan.forms.numbers import with_unit
+from busplan.forms.lines import BLANK, Line, plain_text, styled_text, wrapped
+from busplan.forms.numbers import part_text, sentence_line, with_unit
 from busplan.forms.text_tables import table_lines
-from busplan.forms.wrapping import wrapped
 
 WIDTH: Final = 80
 """Width of a drawing if there is no terminal, in columns."""

@@ -1,13 +1,12 @@
 """Rules for every kind of bus: does the cycle fit, is there room, is the execution time known?"""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from busplan.buses.limits import NODE, busy_words, slow_groups
-from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
+from busplan.buses.rule import Mending, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
 from busplan.questions.fit.assumed import heavy_assumptions
-from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, limits_behind
-from busplan.questions.fit.cycle import TIME, fits_in
+from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME, fits_in, limits_behind
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.execution import TableExecution
 
@@ -71,9 +70,9 @@ def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
             yield RuleProblem("limits.min_spare_axes", _spare(counts, spare, limit), *_room(subject, counts))
 
 
-def _counted(one: RuleFigures) -> Sequence[Any]:
+def _counted(figures: RuleFigures) -> Sequence[Any]:
     """What has counts of its own: the whole, or each group."""
-    return one.groups or (one,)
+    return figures.groups or (figures,)
 
 
 def _spare(counts: Any, spare: int, limit: int) -> str:
@@ -111,72 +110,13 @@ def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
             yield RuleProblem(at, f"{what}, which {one.carries}", "measure it")
 
 
-RULES: Final = (
-    Rule(
-        "BP101",
-        "slice-overrun",
-        "error",
-        "the cycle does not fit its time slice",
-        "All terms of one cycle together (equation 2), with the bias of the timing model, take longer than "
-        "slice_ratio * period_us (equation 1), by more than is not known; or a limit is broken that has no rule of its "
-        "own. The message names the cheapest cure, "
-        "which `busplan plan` finds: a setting of the bus needs no new parts, the slice ratio is computing time of the "
-        "host, the period is what the machine is for.",
-        slice_overrun,
-    ),
-    Rule(
-        "BP114",
-        "not-shown-to-fit",
-        "error",
-        "the cycle is not shown to fit its time slice",
-        "The margin, less the bias of the timing model, is smaller than its uncertainty and limits.reserve together: "
-        "the plan may work, and nobody can say so. `busplan explain PROFILE uncertainty_us` shows what the "
-        "uncertainty is made of; measuring the execution time is the most frequent way to make it smaller.",
-        not_shown_to_fit,
-    ),
-    Rule(
-        "BP103",
-        "over-utilisation",
-        "error",
-        "the slice is fuller than limits.max_utilisation",
-        "[limits] max_utilisation keeps a share of the slice free, for retries, growth and what the model does "
-        "not cover.",
-        over_utilisation,
-    ),
-    Rule(
-        "BP104",
-        "too-few-spare-nodes",
-        "error",
-        "fewer nodes to spare than limits.min_spare_nodes",
-        "[limits] min_spare_nodes asks that so many more nodes are shown to fit the same period.",
-        too_few_spare_nodes,
-    ),
-    Rule(
-        "BP105",
-        "too-few-spare-axes",
-        "error",
-        "fewer axes to spare than limits.min_spare_axes",
-        "[limits] min_spare_axes asks that so many more axes are shown to fit the same period.",
-        too_few_spare_axes,
-    ),
-    Rule(
-        "BP115",
-        "node-too-slow",
-        "error",
-        "a node is not done once a cycle",
-        "Where nodes execute beside the telegrams, no cycle waits for them. But each has a read and a write in every "
-        "period: both execution times, with execution.worst_extra_us of each and their uncertainty, must fit into "
-        "cycle.period_us.",
-        node_too_slow,
-    ),
-    Rule(
-        "BP112",
-        "assumed-key",
-        "warning",
-        "the verdict rests on an assumption",
-        "A key that its comment or its grade calls assumed carries more than a quarter of the required time or of U "
-        "squared; of execution times, which no equation gives, all that are assumed count together. Measure it, and "
-        "say so in its grade or comment.",
-        assumed_key,
-    ),
-)
+CHECKS: Final[Mapping[str, Callable[[RuleSubject], Iterator[RuleProblem]]]] = {
+    "BP101": slice_overrun,
+    "BP114": not_shown_to_fit,
+    "BP103": over_utilisation,
+    "BP104": too_few_spare_nodes,
+    "BP105": too_few_spare_axes,
+    "BP115": node_too_slow,
+    "BP112": assumed_key,
+}
+"""The check of each rule, by its code in `rules.toml`."""

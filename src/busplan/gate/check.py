@@ -3,75 +3,49 @@
 import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.columns import sentence_text
-from busplan.gate.answer import check_report, summary_sentence
-from busplan.gate.baseline import Baseline, Record, load_baseline
-from busplan.gate.gate import FileResult, check_document, check_source
-from busplan.gate.report import CheckReport, Located, Summary
+from busplan.forms.numbers import sentence_text
+from busplan.gate.baseline import Baseline, Record, load_baseline, record_of
+from busplan.gate.gate import check_document, check_source
+from busplan.gate.report import CheckReport, Located, check_report, summary_sentence
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.collect import Collection, collect
 from busplan.profile.document import Document
 from busplan.profile.write import profile_text
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, argument, items
-from busplan.questions.base.origin import key_changes
+from busplan.questions.base.inputs import ProfileLike, argument, items, key_changes
 from busplan.questions.circle.check import MOST_STEPS
 from busplan.sections.profile import Profile
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class CheckAnswer(Answer):
-    """Answer of `check`.
+class CheckAnswer(Answer, CheckReport):
+    """Answer of `check`: `files`, each with its findings, and their `summary`."""
 
-    Parameters
-    ----------
-    files
-        Each file with its `status`, its `findings` and, if it could not be checked, its `failure`.
-    changes
-        What was changed in every file.
-    others
-        Number of files that were skipped because they are no profiles.
-    """
-
-    files: tuple[FileResult, ...]
-    changes: KeyChanges = NO_CHANGES
-    others: int = 0
+    __slots__ = ()
 
     @property
     def findings(self) -> tuple[Located, ...]:
         """All findings by file and place, each with the `path` and the source line."""
-        return self.found.located
-
-    @property
-    def summary(self) -> Summary:
-        """Number of files, errors and warnings."""
-        return self.found.summary
+        return self.located
 
     @property
     def passed(self) -> bool:
         """Whether every file could be checked, and none has an error."""
-        found = self.found
-        return not found.failed and not found.has_findings("error")
+        return not self.failed and not self.has_findings("error")
 
     def report(self) -> Report:
         """The answer in blocks."""
-        return check_report(self.found)
+        return check_report(self)
 
     @property
     def headline(self) -> str:
         """How many profiles were checked, and how many errors and warnings they have."""
-        return sentence_text(summary_sentence(self.found))
-
-    @property
-    def found(self) -> CheckReport:
-        """All findings and their summary, as `busplan.gate.formats` write them."""
-        return CheckReport(self.files, self.changes, others=self.others)
+        return sentence_text(summary_sentence(self))
 
     def _headline(self) -> str:
         return self.headline
@@ -136,9 +110,13 @@ def check(
     changed = changes if isinstance(changes, KeyChanges) else key_changes(changes)
     recorded = None if baseline is None else _recorded(baseline)
     collection, profiles = (paths, []) if isinstance(paths, Collection) else _collected(paths, skip_others=skip_others)
-    check_file = partial(
-        check_source, with_circle=circle, circle_steps=circle_steps, changes=changed, recorded=recorded, record=record
-    )
+    options: dict[str, Any] = {
+        "with_circle": circle,
+        "circle_steps": circle_steps,
+        "changes": changed,
+        "record": record,
+    }
+    check_file = partial(check_source, recorded=recorded, options=options)
     if executor is None:
         found = list(map(check_file, collection.sources))
     else:
@@ -149,17 +127,7 @@ def check(
         found = [results[source] for source in collection.sources]
     for profile in profiles:
         document = Document(f"{profile.name}.toml", profile_text(profile))
-        before = None if recorded is None else recorded.get(document.name, Record({}))
-        found.append(
-            check_document(
-                document,
-                with_circle=circle,
-                circle_steps=circle_steps,
-                changes=changed,
-                baseline=before,
-                record=record,
-            )
-        )
+        found.append(check_document(document, baseline=record_of(document.name, recorded), **options))
     return CheckAnswer(tuple(found), changed, len(collection.skipped) if skip_others else 0)
 
 

@@ -6,9 +6,9 @@ They share one run of the test, only for profiles with a section for it.
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from busplan.buses.rule import Mending, Rule, RuleProblem
+from busplan.buses.rule import Mending, RuleProblem
 from busplan.gate.finding import Subject
-from busplan.questions.fit.circle_refusal import STEP, circle_refusals
+from busplan.questions.fit.circle_refusal import STEP, circle_refusals, path_steps
 from busplan.sections.base import value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
@@ -30,12 +30,11 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     """
     profile, most_steps = subject.profile, subject.circle_steps
     refused = circle_refusals(profile) if subject.deciding.circle_refused_by else ()
-    yield from (("BP203", _refused(one, subject)) for one in refused)
+    yield from (("BP203", _refused(cause, subject)) for cause in refused)
     if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
         return
     from busplan.questions.circle.failures import STABILITY
     from busplan.questions.circle.roundness import circle_test, to_attack
-    from busplan.questions.fit.circle_move import path_steps
 
     steps = path_steps(profile)
     if steps > most_steps:
@@ -44,7 +43,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
         return
     result = circle_test(profile).results[0]
     # A cycle that is not shown to fit has a rule of its own: nothing of the circle mends it.
-    failures = [one for one in result.failures if not one.is_of_bus]
+    failures = [failure for failure in result.failures if not failure.is_of_bus]
     first = to_attack(result)
     attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
     for failure in failures:
@@ -82,44 +81,4 @@ def answered(subject: Subject, problems: Sequence[tuple[str, RuleProblem]]) -> s
     if not_run:
         return not_run
     is_run = subject.circle_steps is not None and (subject.deciding.fits or not subject.profile.asks_for_circle)
-    return {rule.code for rule in RULES} if is_run else {"BP203"}
-
-
-RULES: Final = (
-    Rule(
-        "BP201",
-        "circle-tolerance",
-        "error",
-        "the circle misses a tolerance",
-        "The circle test of this profile, at its own period, does not hold a contour tolerance of [tolerance]. "
-        "`busplan circle-test PROFILE --contributions` ranks the error sources.",
-    ),
-    Rule(
-        "BP202",
-        "no-stability-margin",
-        "error",
-        "the position loop lacks its stability margin",
-        "The discrete position loop, with everything that delays it, is unstable or has less phase or gain margin "
-        "than [tolerance] requires. Delay in a loop can make its circle rounder while it reduces the margins, so a "
-        "circle without margins fails.",
-    ),
-    Rule(
-        "BP203",
-        "circle-impossible",
-        "error",
-        "the circle test cannot be run",
-        "The values of [servo], [circle] and [delivery] do not go together: the period is no multiple of the step, the "
-        "drive cannot reach the feed, the circle is too short for its ramps or too long for memory, jitter and skew "
-        "exceed half the period, or the bus puts more than one period into a loop on the host. No circle is run to "
-        "know it, so that --no-circle reports it, too, and every other command says it first.",
-    ),
-    Rule(
-        "BP204",
-        "circle-too-long",
-        "warning",
-        "the circle test is too long for a check, and was not run",
-        "The circle of this profile takes more simulated steps than a check allows (--circle-steps, 10,000,000 unless "
-        "it says otherwise), so nothing is known of its circle. A faster circle.feed_mm_per_min, a smaller "
-        "circle.radius_mm or a longer servo.step_us makes it shorter; `busplan circle-test PROFILE` runs it.",
-    ),
-)
+    return {"BP201", "BP202", *_NOT_RUN} if is_run else {"BP203"}

@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 from busplan.buses.rule import Mending, Rule, RuleProblem, Severity
 from busplan.forms.numbers import listed
+from busplan.printable import printable
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import Spot
 from busplan.profile.toml import LoadedProfile, override
 from busplan.profile.write import short_text
 from busplan.questions.circle.check import MOST_STEPS
-from busplan.questions.fit.cycle import available_us, cycle_of, fits_in
+from busplan.questions.fit.certainty import available_us, cycle_of, fits_in
 from busplan.questions.fit.figures import CapacityFigures, figures
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.plan.advice import UNTESTED_CIRCLE, changeable, cure
@@ -39,6 +40,16 @@ class Finding(NamedTuple):
     """How it is mended, in words."""
     cure: str | None = None
     """How it is mended, as lines of TOML: key = value."""
+
+
+def finding_parts(path: str, finding: Finding) -> tuple[str, str]:
+    """Place and message of a finding."""
+    return f"{path}:{finding.line}:{finding.column}:", f"{finding.code} {finding.severity}: {finding.message}"
+
+
+def finding_line(path: str, finding: Finding) -> str:
+    """Write path:line:column: CODE severity: message."""
+    return printable(" ".join(finding_parts(path, finding)))
 
 
 class Violation(NamedTuple):

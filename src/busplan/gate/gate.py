@@ -1,23 +1,101 @@
-"""Check documents against all rules."""
+"""Check documents against all rules, and leave out what their comments suppress."""
 
-from collections.abc import Iterator, Mapping
-from typing import Literal, NamedTuple
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
 from busplan.gate import circle
-from busplan.gate.baseline import Record, figures_of, keys_of
-from busplan.gate.file import BY_KIND
+from busplan.gate.baseline import Record, figures_of, keys_of, record_of, regression
 from busplan.gate.finding import Finding, Subject, Violation, finding_of
-from busplan.gate.registry import BASELINE, all_rules, cycle_rules
-from busplan.gate.regression import regression
-from busplan.gate.suppression import suppress
+from busplan.gate.rules import (
+    BASELINE,
+    BY_KIND,
+    NEVER_SUPPRESSED,
+    SUPPRESSION_WITHOUT_EFFECT,
+    SUPPRESSION_WITHOUT_REASON,
+    all_rules,
+    cycle_rules,
+)
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.collect import ProfileSource
 from busplan.profile.document import Document, Spot
 from busplan.profile.keys import path_of
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
 from busplan.questions.circle.check import MOST_STEPS
+
+MARK: Final = "busplan:"
+_ADDRESSED: Final = re.compile(r"#\s*busplan:")
+_COMMENT: Final = re.compile(r"#\s*busplan:\s*ignore\s*\[(?P<codes>[^\]\n]*)\](?P<reason>[^\n]*)")
+
+
+class Suppression(NamedTuple):
+    """One comment, and the line that it applies to."""
+
+    codes: tuple[str, ...]
+    """Rule codes; empty if the comment is not understood."""
+    reason: str
+    spot: Spot
+    of_line: int
+
+
+def suppressions(document: Document) -> Iterator[Suppression]:
+    """Find the suppressions in a valid TOML text."""
+    if MARK not in document.text:
+        return
+    for offset in document.comments:
+        if not _ADDRESSED.match(document.text, offset):
+            continue
+        match = _COMMENT.match(document.text, offset)
+        line, column = document.lines.line_and_column(offset)
+        written = document.text[offset:].partition("\n")[0].rstrip()
+        spot = Spot(line, column, column, column + len(written))
+        if match is None:
+            yield Suppression((), "", spot, line)
+            continue
+        alone = not document.text[document.lines.offset(line, 1) : offset].strip()
+        codes = tuple(code.strip() for code in match["codes"].split(","))
+        yield Suppression(codes, match["reason"].strip(), spot, line + 1 if alone else line)
+
+
+def suppress(found: Iterable[Violation], document: Document, *, ran: set[str]) -> tuple[list[Violation], list[Finding]]:
+    """Remove suppressed problems, and find what is wrong with the suppressions themselves.
+
+    Parameters
+    ----------
+    found
+        All problems of the document.
+    document
+        The document.
+    ran
+        Codes of the rules that have run: a suppression of others may have an effect.
+    """
+    left = list(found)
+    own: list[Finding] = []
+    for one in suppressions(document):
+        if not one.codes:
+            way_out = "write # busplan: ignore[CODE] reason"
+            own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, "the comment suppresses nothing", way_out))
+        elif not one.reason:
+            way_out = "add why behind the bracket"
+            own.append(_finding(SUPPRESSION_WITHOUT_REASON, one, "the suppression says no reason", way_out))
+        for code in one.codes:
+            hit = [each for each in left if each.rule.code == code and each.spot.line == one.of_line]
+            left = [each for each in left if each not in hit]
+            if code not in all_rules():
+                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code or 'nothing'} is no code of a rule"))
+            elif code in NEVER_SUPPRESSED:
+                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code} cannot be suppressed, it must be mended"))
+            elif not hit and code in ran:
+                message = f"{code} has nothing to suppress on line {one.of_line}"
+                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, message))
+    return left, own
+
+
+def _finding(rule: Rule, suppression: Suppression, words: str, way_out: str = "") -> Finding:
+    return finding_of(rule, RuleProblem("", words, way_out), suppression.spot, words=words)
+
 
 Status = Literal["ok", "findings", "error"]
 
@@ -61,13 +139,7 @@ class FileResult(NamedTuple):
 
 
 def check_source(
-    source: ProfileSource,
-    *,
-    with_circle: bool = True,
-    circle_steps: int = MOST_STEPS,
-    changes: KeyChanges = NO_CHANGES,
-    recorded: Mapping[str, Record] | None = None,
-    record: bool = False,
+    source: ProfileSource, *, recorded: Mapping[str, Record] | None, options: Mapping[str, Any]
 ) -> FileResult:
     """Read one file and check it against all rules.
 
@@ -75,16 +147,10 @@ def check_source(
     ----------
     source
         The file; if it cannot be read, the result has a failure.
-    with_circle
-        Whether to run the circle test of profiles that ask for one.
-    circle_steps
-        Most simulated steps of each axis of a circle: a longer one is not run.
-    changes
-        Changes of the profile; if its schema refuses them, the result has a failure.
     recorded
         Records of a baseline by file name; None for no baseline.
-    record
-        Whether to give the figures that a baseline records.
+    options
+        Named arguments of `check_document`.
     """
     if source.failure is not None:
         return FileResult(source.name, None, (), {}, failure=source.failure)
@@ -96,15 +162,7 @@ def check_source(
         document = decode(content, name=source.name)
     except PlacedError as error:
         return unreadable(source.name, error, content)
-    before = None if recorded is None else recorded.get(source.name, Record({}))
-    return check_document(
-        document,
-        with_circle=with_circle,
-        circle_steps=circle_steps,
-        changes=changes,
-        baseline=before,
-        record=record,
-    )
+    return check_document(document, baseline=record_of(document.name, recorded), **options)
 
 
 def check_document(
@@ -174,7 +232,7 @@ def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
     """Make the result for a file that is not text."""
     lines = content.decode("utf-8-sig", errors="replace").split("\n")
     found = tuple(_of_file(error))
-    return FileResult(name, None, found, {}, tuple(lines[one.line - 1] for one in found))
+    return FileResult(name, None, found, {}, tuple(lines[finding.line - 1] for finding in found))
 
 
 def _of_file(error: PlacedError) -> Iterator[Finding]:
@@ -202,4 +260,4 @@ def _said(placed: Violation, subject: Subject) -> Finding:
 def _result(document: Document, name: str | None, found: list[Finding]) -> FileResult:
     ordered = tuple(sorted(found, key=lambda one: (one.line, one.column, one.code, one.message)))
     lines = document.text.split("\n") if ordered else []
-    return FileResult(document.name, name, ordered, {}, tuple(lines[one.line - 1] for one in ordered))
+    return FileResult(document.name, name, ordered, {}, tuple(lines[finding.line - 1] for finding in ordered))

@@ -1,13 +1,17 @@
-"""All findings of one run of the gate, and their summary."""
+"""Answer of `busplan check`: its findings and their summary, as sentences and as JSON."""
 
-from functools import cached_property
+from collections.abc import Iterator
+from functools import partial
 from hashlib import sha256
 from typing import NamedTuple
 
 from busplan.buses.rule import Severity
-from busplan.gate.finding import Finding
-from busplan.gate.gate import FileResult
+from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, State, count_value, joined, sentence
+from busplan.forms.numbers import nouns
+from busplan.gate.finding import Finding, finding_parts
+from busplan.gate.gate import FileResult, Fit
 from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.questions.words.documents import changed_document, document
 
 
 class Summary(NamedTuple):
@@ -27,16 +31,17 @@ class Located(NamedTuple):
     fingerprint: str
 
 
-class CheckReport:
+class CheckReport(NamedTuple):
     """Result of one run of the gate."""
 
-    def __init__(self, files: tuple[FileResult, ...], changes: KeyChanges = NO_CHANGES, *, others: int = 0) -> None:
-        self.files = files
-        self.changes = changes
-        self.others = others
-        """How many files were skipped because they are no profiles."""
+    files: tuple[FileResult, ...]
+    """Each file with its `status`, its `findings` and, if it could not be checked, its `failure`."""
+    changes: KeyChanges = NO_CHANGES
+    """What was changed in every file."""
+    others: int = 0
+    """Number of files that were skipped because they are no profiles."""
 
-    @cached_property
+    @property
     def summary(self) -> Summary:
         """Number of files, errors and warnings."""
         severities = [finding.severity for file in self.files for finding in file.findings]
@@ -51,7 +56,7 @@ class CheckReport:
         """Whether there are findings at or above a severity."""
         return self.summary.errors > 0 or (least == "warning" and self.summary.warnings > 0)
 
-    @cached_property
+    @property
     def located(self) -> tuple[Located, ...]:
         """All findings by file and place."""
         found = []
@@ -65,3 +70,69 @@ class CheckReport:
                     Located(file.path, finding, source, sha256(mark.encode("utf-8", "surrogatepass")).hexdigest())
                 )
         return tuple(found)
+
+
+def check_report(report: CheckReport) -> Report:
+    """Report of `check`."""
+    return Report(
+        Sentence(("Check of profiles",)),
+        lambda: tuple(_sentences(report)),
+        partial(check_document, report),
+        partial(check_records, report),
+    )
+
+
+def _sentences(report: CheckReport) -> Iterator[Sentence]:
+    """Each finding, each file that could not be checked, and the summary."""
+    for located in report.located:
+        place, words = finding_parts(located.path, located.finding)
+        yield Sentence((Code(place), f" {words}"), "fails" if located.finding.severity == "error" else "warns")
+    yield from (Sentence((file.failure,), "fails") for file in report.files if file.failure is not None)
+    yield summary_sentence(report)
+
+
+def summary_sentence(report: CheckReport) -> Sentence:
+    """Say how many profiles were checked, and what was found."""
+    counts = report.summary
+    failed = sum(file.failure is not None for file in report.files)
+    checked = counts.files - failed
+    summary = sentence(
+        f"checked {{}} {nouns(checked, 'profile')}: {{}} {nouns(counts.errors, 'error')}, "
+        f"{{}} {nouns(counts.warnings, 'warning')}",
+        count_value(checked, "files"),
+        count_value(counts.errors, "errors"),
+        count_value(counts.warnings, "warnings"),
+        state=_state(report),
+    )
+    if failed:
+        summary = joined(summary, sentence("{} could not be checked", count_value(failed)), by="; ")
+    if report.others:
+        words = f"skipped {{}} {nouns(report.others, 'file')} without a schema_version"
+        summary = joined(summary, sentence(words, count_value(report.others)), by="; ")
+    return summary
+
+
+def _state(report: CheckReport) -> State:
+    if report.failed or report.has_findings("error"):
+        return "fails"
+    return "warns" if report.has_findings("warning") else "passes"
+
+
+def check_records(report: CheckReport) -> list[Record]:
+    """One row for each finding."""
+    return [{"path": located.path, **located.finding._asdict()} for located in report.located]
+
+
+def check_document(report: CheckReport) -> JsonDocument:
+    """Document of `busplan check --format json`."""
+    files = []
+    for file in report.files:
+        content = {
+            "path": file.path,
+            "profile": file.profile,
+            "status": file.status,
+            **(file.fit or Fit(None, None, None))._asdict(),
+            "findings": [finding._asdict() for finding in file.findings],
+        }
+        files.append(content if file.failure is None else {**content, "failure": file.failure})
+    return changed_document(document("check", files=files, summary=report.summary._asdict()), report.changes)

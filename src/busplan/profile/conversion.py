@@ -92,7 +92,7 @@ def converted(profile: Profile, kind: str) -> Conversion:
 
 
 def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:
-    """Give each node data in both directions, and leave out groups that have none, as couplers: what they are called."""
+    """Give each node data in both directions, and leave out groups that have none, as couplers; gives both."""
     groups: Sequence[TomlTable] = machine.get("group", ())
     empty = [group["name"] for group in groups if not any(group.get(key, 1) for key in _SIZES)]
     raised = []

@@ -171,45 +171,17 @@ def covered_deg(x_mm: Floats, *, y_mm: Floats, part: slice | None = None) -> flo
     return total * _DEG_PER_TURN
 
 
-def least_squares_circle(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> tuple[tuple[float, float], float]:
-    """Fit a circle by least squares of the radial distances.
+class _Fit(NamedTuple):
+    """One pass over the points: their distances from a centre, and the least-squares circle as seen from there.
 
-    Parameters
-    ----------
-    x_mm, y_mm
-        Points near a circle about the origin, shape (n,) each [mm].
-    radius_mm
-        Its nominal radius [mm].
-
-    Returns
-    -------
-    tuple
-        Centre (x, y), and fitted radius minus nominal radius [mm].
-
-    Notes
-    -----
-    Gauss-Newton steps for the centre and the deviation of the radius. The equations contain only small differences from
-    the nominal circle, so they resolve a nanometre on a metre; fits of x^2 + y^2 do not. If the solution is not unique
-    (an axis that stands still), the one of smallest norm is taken.
+    Its Gauss-Newton steps are for the centre and the deviation of the radius. The equations contain only small
+    differences from the nominal circle, so they resolve a nanometre on a metre; fits of x^2 + y^2 do not. If the
+    solution is not unique (an axis that stands still), the one of smallest norm is taken.
 
     References
     ----------
     A. B. Forbes, Least-squares best-fit geometric elements, NPL report DITC 140/89, 1989.
-
-    Examples
-    --------
-    >>> angle = np.linspace(0.0, 6.0, 50)
-    >>> x, y = 1000.0 * np.cos(angle) - 2e-6, 1000.0 * np.sin(angle) + 1e-6
-    >>> (a, b), deviation = least_squares_circle(x, y_mm=y, radius_mm=1000.0)
-    >>> round(a, 9), round(b, 9), abs(deviation) < 1e-9
-    (-2e-06, 1e-06, True)
     """
-    fitted = _Fit.about((0.0, 0.0), x_mm, y_mm, radius_mm, 0.0).best(x_mm, y_mm)
-    return fitted.best_centre_mm, fitted.deviation_mm
-
-
-class _Fit(NamedTuple):
-    """One pass over the points: their distances from a centre, and the best circle as seen from there."""
 
     centre_mm: tuple[float, float]
     radius_mm: float

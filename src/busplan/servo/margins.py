@@ -141,36 +141,6 @@ def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
     )
 
 
-def loop_gain(frequency_hz: Floats, *, axis: Axis, timing: LoopTiming) -> NDArray[np.complex128]:
-    """Compute the frequency response of the open position loop.
-
-    Parameters
-    ----------
-    frequency_hz
-        Frequencies above 0 and up to half the control rate, shape (n,) [Hz].
-    axis, timing
-        As for `loop_margins`.
-
-    Returns
-    -------
-    ndarray
-        L(exp(j 2 pi f h)), shape (n,) [1].
-
-    Notes
-    -----
-    The closed loop follows its target with L / (1 + L).
-
-    Examples
-    --------
-    >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
-    >>> response = loop_gain(np.array([5000.0]), axis=axis, timing=LoopTiming(period_us=1000.0))
-    >>> complex(response[0].round(9))
-    (-0.005+0j)
-    """
-    angle = 2 * math.pi * frequency_hz * (timing.control_period_us / _US_PER_S)
-    return _at(angle, *_loop(axis, timing))
-
-
 def _loop(axis: Axis, timing: LoopTiming) -> tuple[Floats, Floats]:
     """Numerator and denominator of the open loop in w = z - 1, highest power first."""
     period = timing.control_period_us / _US_PER_S

@@ -19,6 +19,7 @@ from busplan.buses.can.limits import LIMITS
 from busplan.buses.can.response import Sender, worst_response
 from busplan.buses.can.section import CanProfile
 from busplan.elementwise import pointwise
+from busplan.forms.blocks import Chapter, Table
 from busplan.profile.toml import override
 from busplan.profile.write import profile_text
 from busplan.questions.fit.network import network_of
@@ -148,3 +149,13 @@ def test_arrays_of_points_give_what_each_point_gives(
         expected |= {"required": own.required_us, "longer": own.added_us(37.0)}
         assert {key: each[place] for key, each in told.items()} == expected, at
     assert 0 < np.mean(told["deadline"]) < 1
+
+
+def test_a_long_list_of_inputs_stands_once() -> None:
+    chapters = busplan.explain(many(40, load=0.5), "worst_response_us").report().blocks()
+    sections = [chapter.blocks for chapter in chapters if isinstance(chapter, Chapter)]
+    tables = [block for blocks in sections for block in blocks if isinstance(block, Table)]
+    shown = [len(table.rows) for table in tables]
+    assert len(chapters) > 40
+    assert max(shown) > 100
+    assert shown.count(max(shown)) < 3  # the messages', and that of the loop

@@ -6,10 +6,9 @@ from subprocess import CompletedProcess
 import pytest
 
 from busplan.buses import kind_named
-from busplan.buses.published import EvidenceSection
-from busplan.questions.evidence.figures import bus_evidence
+from busplan.questions.evidence.rows import EvidenceSection, sections_of
 
-SECTIONS = bus_evidence(kind_named("can"))
+SECTIONS = [*sections_of(kind_named("can"), "can"), *sections_of(kind_named("can"), "paper")]
 SYSTEM = SECTIONS[-1]
 SEEN = {"CAN: bits of frames of 8 bytes that hardware counted", "CAN: the load of a log"}
 """What frames on a bus had."""

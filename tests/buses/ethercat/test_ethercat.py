@@ -18,8 +18,8 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.evidence.figures import bus_evidence
-from busplan.questions.fit.cycle import cycle_of, limits_with_time
+from busplan.questions.evidence.rows import sections_of
+from busplan.questions.fit.certainty import cycle_of, limits_with_time
 from busplan.questions.fit.loop_delays import loop_delays_us, skew_us
 from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
@@ -398,7 +398,7 @@ PUBLISHED = {
 def test_published_figures_are_met_within_what_their_sources_leave_open() -> None:
     found = {
         (one.quantity, one.method): one.relative_residual
-        for section in bus_evidence(kind_named("ethercat"))
+        for section in sections_of(kind_named("ethercat"), "ethercat")
         for one in section.comparisons
     }
     assert set(PUBLISHED) <= set(found)
@@ -467,7 +467,9 @@ def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None
 
 
 def test_frames_are_those_of_eni_files_and_loops_lie_within_u_but_for_one_machine() -> None:
-    each = {one.quantity: one for section in bus_evidence(kind_named("ethercat")) for one in section.comparisons}
+    each = {
+        one.quantity: one for section in sections_of(kind_named("ethercat"), "ethercat") for one in section.comparisons
+    }
     frames = [one for name, one in each.items() if name.startswith(("acontis", "KPA"))]
     assert len(frames) == 6
     assert all(abs(one.residual or 0) < 1e-9 for one in frames)

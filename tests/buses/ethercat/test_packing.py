@@ -1,5 +1,6 @@
 """Frames against a writer that puts them together byte by byte, and against published sizes."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from busplan.buses.ethercat.equations import datagram_bytes, frame_bytes, room_bytes, sending_us
 from busplan.buses.ethercat.packing import Devices, frames_of, pack
-from busplan.elementwise import Traced
+from busplan.elementwise import Traced, plain
 
 MOST, LEAST = 1538, 84
 
@@ -19,6 +20,14 @@ class Written(NamedTuple):
 
     bytes: bytes
     devices: tuple[int, ...]
+
+
+def one_by_one(
+    devices: Sequence[Devices], *, datagrams: int, first_bytes: float
+) -> list[tuple[float, tuple[int, ...]]]:
+    """Bytes and devices of each frame."""
+    runs = frames_of(devices, datagrams=datagrams, first_bytes=first_bytes)
+    return [(plain(frame_bytes(run.datagrams_bytes)), tuple(held)) for run in runs for held in run.each()]
 
 
 def datagram(data: bytes) -> bytes:
@@ -87,10 +96,7 @@ def test_frames_are_those_of_a_writer(groups: list[tuple[int, int, int]], is_sha
     assert found.frames * 40 + found.datagrams_bytes + found.padding_bytes == sum(len(one.bytes) for one in whole)
     assert frame_bytes(found.last_bytes) == len(whole[-1].bytes)
     assert found.before_bytes == 0 if len(whole) == 1 else frame_bytes(found.before_bytes) == len(whole[-2].bytes)
-    one_by_one = list(frames_of(own, datagrams=datagrams, first_bytes=first))
-    assert [(frame_bytes(one.datagrams_bytes), one.devices) for one in one_by_one] == [
-        (len(one.bytes), one.devices) for one in whole
-    ]
+    assert one_by_one(own, datagrams=datagrams, first_bytes=first) == [(len(one.bytes), one.devices) for one in whole]
 
 
 @given(GROUPS, st.booleans(), st.integers(0, 4))
@@ -139,15 +145,23 @@ def test_a_frame_has_room_for_1486_bytes_and_20_less_beside_the_clocks() -> None
 
 
 def test_a_first_device_that_has_no_room_beside_the_clocks_leaves_them_alone() -> None:
-    found = list(frames_of([Devices(1, 1486)], datagrams=1, first_bytes=20.0))
-    assert [(one.devices, frame_bytes(one.datagrams_bytes)) for one in found] == [((), 84), ((1,), 1538)]
+    assert one_by_one([Devices(1, 1486)], datagrams=1, first_bytes=20.0) == [(84, ()), (1538, (1,))]
 
 
 def test_a_device_is_never_split() -> None:
-    found = list(frames_of([Devices(3, 800)], datagrams=1, first_bytes=0.0))
-    assert [one.devices for one in found] == [(1,), (2,), (3,)]
+    frames = one_by_one([Devices(3, 800)], datagrams=1, first_bytes=0.0)
+    assert [devices for _, devices in frames] == [(1,), (2,), (3,)]
 
 
 def test_groups_share_a_frame_at_their_boundary() -> None:
-    found = list(frames_of([Devices(150, 10), Devices(2, 700), Devices(1, 100)], datagrams=1, first_bytes=0.0))
-    assert [one.devices[:1] + one.devices[-1:] for one in found] == [(1, 148), (149, 152), (153, 153)]
+    frames = one_by_one([Devices(150, 10), Devices(2, 700), Devices(1, 100)], datagrams=1, first_bytes=0.0)
+    assert [devices[:1] + devices[-1:] for _, devices in frames] == [(1, 148), (149, 152), (153, 153)]
+
+
+def test_frames_of_many_devices_are_counted_and_not_listed() -> None:
+    runs = list(frames_of([Devices(10**6, 16), Devices(10**6, 8)], datagrams=1, first_bytes=20.0))
+    assert len(runs) <= 2 * 3
+    assert (
+        sum(run.frames for run in runs)
+        == pack([Devices(10**6, 16), Devices(10**6, 8)], datagrams=1, first_bytes=20.0).frames
+    )

@@ -18,7 +18,7 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import bus_of, model_names, network_of

@@ -11,7 +11,7 @@ from busplan.buses.ieee1394 import constants as ieee1394
 from busplan.elementwise import plain
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.evidence.figures import bus_evidence
+from busplan.questions.evidence.rows import sections_of
 from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.sourced import Sourced
 
@@ -61,7 +61,10 @@ def test_every_number_names_its_source() -> None:
 
 def test_published_machines_fit_their_periods() -> None:
     found = [
-        one for each in bus_evidence(kind_named("ieee1394")) for one in each.comparisons if "axes of a" in one.section
+        one
+        for each in sections_of(kind_named("ieee1394"), "ieee1394")
+        for one in each.comparisons
+        if "axes of a" in one.section
     ]
     assert [(one.quantity, one.published) for one in found[::2]] == [("4 axes", 250), ("8 axes", 500)]
     assert all(one.published is not None and 0 < one.computed < one.published for one in found)

@@ -14,7 +14,7 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.profile.write import profile_text
-from busplan.questions.evidence.figures import bus_evidence
+from busplan.questions.evidence.rows import sections_of
 from busplan.questions.fit.inputs import given
 from busplan.sections.profile import Profile
 
@@ -101,7 +101,7 @@ def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[st
 
 def test_no_published_figure_tests_it_and_evidence_says_so() -> None:
     bus = kind_named("sercos2")
-    (section,) = bus_evidence(bus)
+    (section,) = sections_of(bus, "sercos2")
     assert parts_tested(bus.evidence_data).parts == {}
     assert "0.0448 mm" in section.note
     assert "validates no schedule" in section.note
@@ -109,7 +109,7 @@ def test_no_published_figure_tests_it_and_evidence_says_so() -> None:
 
 
 def test_the_gap_of_the_evidence_fills_the_period() -> None:
-    (section,) = bus_evidence(kind_named("sercos2"))
+    (section,) = sections_of(kind_named("sercos2"), "sercos2")
     base = load("sercos2-servo-8").profile
     changes = {"bus.nodes": 6, "payload.read_bytes": 4, "payload.write_bytes": 4, "cycle.period_us": 500.0}
     assert len(section.comparisons) == 3

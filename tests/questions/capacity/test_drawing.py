@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.capacity.drawing import SensitivityDrawing
 from busplan.questions.capacity.sensitivity import Effect, Sensitivity, sensitivity
+from busplan.questions.capacity.sensitivity_report import SensitivityDrawing
 
 SVG = "{http://www.w3.org/2000/svg}"
 BASE = sensitivity(load("paper-1ms").profile)

@@ -10,9 +10,9 @@ import pytest
 
 from busplan.forms import render
 from busplan.forms.blocks import Report
-from busplan.forms.columns import sentence_text
 from busplan.forms.csv_rows import to_csv
-from busplan.forms.json_document import to_json
+from busplan.forms.numbers import sentence_text
+from busplan.printable import to_json
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.questions.capacity.report import capacity_document, capacity_records, capacity_report

@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
-from busplan.questions.capacity.sensitivity import Effect, sensitivities, sensitivity, standing
-from busplan.questions.fit.bottleneck import next_bottleneck
-from busplan.questions.fit.certainty import certainty
-from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.capacity.sensitivity import Effect, next_bottleneck, sensitivities, sensitivity, standing
+from busplan.questions.fit.certainty import certainty, cycle_of
 from busplan.questions.fit.figures import capacity, figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile

@@ -9,7 +9,7 @@ import pytest
 
 from busplan.forms import render
 from busplan.forms.blocks import Report
-from busplan.forms.json_document import to_json
+from busplan.printable import to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.capacity.report import capacity_document

@@ -9,7 +9,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from busplan.forms.numbers import ROUNDING_UM
-from busplan.questions.circle.contour_profile import CONTOUR_SECTORS, ContourProfile
+from busplan.questions.circle.contour import CONTOUR_SECTORS, ContourProfile
 from busplan.questions.circle.drawing import CircleDrawing
 from busplan.servo.path import Direction
 

@@ -11,8 +11,8 @@ import pytest
 
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.circle.figures import CircleTest
 from busplan.questions.circle.plot import circle_svg
-from busplan.questions.circle.record import CircleTest
 from busplan.questions.circle.roundness import circle_test
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -9,23 +9,24 @@ import pytest
 
 from busplan.forms import render
 from busplan.forms.blocks import Bar, Chart, Report, Sentence, ShownValue, Table
-from busplan.forms.columns import sentence_text
-from busplan.forms.json_document import to_json
-from busplan.forms.numbers import figure_text
+from busplan.forms.numbers import figure_text, sentence_text
+from busplan.printable import to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.circle.contour import TRACE_COLUMNS, trace_records
 from busplan.questions.circle.failures import Failure, Stated
-from busplan.questions.circle.record import CircleTest
+from busplan.questions.circle.figures import CircleTest
 from busplan.questions.circle.report import (
     circle_document,
     circle_records,
     circle_report,
+    circle_sentences,
     circle_table,
     contributions_table,
+    servo_sentence,
+    verdict_words,
 )
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.circle.sentences import circle_sentences, servo_sentence, verdict_words
-from busplan.questions.circle.trace import TRACE_COLUMNS, trace_records
 
 ValuesIn = Callable[[object], Iterator[ShownValue]]
 

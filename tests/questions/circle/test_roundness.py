@@ -12,8 +12,8 @@ from busplan.profile.document import Document
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.profile.write import profile_text
-from busplan.questions.circle.contour_profile import CONTOUR_SECTORS, contour_profile, drawn_profile
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.contour import CONTOUR_SECTORS, contour_profile, drawn_profile
+from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.report import circle_document
 from busplan.questions.circle.roundness import circle_test, to_attack
 from busplan.questions.fit.figures import figures

@@ -7,10 +7,8 @@ import pytest
 
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.compare.characters import compare_lines
+from busplan.questions.compare.drawing import axes_labels, compare_lines, compare_svg, kind_lines, own_axes, plane_of
 from busplan.questions.compare.kinds import KindComparison, compare
-from busplan.questions.compare.plane import axes_labels, kind_lines, own_axes, plane_of
-from busplan.questions.compare.svg import compare_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 EACH = pytest.mark.parametrize("found", ["can-servo-8", "dvrk", "gantry-24", "paper-1ms"], indirect=True)

@@ -9,9 +9,8 @@ from busplan.buses import kind_named, kind_names
 from busplan.forms import ENDINGS, render
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.compare.document import compare_document, compare_records
 from busplan.questions.compare.kinds import KindComparison, compare
-from busplan.questions.compare.report import compare_report
+from busplan.questions.compare.report import compare_document, compare_records, compare_report
 
 BOTH = ("ieee1394", "can")
 INPUTS = override(load("gantry-24").profile, {"group.io.read_bytes": 40})

@@ -13,7 +13,7 @@ from busplan.errors import BusplanError
 from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.diff.difference import ComparedFigure, Difference, difference
 from busplan.sections.profile import Profile

@@ -14,16 +14,14 @@ from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.errors import BusplanError
 from busplan.forms import render
 from busplan.forms.blocks import Report, Table, TableRow
-from busplan.forms.json_document import to_json
 from busplan.forms.terminal import block_lines
+from busplan.printable import to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.diff.changes import shown_value
 from busplan.questions.diff.difference import Difference, cycle_figures, difference, plan_figures
-from busplan.questions.diff.headline import regression_words
-from busplan.questions.diff.report import diff_document, diff_records, diff_report
+from busplan.questions.diff.report import diff_document, diff_records, diff_report, regression_words, shown_value
 from busplan.questions.fit.network import bus_of
 from busplan.sections.profile import Profile
 

@@ -2,13 +2,10 @@
 
 import pytest
 
-from busplan.buses.ieee1394 import table_1
-from busplan.buses.published import Comparison, published
+import busplan
+from busplan.buses import kind_named
 from busplan.profile.shipped import load
-from busplan.questions.circle.record import CircleFigures
-from busplan.questions.circle.roundness import circle_test
-from busplan.questions.evidence.figures import kind_evidence, paper_evidence
-from busplan.questions.evidence.paper import BENCH_PROFILE, CIRCLE_PROFILES
+from busplan.questions.evidence.rows import Comparison, sections_of
 
 # As printed in Table I: payload, T_lant, T1+T2, T1+T2 theory.
 TABLE_1 = [
@@ -33,32 +30,36 @@ TABLE_2 = [
 
 
 @pytest.fixture(scope="module")
-def circles() -> list[CircleFigures]:
-    return [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
+def comparisons() -> list[Comparison]:
+    (kind,) = busplan.evidence(paper=True).kinds
+    return [one for section in kind.sections for one in section.comparisons]
 
 
 @pytest.fixture(scope="module")
-def comparisons(circles: list[CircleFigures]) -> list[Comparison]:
-    return [one for section in paper_evidence(circles=lambda: circles).sections for one in section.comparisons]
-
-
-@pytest.fixture(scope="module")
-def others(circles: list[CircleFigures]) -> list[Comparison]:
+def others() -> list[Comparison]:
     """What is known beside the paper."""
-    found = kind_evidence("ieee1394", circles=lambda: circles).sections
-    assert [one.data for one in found] == sorted((one.data for one in found), key=["paper", "dvrk", "ieee1394"].index)
-    return [one for section in found if section.data != "paper" for one in section.comparisons]
+    bus = kind_named("ieee1394")
+    assert bus.evidence_data == ("paper", "dvrk", "ieee1394")
+    return [one for data in bus.evidence_data[1:] for table in sections_of(bus, data) for one in table.comparisons]
 
 
 def chosen(comparisons: list[Comparison], section: str, method: str) -> dict[str, Comparison]:
     return {one.quantity: one for one in comparisons if one.section == section and one.method == method}
 
 
-def test_the_data_hold_the_printed_tables() -> None:
-    assert [tuple(row) for row in table_1.TABLE_1] == TABLE_1
-    two = published("paper")["table_2"]
-    columns = ("payload_bytes", "latency_us", "reference_first_us", "reference_second_us")
-    assert list(zip(*(two[column] for column in columns), strict=True)) == TABLE_2
+def test_the_data_hold_the_printed_tables(comparisons: list[Comparison]) -> None:
+    theory, halves, latencies = (
+        {one.quantity: one.published for one in comparisons if one.section == f"Table I: {name}"}
+        for name in ("T1+T2, theory", "T1+T2, measured", "T_lant, measured")
+    )
+    rows = {f"{size} bytes": printed for size, *printed in TABLE_1}
+    assert {size: [latencies[size], halves[size], theory[size]] for size in theory} == rows
+    first, second = (
+        {one.quantity: one.published for one in comparisons if one.section.endswith(f"{name} figure")}
+        for name in ("first", "second")
+    )
+    assert first == {f"{size} bytes": own / other for size, own, other, _ in TABLE_2}
+    assert second == {f"{size} bytes": own / other for size, own, _, other in TABLE_2}
 
 
 def test_theory_column_to_its_two_decimals(comparisons: list[Comparison]) -> None:
@@ -81,7 +82,7 @@ def test_latency_of_the_paper_model_leaves_what_both_its_halves_leave(comparison
     # T_exec is derived from the same table, so this is arithmetic and no validation: the report says so.
     whole = chosen(comparisons, "Table I: T_lant, measured", "paper model")
     half = chosen(comparisons, "Table I: T1+T2, measured", "paper model")
-    execution = load(BENCH_PROFILE).profile.alike_nodes[0].node.execution
+    execution = load("paper-two-node").profile.alike_nodes[0].node.execution
     for size, latency_us, first_us, _ in TABLE_1:
         # The response to a write carries no payload: at 4 bytes both halves are 6.0 us, of which 32 bits are payload.
         second_us = latency_us - first_us - execution.execution_us(size)
@@ -118,7 +119,8 @@ def test_every_figure_has_the_grade_of_its_source(comparisons: list[Comparison],
     assert {one.partition(":")[0] for one in measured} == {
         *("Table I", "Section IV-A", "Figs. 9 and 10", "dVRK", "IEEE 1394"),
     }
-    assert {one.grade for one in (*comparisons, *others)} == {"published", "measured", "derived"}
+    assert {one.grade for one in (*comparisons, *others)} == {"published", "measured", "derived", None}
+    assert all((one.grade is None) == (one.published is None) for one in (*comparisons, *others))
 
 
 def test_the_kit_gains_less_on_the_bus_alone_than_was_measured_with_its_host(others: list[Comparison]) -> None:

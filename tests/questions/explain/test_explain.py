@@ -20,14 +20,12 @@ from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.capacity.report import capacity_document, capacity_records
 from busplan.questions.capacity.verdict import verdicts
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.explain.capacity import VERDICT_KEYS, capacity_figures
+from busplan.questions.explain.bus import VERDICT_KEYS, capacity_figures, latency_figures
 from busplan.questions.explain.circle import circle_figures
-from busplan.questions.explain.derivation import assumptions, explain
-from busplan.questions.explain.latency import latency_figures
-from busplan.questions.explain.register import figure_named, figures_of
-from busplan.questions.explain.trace import inputs
+from busplan.questions.explain.derivation import assumptions, explain, figure_named, figures_of
+from busplan.questions.explain.formulas import inputs
 from busplan.questions.fit.figures import capacity, figures
 from busplan.questions.latency.figures import latency
 from busplan.questions.latency.report import latency_records

@@ -8,13 +8,11 @@ from busplan.buses import kind_named
 from busplan.buses.figure import Figure
 from busplan.forms import render
 from busplan.forms.blocks import Calculation, Chapter, Code, Report, ShownValue, Table, Words
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.explain.assumptions import assumptions_report, assumptions_table
-from busplan.questions.explain.derivation import assumptions, explain
-from busplan.questions.explain.register import figures_of
-from busplan.questions.explain.report import explain_report
+from busplan.questions.explain.derivation import assumptions, explain, figures_of
+from busplan.questions.explain.report import assumptions_report, assumptions_table, explain_report
 
 ValuesIn = Callable[[object], Iterator[ShownValue]]
 

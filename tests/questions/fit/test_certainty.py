@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.table_1 import TABLE_1, residual
+from busplan.buses.ieee1394.table_1 import measured_halves_us, residual
 from busplan.buses.parts import Limit, share_limit
 from busplan.profile.toml import override
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS
-from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS, cycle_of
 from busplan.questions.fit.figures import CapacityFigures, figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.fit.node_limit import most_nodes
@@ -84,10 +83,10 @@ def test_two_nodes_of_the_paper_by_hand(make: Maker) -> None:
     assert figures(profile, model="paper").verdict is None
 
 
-@given(payload=st.sampled_from([row.payload_bytes for row in TABLE_1]), nodes=st.integers(1, 16))
+@given(payload=st.sampled_from(list(measured_halves_us())), nodes=st.integers(1, 16))
 def test_the_bias_at_gap_count_63_is_the_residual_of_the_table(make: Maker, payload: int, nodes: int) -> None:
     profile = make(bus__nodes=nodes, payload__read_bytes=payload, payload__write_bytes=payload)
-    mean_us = np.mean([row.request_and_acknowledge_us - _half_us(make, row.payload_bytes) for row in TABLE_1])
+    mean_us = np.mean([us - _half_us(make, payload_bytes) for payload_bytes, us in measured_halves_us().items()])
     assert residual().mean_us == pytest.approx(mean_us, rel=1e-12)
     assert of(profile).bias_us == pytest.approx(4 * nodes * mean_us, rel=1e-9)
 

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.buses import kind_names
-from busplan.elementwise import Traced
+from busplan.buses import kind_named, kind_names
+from busplan.elementwise import Traced, plain
+from busplan.profile.kinds import cycle_keys
+from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
-from busplan.questions.fit.certainty import FITS, certainty, limits_to_be_safe
-from busplan.questions.fit.cycle import cycle_of, limits_with_time
+from busplan.questions.fit.certainty import FITS, certainty, cycle_of, limits_to_be_safe, limits_with_time
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.fit.node_limit import most_nodes, safe_nodes
@@ -41,10 +42,48 @@ def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
         of_events: dict[str, list[float]] = defaultdict(list)
         for event in cycle.events():
             assert bus.event_kind(event.kind).key == event.kind
-            of_events[event.term].append(event.us)
+            of_events[event.term].append(plain(event.us))
         for term in cycle.terms:
             assert fsum(of_events.pop(term.key, [])) == pytest.approx(term.us, rel=1e-12, abs=1e-12)
         assert not of_events
+
+
+@KINDS
+def test_every_term_has_an_event(kind: str, profiles_by_kind: Profiles) -> None:
+    bus = kind_named(kind)
+    written: set[str] = set()
+
+    def look(profile: Profile) -> None:
+        cycle = cycle_of(profile, model=bus.deciding_model)
+        assert {term.rests_on for term in cycle.terms} - {""} <= set(cycle_keys(profile))
+        written.update(event.term for event in cycle.events())
+
+    for profile in (load(name).profile for name in shipped_names()):
+        if profile.bus.kind == kind:
+            look(profile)
+            for setting in bus.settings(network_of(profile)):
+                for changes in setting.values:
+                    look(override(profile, dict(changes)))
+    settings(max_examples=25, derandomize=True)(given(profiles_by_kind[kind])(look))()
+    assert written == {figure.key for figure in bus.figures.terms}
+
+
+@pytest.mark.parametrize("kind", ["can", "ieee1394"])
+@SOME
+@given(data=st.data())
+def test_a_command_arrives_when_its_last_event_has_ended(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    cycle = cycle_of(profile, model=bus_of(profile).deciding_model)
+    ends_us: dict[int | None, float] = {}
+    now_us = 0.0
+    for event in cycle.events():
+        now_us += plain(event.us)
+        if (event.transaction, event.kind) in cycle.command_events:
+            ends_us[event.node] = now_us
+    for node in {1, data.draw(st.integers(1, int(cycle.network.nodes))), int(cycle.network.nodes)}:
+        assert cycle.arrival_us(node) == pytest.approx(ends_us.get(node, ends_us.get(None)), rel=1e-12)
 
 
 @KINDS
@@ -96,10 +135,10 @@ def test_a_traced_number_has_the_same_value(kind: str, data: st.DataObject, prof
     nodes = data.draw(st.integers(1, 100))
     for model in model_names(profile):
         bus = bus_of(profile)
-        plain = bus.cycle(network.with_nodes(nodes), model=model).required_us
+        own = bus.cycle(network.with_nodes(nodes), model=model).required_us
         traced = bus.cycle(network.with_nodes(Traced(float(nodes))), model=model).required_us
         assert isinstance(traced, Traced)
-        assert traced.value == plain
+        assert traced.value == own
 
 
 @KINDS

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
-from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.fit.certainty import cycle_of, fits_in
 from busplan.questions.fit.figures import CapacityFigures, capacity, figures
 from busplan.questions.fit.network import model_names, network_of
 from busplan.questions.fit.node_limit import largest_nodes

@@ -19,13 +19,12 @@ from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load
 from busplan.profile.toml import decode, override, validate
 from busplan.profile.write import profile_text
-from busplan.questions.explain.capacity import capacity_figures
-from busplan.questions.fit.certainty import certainty
-from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.explain.bus import capacity_figures
+from busplan.questions.fit.certainty import certainty, cycle_of, fits_in
 from busplan.questions.fit.figures import COUNTS, figures
 from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import bus_of, model_names, network_of
-from busplan.questions.plan.machine import nodes_for_axes, rooms
+from busplan.questions.plan.constraints import nodes_for_axes, rooms
 from busplan.questions.plan.planning import plan
 from busplan.questions.sweep.blocks import figure_names, sweep
 from busplan.questions.sweep.grid import checked_grid
@@ -160,7 +159,7 @@ def test_events_add_up_to_the_terms(profile: Profile) -> None:
         cycle = cycle_of(profile, model=model)
         of_events: dict[str, list[float]] = defaultdict(list)
         for event in cycle.events():
-            of_events[event.term].append(event.us)
+            of_events[event.term].append(plain(event.us))
         for term in cycle.terms:
             assert fsum(of_events.pop(term.key, [])) == pytest.approx(plain(term.us), rel=1e-12, abs=1e-12)
         assert not of_events
@@ -399,7 +398,7 @@ def test_each_node_is_drawn_at_its_own_hops(
     first_us: dict[int, float] = {}
     for event in cycle_of(profile, model="standard").events():
         if event.kind == kind and event.transaction == "read" and event.node is not None:
-            first_us.setdefault(event.node, event.us)
+            first_us.setdefault(event.node, plain(event.us))
     assert list(first_us) == [1, 2, 3, 4]
     steps_us = [first_us[node + 1] - first_us[node] for node in (1, 2, 3)]
     assert steps_us == pytest.approx([steps * hop_us] * 3, rel=1e-9)

@@ -6,15 +6,12 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from busplan.forms.inks import INKS
+from busplan.forms.picture import INKS
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.map.cells import Cell, State
-from busplan.questions.map.characters import map_lines
 from busplan.questions.map.direction import AXES, PERIOD, Direction
-from busplan.questions.map.labels import LOOKS, legend_of, look_of, looks_of
-from busplan.questions.map.svg import map_svg
-from busplan.questions.map.trade_off import TradeOff, trade_off
+from busplan.questions.map.drawing import LOOKS, legend_of, look_of, looks_of, map_lines, map_svg
+from busplan.questions.map.trade_off import Cell, State, TradeOff, trade_off
 
 SVG = "{http://www.w3.org/2000/svg}"
 PAPER = load("paper-4ms").profile

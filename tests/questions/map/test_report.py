@@ -6,10 +6,9 @@ from busplan.buses.figure import TIMING_MODEL
 from busplan.forms import render
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.map.cells import STATES
 from busplan.questions.map.direction import AXES, PERIOD, Direction
 from busplan.questions.map.report import map_document, map_report
-from busplan.questions.map.trade_off import TradeOff, trade_off
+from busplan.questions.map.trade_off import STATES, TradeOff, trade_off
 
 PAPER = load("paper-4ms").profile
 SHOWN = trade_off(PAPER)

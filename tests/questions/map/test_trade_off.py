@@ -13,12 +13,11 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.certainty import TIME
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.map.cells import Cell, NotDrawn
 from busplan.questions.map.direction import AXES, MOST_VALUES, PERIOD, Direction, checked_direction
-from busplan.questions.map.trade_off import TradeOff, trade_off
+from busplan.questions.map.trade_off import Cell, NotDrawn, TradeOff, trade_off
 from busplan.questions.sweep.grid import Listed, Steps
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile

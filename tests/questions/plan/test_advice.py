@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.gate.gate import check_document
 from busplan.profile.document import Document
 from busplan.profile.shipped import load, shipped_names
@@ -22,8 +22,8 @@ from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
 from busplan.questions.fit.figures import capacity, figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import UNTESTED_CIRCLE, Change, cure
+from busplan.questions.plan.freedoms import MOST_RATIO
 from busplan.questions.plan.planning import plan
-from busplan.questions.plan.short_numbers import MOST_RATIO
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]

@@ -13,8 +13,7 @@ from busplan.profile.toml import override
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.plan.constraints import keeps_limits, refused_period
-from busplan.questions.plan.machine import with_payload_within
+from busplan.questions.plan.constraints import keeps_limits, refused_period, with_payload_within
 from busplan.questions.plan.planning import plan
 from busplan.questions.plan.search import Search
 from busplan.sections.profile import Profile

@@ -17,7 +17,7 @@ from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.questions.plan.freedoms import freed
-from busplan.questions.plan.option import Option
+from busplan.questions.plan.options import Option
 from busplan.questions.plan.planning import plan
 from busplan.questions.plan.search import Search
 from busplan.sections.profile import Profile

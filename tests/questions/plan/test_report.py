@@ -8,9 +8,9 @@ import pytest
 
 from busplan.forms import render
 from busplan.forms.blocks import Report, Sentence, ShownValue, Table, TableRow, Words
-from busplan.forms.columns import cell_text, sentence_text
 from busplan.forms.csv_rows import to_csv
-from busplan.forms.json_document import to_json
+from busplan.forms.numbers import cell_text, sentence_text
+from busplan.printable import to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.plan.planning import Plan, plan

@@ -18,17 +18,14 @@ from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import decode, override
 from busplan.profile.write import profile_text
 from busplan.questions.circle.check import CircleCheck
-from busplan.questions.fit.certainty import FITS, certainty
-from busplan.questions.fit.cycle import available_us, cycle_of
+from busplan.questions.fit.certainty import FITS, available_us, certainty, cycle_of
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import cure
-from busplan.questions.plan.constraints import needs
-from busplan.questions.plan.freedoms import freed
-from busplan.questions.plan.machine import with_payload_within
+from busplan.questions.plan.constraints import needs, with_payload_within
+from busplan.questions.plan.freedoms import ShortNumbers, freed
 from busplan.questions.plan.planning import plan
 from busplan.questions.plan.search import Search
-from busplan.questions.plan.short_numbers import ShortNumbers
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]

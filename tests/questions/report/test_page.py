@@ -20,10 +20,10 @@ from markdown_it import MarkdownIt
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.forms import render
+from busplan.forms.bars import signed_bar
 from busplan.forms.blocks import Chapter, Report, ShownValue, Table
-from busplan.forms.columns import cell_text, sentence_text
-from busplan.forms.inks import INKS
-from busplan.forms.signed_bar import signed_bar
+from busplan.forms.numbers import cell_text, sentence_text
+from busplan.forms.picture import INKS
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.fit.figures import capacity
@@ -31,8 +31,7 @@ from busplan.questions.fit.node_steps import node_steps, telling_periods
 from busplan.questions.report.all_answers import AllAnswers, all_answers
 from busplan.questions.report.commands import shell_word, sources
 from busplan.questions.report.page import ReportedProfile, page_report
-from busplan.questions.words.axes import AxesDrawing
-from busplan.questions.words.terms import LEFT, TermsDrawing
+from busplan.questions.words.drawings import LEFT, AxesDrawing, TermsDrawing
 from busplan.sections.profile import Profile
 
 PLACES = {"paper": "first", "standard": "second"}
@@ -164,7 +163,7 @@ def parts(report: Report) -> dict[str, Chapter]:
 def documents() -> dict[str, Any]:
     subject, _ = whole()
     found = sources(subject.answer, argument=subject.argument, changes=subject.changes)
-    return {name: source.document for name, source in found.items()}
+    return {name: source.document() for name, source in found.items()}
 
 
 def test_only_the_parts_in_their_order() -> None:

@@ -16,7 +16,7 @@ from busplan.questions.sweep.asked import Sweep, column_figures
 from busplan.questions.sweep.blocks import figure_names, sweep
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS
 from busplan.questions.sweep.grid import Listed, Steps, Values, checked_grid, grid_models
-from busplan.questions.sweep.writers import rows_writer
+from busplan.questions.sweep.rows import rows_writer
 
 pytest.importorskip("pyarrow")
 

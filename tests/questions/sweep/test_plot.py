@@ -15,9 +15,8 @@ from busplan.questions.sweep.blocks import sweep
 from busplan.questions.sweep.grid import Values, checked_grid
 from busplan.questions.sweep.panels import sweep_svg
 from busplan.questions.sweep.plot import FigureData
-from busplan.questions.sweep.scales import key_label, plot_scale, plotted_figure
+from busplan.questions.sweep.plotted import Plotted, caption, key_label, plot_scale, plotted_figure
 from busplan.questions.sweep.values import listed, stepped
-from busplan.questions.sweep.words import Plotted, caption
 
 SVG = "{http://www.w3.org/2000/svg}"
 Plots = Callable[[Element], list[Any]]

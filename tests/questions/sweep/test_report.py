@@ -11,18 +11,18 @@ import pytest
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.forms import RowsForm, html, markdown, terminal
 from busplan.forms.blocks import Report, ShownValue, Table
-from busplan.forms.columns import sentence_text
 from busplan.forms.csv_rows import to_csv
-from busplan.forms.json_document import to_json
+from busplan.forms.numbers import sentence_text
+from busplan.printable import to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.capacity.report import capacity_records
 from busplan.questions.fit.figures import capacity
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import Column, SweepBlock, figure_names, sweep
+from busplan.questions.sweep.digest import Digest
 from busplan.questions.sweep.grid import Listed, Steps, Values, checked_grid
-from busplan.questions.sweep.top import Tally, TopRows, sweep_report
-from busplan.questions.sweep.writers import rows_writer
+from busplan.questions.sweep.rows import rows_writer
 from busplan.sections.profile import Profile
 
 ValuesIn = Callable[[object], Iterator[ShownValue]]
@@ -115,27 +115,32 @@ def test_what_does_not_exist_is_null_and_empty() -> None:
     holed = block._replace(models=tuple({**one, "phase_margin_deg": missing} for one in block.models))
     assert '"phase_margin_deg": null}' in written("jsonl", [holed], ("fits", "phase_margin_deg"))
     assert written("csv", [holed], ("fits", "phase_margin_deg")).splitlines()[1] == "true,"
-    top = TopRows(("bus.nodes", "phase_margin_deg"), sort_by="phase_margin_deg", ascending=True, top=3)
+    top = Digest(swept(("bus.nodes", "phase_margin_deg")), sort_by="phase_margin_deg", ascending=True, top=3)
     top.add(holed)
-    assert top.kept == []
+    assert top.rows == []
+
+
+def swept(columns: tuple[str, ...]) -> Sweep:
+    profile = named("p")
+    return Sweep(profile, checked_grid(profile, AXES, with_circle=False), BOTH, columns)
 
 
 @pytest.mark.parametrize(("ascending", "top"), [(True, 1), (False, 4), (True, 1000)])
 def test_top_rows_are_those_of_a_whole_sort(ascending: bool, top: int) -> None:
-    kept = TopRows(("bus.nodes", "margin_us", "max_axes"), sort_by="max_axes", ascending=ascending, top=top)
+    kept = Digest(swept(("bus.nodes", "margin_us", "max_axes")), sort_by="max_axes", ascending=ascending, top=top)
     rows = []
     for block in blocks():
         kept.add(block)
         rows += [block.row(index, ("bus.nodes", "margin_us", "max_axes")) for index in range(2 * block.chunk.points)]
     rows.sort(key=lambda row: int(str(row["max_axes"])) * (1 if ascending else -1))
-    assert [one.record for one in kept.kept] == rows[:top]
+    assert kept.rows == rows[:top]
 
 
 def test_without_a_sort_the_top_rows_are_the_first() -> None:
-    kept = TopRows(("bus.nodes", "timing_model"), sort_by=None, ascending=False, top=3)
+    kept = Digest(swept(("bus.nodes", "timing_model")), sort_by=None, ascending=False, top=3)
     for block in blocks(1):
         kept.add(block)
-    assert [row.record["timing_model"] for row in kept.kept] == ["paper", "standard", "paper"]
+    assert [row["timing_model"] for row in kept.rows] == ["paper", "standard", "paper"]
 
 
 def named(name: str) -> Profile:
@@ -144,14 +149,14 @@ def named(name: str) -> Profile:
 
 def test_the_summary_counts_points_under_each_model(values_in: ValuesIn) -> None:
     grid = checked_grid(named("p"), AXES, with_circle=False)
-    tally = Tally(Sweep(named("p"), grid, BOTH, ()))
+    digest = Digest(Sweep(named("p"), grid, BOTH, ()), top=0)
     for block in blocks(4):
-        tally.add(block)
+        digest.add(block)
     pairs = [capacity(profile, timing_models=BOTH).results for _, profile in points()]
     by_hand = (sum(paper.fits for paper, _ in pairs), sum(standard.verdict == "fits" for _, standard in pairs))
     assert by_hand[1] <= sum(standard.fits for _, standard in pairs) < by_hand[0] < 18
     unsafe = sum(not capacity(profile).results[0].gap_count_safe for _, profile in points())
-    lines = [sentence_text(one) for one in tally.sentences()]
+    lines = [sentence_text(one) for one in digest.sentences()]
     assert lines[0] == (
         f"p: 18 points; {by_hand[0]} fit by the closed form of the paper model, {by_hand[1]} shown to fit "
         "(standard model)."
@@ -159,7 +164,7 @@ def test_the_summary_counts_points_under_each_model(values_in: ValuesIn) -> None
     refused = sum(bool(standard.circle_refused_by) for _, standard in pairs)
     assert lines[1] == f"The circle cannot be run at {refused} points: servo.step_us."
     assert (len(lines) == 3) == (unsafe > 0)
-    partial = Tally(Sweep(named("p"), grid, BOTH, ()))
+    partial = Digest(Sweep(named("p"), grid, BOTH, ()), top=0)
     partial.add(blocks(5)[0])
     stopped = next(partial.sentences())
     assert "3 points of 18 (interrupted)" in sentence_text(stopped)
@@ -170,19 +175,19 @@ def test_the_summary_counts_points_under_each_model(values_in: ValuesIn) -> None
 def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
     profile = load("paper-4ms").profile
     grid = checked_grid(profile, {"bus.gap_count": Steps(0, 1, 1, 64)}, with_circle=False)
-    tally = Tally(Sweep(profile, grid, BOTH, ()))
+    digest = Digest(Sweep(profile, grid, BOTH, ()), top=0)
     for block in sweep(profile, grid, timing_models=BOTH):
-        tally.add(block)
+        digest.add(block)
     # Two hops need 7: 0 to 6 are unsafe.
-    *_, last = tally.sentences()
+    *_, last = digest.sentences()
     assert (sentence_text(last), last.state) == ("At 7 points the gap count is unsafe (gap_count_safe).", "warns")
 
 
 @pytest.mark.parametrize("follows", [False, True])
 def test_a_payload_that_the_axes_do_not_change_is_said_to_be_so(follows: bool) -> None:
     own = override(named("p"), {"payload.read_bytes_per_axis": 8} if follows else {})
-    tally = Tally(Sweep(own, checked_grid(own, {"node.axes": Steps(1, 1, 1, 3)}, with_circle=False), BOTH, ()))
-    said = [sentence_text(one) for one in tally.sentences()]
+    digest = Digest(Sweep(own, checked_grid(own, {"node.axes": Steps(1, 1, 1, 3)}, with_circle=False), BOTH, ()), top=0)
+    said = [sentence_text(one) for one in digest.sentences()]
     words = (
         "The payload does not depend on the axes of a node: payload.read_bytes_per_axis and "
         "payload.write_bytes_per_axis say what each adds."
@@ -197,16 +202,14 @@ def reported(*, sort_by: str | None = None, top: int = 7) -> Report:
     """The answer with a circle's figure that does not exist."""
     profile = load("paper-4ms").profile
     grid = checked_grid(profile, AXES, with_circle=False)
-    tally = Tally(Sweep(named("<b>p|q"), grid, BOTH, ()))
-    rows = TopRows(COLUMNS, sort_by=sort_by, ascending=True, top=top)
+    digest = Digest(Sweep(named("<b>p|q"), grid, BOTH, COLUMNS), top=top, sort_by=sort_by, ascending=True)
     parts = []
     for block in blocks():
         missing = Column(np.full(block.chunk.shape, np.nan))
         parts.append(block._replace(models=tuple({**one, "phase_margin_deg": missing} for one in block.models)))
-        tally.add(parts[-1])
-        rows.add(parts[-1])
+        digest.add(parts[-1])
     text = written("json", parts, COLUMNS)
-    return sweep_report(rows, tally, document=lambda: json.loads(text))
+    return digest.report(lambda: json.loads(text))
 
 
 @pytest.mark.parametrize("sort_by", [None, "margin_us"])

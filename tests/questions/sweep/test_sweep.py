@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
-from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, model_names
 from busplan.questions.sweep.asked import Sweep

@@ -15,10 +15,9 @@ from busplan.printable import json_text
 from busplan.profile.shipped import load
 from busplan.questions.fit.network import model_names
 from busplan.questions.sweep.asked import Sweep
-from busplan.questions.sweep.blocks import Cell, Column, SweepBlock, figure_names, sweep
+from busplan.questions.sweep.blocks import Column, SweepBlock, Word, figure_names, sweep
 from busplan.questions.sweep.grid import Listed, Steps, Values, checked_grid, grid_models
-from busplan.questions.sweep.rows import sweep_facts
-from busplan.questions.sweep.writers import rows_writer
+from busplan.questions.sweep.rows import rows_writer, sweep_facts
 
 SWEEPS: dict[str, tuple[str, dict[str, Values]]] = {
     "one key": ("paper-4ms", {"cycle.period_us": Steps(1000, 37, 10, 20)}),
@@ -50,7 +49,7 @@ def holed(block: SweepBlock) -> SweepBlock:
     return block._replace(models=tuple({**one, **more} for one in block.models))
 
 
-def csv_by_cell(table: Sweep, rows: list[dict[str, Cell]]) -> str:
+def csv_by_cell(table: Sweep, rows: list[dict[str, Word]]) -> str:
     def text(value: object) -> object:
         missing = isinstance(value, float) and np.isnan(value)
         return "" if missing else repr(value) if isinstance(value, float) else csv_cell(value)
@@ -61,7 +60,7 @@ def csv_by_cell(table: Sweep, rows: list[dict[str, Cell]]) -> str:
     return buffer.getvalue()
 
 
-def jsonl_by_cell(table: Sweep, rows: list[dict[str, Cell]]) -> str:
+def jsonl_by_cell(table: Sweep, rows: list[dict[str, Word]]) -> str:
     def lines() -> list[str]:
         plain = (
             {name: None if isinstance(value, float) and np.isnan(value) else value for name, value in row.items()}

@@ -12,7 +12,7 @@ from busplan.buses import kind_named
 from busplan.buses.parts import IDLE
 from busplan.forms import html, markdown, terminal
 from busplan.forms.blocks import Report, ShownValue
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.forms.raster import png
 from busplan.forms.scale import ticks
 from busplan.profile.shipped import load

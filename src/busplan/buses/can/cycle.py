@@ -2,26 +2,46 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, lru_cache, partial, reduce
-from itertools import chain, islice
+from itertools import islice
 from math import inf
 from typing import Final, Literal
 
 from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
+from busplan.buses.can.figures import BUS_LOAD, TERMS
 from busplan.buses.can.response import Response
 from busplan.buses.can.streams import Stream, frame_sizes, streams
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
 from busplan.buses.can.waiting import is_higher, last_cyclic, response, waits
-from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
+from busplan.buses.parts import EventKind
 from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, named, plain, rounded_up, total
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
-_RESTS_ON: Final = {"cycle_host_us": "bus.host_us"}
-"""The key that a term comes from alone."""
+
+
+_DAVIS: Final = BUS_LOAD.reference
+EVENTS: Final = (
+    EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
+    EventKind("wait", "wait for nodes", "profile", "=", "work"),
+    EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "response"),
+    EventKind("command_frame", "command PDO", _DAVIS, ">", "request"),
+    EventKind("host", "host", "profile", "h", "idle"),
+    EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
+    EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),
+    EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (
+    EventKind("feedback", "feedback", "", "F", "in"),
+    EventKind("command", "command", "", "C", "out"),
+)
+"""What several events make together."""
 
 
 class CanCycle(BusCycle):
@@ -32,13 +52,16 @@ class CanCycle(BusCycle):
     priorities go whenever they are queued.
     """
 
+    term_figures = TERMS
+    command_events = (("command", "command_frame"),)
+
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
         self.is_stuffed = model == WORST
 
     @cached_property
     def traffic(self) -> Traffic:
-        """What the network sends."""
+        """SYNC, PDOs and other messages."""
         return traffic_of(self.network)
 
     @cached_property
@@ -52,25 +75,22 @@ class CanCycle(BusCycle):
     def _frame_us(self, data_bytes: Number) -> Number:
         return frame_us(data_bytes, **self._wire, is_stuffed=self.is_stuffed)
 
-    def _pdo_us(self, one: Pdos) -> Number:
-        found = payload_us(one.payload_bytes, **self._wire, is_stuffed=self.is_stuffed)
-        return named(found, f"{one.name}_us", f"PDO,{one.name}{one.group and f',{one.group}'}")
+    def _pdo_us(self, pdos: Pdos) -> Number:
+        pdo_us = payload_us(pdos.payload_bytes, **self._wire, is_stuffed=self.is_stuffed)
+        return named(pdo_us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
 
     @cached_property
     def _pdos(self) -> tuple[tuple[Pdos, Number], ...]:
         """All PDOs, each with its time."""
-        return tuple((one, self._pdo_us(one)) for one in self.traffic.pdos)
+        return tuple((pdos, self._pdo_us(pdos)) for pdos in self.traffic.pdos)
 
     @cached_property
     def _messages(self) -> tuple[tuple[Message, Number], ...]:
         """All other messages, each with the time of its frame."""
         return tuple(
-            (one, named(self._frame_us(one.payload_bytes), f"{one.name}_us", f"C,{one.name}"))
-            for one in self.traffic.messages
+            (message, named(self._frame_us(message.payload_bytes), f"{message.name}_us", f"C,{message.name}"))
+            for message in self.traffic.messages
         )
-
-    def _all_us(self, kind: TransactionKind) -> Number:
-        return total(one.pdos * us for one, us in self._pdos if one.kind == kind)
 
     @cached_property
     def sync_us(self) -> Number:
@@ -79,26 +99,76 @@ class CanCycle(BusCycle):
 
     def _wait_us(self, kind: TransactionKind, *, uncertainties: int = 0) -> Number:
         """The slowest execution of any node, with some standard uncertainties of each [us]."""
-        return reduce(larger, (_execution_us(one, kind, uncertainties) for one in self.network.groups))
+        return reduce(larger, (_execution_us(group, kind, uncertainties) for group in self.network.groups))
+
+    def _frames(self, kind: TransactionKind) -> Iterator[Run]:
+        """All PDOs of one direction, node by node; a timeline shows their frames."""
+        name, own = NAMES[kind], (pair for pair in self._pdos if pair[0].kind == kind)
+        for place, (pdos, us) in enumerate(own):
+            pdo = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
+            yield Run((pdo,), pdos.pdos, place, partial(self._of_pdo, pdo, pdos))
+
+    def _of_pdo(self, pdo: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
+        return (pdo._replace(us=self._frame_us(size)) for size in frame_sizes(pdos))
+
+    @cached_property
+    def _opening(self) -> tuple[Run, ...]:
+        """SYNC, and the wait for the slowest feedback."""
+        sync = BusEvent("sync", "cycle_sync_us", self.sync_us, "SYNC")
+        wait = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest feedback")
+        return Run((sync,)), Run((wait,))
+
+    @cached_property
+    def _feedback(self) -> tuple[Run, ...]:
+        """All feedback, and the host."""
+        host = BusEvent("host", "cycle_host_us", self.traffic.host_us, "host", rests_on="bus.host_us")
+        return (*self._frames("read"), Run((host,)))
+
+    @cached_property
+    def _commands(self) -> tuple[Run, ...]:
+        """All commands, and the wait for the slowest execution."""
+        slowest = "wait for the slowest execution of a command"
+        return (*self._frames("write"), Run((BusEvent("wait", "cycle_wait_us", self._wait_us("write"), slowest),)))
+
+    def written(self) -> Iterator[BusEvent | Run]:
+        """The cycle node by node, with other messages as late for the commands as they can be."""
+        blocking_us, counts = self._own_waits
+        blocking = BusEvent("blocking", "cycle_blocking_us", blocking_us, "messages of a lower priority")
+        yield Run((blocking,), laid_out=lambda _: self._blocks(blocking, 0, 1))
+        yield from self._opening
+        yield Run((), laid_out=lambda _: self._blocks(blocking, 1, 2))
+        yield from self._feedback
+        yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
+        for count, (message, us) in zip(counts, self._messages, strict=True):
+            yield Run((BusEvent("message", "cycle_interference_us", us, f"message {message.name}"),), count)
+        yield from self._commands
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
+
+    def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
+        """Some of the frames of lower priorities: one before SYNC, one before the feedback, the others behind it."""
+        waited = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
+        for message in islice(waited.blocks(), first, end):
+            label = f"message {message.name} of a lower priority"
+            yield blocking._replace(us=plain(message.frame_us), label=label)
 
     @cached_property
     def _own(self) -> dict[str, Number]:
-        """The terms that no other message is in."""
-        return {
-            "cycle_sync_us": self.sync_us,
-            "cycle_wait_us": total(self._wait_us(kind) for kind in TRANSACTION_KINDS),
-            "cycle_feedback_us": self._all_us("read"),
-            "cycle_host_us": self.traffic.host_us,
-            "cycle_command_us": self._all_us("write"),
-        }
+        """The terms that no other message is in, which these wait beside."""
+        keys = ("cycle_sync_us", "cycle_wait_us", "cycle_feedback_us", "cycle_host_us", "cycle_command_us")
+        return summed((*self._opening, *self._feedback, *self._commands), keys)
+
+    @cached_property
+    def by_term(self) -> Mapping[str, Number]:
+        """Time of each term, by its key [us]."""
+        rest = (run for run in self.runs if not any(event.term in self._own for event in run.events))
+        return summed(rest, (figure.key for figure in TERMS)) | self._own
 
     @cached_property
     def _on_bus_us(self) -> Number:
         """From SYNC to the end of the last command, but for other messages [us]."""
-        waits_us = {"cycle_wait_us": self._wait_us("read")}
-        return total((self._own | waits_us).values())
+        return total((self._own | {"cycle_wait_us": self._wait_us("read")}).values())
 
-    def _waits_us(self, extra_us: Number = 0.0) -> tuple[Number, Number]:
+    def _waits_us(self, extra_us: Number) -> Number:
         """Blocking by frames of lower priorities, and interference by those of higher ones [us].
 
         Parameters
@@ -106,33 +176,34 @@ class CanCycle(BusCycle):
         extra_us
             By how much the rest takes longer [us].
         """
-        return self._own_waits_us if is_off(extra_us) else self._waits_beside_us(self._on_bus_us + extra_us)
+        is_own = is_off(extra_us)
+        blocking_us, counts = self._own_waits if is_own else self._waits_beside(self._on_bus_us + extra_us)
+        return blocking_us + total(count * us for count, (_, us) in zip(counts, self._messages, strict=True))
 
     @cached_property
-    def _own_waits_us(self) -> tuple[Number, Number]:
-        """The same where nothing takes longer [us]."""
-        return self._waits_beside_us(self._on_bus_us + 0.0)
+    def _own_waits(self) -> tuple[Number, tuple[Number, ...]]:
+        return self._waits_beside(self._on_bus_us + 0.0)
 
-    def _waits_beside_us(self, others_us: Number) -> tuple[Number, Number]:
+    def _waits_beside(self, others_us: Number) -> tuple[Number, tuple[Number, ...]]:
+        """Blocking [us], and how many frames of each message go before the last PDO [1]."""
         if not self._messages:
-            return 0.0, 0.0
+            return 0.0, ()
         others_us = named(others_us, "others_us", "others")
 
-        def found(key: str, words: str) -> Number:
+        def figure(key: str, words: str) -> Number:
             return self._sent.of(partial(_waits, self.is_stuffed, key), others_us, words=words)
 
         words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
-        lasts_us = named(found("lasts_us", words), "busy_us", "w")
-        blocking_us = found("blocking_us", "the 3 longest frames of a lower priority that can be there in w")
-        counts = self._higher(lasts_us)
-        return blocking_us, total(count * us for count, (_, us) in zip(counts, self._messages, strict=True))
+        lasts_us = named(figure("lasts_us", words), "busy_us", "w")
+        blocking_us = figure("blocking_us", "the 3 longest frames of a lower priority that can be there in w")
+        return blocking_us, tuple(self._higher(lasts_us))
 
     def _higher(self, lasts_us: Number) -> Iterator[Number]:
         """How many frames of each message go before the last PDO in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
-        for one, _ in self._messages:
-            count = rounded_up((window_us + one.jitter_us) / one.period_us)
-            yield choose(is_higher(one.identifier, self._last), count, 0)
+        for message, _ in self._messages:
+            count = rounded_up((window_us + message.jitter_us) / message.period_us)
+            yield choose(is_higher(message.identifier, self._last), count, 0)
 
     @cached_property
     def _last(self) -> Number:
@@ -140,21 +211,11 @@ class CanCycle(BusCycle):
         sent, words = Sent(without_times(self.traffic)), "the largest identifier of SYNC and all PDOs"
         return named(sent.of(_last, words=words), "last_identifier", "id_last")
 
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire."""
-        blocking_us, interference_us = self._waits_us()
-        return (
-            *(Term(key, us, _RESTS_ON.get(key, "")) for key, us in self._own.items()),
-            Term("cycle_blocking_us", blocking_us),
-            Term("cycle_interference_us", interference_us),
-            Term("nonperiodic_us", self.network.nonperiodic_us),
-        )
-
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
-        """What the cycle grows by if its nodes take longer: more messages may arrive, too [us]."""
+        """Growth of the cycle if its nodes take longer: more messages may arrive, too [us]."""
         if not self._messages:
             return extra_us
-        return extra_us + total(self._waits_us(after_us + extra_us)) - total(self._waits_us(after_us))
+        return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The execution time, what two standard uncertainties more change, halved, and the host's own time."""
@@ -176,41 +237,6 @@ class CanCycle(BusCycle):
         others = () if self._messages or self.network.nonperiodic_us else (LeftOut("other messages", "message"),)
         return (*host, *slowest, *others)
 
-    def events(self) -> Iterator[BusEvent]:
-        """The cycle node by node, with other messages as late for the commands as they can be."""
-        found = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
-        blocks = (
-            BusEvent("blocking", "cycle_blocking_us", one.frame_us, f"message {one.name} of a lower priority")
-            for one in found.blocks()
-        )
-        yield from islice(blocks, 1)
-        yield BusEvent("sync", "cycle_sync_us", plain(self.sync_us), "SYNC")
-        yield BusEvent("wait", "cycle_wait_us", plain(self._wait_us("read")), "wait for the slowest feedback")
-        yield from islice(blocks, 1)
-        yield from self._frames("read")
-        yield BusEvent("host", "cycle_host_us", plain(self.traffic.host_us), "host")
-        yield from blocks
-        for count, (one, us) in zip(self._higher(found.lasts_us), self._messages, strict=True):
-            for _ in range(int(plain(count))):
-                yield BusEvent("message", "cycle_interference_us", plain(us), f"message {one.name}")
-        yield from self._frames("write")
-        waiting_us = plain(self._wait_us("write"))
-        yield BusEvent("wait", "cycle_wait_us", waiting_us, "wait for the slowest execution of a command")
-        yield BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window")
-
-    def _frames(self, kind: TransactionKind) -> Iterator[BusEvent]:
-        """All frames of one direction, node by node."""
-        name, node = NAMES[kind], 0
-        own = (one for one, _ in self._pdos if one.kind == kind)
-        for group, one in zip(self.network.groups, own, strict=True):
-            nodes = int(plain(group.nodes))
-            pdos = int(plain(one.pdos)) // nodes
-            for _ in range(nodes):
-                node += 1
-                for size in chain.from_iterable(frame_sizes(one) for _ in range(pdos)):
-                    us = plain(self._frame_us(size))
-                    yield BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", node, name)
-
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
         least, most = (CanCycle(self.network, model).load for model in (NONE, WORST))
@@ -227,11 +253,11 @@ class CanCycle(BusCycle):
 
     @property
     def _in_cycle_us(self) -> Number:
-        return self.sync_us + self._all_us("read") + self._all_us("write")
+        return self.sync_us + self._own["cycle_feedback_us"] + self._own["cycle_command_us"]
 
     @property
     def _messages_load(self) -> Number:
-        return total(us / one.period_us for one, us in self._messages)
+        return total(us / message.period_us for message, us in self._messages)
 
     @property
     def load_period_us(self) -> Number:
@@ -241,21 +267,21 @@ class CanCycle(BusCycle):
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
-        pdos = ((one.name, one.group) for one in self.traffic.pdos)
-        names = ((SYNC, ""), *pdos, *((one.name, "") for one in self.traffic.messages))
-        found = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
-        return (*found, BusLatency(LOOP, None, self._loop()))
+        ends = ((pdos.name, pdos.group) for pdos in self.traffic.pdos)
+        names = ((SYNC, ""), *ends, *((message.name, "") for message in self.traffic.messages))
+        each = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
+        return (*each, BusLatency(LOOP, None, self._loop()))
 
     def _loop(self) -> dict[str, Number]:
         """Parts of the way from SYNC to the last executed command that rests on it."""
-        blocking_us, interference_us = self._waits_us()
+        us = self.by_term
         parts_us = {
             "jitter_us": 0.0,
-            "blocking_us": blocking_us,
-            "interference_us": interference_us,
+            "blocking_us": us["cycle_blocking_us"],
+            "interference_us": us["cycle_interference_us"],
             "backlog_us": 0.0,
             "frame_us": self._in_cycle_us,
-            "execution_us": self._own["cycle_wait_us"] + self.traffic.host_us,
+            "execution_us": us["cycle_wait_us"] + self.traffic.host_us,
             "pipeline_us": self.network.profile.bus.pipeline_cycles * self.network.period_us,
         }
         return _numbered(parts_us, identifier=inf, data_bytes=inf, instance=inf, deadline_us=inf)
@@ -277,15 +303,15 @@ class CanCycle(BusCycle):
     def _phases(self, place: int, name: str) -> dict[str, Number]:
         """Figures of the stream at a place among those that end a PDO or a message."""
 
-        def found(key: str, words: str) -> Number:
+        def figure(key: str, words: str) -> Number:
             return self._sent.of_points(partial(_phase, self.is_stuffed, place, key), words=words)
 
-        jitter_us = found("jitter_us", f"how late {name} may be queued")
-        frame_us_ = found("frame_us", f"the last frame of {name}")
-        blocking_us = found("blocking_us", f"the longest frame of a lower priority than {name}")
-        interference_us = found("interference_us", f"frames of higher priorities before {name}, in its worst instance")
-        instance = found("instance", f"the worst instance of {name} in the busy period, from 0")
-        period_us = named(found("period_us", f"period of {name}"), "period_us", "T")
+        jitter_us = figure("jitter_us", f"how late {name} may be queued")
+        frame_us_ = figure("frame_us", f"the last frame of {name}")
+        blocking_us = figure("blocking_us", f"the longest frame of a lower priority than {name}")
+        interference_us = figure("interference_us", f"frames of higher priorities before {name}, in its worst instance")
+        instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")
+        period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
         backlog_us = choose(instance < inf, instance * frame_us_ - instance * period_us, instance)
         parts_us = {
             "jitter_us": named(jitter_us, "jitter_us", "J"),
@@ -298,10 +324,10 @@ class CanCycle(BusCycle):
         }
         return _numbered(
             parts_us,
-            identifier=found("last", f"identifier of {name}"),
-            data_bytes=found("data_bytes", f"data of {name}"),
+            identifier=figure("last", f"identifier of {name}"),
+            data_bytes=figure("data_bytes", f"data of {name}"),
             instance=instance,
-            deadline_us=found("deadline_us", f"deadline of {name}"),
+            deadline_us=figure("deadline_us", f"deadline of {name}"),
         )
 
 
@@ -323,13 +349,13 @@ def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Nu
 
 def _waits(is_stuffed: bool, key: str, traffic: Traffic, others_us: Number) -> Number:
     """One figure of what a cycle waits for."""
-    found: Number = getattr(waits(traffic, others_us, is_stuffed=is_stuffed), key)
-    return found
+    number: Number = getattr(waits(traffic, others_us, is_stuffed=is_stuffed), key)
+    return number
 
 
 def _last(traffic: Traffic) -> Number:
-    found: Number = last_cyclic(streams(traffic, is_stuffed=True))
-    return found
+    last: Number = last_cyclic(streams(traffic, is_stuffed=True))
+    return last
 
 
 def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:
@@ -345,5 +371,5 @@ def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:
 @lru_cache(maxsize=1024)
 def _answer(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[Stream, Response | None]:
     """The stream at a place among those that end a PDO or a message, with its response."""
-    own = next(islice((one for one in streams(traffic, is_stuffed=is_stuffed) if one.is_end), place, None))
+    own = next(islice((stream for stream in streams(traffic, is_stuffed=is_stuffed) if stream.is_end), place, None))
     return own, response(own, traffic, is_stuffed=is_stuffed)

@@ -6,6 +6,9 @@ R. I. Davis, A. Burns, R. J. Bril, J. J. Lukkien, Controller Area Network (CAN) 
 revisited and revised, Real-Time Systems 35, 2007.
 """
 
+from collections.abc import Callable
+from functools import lru_cache
+
 from busplan.buses.can.constants import (
     BASE_BITS,
     BITS_PER_BYTE,
@@ -17,6 +20,7 @@ from busplan.buses.can.constants import (
 )
 from busplan.elementwise import Number, choose, rounded_down, rounded_up
 
+_PLAIN = (int, float)
 KBIT_US = 1000
 """Microseconds of a bit at 1 kbit/s."""
 
@@ -120,7 +124,14 @@ def payload_us(payload_bytes: Number, *, identifier_bits: Number, bit_rate_kbit_
     >>> payload_us(10, identifier_bits=11, bit_rate_kbit_s=1000, is_stuffed=True)
     210.0
     """
+    wire = identifier_bits, bit_rate_kbit_s, is_stuffed
+    is_plain = isinstance(payload_bytes, _PLAIN) and isinstance(identifier_bits, _PLAIN)
+    if is_plain and isinstance(bit_rate_kbit_s, _PLAIN):
+        return _plain_payload_us(payload_bytes, *wire)
+    return _payload_us(payload_bytes, *wire)
 
+
+def _payload_us(payload_bytes: Number, identifier_bits: Number, bit_rate_kbit_s: Number, is_stuffed: bool) -> Number:
     def of_frame(data_bytes: Number) -> Number:
         return frame_us(
             data_bytes, identifier_bits=identifier_bits, bit_rate_kbit_s=bit_rate_kbit_s, is_stuffed=is_stuffed
@@ -129,6 +140,10 @@ def payload_us(payload_bytes: Number, *, identifier_bits: Number, bit_rate_kbit_
     full = full_frames(payload_bytes)
     rest_bytes = payload_bytes - FRAME_BYTES * full
     return full * of_frame(float(FRAME_BYTES)) + choose(rest_bytes > 0, of_frame(rest_bytes), 0.0)
+
+
+_plain_payload_us: Callable[..., Number] = lru_cache(maxsize=1024)(_payload_us)
+"""The groups of a network have few sizes of payloads between them."""
 
 
 def share_bytes(payload_bytes: Number, *, pdos: Number) -> Number:

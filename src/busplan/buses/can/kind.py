@@ -1,7 +1,7 @@
 """CAN 2.0 with a CANopen cycle, as a kind of bus."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.can import rules
@@ -14,18 +14,13 @@ from busplan.buses.can.constants import (
     PIPELINE_CYCLES,
     SYNC_IDENTIFIER,
 )
-from busplan.buses.can.cycle import NONE, WORST, CanCycle
-from busplan.buses.can.figures import BUS_LOAD, FIGURES
+from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle
+from busplan.buses.can.figures import FIGURES
 from busplan.buses.can.limits import LIMITS
-from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.elementwise import plain
 
-if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
-
-_DAVIS: Final = BUS_LOAD.reference
 _HOST_STEP_US: Final = 10.0
 
 
@@ -57,21 +52,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         measure="measure both on a node: SYNC to its frame, command to effect",
         base="from SYNC to a queued feedback PDO, and from a command PDO to its effect",
     )
-    command_events = (("command", "command_frame"),)
-    event_kinds = (
-        EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
-        EventKind("wait", "wait for nodes", "profile", "=", "work"),
-        EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "response"),
-        EventKind("command_frame", "command PDO", _DAVIS, ">", "request"),
-        EventKind("host", "host", "profile", "h", "idle"),
-        EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
-        EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("feedback", "feedback", "", "F", "in"),
-        EventKind("command", "command", "", "C", "out"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),
@@ -138,15 +120,11 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         """The bit rate."""
         return (f"{network.profile.bus.bit_rate_kbit_s} kbit/s",)
 
-    def evidence(
-        self,
-        networks: Mapping[str, Network],  # noqa: ARG002 - it is asked for frames and messages alone
-        published: Mapping[str, Mapping[str, Any]],
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare published frames, loads and response times with what the equations give."""
-        from busplan.buses.can.evidence import can_sections  # one command alone asks for it
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Those of `busplan.buses.can.evidence`."""
+        from busplan.buses.can.evidence import FUNCTIONS  # one command alone asks for them
 
-        return can_sections(published["can"], published["paper"])
+        return FUNCTIONS
 
 
 def _all_nodes(network: Network) -> str:

@@ -9,7 +9,7 @@ from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES,
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.response import TooManyStepsError
 from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
-from busplan.buses.can.traffic import Sent, Traffic, traffic_of, without_times
+from busplan.buses.can.traffic import Sent, Traffic, pdos_of, traffic_of, without_times
 from busplan.buses.can.waiting import Messages, messages
 from busplan.buses.limits import NODE_LIMIT
 from busplan.buses.network import Network
@@ -18,50 +18,54 @@ from busplan.elementwise import Number, is_everywhere, larger, plain, pointwise,
 from busplan.sections.base import MAX_TIME_US
 
 
-def late_messages(traffic: Traffic) -> tuple[str, ...]:
-    """Say of each message that misses its deadline by how much, with its name first; of plain numbers."""
-    return tuple(f"{one.name}: {_late(one, share, traffic)}" for one, share in _late_streams(traffic))
+def late_messages(traffic: Traffic) -> Iterator[tuple[str, str]]:
+    """Names of the messages of plain numbers that miss their deadline, each with by how much in words."""
+    return ((stream.name, _late(stream, share, traffic)) for stream, share in _late_streams(traffic))
 
 
 def _late_streams(traffic: Traffic) -> Iterator[tuple[Stream, float]]:
     """Messages that miss their deadline, each with its response over its deadline."""
     each = messages(traffic, is_stuffed=True)
-    for one in streams(traffic, is_stuffed=True):
-        if one.is_message and (share := plain(each.deadline_share(one))) > 1:
-            yield one, share
+    for stream in streams(traffic, is_stuffed=True):
+        if stream.is_message and (share := plain(each.deadline_share(stream))) > 1:
+            yield stream, share
 
 
 def _all_late(traffic: Traffic) -> str:
     """Say of all messages that miss their deadline in one clause, the worst first."""
     late = sorted(_late_streams(traffic), key=lambda pair: -pair[1])
-    endless = [one.name for one, share in late if share == inf]
+    endless = [stream.name for stream, share in late if share == inf]
     if endless:
         more = len(endless) - 1
         others = f" and {more} more message{'s' * (more > 1)} have" if more else " has"
         return f"{endless[0]}{others} no worst-case response time"
-    times = ((one.name, share * one.deadline_us, one.deadline_us) for one, share in late)
     return _and_more(
-        [f"the worst-case response time of {one} is {us:g} us, over its {most:g} us" for one, us, most in times]
+        [
+            f"the worst-case response time of {stream.name} is {share * stream.deadline_us:g} us, "
+            f"over its {stream.deadline_us:g} us"
+            for stream, share in late
+        ]
     )
 
 
-def _late(one: Stream, share: float, traffic: Traffic) -> str:
+def _late(stream: Stream, share: float, traffic: Traffic) -> str:
     if share < inf:
-        return f"its worst-case response time is {share * one.deadline_us:g} us, over its {one.deadline_us:g} us"
-    load = messages(traffic, is_stuffed=True).load(one)
+        us = share * stream.deadline_us
+        return f"its worst-case response time is {us:g} us, over its {stream.deadline_us:g} us"
+    load = messages(traffic, is_stuffed=True).load(stream)
     steps = "" if load >= SATURATED else f", and its busy period takes over {MOST_STEPS:.0f} steps to find"
     return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}{steps}"
 
 
 def _slowest(traffic: Traffic) -> float:
     """The largest response over deadline of any message of plain numbers [1]."""
-    each, found = messages(traffic, is_stuffed=True), 0.0
+    each, largest = messages(traffic, is_stuffed=True), 0.0
     # The lowest priorities first: one of them has no response time, or none has.
-    for one in each.by_priority():
-        found = max(found, plain(each.deadline_share(one)))
-        if found == inf:
+    for stream in each.by_priority():
+        largest = max(largest, plain(each.deadline_share(stream)))
+        if largest == inf:
             break
-    return found
+    return largest
 
 
 def _deadline(network: Network) -> Number:
@@ -72,7 +76,7 @@ def _deadline(network: Network) -> Number:
 
 def _largest(traffic: Traffic, share: Callable[[Messages, Stream], Number]) -> Number:
     each = messages(traffic, is_stuffed=True)
-    return reduce(larger, (share(each, one) for one in each.by_priority()))
+    return reduce(larger, (share(each, stream) for stream in each.by_priority()))
 
 
 def _is_late(network: Network) -> Number:
@@ -97,8 +101,10 @@ def _late_points(traffic: Traffic, least: Any, most: Any) -> Number:
 
     numbers: tuple[Any, ...] = traffic.numbers()
     shape = np.broadcast_shapes(np.shape(least), np.shape(most), *map(np.shape, numbers))
-    least, most = (np.broadcast_to(one, shape).ravel() for one in (least, most))
-    columns = [one if isinstance(one, int | float) else np.broadcast_to(one, shape).ravel() for one in numbers]
+    least, most = (np.broadcast_to(share, shape).ravel() for share in (least, most))
+    columns = [
+        number if isinstance(number, int | float) else np.broadcast_to(number, shape).ravel() for number in numbers
+    ]
     late = least > 1
     asked = np.flatnonzero((least <= 1) & (most > 1))
     # Points of like loads take like numbers of steps.
@@ -107,19 +113,18 @@ def _late_points(traffic: Traffic, least: Any, most: Any) -> Number:
     while waiting:
         some = waiting.pop()
         at = some if len(some) > 1 else some[0]
-        row = (one if isinstance(one, int | float) else one[at] for one in columns)
+        row = (column if isinstance(column, int | float) else column[at] for column in columns)
         try:
             late[some] = _has_late(traffic.with_numbers(*map(_as_plain, row)))
         except TooManyStepsError:
             waiting += np.array_split(some, 2)
-    found: Number = late.reshape(shape)
-    return found
+    is_late: Number = late.reshape(shape)
+    return is_late
 
 
-def _as_plain(number: Any) -> Number:
-    """One point of an array as a plain number."""
-    found: Number = getattr(number, "item", lambda: number)() if getattr(number, "ndim", 0) == 0 else number
-    return found
+def _as_plain(number: Any) -> Any:
+    """A single point of an array as a plain number."""
+    return number.item() if getattr(number, "shape", None) == () else number
 
 
 _POINTS_AT_ONCE: Final = 4096
@@ -127,12 +132,12 @@ _POINTS_AT_ONCE: Final = 4096
 
 
 def _has_late(traffic: Traffic) -> Number:
-    each, found = messages(traffic, is_stuffed=True), False
-    for one in each.by_priority():
-        found = found | (each.deadline_share(one) > 1)
-        if is_everywhere(found):
+    each, late = messages(traffic, is_stuffed=True), False
+    for stream in each.by_priority():
+        late = late | (each.deadline_share(stream) > 1)
+        if is_everywhere(late):
             break
-    return found
+    return late
 
 
 _DEADLINE_WORDS: Final = "busy periods of all messages"
@@ -140,27 +145,27 @@ _DEADLINE_WORDS: Final = "busy periods of all messages"
 
 def shared_identifiers(traffic: Traffic) -> tuple[tuple[str, str], ...]:
     """Say which messages share identifiers, once for each key that sets those of the second one; of plain numbers."""
-    found: dict[str, list[str]] = {}
+    clauses: dict[str, list[str]] = {}
     for key, words in _collisions_in_words(traffic):
-        found.setdefault(key, []).append(words)
-    return tuple((key, _and_more(each)) for key, each in found.items())
+        clauses.setdefault(key, []).append(words)
+    return tuple((key, _and_more(each)) for key, each in clauses.items())
 
 
 def _collisions_in_words(traffic: Traffic) -> Iterator[tuple[str, str]]:
     """Each pair of messages that shares identifiers, with the key of the second."""
-    for one, other, first, shared in collisions(streams(traffic, is_stuffed=True)):
-        pair = f"{one.label} and {other.label}" if one.label != other.label else f"frames of {one.label} PDOs"
-        yield _identifier_key(other), f"{pair} share {_from(first, shared)}"
+    for early, late, first, shared in collisions(streams(traffic, is_stuffed=True)):
+        pair = f"{early.label} and {late.label}" if early.label != late.label else f"frames of {early.label} PDOs"
+        yield _identifier_key(late), f"{pair} share {_from(first, shared)}"
 
 
 def _and_more(clauses: Sequence[str]) -> str:
     return f"{clauses[0]}, and {len(clauses) - 1} more" if len(clauses) > 1 else clauses[0]
 
 
-def _identifier_key(one: Stream) -> str:
-    if one.is_message:
-        return f"message.{one.name}.identifier"
-    return f"{f'group.{one.group}' if one.group else 'payload'}.{one.name}_identifier"
+def _identifier_key(stream: Stream) -> str:
+    if stream.is_message:
+        return f"message.{stream.name}.identifier"
+    return f"{f'group.{stream.group}' if stream.group else 'payload'}.{stream.name}_identifier"
 
 
 def _from(first: int, shared: int) -> str:
@@ -182,13 +187,13 @@ def _of_identifiers(network: Network, function: Callable[[Sequence[Stream]], Num
 
 def _most_identifier(network: Network) -> Number:
     bits = network.profile.bus.identifier_bits
-    return pointwise(lambda one: MAX_IDENTIFIER[int(one)], bits, words="the largest identifier of the format")
+    return pointwise(lambda length: MAX_IDENTIFIER[int(length)], bits, words="the largest identifier of the format")
 
 
 def _largest_pdo(network: Network) -> Number:
     largest: Number = 0
-    for one in traffic_of(network).pdos:
-        largest = larger(largest, one.payload_bytes)
+    for pdos in traffic_of(network).pdos:
+        largest = larger(largest, pdos.payload_bytes)
     return largest
 
 
@@ -231,7 +236,7 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",
-        lambda network: total(one.pdos for one in traffic_of(network).pdos if one.kind == "read"),
+        lambda network: total(pdos_of(group) for group in network.groups),
         lambda _network: MOST_NODES,
         way_out=f"a second bus has {MOST_NODES:g} more",
     ),

@@ -26,8 +26,7 @@ def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def deadline_missed(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A message may arrive behind its deadline."""
-    for words in late_messages(traffic_of_profile(subject.profile)):
-        name, _, why = words.partition(": ")
+    for name, why in late_messages(traffic_of_profile(subject.profile)):
         yield RuleProblem(f"message.{name}.deadline_us", why, *subject.cure())
 
 

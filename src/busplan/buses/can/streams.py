@@ -105,21 +105,21 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
     yield sent(SYNC, int(plain(traffic.sync_identifier)), _whole(traffic.sync_bytes))
     block = {"read": FOLLOWS, "write": FOLLOWS}
     free: dict[str, Points] = dict(block)
-    for one in traffic.pdos:
-        said, count = int(plain(one.identifier)), _whole(one.pdos)
-        first = free[one.kind] if said == FOLLOWS else said
+    for pdos in traffic.pdos:
+        said, count = int(plain(pdos.identifier)), _whole(pdos.pdos)
+        first = free[pdos.kind] if said == FOLLOWS else said
         if said != FOLLOWS:
-            block[one.kind] = said
-        free[one.kind] = first + count
-        frames = _most_frames(one)
+            block[pdos.kind] = said
+        free[pdos.kind] = first + count
+        frames = _most_frames(pdos)
         for number in range(frames):
             step = number * int(PDO_STEP)
-            left_bytes = _whole(one.payload_bytes) - number * int(FRAME_BYTES)
+            left_bytes = _whole(pdos.payload_bytes) - number * int(FRAME_BYTES)
             own = sent(
-                one.name,
-                block[one.kind] + step,
+                pdos.name,
+                block[pdos.kind] + step,
                 larger(smaller(left_bytes, int(FRAME_BYTES)), 0),
-                group=one.group,
+                group=pdos.group,
                 first=first + step,
                 identifiers=count,
                 is_end=number == frames - 1,
@@ -133,15 +133,15 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
         )
 
 
-def _most_frames(one: Pdos) -> int:
+def _most_frames(pdos: Pdos) -> int:
     """Frames of a PDO that have streams, the most at any point."""
-    frames: Any = rounded_up(one.payload_bytes / FRAME_BYTES)
+    frames: Any = rounded_up(pdos.payload_bytes / FRAME_BYTES)
     return min(int(frames.max() if hasattr(frames, "max") else frames), _MOST_FRAMES)
 
 
-def frame_sizes(one: Pdos) -> Iterator[int]:
+def frame_sizes(pdos: Pdos) -> Iterator[int]:
     """Data of each frame of a PDO of plain numbers, of which there may be billions [bytes]."""
-    full, rest = divmod(int(plain(one.payload_bytes)), int(FRAME_BYTES))
+    full, rest = divmod(int(plain(pdos.payload_bytes)), int(FRAME_BYTES))
     return chain(repeat(int(FRAME_BYTES), full), repeat(rest, int(rest > 0)))
 
 
@@ -156,16 +156,16 @@ def _whole(number: Points) -> Points:
 
 def last_identifier(each: Iterable[Stream]) -> Points:
     """The largest identifier of some streams."""
-    return reduce(larger, (choose(one.identifiers > 0, one.last, 0) for one in each))
+    return reduce(larger, (choose(stream.identifiers > 0, stream.last, 0) for stream in each))
 
 
 def identifiers_twice(each: Sequence[Stream]) -> Points:
     """How many identifiers stand twice, or more often [1]."""
-    if all(isinstance(one.last, int) for one in each):
+    if all(isinstance(stream.last, int) for stream in each):
         return sum(shared for *_, shared in collisions(each))
     return total(
-        larger(smaller(one.last, other.last) - larger(one.first, other.first) + 1, 0)
-        for one, other in combinations(each, 2)
+        larger(smaller(early.last, late.last) - larger(early.first, late.first) + 1, 0)
+        for early, late in combinations(each, 2)
     )
 
 

@@ -1,4 +1,4 @@
-"""What a network sends: SYNC, the PDOs of its nodes, and other messages."""
+"""All that a network sends: SYNC, the PDOs of its nodes, and other messages."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache, reduce
@@ -7,9 +7,8 @@ from typing import Any, Final, NamedTuple
 
 from busplan.buses.can.constants import COMMAND_IDENTIFIER, FEEDBACK_IDENTIFIER
 from busplan.buses.can.equations import share_bytes
-from busplan.buses.network import Network
+from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, choose, larger, pointwise
-from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 FOLLOWS: Final = -1
@@ -36,7 +35,7 @@ class Pdos(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What they are called."""
+        """Name: feedback or command."""
         return NAMES[self.kind]
 
 
@@ -68,17 +67,17 @@ class Traffic(NamedTuple):
 
     def numbers(self) -> tuple[Number, ...]:
         """All its numbers in one row, as `with_numbers` takes them."""
-        pdos = (number for one in self.pdos for number in one[_PDO_WORDS:])
+        pdos = (number for pdos in self.pdos for number in pdos[_PDO_WORDS:])
         own: tuple[Any, ...] = self[:_OWN_NUMBERS]
-        return (*own, *pdos, *(number for one in self.messages for number in one[_MESSAGE_WORDS:]))
+        return (*own, *pdos, *(number for message in self.messages for number in message[_MESSAGE_WORDS:]))
 
     def with_numbers(self, *numbers: Number) -> "Traffic":
         """The same senders with other numbers, in the order of `numbers`."""
         rest: Iterator[Any] = iter(numbers)
         own = tuple(islice(rest, _OWN_NUMBERS))
-        pdos = tuple(Pdos(one.kind, one.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for one in self.pdos)
+        pdos = tuple(Pdos(pdos.kind, pdos.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for pdos in self.pdos)
         count = len(Message._fields) - _MESSAGE_WORDS
-        messages = tuple(Message(one.name, *islice(rest, count)) for one in self.messages)
+        messages = tuple(Message(message.name, *islice(rest, count)) for message in self.messages)
         return Traffic._make((*own, pdos, messages))
 
 
@@ -116,8 +115,8 @@ class Sent:
             What a derivation says of it.
         """
         if self.is_ordered:
-            found: Number = function(self.traffic, *others)
-            return found
+            result: Number = function(self.traffic, *others)
+            return result
         return self.of_points(function, *others, words=words)
 
     def of_points(self, function: Callable[..., float], *others: Number, words: str) -> Number:
@@ -132,10 +131,10 @@ class Sent:
     def is_ordered(self) -> bool:
         """Whether identifiers and sizes of messages are plain, and no number is traced."""
         traffic = self.traffic
-        messages = (number for one in traffic.messages for number in (one.identifier, one.payload_bytes))
-        order = (traffic.sync_identifier, *(one.identifier for one in traffic.pdos), *messages)
-        return all(isinstance(one, int | float) for one in order) and not any(
-            isinstance(one, Traced) for one in traffic.numbers()
+        messages = (number for message in traffic.messages for number in (message.identifier, message.payload_bytes))
+        order = (traffic.sync_identifier, *(pdos.identifier for pdos in traffic.pdos), *messages)
+        return all(isinstance(number, int | float) for number in order) and not any(
+            isinstance(number, Traced) for number in traffic.numbers()
         )
 
     @cached_property
@@ -154,49 +153,63 @@ class _Senders(NamedTuple):
     """Nodes that send alike, as a network or a profile has them."""
 
     name: str
-    said: AlikeNodes
-    nodes: Number
-    axes: Number
-    payloads_bytes: dict[TransactionKind, Number]
+    payload: Any
+    pdos: Number
+    """PDOs of all its nodes in one direction [1]."""
+    pdos_each: Number
+    """PDOs of one node in one direction [1]."""
+    payloads_bytes: tuple[Number, ...]
+    """Of a node, in the order of `TRANSACTION_KINDS` [bytes]."""
     read_us: Number
     """Slowest execution of a read [us]."""
 
 
+def _pdos_each(payload: Any, axes: Number) -> Number:
+    """PDOs of one node in one direction [1]."""
+    return larger(axes, 1) if payload.pdo_per == "axis" else 1
+
+
+def pdos_of(group: Group) -> Number:
+    """PDOs of all nodes of a group in one direction [1]."""
+    return group.nodes * _pdos_each(group.said.payload, group.axes)
+
+
+_last: tuple[Network, Traffic] | None = None
+
+
 def traffic_of(network: Network) -> Traffic:
-    """What a network sends."""
-    senders = [
-        _Senders(
-            one.name,
-            one.said,
-            one.nodes,
-            one.axes,
-            {"read": one.read_bytes, "write": one.write_bytes},
-            one.read_execution_us + one.worst_extra_us,
-        )
-        for one in network.groups
-    ]
-    return _traffic(network.profile, senders, network.period_us)
+    """Traffic of a network. That of the last one is remembered: all limits of a network ask for it, one by one."""
+    global _last  # noqa: PLW0603 - a network may hold arrays, and is told apart by identity alone
+    if _last is None or _last[0] is not network:
+        senders = [
+            _Senders(
+                group.name,
+                group.said.payload,
+                pdos_of(group),
+                _pdos_each(group.said.payload, group.axes),
+                (group.read_bytes, group.write_bytes),
+                group.read_execution_us + group.worst_extra_us,
+            )
+            for group in network.groups
+        ]
+        _last = network, _traffic(network.profile, senders, network.period_us)
+    return _last[1]
 
 
 def traffic_of_profile(profile: Any) -> Traffic:
-    """What the network of a profile sends, for who has no network."""
-    senders = [
-        _Senders(
-            one.name,
-            one,
-            one.nodes,
-            one.node.axes,
-            {kind: one.bytes_of(kind) for kind in TRANSACTION_KINDS},
-            one.node.execution.execution_us(one.bytes_of("read")) + one.node.execution.worst_extra_us,
-        )
-        for one in profile.alike_nodes
-    ]
+    """Traffic of a profile with plain numbers, each of its groups by itself."""
+    senders = []
+    for nodes in profile.alike_nodes:
+        payloads_bytes = tuple(nodes.bytes_of(kind) for kind in TRANSACTION_KINDS)
+        each, execution = _pdos_each(nodes.payload, nodes.node.axes), nodes.node.execution
+        read_us = execution.execution_us(payloads_bytes[0]) + execution.worst_extra_us
+        senders.append(_Senders(nodes.name, nodes.payload, nodes.nodes * each, each, payloads_bytes, read_us))
     return _traffic(profile, senders, profile.cycle.period_us)
 
 
 def without_times(traffic: Traffic) -> Traffic:
     """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
-    messages = tuple(one._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for one in traffic.messages)
+    messages = tuple(message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for message in traffic.messages)
     return traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, read_us=0.0, host_us=0.0, messages=messages)
 
 
@@ -219,32 +232,25 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number) -> Tr
         identifier_bits=bus.identifier_bits,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
-        read_us=reduce(larger, (one.read_us for one in senders)),
+        read_us=reduce(larger, (sender.read_us for sender in senders)),
         host_us=host_us(bus),
-        pdos=tuple(_pdos(one, kind, place) for kind in TRANSACTION_KINDS for place, one in enumerate(senders)),
-        messages=tuple(
-            Message(
-                one.name,
-                one.identifier,
-                one.payload_bytes,
-                one.period_us,
-                one.jitter_us,
-                one.period_us if one.deadline_us is None else one.deadline_us,
-            )
-            for one in profile.message
+        pdos=tuple(
+            _pdos(sender, kind, number, is_first=not place)
+            for number, kind in enumerate(TRANSACTION_KINDS)
+            for place, sender in enumerate(senders)
         ),
+        messages=tuple(map(_message, profile.message)),
     )
 
 
-def _pdos(one: _Senders, kind: TransactionKind, place: int) -> Pdos:
-    payload = one.said.payload
-    said = getattr(payload, f"{NAMES[kind]}_identifier")
-    first = FOLLOWS if place else int(_FIRST[kind])
-    each = larger(one.axes, 1) if payload.pdo_per == "axis" else 1
-    return Pdos(
-        kind,
-        one.name,
-        first if said is None else said,
-        one.nodes * each,
-        share_bytes(one.payloads_bytes[kind], pdos=each),
-    )
+def _pdos(sender: _Senders, kind: TransactionKind, number: int, *, is_first: bool) -> Pdos:
+    identifier = getattr(sender.payload, f"{NAMES[kind]}_identifier")
+    if identifier is None:
+        identifier = int(_FIRST[kind]) if is_first else FOLLOWS
+    payload_bytes = share_bytes(sender.payloads_bytes[number], pdos=sender.pdos_each)
+    return Pdos(kind, sender.name, identifier, sender.pdos, payload_bytes)
+
+
+def _message(said: Any) -> Message:
+    deadline_us = said.period_us if said.deadline_us is None else said.deadline_us
+    return Message(said.name, said.identifier, said.payload_bytes, said.period_us, said.jitter_us, deadline_us)

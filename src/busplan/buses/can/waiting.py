@@ -40,8 +40,8 @@ class Waits(NamedTuple):
 
     def blocks(self) -> Iterator[Stream]:
         """One of them for each frame that goes, of plain numbers."""
-        counts = (int(plain(_frames_within(one, self.lasts_us))) for one in self.lower)
-        each = (repeat(one, count) for one, count in zip(self.lower, counts, strict=True))
+        counts = (int(plain(_frames_within(stream, self.lasts_us))) for stream in self.lower)
+        each = (repeat(stream, count) for stream, count in zip(self.lower, counts, strict=True))
         return islice(chain.from_iterable(each), int(MOST_BLOCKS))
 
 
@@ -52,7 +52,7 @@ def is_higher(message: Points, last: Points) -> Points:
 
 def last_cyclic(each: Iterable[Stream]) -> Points:
     """The largest identifier of SYNC and all PDOs."""
-    return last_identifier(one for one in each if not one.is_message)
+    return last_identifier(stream for stream in each if not stream.is_message)
 
 
 @remembered(maxsize=256)
@@ -78,23 +78,23 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     """
     each = streams(traffic, is_stuffed=is_stuffed)
     last, bit = last_cyclic(each), bit_us(traffic.bit_rate_kbit_s)
-    messages = [one for one in each if one.is_message]
+    messages = [stream for stream in each if stream.is_message]
     higher = [
-        Sender(choose(is_higher(one.first, last), one.frame_us, 0.0), one.period_us, one.jitter_us + bit)
-        for one in messages
-        if is_higher(one.first, last) is not False
+        Sender(choose(is_higher(stream.first, last), stream.frame_us, 0.0), stream.period_us, stream.jitter_us + bit)
+        for stream in messages
+        if is_higher(stream.first, last) is not False
     ]
     # Every frame has one bit rate and one format: the one with the most data is the longest.
-    by_length = sorted(messages, key=lambda one: -plain(one.data_bytes))
-    lower = tuple(one for one in by_length if is_higher(one.first, last) is not True)
+    by_length = sorted(messages, key=lambda stream: -plain(stream.data_bytes))
+    lower = tuple(stream for stream in by_length if is_higher(stream.first, last) is not True)
 
     def blocking_us(span_us: Points) -> Points:
         blocked: Points = 0.0
         left: Points = int(MOST_BLOCKS)
-        for one in lower:
-            count = choose(is_higher(one.first, last), 0, smaller(_frames_within(one, span_us), left))
+        for stream in lower:
+            count = choose(is_higher(stream.first, last), 0, smaller(_frames_within(stream, span_us), left))
             for number in range(int(MOST_BLOCKS)):
-                blocked = blocked + choose(count > number, one.frame_us, 0.0)
+                blocked = blocked + choose(count > number, stream.frame_us, 0.0)
             left = left - count
             if is_everywhere(left == 0):
                 break
@@ -104,14 +104,14 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     return Waits(lasts_us, blocking_us(lasts_us), lower)
 
 
-def _frames_within(one: Stream, span_us: Points) -> Points:
+def _frames_within(stream: Stream, span_us: Points) -> Points:
     """Frames of a message of a lower priority that go within a span of time, of which three are enough [1]."""
-    return rounded_up(smaller((span_us + one.deadline_us) / one.period_us, int(MOST_BLOCKS)))
+    return rounded_up(smaller((span_us + stream.deadline_us) / stream.period_us, int(MOST_BLOCKS)))
 
 
 def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> dict[str, Points]:
     """How late the last feedback and all commands may be queued behind the start of their cycle, by name [us]."""
-    us = {name: total(one.sender().frames_us for one in each if one.name == name) for name in _CYCLIC}
+    us = {name: total(stream.sender().frames_us for stream in each if stream.name == name) for name in _CYCLIC}
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
     commands_us = waits(traffic, others_us, is_stuffed=is_stuffed).lasts_us - us[_COMMAND]
     return {_FEEDBACK: commands_us - traffic.host_us - us[_FEEDBACK], _COMMAND: commands_us}
@@ -134,16 +134,18 @@ class _Start:
 
     def __init__(self, ranked: Sequence[Stream], late: Sequence[str], offset_us: Points, bit_us: Points) -> None:
         self.senders = [
-            one.sender()._replace(jitter_us=-offset_us) if late and not one.is_message else one.sender()
-            for one in ranked
+            stream.sender()._replace(jitter_us=-offset_us) if late and not stream.is_message else stream.sender()
+            for stream in ranked
         ]
         self.first_us = _sums(
-            one.frames_us * (stream.name in late) for one, stream in zip(self.senders, ranked, strict=True)
+            sender.frames_us * (stream.name in late) for sender, stream in zip(self.senders, ranked, strict=True)
         )
         # ceil(x) is less than x + 1.
         # ceil(x) is no less than x.
-        self.least_us = _sums(one.load * (one.jitter_us + bit_us) for one in self.senders)
-        self.most_us = _sums(one.frames_us + one.load * (larger(one.jitter_us, 0.0) + bit_us) for one in self.senders)
+        self.least_us = _sums(sender.load * (sender.jitter_us + bit_us) for sender in self.senders)
+        self.most_us = _sums(
+            sender.frames_us + sender.load * (larger(sender.jitter_us, 0.0) + bit_us) for sender in self.senders
+        )
 
 
 def _sums(numbers: Iterator[Points]) -> list[Points]:
@@ -168,21 +170,22 @@ class Messages:
 
     def __init__(self, traffic: Traffic, *, is_stuffed: bool) -> None:
         each = streams(traffic, is_stuffed=is_stuffed)
-        self._ranked = sorted(each, key=_rank)
-        self._ranks = [_rank(one) for one in self._ranked]
+        self._ranked = sorted(each, key=lambda stream: stream.block)
+        self._ranks = [stream.block for stream in self._ranked]
         self._bit_us = bit_us(traffic.bit_rate_kbit_s)
         period_us, late_us = traffic.period_us, queued_us(each, traffic, is_stuffed=is_stuffed)
         places = (((), 0.0), ((_FEEDBACK, _COMMAND), late_us[_FEEDBACK]), ((_COMMAND,), late_us[_COMMAND]))
         self._starts = [_Start(self._ranked, late, larger(period_us - us, 0.0), self._bit_us) for late, us in places]
-        self._loads = _sums(one.load for one in self._starts[0].senders)
-        frames_us: Iterator[Points] = (one.frame_us for one in reversed(self._ranked))
+        self._loads = _sums(sender.load for sender in self._starts[0].senders)
+        frames_us: Iterator[Points] = (stream.frame_us for stream in reversed(self._ranked))
         nothing: Points = 0.0
         self._longest_us: list[Points] = [*accumulate(frames_us, larger, initial=nothing)][::-1]
         """The longest frame from each rank on."""
+        self._known: dict[str, Response | None] = {}
 
     def by_priority(self) -> Iterator[Stream]:
         """The messages, that of the lowest priority first."""
-        return (one for one in reversed(self._ranked) if one.is_message)
+        return (stream for stream in reversed(self._ranked) if stream.is_message)
 
     def load(self, own: Stream) -> Points:
         """Load of the bus by a message and all that goes before it [1]."""
@@ -190,17 +193,22 @@ class Messages:
 
     def response(self, own: Stream) -> Response | None:
         """Worst-case response of a message of plain numbers; None where `worst_response` has none."""
+        if own.name not in self._known:
+            self._known[own.name] = self._worst(own)
+        return self._known[own.name]
+
+    def _worst(self, own: Stream) -> Response | None:
         try:
             found = [*self._responses(own)]
         except TooManyStepsError:
             return None
-        each = [one for one in found if one is not None]
-        return max(each, key=lambda one: plain(one.us)) if len(each) == len(found) else None
+        each = [response for response in found if response is not None]
+        return max(each, key=lambda response: plain(response.us)) if len(each) == len(found) else None
 
     def _responses(self, own: Stream) -> Iterator[Response | None]:
         """The worst instance of a message from each start of a busy period."""
         behind = self._behind(own)
-        at = next(place for place, one in enumerate(self._ranked) if one.is_message and one.name == own.name)
+        at = next(place for place, stream in enumerate(self._ranked) if stream.is_message and stream.name == own.name)
         for start in self._starts:
             yield worst_instance(
                 own.sender(),
@@ -214,7 +222,7 @@ class Messages:
         """A bound of the response over the deadline; infinite where the load of the bus leaves no response [1]."""
         behind, sender = self._behind(own), own.sender()
         load, own_most_us = self._loads[behind], sender.frames_us + sender.load * (sender.jitter_us + self._bit_us)
-        starts_us = (one.first_us[behind] + one.most_us[behind] for one in self._starts)
+        starts_us = (start.first_us[behind] + start.most_us[behind] for start in self._starts)
         most_us = reduce(larger, starts_us) - own_most_us + self._longest_us[behind]
         has_response = load < SATURATED
         idle = choose(has_response, 1 - load + sender.load, 1.0)
@@ -245,16 +253,12 @@ class Messages:
         if isinstance(bound, float):
             found = self.response(own)
             return inf if found is None else found.us / own.deadline_us
-        us = (inf if one is None else one.us for one in self._responses(own))
+        us = (inf if response is None else response.us for response in self._responses(own))
         return choose(tells, bound, reduce(larger, us) / own.deadline_us)
 
     def _behind(self, own: Stream) -> int:
         """The first rank behind a message."""
         return bisect_right(self._ranks, plain(own.first))
-
-
-def _rank(one: Stream) -> int:
-    return one.block
 
 
 @remembered(maxsize=16)
@@ -284,11 +288,13 @@ def response(own: Stream, traffic: Traffic, *, is_stuffed: bool) -> Response | N
     """
     if own.is_message:
         return messages(traffic, is_stuffed=is_stuffed).response(own)
-    others = [one for one in streams(traffic, is_stuffed=is_stuffed) if one is not own]
+    others = [stream for stream in streams(traffic, is_stuffed=is_stuffed) if stream is not own]
     lower_us = (
-        plain(one.frame_us) for one in others if not one.goes_before(own) and (own.name != SYNC or one.is_message)
+        plain(stream.frame_us)
+        for stream in others
+        if not stream.goes_before(own) and (own.name != SYNC or stream.is_message)
     )
-    higher = [one.sender() for one in others if one.goes_before(own)]
+    higher = [stream.sender() for stream in others if stream.goes_before(own)]
     if own.identifiers > 1:
         higher.append(own.sender(own.identifiers - 1))
     blocking_us, bit = max(lower_us, default=0.0), plain(bit_us(traffic.bit_rate_kbit_s))

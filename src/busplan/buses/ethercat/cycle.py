@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run
 from busplan.buses.ethercat.equations import (
     BYTE_BIAS_UNCERTAINTY_US,
     BYTE_BIAS_US,
@@ -13,26 +13,47 @@ from busplan.buses.ethercat.equations import (
     overhead_bytes,
     sending_us,
 )
+from busplan.buses.ethercat.figures import FRAME, TERMS
 from busplan.buses.ethercat.latency import last_command_us, latencies, loop_periods, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (
+    arrival_us,
     cables_us,
-    data_bytes,
     devices,
     devices_doubts,
     devices_us,
     frames,
     hop,
     mailbox_frame_us,
-    mailbox_us,
     packing,
 )
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind
 from busplan.elementwise import Number, choose, larger, named, plain, total
 
 TimingModelName = Literal["last-byte", "vendors"]
 LAST_BYTE: Final[TimingModelName] = "last-byte"
 VENDORS: Final[TimingModelName] = "vendors"
+
+
+EVENTS: Final = (
+    EventKind("master", "master", "profile", "M", "contention"),
+    EventKind("jitter", "master's jitter", "profile", "j", "contention"),
+    EventKind("overhead", "frame overhead", FRAME, "f", "gap"),
+    EventKind("data", "process data", FRAME, ">", "request"),
+    EventKind("mailbox", "mailbox poll", FRAME, "b", "acknowledge"),
+    EventKind("cable", "cable", "SOEM", "-", "sync"),
+    EventKind("device", "device", "DC time stamps", "=", "work"),
+    EventKind("receive", "receiving again", "acontis", "<", "response"),
+    EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (
+    EventKind("frame", "frames", "", "F", "out"),
+    EventKind("way", "way through the devices", "", "W", "in"),
+)
+"""What several events make together."""
 
 
 _LEFT_OUT: Final = {
@@ -45,6 +66,8 @@ _LEFT_OUT: Final = {
 
 class EthercatCycle(BusCycle):
     """The master's time and jitter, frames, devices and cables there and back, and the window."""
+
+    term_figures = TERMS
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
@@ -62,13 +85,13 @@ class EthercatCycle(BusCycle):
     @cached_property
     def process_bytes(self) -> Number:
         """Process data of all devices [bytes]."""
-        return named(total(one.number * one.data_bytes for one in self._devices), "process_bytes", "D")
+        return named(total(own.number * own.data_bytes for own in self._devices), "process_bytes", "D")
 
     @cached_property
     def _overhead_bytes(self) -> Number:
-        found = self.packing
-        headers = found.datagrams_bytes - self.process_bytes
-        return found.frames * overhead_bytes(found.frames) + headers + found.padding_bytes
+        packed = self.packing
+        headers = packed.datagrams_bytes - self.process_bytes
+        return packed.frames * overhead_bytes(packed.frames) + headers + packed.padding_bytes
 
     @cached_property
     def _receive_us(self) -> Number:
@@ -84,33 +107,38 @@ class EthercatCycle(BusCycle):
         if not self.counts_reception:
             return self.required_us
         last_us, before_us = (
-            sending_us(frame_bytes(one)) for one in (self.packing.last_bytes, self.packing.before_bytes)
+            sending_us(frame_bytes(datagrams_bytes))
+            for datagrams_bytes in (self.packing.last_bytes, self.packing.before_bytes)
         )
         polls = self.network.profile.bus.mailbox_polls
         lost_us = choose(self.packing.before_bytes > 0, larger(before_us - 2 * last_us, 0.0), 0.0)
         return self.required_us + choose(polls > 0, 0.0, lost_us)
 
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire."""
-        return (
-            Term("cycle_master_us", self.network.profile.bus.master_us, "bus.master_us"),
-            Term("cycle_jitter_us", self.network.profile.bus.master_jitter_us, "bus.master_jitter_us"),
-            Term("cycle_frames_us", sending_us(self._overhead_bytes)),
-            Term("cycle_data_us", sending_us(self.process_bytes)),
-            Term("cycle_mailbox_us", mailbox_us(self.network), "bus.mailbox_polls"),
-            Term("cycle_devices_us", devices_us(self.network)),
-            Term("cycle_cable_us", cables_us(self.network)),
-            Term("cycle_receive_us", self._receive_us),
-            Term("nonperiodic_us", self.network.nonperiodic_us),
-        )
+    def written(self) -> Iterator[BusEvent | Run]:
+        """The master, its frames, the last byte through all devices and back, and the window."""
+        bus = self.network.profile.bus
+        yield BusEvent("master", "cycle_master_us", bus.master_us, "master", rests_on="bus.master_us")
+        late_us, late = bus.master_jitter_us, "latest start of the frames"
+        yield BusEvent("jitter", "cycle_jitter_us", late_us, late, rests_on="bus.master_jitter_us")
+        headers = BusEvent("overhead", "cycle_frames_us", sending_us(self._overhead_bytes), "headers")
+        data = BusEvent("data", "cycle_data_us", sending_us(self.process_bytes), "data")
+        yield Run((headers, data), laid_out=lambda _: self._frames())
+        poll_us = mailbox_frame_us(self.network)
+        poll = BusEvent("mailbox", "cycle_mailbox_us", poll_us, "mailbox", rests_on="bus.mailbox_polls")
+        yield Run((poll,), bus.mailbox_polls, laid_out=lambda number: [poll._replace(label=f"mailbox {number + 1}")])
+        cables = BusEvent("cable", "cycle_cable_us", cables_us(self.network), "cables")
+        hops = BusEvent("device", "cycle_devices_us", devices_us(self.network), "devices")
+        yield Run((cables, hops), laid_out=lambda _: self._way())
+        yield BusEvent("receive", "cycle_receive_us", self._receive_us, "last frame again")
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def bias_us(self) -> Number:
-        """What process data take beyond the wire: about a copy in the host [us]."""
+        """Time of process data beyond the wire: about a copy in the host [us]."""
         return self.process_bytes * BYTE_BIAS_US
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The delays of devices, the master's own time, and what bytes take beyond the wire."""
-        devices = (Doubt(one.key, one.label, device_us(one.one_way_us)) for one in devices_doubts(self.network))
+        devices = (Doubt(doubt.key, doubt.label, device_us(doubt.one_way_us)) for doubt in devices_doubts(self.network))
         return (
             *devices,
             Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
@@ -120,48 +148,43 @@ class EthercatCycle(BusCycle):
     def left_out(self) -> tuple[LeftOut, ...]:
         """The master's own time and jitter, mailbox polls, and cables without a length."""
         bus = self.network.profile.bus
-        found = {key: getattr(bus, key.removeprefix("bus.")) for key in _LEFT_OUT}
-        found |= {one.key("cable_m"): one.node.cable_m for one in self.network.groups if one.node.port != "E-bus"}
-        return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in found.items() if not value)
-
-    def events(self) -> Iterator[BusEvent]:
-        """Frame by frame with the data of each device, then the last byte through all devices and back."""
-        bus = self.network.profile.bus
-        yield BusEvent("master", "cycle_master_us", plain(bus.master_us), "master")
-        yield BusEvent("jitter", "cycle_jitter_us", plain(bus.master_jitter_us), "latest start of the frames")
-        yield from self._frames()
-        for number in range(1, int(plain(bus.mailbox_polls)) + 1):
-            yield BusEvent("mailbox", "cycle_mailbox_us", plain(mailbox_frame_us(self.network)), f"mailbox {number}")
-        way = list(self._way())
-        yield from way
-        yield from reversed([one._replace(label=one.label.replace("to", "back from", 1)) for one in way])
-        yield BusEvent("receive", "cycle_receive_us", plain(self._receive_us), "last frame again")
-        yield BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window")
+        keys = {key: getattr(bus, key.removeprefix("bus.")) for key in _LEFT_OUT}
+        keys |= {
+            group.key("cable_m"): group.node.cable_m for group in self.network.groups if group.node.port != "E-bus"
+        }
+        return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in keys.items() if not value)
 
     def _frames(self) -> Iterator[BusEvent]:
-        """What each frame has beside its data, then the data of each of its devices."""
-        sizes = [
-            plain(data_bytes(one, self.network)) for one in self.network.groups for _ in range(int(plain(one.nodes)))
-        ]
-        for number, one in enumerate(frames(self.network), start=1):
-            own = [(device, sizes[device - 1]) for device in one.devices]
-            overhead = plain(frame_bytes(one.datagrams_bytes)) - sum(size for _, size in own)
-            yield BusEvent(
-                "overhead", "cycle_frames_us", plain(sending_us(overhead)), f"headers of frame {number}", None, "frame"
-            )
-            for device, size in own:
-                us = plain(sending_us(size))
-                yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
+        """All of each frame but its data, then the data of each of its devices."""
+        sizes = [plain(own.data_bytes) for own in self._devices for _ in range(int(plain(own.number)))]
+        number = 0
+        for run in frames(self.network):
+            for own in run.each():
+                number += 1
+                overhead = plain(frame_bytes(run.datagrams_bytes)) - sum(sizes[device - 1] for device in own)
+                us, label = plain(sending_us(overhead)), f"headers of frame {number}"
+                yield BusEvent("overhead", "cycle_frames_us", us, label, None, "frame")
+                for device in own:
+                    us = plain(sending_us(sizes[device - 1]))
+                    yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
 
     def _way(self) -> Iterator[BusEvent]:
-        """The last byte to each device and through it."""
-        device = 0
-        for one in map(hop, self.network.groups):
-            for _ in range(int(plain(one.nodes))):
+        """The last byte to each device and through it, and back."""
+        way, device = [], 0
+        for one_hop in map(hop, self.network.groups):
+            for _ in range(int(plain(one_hop.nodes))):
                 device += 1
-                cable_us, device_us = plain(one.cable_us) / 2, plain(one.device_us) / 2
-                yield BusEvent("cable", "cycle_cable_us", cable_us, f"cable to device {device}", device, "way")
-                yield BusEvent("device", "cycle_devices_us", device_us, f"way to device {device}", device, "way")
+                cable_us, device_us = plain(one_hop.cable_us) / 2, plain(one_hop.device_us) / 2
+                way += [
+                    BusEvent("cable", "cycle_cable_us", cable_us, f"cable to device {device}", device, "way"),
+                    BusEvent("device", "cycle_devices_us", device_us, f"way to device {device}", device, "way"),
+                ]
+        yield from way
+        yield from (part._replace(label=part.label.replace("to", "back from", 1)) for part in reversed(way))
+
+    def arrival_us(self, node: int) -> float:
+        """When the last byte of its frame has reached a device [us]."""
+        return arrival_us(self.network, node)
 
     def figures(self) -> Mapping[str, Number | None]:
         """Frames and process data, and whether commands come before SYNC0."""

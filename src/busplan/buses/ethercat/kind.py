@@ -1,10 +1,10 @@
 """EtherCAT, as a kind of bus."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
 
 from busplan.buses.bus import Bus
-from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
+from busplan.buses.ethercat.cycle import EVENTS, LAST_BYTE, STRETCHES, VENDORS, EthercatCycle
 from busplan.buses.ethercat.equations import (
     CONSTANTS,
     MAILBOX_BYTES,
@@ -14,17 +14,12 @@ from busplan.buses.ethercat.equations import (
     SYNC_SHIFT,
     room_bytes,
 )
-from busplan.buses.ethercat.figures import FIGURES, FRAME
+from busplan.buses.ethercat.figures import FIGURES
 from busplan.buses.ethercat.rules import LIMITS, RULES
-from busplan.buses.ethercat.traffic import arrivals_us, datagrams, layout
-from busplan.buses.figure import NONPERIODIC
+from busplan.buses.ethercat.traffic import datagrams, layout
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.elementwise import plain
-
-if TYPE_CHECKING:
-    from busplan.buses.cycle import BusCycle
-    from busplan.buses.published import EvidenceSection
 
 _PROCESS_DATA = "bus.process_data"
 _MASTER_STEP_US = 10.0
@@ -68,21 +63,8 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         measure="measure both on a drive: SYNC0 to its feedback, frame to command taken; no frame waits for them",
         base="from SYNC0 to feedback, and from the frame to a command that is taken",
     )
-    event_kinds = (
-        EventKind("master", "master", "profile", "M", "contention"),
-        EventKind("jitter", "master's jitter", "profile", "j", "contention"),
-        EventKind("overhead", "frame overhead", FRAME, "f", "gap"),
-        EventKind("data", "process data", FRAME, ">", "request"),
-        EventKind("mailbox", "mailbox poll", FRAME, "b", "acknowledge"),
-        EventKind("cable", "cable", "SOEM", "-", "sync"),
-        EventKind("device", "device", "DC time stamps", "=", "work"),
-        EventKind("receive", "receiving again", "acontis", "<", "response"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("frame", "frames", "", "F", "out"),
-        EventKind("way", "way through the devices", "", "W", "in"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second segment"),
@@ -103,7 +85,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         {"bus.mailbox_polls": 0},
     )
     evidence_data = ("ethercat",)
-    evidence_profiles = ("ethercat-servo-8",)
 
     def cycle(self, network: Network, *, model: str) -> EthercatCycle:
         """The cycle of a network under one timing model."""
@@ -119,10 +100,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
         """No device keeps a frame waiting: their own time is in latencies alone."""
         return of_latency
-
-    def arrivals_us(self, cycle: "BusCycle") -> Mapping[int, float]:
-        """When the last byte of its frame has reached each device [us]."""
-        return arrivals_us(cycle.network)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """SYNC0 later in the cycle, for commands that come behind it."""
@@ -165,15 +142,11 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         clocks = ("distributed clocks",) if network.profile.bus.distributed_clocks else ()
         return (layout(network), f"{count} frame{'s' * (count != 1)}", *clocks)
 
-    def evidence(
-        self,
-        networks: Mapping[str, Network],
-        published: Mapping[str, Mapping[str, Any]],
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare what vendors and others publish with what the equations give."""
-        from busplan.buses.ethercat.evidence import sections  # one command alone asks for it
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Those of `busplan.buses.ethercat.evidence`."""
+        from busplan.buses.ethercat.evidence import FUNCTIONS  # one command alone asks for them
 
-        return sections(networks["ethercat-servo-8"], published["ethercat"])
+        return FUNCTIONS
 
 
 BUS = Ethercat()

@@ -11,7 +11,7 @@ from busplan.buses.cycle import BusLatency
 from busplan.buses.ethercat.equations import BYTE_BIAS_UNCERTAINTY_US
 from busplan.buses.ethercat.figures import LATENCY_TABLE
 from busplan.buses.ethercat.traffic import (
-    arrivals_us,
+    arrival_us,
     cables_us,
     devices,
     devices_doubts,
@@ -45,33 +45,33 @@ def latencies(network: Network) -> tuple[BusLatency, ...]:
         The network; its numbers may be of any sort.
     """
     sent_us, way_us = process_us(network), _way_us(network)
-    found = []
-    for one in network.groups:
-        there, back = _command(one, network, sent_us, way_us), _feedback(one, network, sent_us, way_us)
+    each = []
+    for group in network.groups:
+        there, back = _command(group, network, sent_us, way_us), _feedback(group, network, sent_us, way_us)
         # The master's pipeline begins with the cycle that brings the feedback.
         both = {**there, "drive_us": back["drive_us"] + there["drive_us"], "frame_wait_us": back["frame_wait_us"]}
         for name, phases in (("command", there), ("feedback", back), ("loop", both)):
-            found.append(BusLatency(name, None, phases | {_SUM: total(phases.values())}, one.name))
-    return tuple(found)
+            each.append(BusLatency(name, None, phases | {_SUM: total(phases.values())}, group.name))
+    return tuple(each)
 
 
 def last_command_us(network: Network) -> Number:
     """When the last device has taken its command at the latest, from the master's task [us]."""
     sent_us, way_us = process_us(network), _way_us(network)
-    return reduce(larger, (_taken_us(one, network, sent_us, way_us) for one in network.groups))
+    return reduce(larger, (_taken_us(group, network, sent_us, way_us) for group in network.groups))
 
 
 def command_doubt_us(network: Network) -> Number:
     """Standard uncertainty of that: of the master, the devices one way, the bytes and the slowest execution [us]."""
-    execution_us = reduce(larger, (one.write_uncertainty_us for one in network.groups))
-    process_bytes = total(one.number * one.data_bytes for one in devices(network))
+    execution_us = reduce(larger, (group.write_uncertainty_us for group in network.groups))
+    process_bytes = total(own.number * own.data_bytes for own in devices(network))
     parts = (
         network.profile.bus.master_doubt_us,
-        *(one.one_way_us for one in devices_doubts(network)),
+        *(doubt.one_way_us for doubt in devices_doubts(network)),
         process_bytes * BYTE_BIAS_UNCERTAINTY_US,
         execution_us,
     )
-    return square_root(total(one * one for one in parts))
+    return square_root(total(part * part for part in parts))
 
 
 def _way_us(network: Network) -> Number:
@@ -141,7 +141,7 @@ def loop_periods(network: Network, *, at_sync: bool) -> int:
     """
     bus, period_us = network.profile.bus, plain(network.period_us)
     shift_us = plain(sync0_us(network)) if at_sync else 0.0
-    last_us = max(arrivals_us(network).values())
+    last_us = arrival_us(network, int(plain(network.nodes)))
 
     def of(group: Group) -> float:
         extra_us = plain(group.worst_extra_us)

@@ -36,7 +36,7 @@ class Packing(NamedTuple):
     datagrams_bytes: Number
     """All their datagrams, headers and data [bytes]."""
     padding_bytes: Number
-    """What fills short frames [bytes]."""
+    """Filling of short frames [bytes]."""
     last_bytes: Number
     """Datagrams of the last frame [bytes]."""
     before_bytes: Number
@@ -81,18 +81,18 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
         present = first_bytes + choose(has_room, headers, 0.0)
         whole = present
         frames = 1
-    for one in devices:
-        beside = smaller(one.number, rounded_down(free / one.data_bytes))
-        behind = one.number - beside
-        present, free = present + beside * one.data_bytes, free - beside * one.data_bytes
-        each = larger(rounded_down(room / one.data_bytes), 1)
+    for group in devices:
+        beside = smaller(group.number, rounded_down(free / group.data_bytes))
+        behind = group.number - beside
+        present, free = present + beside * group.data_bytes, free - beside * group.data_bytes
+        each = larger(rounded_down(room / group.data_bytes), 1)
         new = rounded_up(behind / each)
-        in_last = (behind - (larger(new, 1) - 1) * each) * one.data_bytes
+        in_last = (behind - (larger(new, 1) - 1) * each) * group.data_bytes
         opens = behind > 0
-        before = choose(opens, choose(new > 1, headers + each * one.data_bytes, present), before)
+        before = choose(opens, choose(new > 1, headers + each * group.data_bytes, present), before)
         padding = padding + choose(opens, padding_bytes(present), 0.0)
         present, free = choose(opens, headers + in_last, present), choose(opens, larger(room - in_last, 0.0), free)
-        frames, whole = frames + new, whole + new * headers + one.number * one.data_bytes
+        frames, whole = frames + new, whole + new * headers + group.number * group.data_bytes
     return Packing(frames, whole, padding + padding_bytes(present), present, before)
 
 
@@ -104,16 +104,27 @@ def _with_data(devices: Devices) -> Devices:
     return Devices(number, larger(devices.data_bytes, 1))
 
 
-class Frame(NamedTuple):
-    """One frame of plain numbers."""
+class Frames(NamedTuple):
+    """Frames one behind the other that hold as many devices of one size, of plain numbers."""
 
-    devices: tuple[int, ...]
-    """Devices whose data it holds, from 1; none where only the clocks' datagram had room."""
+    first: int
+    """First device of the first of them, from 1."""
+    devices: int
+    """Devices in each; none where only the clocks' datagram had room."""
     datagrams_bytes: float
+    """Datagrams of each [bytes]."""
+    frames: int = 1
+    """How many [1]."""
+
+    def each(self) -> Iterator[range]:
+        """Devices of each frame."""
+        for frame in range(self.frames):
+            first = self.first + frame * self.devices
+            yield range(first, first + self.devices)
 
 
-def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Iterator[Frame]:
-    """The same frames one by one, of plain numbers.
+def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Iterator[Frames]:
+    """The same frames in their order, of plain numbers; a few entries for each group, however many its devices.
 
     Parameters
     ----------
@@ -121,13 +132,19 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
         As `pack` takes them.
     """
     room, headers = room_bytes(datagrams), datagrams * float(DATAGRAM_BYTES)
-    held: list[int] = []
-    opened, filled = first_bytes, 0.0
-    sizes = [plain(one.data_bytes) for one in devices for _ in range(int(plain(one.number)))]
-    for device, size in enumerate(sizes, start=1):
-        if filled + size > room - opened and (held or opened):
-            yield Frame(tuple(held), opened + bool(filled) * headers + filled)
-            held, opened, filled = [], 0.0, 0.0
-        held.append(device)
-        filled += size
-    yield Frame(tuple(held), opened + bool(filled) * headers + filled)
+    first, held, opened, filled = 1, 0, first_bytes, 0.0
+    for group in devices:
+        size, left = plain(group.data_bytes), int(plain(group.number))
+        # Couplers have no data, and room in any frame.
+        fitting = max(int((room - opened - filled) // size), 0 if held or opened else 1) if size else left
+        beside = min(left, fitting)
+        held, filled, left = held + beside, filled + beside * size, left - beside
+        if left:
+            yield Frames(first, held, opened + bool(filled) * headers + filled)
+            first, each = first + held, max(int(room // size), 1)
+            full = (left - 1) // each
+            if full:
+                yield Frames(first, each, headers + each * size, full)
+            first, held, opened = first + full * each, left - full * each, 0.0
+            filled = held * size
+    yield Frames(first, held, opened + bool(filled) * headers + filled)

@@ -1,4 +1,4 @@
-"""What a network sends in a cycle, and how long it takes on its way."""
+"""Frames of a network in a cycle, and their way through the devices."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -21,13 +21,13 @@ from busplan.buses.ethercat.equations import (
     overhead_bytes,
     sending_us,
 )
-from busplan.buses.ethercat.packing import Devices, Frame, Packing, frames_of, pack
+from busplan.buses.ethercat.packing import Devices, Frames, Packing, frames_of, pack
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, alike, larger, named, plain, square_root, total
 
 
 class Hop(NamedTuple):
-    """What a device and the cable to it add to the way, there and back. The numbers may be of any sort."""
+    """Delay of a device and of the cable to it, there and back. The numbers may be of any sort."""
 
     nodes: Number
     device_us: Number
@@ -58,44 +58,44 @@ def datagrams(network: Network) -> int:
 def data_bytes(group: Group, network: Network) -> Number:
     """Bytes of one device in a frame: the larger of input and output where they share bytes, else both [bytes]."""
     both = group.read_bytes, group.write_bytes
-    found = larger(*both) if layout(network) == SHARED else total(both)
-    return named(found, "device_bytes", f"d{group.name and f',{group.name}'}")
+    size_bytes = larger(*both) if layout(network) == SHARED else total(both)
+    return named(size_bytes, "device_bytes", f"d{group.name and f',{group.name}'}")
 
 
 def devices(network: Network) -> tuple[Devices, ...]:
     """All devices in their order."""
-    return tuple(Devices(one.nodes, data_bytes(one, network)) for one in network.groups)
+    return tuple(Devices(group.nodes, data_bytes(group, network)) for group in network.groups)
 
 
 def housekeeping_bytes(network: Network) -> Number:
     """The datagrams that the master adds to the first frame, those of distributed clocks among them [bytes]."""
     bus = network.profile.bus
     if bus.housekeeping_bytes is not None:
-        return total(datagram_bytes(alike(one, network.nodes)) for one in bus.housekeeping_bytes)
+        return total(datagram_bytes(alike(size, network.nodes)) for size in bus.housekeeping_bytes)
     tables = (HOUSEKEEPING_BYTES, CLOCK_BYTES) if bus.distributed_clocks else (HOUSEKEEPING_BYTES,)
-    added = [one[bus.master or UNNAMED] for one in tables]
-    return total(alike(one, network.nodes) for one in added if one)
+    added = [table[bus.master or UNNAMED] for table in tables]
+    return total(alike(datagram, network.nodes) for datagram in added if datagram)
 
 
 def packing(network: Network, each: Sequence[Devices]) -> Packing:
     """All frames of its process data, of all its devices."""
-    found = pack(each, datagrams=datagrams(network), first_bytes=housekeeping_bytes(network))
-    return found._replace(
-        frames=named(found.frames, "frames", "F"),
-        datagrams_bytes=named(found.datagrams_bytes, "datagrams_bytes", "G"),
-        padding_bytes=named(found.padding_bytes, "padding_bytes", "pad"),
+    packed = pack(each, datagrams=datagrams(network), first_bytes=housekeeping_bytes(network))
+    return packed._replace(
+        frames=named(packed.frames, "frames", "F"),
+        datagrams_bytes=named(packed.datagrams_bytes, "datagrams_bytes", "G"),
+        padding_bytes=named(packed.padding_bytes, "padding_bytes", "pad"),
     )
 
 
-def frames(network: Network) -> tuple[Frame, ...]:
-    """The same frames one by one, of plain numbers."""
+def frames(network: Network) -> tuple[Frames, ...]:
+    """The same frames in their order, of plain numbers."""
     return tuple(
         frames_of(devices(network), datagrams=datagrams(network), first_bytes=plain(housekeeping_bytes(network)))
     )
 
 
 def hop(group: Group) -> Hop:
-    """What each device of a group adds to the way."""
+    """Delay of each device of a group, and of the cable to it."""
     node = group.node
     delay_us = alike(DELAY_US[node.port], group.nodes) if node.delay_us is None else node.delay_us
     return Hop(group.nodes, device_us(delay_us), cable_us(node.cable_m))
@@ -103,31 +103,31 @@ def hop(group: Group) -> Hop:
 
 def devices_us(network: Network) -> Number:
     """Delay of all devices there and back [us]."""
-    return total(one.nodes * one.device_us for one in map(hop, network.groups))
+    return total(step.nodes * step.device_us for step in map(hop, network.groups))
 
 
 def devices_doubts(network: Network) -> Iterator[DevicesDoubt]:
     """How well the delays are known: those of a port err together, measured ones each by itself."""
     for port, uncertainty_us in DELAY_UNCERTAINTY_US.items():
-        own = [one for one in network.groups if one.node.delay_us is None and one.node.port == port]
+        own = [group for group in network.groups if group.node.delay_us is None and group.node.port == port]
         if own:
-            nodes = total(one.nodes for one in own)
+            nodes = total(group.nodes for group in own)
             yield DevicesDoubt(own[0].key("delay_us"), f"delay of {port} devices", nodes * uncertainty_us)
-    own = [one for one in network.groups if one.node.delay_us is not None]
+    own = [group for group in network.groups if group.node.delay_us is not None]
     if own:
-        us = square_root(total(one.nodes for one in own)) * MEASURED_DELAY_UNCERTAINTY_US
+        us = square_root(total(group.nodes for group in own)) * MEASURED_DELAY_UNCERTAINTY_US
         yield DevicesDoubt(own[0].key("delay_us"), "step of the clocks that measured delays", us)
 
 
 def cables_us(network: Network) -> Number:
     """Delay of all cables there and back [us]."""
-    return total(one.nodes * one.cable_us for one in map(hop, network.groups))
+    return total(step.nodes * step.cable_us for step in map(hop, network.groups))
 
 
 def process_us(network: Network) -> Number:
     """All frames of process data on the wire [us]."""
-    found = packing(network, devices(network))
-    wire_bytes = found.frames * overhead_bytes(found.frames) + found.datagrams_bytes + found.padding_bytes
+    packed = packing(network, devices(network))
+    wire_bytes = packed.frames * overhead_bytes(packed.frames) + packed.datagrams_bytes + packed.padding_bytes
     return named(sending_us(wire_bytes), "sending_us", "sending")
 
 
@@ -143,21 +143,29 @@ def mailbox_frame_us(network: Network) -> Number:
     return sending_us(frame_bytes(datagram_bytes(network.profile.bus.mailbox_bytes)))
 
 
-def arrivals_us(network: Network) -> dict[int, float]:
-    """When each device has its command, by its number from 1; of plain numbers [us].
+def arrival_us(network: Network, device: int) -> float:
+    """When a device has its command, from the start of a cycle of plain numbers [us].
 
-    A device acts when the last byte of its frame has come: a check behind the data says whether the frame is whole.
-    The frames start as late as the master's jitter lets them.
+    It acts when the last byte of its frame has come: a check behind the data says whether the frame is whole. The
+    frames start as late as the master's jitter lets them.
+
+    Parameters
+    ----------
+    network
+        The network.
+    device
+        Number of the device, from 1.
     """
-    now_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
-    sent_us: dict[int, float] = {}
-    for one in frames(network):
-        now_us += plain(sending_us(frame_bytes(one.datagrams_bytes)))
-        sent_us |= dict.fromkeys(one.devices, now_us)
-    found, way_us, device = {}, 0.0, 0
-    for one_hop in map(hop, network.groups):
-        for _ in range(int(plain(one_hop.nodes))):
-            device += 1
-            way_us += plain(one_hop.device_us + one_hop.cable_us) / 2
-            found[device] = sent_us[device] + way_us
-    return found
+    sent_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
+    for run in frames(network):
+        frame_us, before = plain(sending_us(frame_bytes(run.datagrams_bytes))), device - run.first
+        if before < run.devices * run.frames:
+            sent_us += (before // run.devices + 1) * frame_us
+            break
+        sent_us += run.frames * frame_us
+    way_us, left = 0.0, device
+    for step in map(hop, network.groups):
+        passed = min(left, int(plain(step.nodes)))
+        way_us += passed * plain(step.device_us + step.cable_us) / 2
+        left -= passed
+    return sent_us + way_us

@@ -1,21 +1,280 @@
-"""A cycle of the broadcast schedule as latencies and as events; `broadcast_terms` says what the schedule is."""
+"""The broadcast schedule: one query, a broadcast of each node, one read of the hub that collected them, one write.
 
-from collections.abc import Iterator, Mapping, Sequence
+It is that of the da Vinci Research Kit (dVRK). A query is a quadlet write to the hub, which all nodes hear. Each
+broadcasts its data without an acknowledge, in the order of the nodes. The hub has all of them in one block, which the
+host reads; the answer is concatenated. One block write, to the hub too, has the commands of all nodes. What goes on the
+bus goes to the farthest node. No execution time is on the bus.
 
-from busplan.buses.cycle import BusEvent, BusLatency
-from busplan.buses.ieee1394 import figures
-from busplan.buses.ieee1394.broadcast_terms import BroadcastTerms, Idle, hub_block_bytes, write_block_bytes
+References
+----------
+Z. Chen, P. Kazanzides, "Multi-Kilohertz Control of Multiple Robots via IEEE-1394 (FireWire)", TePRA 2014; JHU
+mechatronics-firmware and mechatronics-software.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property, partial
+from typing import NamedTuple
+
+from busplan.buses.cycle import BUT_FIRST, FIRST, BusEvent, BusLatency, Doubt, Run
+from busplan.buses.ieee1394 import doubts, equations, figures
 from busplan.buses.ieee1394.constants import (
+    BASE_RATE_MBIT_S,
     BLOCK_READ_REQUEST_BYTES,
     BLOCK_READ_RESPONSE_OVERHEAD_BYTES,
     BLOCK_WRITE_REQUEST_OVERHEAD_BYTES,
+    BROADCAST_CLOCK_MHZ,
+    BROADCAST_NODE_BYTES,
+    BROADCAST_SLOT_CLOCKS,
+    FIRST_BROADCAST_CLOCKS,
+    HUB_TIMING_BYTES,
+    HUB_WAIT_PER_NODE_US,
+    HUB_WAIT_US,
+    QUADLET_WRITE_REQUEST_BYTES,
+    padded_bytes,
 )
-from busplan.buses.network import Group
-from busplan.elementwise import Number, plain
+from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
+from busplan.buses.network import Group, Network
+from busplan.elementwise import Number, alike, is_off, larger, named, total
 
 
-class BroadcastCycle(BroadcastTerms):
-    """The query, the nodes' broadcasts, the read of the hub, the write, and the window for non-periodic data."""
+def hub_block_bytes(network: Network) -> Number:
+    """Payload of the hub's block: the data of each node behind its quadlet of sequence, and one of timing [bytes].
+
+    Parameters
+    ----------
+    network
+        The network; of any sort.
+    """
+    return total(group.nodes * _with_quadlet(group.read_bytes) for group in network.groups) + HUB_TIMING_BYTES
+
+
+def write_block_bytes(network: Network) -> Number:
+    """Payload of the write: the command to each node behind its header quadlet [bytes].
+
+    Parameters
+    ----------
+    network
+        The network; of any sort.
+    """
+    return total(group.nodes * _with_quadlet(group.write_bytes) for group in network.groups)
+
+
+def _with_quadlet(payload_bytes: Number) -> Number:
+    return padded_bytes(payload_bytes) + BROADCAST_NODE_BYTES
+
+
+class Packets(NamedTuple):
+    """Data phases of the packets that are not the nodes' own [us]."""
+
+    query_us: Number
+    hub_request_us: Number
+    hub_block_us: Number
+    write_us: Number
+
+
+class Idle(NamedTuple):
+    """Idle bus before a request of the host, or behind the last one [us]."""
+
+    gap_us: Number
+    """The arbitration reset gap."""
+    host_us: Number
+    """The host's own time beyond it."""
+
+    @property
+    def us(self) -> Number:
+        """Both."""
+        return self.gap_us + self.host_us
+
+
+class BroadcastCycle(CycleWithStarts):
+    """The query, the nodes' broadcasts, the read of the hub, the write, and the window for non-periodic data.
+
+    References
+    ----------
+    `busplan manual models`, the broadcast schedule.
+    """
+
+    @cached_property
+    def packets(self) -> Packets:
+        """Data phases of query, hub and write [us]."""
+        sizes = (
+            QUADLET_WRITE_REQUEST_BYTES,
+            BLOCK_READ_REQUEST_BYTES,
+            BLOCK_READ_RESPONSE_OVERHEAD_BYTES + hub_block_bytes(self.network),
+            BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + write_block_bytes(self.network),
+        )
+        return Packets(*map(self._data_us, sizes))
+
+    def _data_us(self, packet_bytes: Number) -> Number:
+        return equations.data_phase_us(
+            self.link.hops,
+            hop_us=self.delays.hop_us,
+            packet_bytes=packet_bytes,
+            data_rate_mbit_s=self.link.data_rate_mbit_s,
+        )
+
+    @property
+    def _is_isochronous(self) -> bool:
+        return bool(self.network.profile.cycle.broadcast_request != "priority")
+
+    @property
+    def _is_timed(self) -> bool:
+        return bool(self.network.profile.cycle.broadcast_request == "timed")
+
+    @cached_property
+    def gap_us(self) -> Number:
+        """Idle bus before each broadcast: none for an isochronous request [us]."""
+        return 0.0 if self._is_isochronous else self.delays.gaps.subaction_us
+
+    @cached_property
+    def first_wait_us(self) -> Number:
+        """Wait of the first node behind the query, beyond its gap [us]."""
+        return larger(self._clocks_us(FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
+
+    def _clocks_us(self, clocks: Number) -> Number:
+        return alike(clocks, self.link.hops) / BROADCAST_CLOCK_MHZ
+
+    def slot_wait_us(self, group: Group) -> Number:
+        """Wait of the next node behind the broadcast of a node, where each has its own time [us].
+
+        With unlike nodes it is the most: a node that is late because of a long broadcast waits less.
+
+        Parameters
+        ----------
+        group
+            The node's group.
+        """
+        if not self._is_timed:
+            return 0.0
+        sent_us = self.arbitration_us + self.broadcast_us(group)
+        return larger(self._clocks_us(BROADCAST_SLOT_CLOCKS) - sent_us, 0.0)
+
+    @cached_property
+    def slot_waits_us(self) -> Number:
+        """Wait of all nodes for their times behind the first; nobody waits behind the last [us]."""
+        groups = self.network.groups
+        return total(group.nodes * self.slot_wait_us(group) for group in groups) - self.slot_wait_us(groups[-1])
+
+    @cached_property
+    def arbitration_us(self) -> Number:
+        """Arbitration of a broadcast: an isochronous request waits for no part of the gap count [us]."""
+        if not self._is_isochronous:
+            return self.delays.arbitration_us
+        return equations.arbitration_phase_us(
+            self.link.hops, hop_us=self.delays.hop_us, gap_count=0, gap_clock_mbit_s=BASE_RATE_MBIT_S
+        )
+
+    def broadcast_us(self, group: Group) -> Number:
+        """Data phase of the broadcast of a node [us].
+
+        Parameters
+        ----------
+        group
+            The node's group.
+        """
+        return self._data_us(BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + _with_quadlet(group.read_bytes))
+
+    @cached_property
+    def query_us(self) -> Number:
+        """The query with its acknowledge [us]."""
+        found_us = self.delays.arbitration_us + self.packets.query_us + self.delays.acknowledge_us
+        return named(found_us, "query_us", "T_query")
+
+    @property
+    def node_waits_us(self) -> Number:
+        """Idle bus before all broadcasts [us]."""
+        return self.first_wait_us + self.network.nodes * self.gap_us + self.slot_waits_us
+
+    @cached_property
+    def boards_us(self) -> Number:
+        """All broadcasts with their gaps [us]."""
+        each_us = self.gap_us + self.arbitration_us
+        sent_us = total(group.nodes * (each_us + self.broadcast_us(group)) for group in self.network.groups)
+        return named(self.first_wait_us + sent_us + self.slot_waits_us, "boards_us", "T_boards")
+
+    @cached_property
+    def hub_us(self) -> Number:
+        """The read of the hub: request, acknowledge, concatenated block and its acknowledge [us]."""
+        own, sent = self.delays, self.packets
+        return own.arbitration_us + sent.hub_request_us + own.acknowledge_us + sent.hub_block_us + own.acknowledge_us
+
+    @cached_property
+    def write_us(self) -> Number:
+        """The write with its acknowledge [us]."""
+        return self.delays.arbitration_us + self.packets.write_us + self.delays.acknowledge_us
+
+    @cached_property
+    def hub_wait(self) -> Idle:
+        """From the last broadcast to the read of the hub.
+
+        The host waits 10 + 5 N us behind the query, and knows nothing of the broadcasts. Its own time follows that, or
+        the last broadcast if it is later.
+        """
+        return self._idle(self.host_us, late_us=self.late_us)
+
+    @cached_property
+    def late_us(self) -> Number:
+        """Rest of the host's wait when the last broadcast ends [us]."""
+        wait_us = alike(HUB_WAIT_US, self.network.nodes) + HUB_WAIT_PER_NODE_US * self.network.nodes
+        return named(larger(wait_us - self.boards_us, 0.0), "late_us", "late")
+
+    @cached_property
+    def idle(self) -> Idle:
+        """Behind the read of the hub, and behind the write."""
+        return self._idle(self.host_us)
+
+    @property
+    def host_us(self) -> Number:
+        """The host's own time before each of its requests [us]."""
+        host_us: Number = self.network.profile.host.transaction_us
+        return host_us
+
+    def _idle(self, host_us: Number, *, late_us: Number = 0.0) -> Idle:
+        """Idle bus before a request of the host, whose own time overlaps the gap."""
+        gap_us = self.delays.gaps.arbitration_reset_us
+        if is_off(host_us) and is_off(late_us):
+            return Idle(gap_us, 0.0)
+        return Idle(gap_us, larger(late_us + host_us - gap_us, 0.0))
+
+    @property
+    def longest_request_us(self) -> Number:
+        """Data phase of the write [us]."""
+        return self.packets.write_us
+
+    def schedule(self) -> Iterator[BusEvent | Run]:
+        """The query, at which the nodes sample, each broadcast, the read of the hub, and the write."""
+        own, sent, waits_us = self.delays, self.packets, self.first_wait_us
+        yield BusEvent("sync", "sync_us", self.query_us, "query to all nodes")
+        for place, group in enumerate(self.network.groups):
+            part = partial(_part, "read", "response")
+            wait, next_us = part("node_wait", "idle", waits_us, "wait of the node"), self.slot_wait_us(group)
+            events = (
+                part("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast"),
+                wait._replace(rounds=FIRST),
+                wait._replace(us=next_us, rounds=BUT_FIRST),
+                part("arbitration", "arbitration", self.arbitration_us, "node arbitration"),
+                part("response_data", "data", self.broadcast_us(group), "node broadcast"),
+            )
+            yield Run(events, group.nodes, place)
+            waits_us = next_us
+        request, response, write = (
+            partial(_part, *of) for of in (("read", "request"), ("read", "response"), ("write", "request"))
+        )
+        read_hub = (
+            request("arbitration", "arbitration", own.arbitration_us, "host arbitration"),
+            request("request_data", "data", sent.hub_request_us, "host request to the hub"),
+            request("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge"),
+            response("response_data", "data", sent.hub_block_us, "hub's block of all data"),
+            response("acknowledge", "acknowledge", own.acknowledge_us, "host acknowledge"),
+        )
+        write_hub = (
+            write("arbitration", "arbitration", own.arbitration_us, "host arbitration"),
+            write("request_data", "data", sent.write_us, "commands to all nodes"),
+            write("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge"),
+        )
+        yield Run((*_waits(self.hub_wait, "before the hub is read"), *read_hub))
+        yield Run((*_waits(self.idle, "behind the hub's block"), *write_hub))
+        yield Run(_waits(self.idle, "behind the write"))
 
     def _phases(self) -> tuple[dict[str, Number], dict[str, Number]]:
         """The phases of the read of all data, from the query to the host, and of the write of all commands."""
@@ -93,57 +352,56 @@ class BroadcastCycle(BroadcastTerms):
             )
         )
 
-    def stretches(self) -> Iterator[Sequence[BusEvent]]:
-        """What no cycle start interrupts: the query, each broadcast, the read of the hub, and the write."""
-        yield [BusEvent("sync", "sync_us", plain(self.query_us), "query to all nodes")]
-        node, waits_us = 0, plain(self.first_wait_us)
-        for group in self.network.groups:
-            for _ in range(int(group.nodes)):
-                node += 1
-                yield list(self._broadcast_events(group, node, waits_us))
-                waits_us = plain(self.slot_wait_us(group))
-        yield [*_waits(self.hub_wait, "before the hub is read"), *self._hub_events()]
-        yield [*_waits(self.idle, "behind the hub's block"), *self._write_events()]
-        yield _waits(self.idle, "behind the write")
+    def bias_us(self) -> Number | None:
+        """Time of the packets beyond the model, on the mean [us]."""
+        return doubts.broadcast_bias_us(self.halves, with_gap=self.with_gap, gap_count=self.link.gap_count)
 
-    def _broadcast_events(self, group: Group, node: int, waits_us: float) -> Iterator[BusEvent]:
-        def event(kind: str, term: str, us: Number, label: str) -> BusEvent:
-            return BusEvent(kind, f"cycle_{term}_us", plain(us), label, node, "read", "response")
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Inputs that are not known exactly."""
+        retries, nodes = self.network.profile.cycle.retries, self.network.nodes
+        return doubts.of_broadcast(
+            self.halves,
+            with_gap=self.with_gap,
+            link=self.link,
+            # Of the query, of arbitration and data of each broadcast, of the hub's packets, and of the write.
+            hop_delays=3 + 2 * nodes + 5 + 3 + 3 * retries + 2 * self.number_of_starts,
+            host_swing_us=self._host_swing_us(),
+        )
 
-        yield event("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast")
-        yield event("node_wait", "idle", waits_us, "wait of the node")
-        yield event("arbitration", "arbitration", self.arbitration_us, "node arbitration")
-        yield event("response_data", "data", self.broadcast_us(group), "node broadcast")
+    @property
+    def halves(self) -> Number:
+        """Packets: the query, each broadcast, two of the hub, the write, and retries [1]."""
+        return named(self.network.nodes + 4 + self.network.profile.cycle.retries, "halves", "halves")
 
-    def _hub_events(self) -> Iterator[BusEvent]:
-        own, sent = self.delays, self.packets
+    @property
+    def with_gap(self) -> Number:
+        """Those with the gap term of equation (4) in their arbitration [1]."""
+        return 4 + self.network.profile.cycle.retries if self._is_isochronous else self.halves
 
-        def event(kind: str, term: str, us: Number, label: str, packet: str) -> BusEvent:
-            return BusEvent(kind, f"cycle_{term}_us", plain(us), label, None, "read", packet)
+    def _host_swing_us(self) -> Number:
+        """Change by one standard uncertainty of the host, as the larger of two steps of two: up and down [us]."""
+        step_us: Number = self.network.profile.host.standard_uncertainty_us
+        if is_off(step_us):
+            return 0.0
 
-        yield event("arbitration", "arbitration", own.arbitration_us, "host arbitration", "request")
-        yield event("request_data", "data", sent.hub_request_us, "host request to the hub", "request")
-        yield event("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge", "request")
-        yield event("response_data", "data", sent.hub_block_us, "hub's block of all data", "response")
-        yield event("acknowledge", "acknowledge", own.acknowledge_us, "host acknowledge", "response")
+        def waits_us(host_us: Number) -> Number:
+            return self._idle(host_us, late_us=self.late_us).us + 2 * self._idle(host_us).us
 
-    def _write_events(self) -> Iterator[BusEvent]:
-        own = self.delays
-
-        def event(kind: str, term: str, us: Number, label: str) -> BusEvent:
-            return BusEvent(kind, f"cycle_{term}_us", plain(us), label, None, "write", "request")
-
-        yield event("arbitration", "arbitration", own.arbitration_us, "host arbitration")
-        yield event("request_data", "data", self.packets.write_us, "commands to all nodes")
-        yield event("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge")
+        above_us, own_us, below_us = (waits_us(self.host_us + steps * step_us) for steps in (2, 0, -2))
+        return larger(above_us - own_us, own_us - below_us) / 2
 
 
-def _waits(idle: Idle, where: str) -> list[BusEvent]:
+def _part(transaction: str, packet: str, kind: str, term: str, us: Number, label: str) -> BusEvent:
+    return BusEvent(kind, f"cycle_{term}_us", us, label, transaction=transaction, packet=packet)
+
+
+def _waits(idle: Idle, where: str) -> tuple[BusEvent, BusEvent]:
     """Idle bus before a request, as events."""
-    return [
-        BusEvent("arbitration_reset_gap", "cycle_idle_us", plain(idle.gap_us), f"arbitration reset gap {where}"),
-        BusEvent("host", "cycle_host_us", plain(idle.host_us), f"host's own time {where}"),
-    ]
+    host = f"host's own time {where}"
+    return (
+        BusEvent("arbitration_reset_gap", "cycle_idle_us", idle.gap_us, f"arbitration reset gap {where}"),
+        BusEvent("host", "cycle_host_us", idle.host_us, host, rests_on="host.transaction_us"),
+    )
 
 
 def _in_order(phases: Mapping[str, Number]) -> dict[str, Number]:

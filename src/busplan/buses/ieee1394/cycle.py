@@ -1,11 +1,10 @@
-"""The individual schedule, a read and a write of each node: as terms, as events, and the figures that go with it."""
+"""The individual schedule, a read and a write of each node, and the figures that go with it."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cached_property, reduce
-from itertools import repeat
+from collections.abc import Iterator, Mapping
+from functools import cached_property, partial, reduce
 from typing import Final
 
-from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Run
 from busplan.buses.figure import AVAILABLE
 from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import SYNC_PACKET_BYTES
@@ -20,35 +19,21 @@ from busplan.buses.ieee1394.transactions import (
     ways,
 )
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, is_off, larger, named, plain, total
+from busplan.elementwise import Number, larger, named
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
-_OF_TRANSACTIONS: Final = (
-    "cycle_arbitration_us",
-    "cycle_data_us",
-    "cycle_acknowledge_us",
-    "cycle_hold_us",
-    "cycle_execution_us",
-    "cycle_worst_extra_us",
-    "cycle_idle_us",
-    "cycle_host_us",
-)
-"""Terms that add up the parts of all transactions."""
 _SHOWN: Final = (
     *("latency_us", "latency_with_gaps_us", "transaction_us"),
     *("gaps_us", "subaction_gap_us", "arbitration_reset_gap_us"),
 )
 """Phases of a transaction that are figures of a cycle."""
-_RESTS_ON: Final = {"cycle_host_us": "host.transaction_us"}
-"""The key that a term comes from alone."""
 
 
 class Ieee1394Cycle(CycleWithStarts):
     """The synchronous packet, a read and then a write of every node, and the window for non-periodic data.
 
     Every node is charged the hops of the farthest, or, with `charge_hops = "own"`, its own: for its arbitration only
-    where the host is the root. What all nodes hear, as the
-    synchronous packet, goes to the farthest.
+    where the host is the root. What all nodes hear, as the synchronous packet, goes to the farthest.
 
     References
     ----------
@@ -77,9 +62,9 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def _own_delays(self, link: Link) -> Delays:
         """Delays over a node's own way; its arbitration goes to the root, wherever that is."""
-        found = self.delays_of(link, self.delays)
+        own = self.delays_of(link, self.delays)
         is_at_host = self.network.profile.bus.root == "host"
-        return found if is_at_host else found._replace(arbitration_us=self.delays.arbitration_us)
+        return own if is_at_host else own._replace(arbitration_us=self.delays.arbitration_us)
 
     @cached_property
     def sync_us(self) -> Number:
@@ -101,34 +86,29 @@ class Ieee1394Cycle(CycleWithStarts):
     @property
     def longest_request_us(self) -> Number:
         """Data phase of the longest request, to the farthest node of its group [us]."""
-        return reduce(larger, (one.phases.request_data_us for one in self._farthest))
+        return reduce(larger, (transaction.phases.request_data_us for transaction in self._farthest))
 
-    @cached_property
-    def other_terms(self) -> tuple[Term, ...]:
-        """All terms but the cycle starts, whose number follows from them."""
-        own: dict[str, Number] = dict.fromkeys(_OF_TRANSACTIONS, 0.0)
-        for one in self.exchanges:
-            by_term: dict[str, list[Number]] = {}
-            for part in one.parts:
-                if not is_off(part.us):
-                    by_term.setdefault(part.term, []).append(part.us)
-            for term, parts_us in by_term.items():
-                own[term] = own[term] + one.nodes * _sum(parts_us)
-        return (
-            Term("sync_us", self.sync_us),
-            *(Term(key, us, _RESTS_ON.get(key, "")) for key, us in own.items()),
-            Term("retries_us", self.retries_us),
-            Term("nonperiodic_us", self.network.nonperiodic_us),
-        )
+    def schedule(self) -> Iterator[BusEvent | Run]:
+        """The synchronous packet, and each transaction of every node."""
+        yield BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")
+        for kind in TRANSACTION_KINDS:
+            for place, transaction in enumerate(each for each in self.exchanges if each.kind == kind):
+                yield Run(transaction.parts, transaction.nodes, place, partial(self._laid_out, transaction, place))
+
+    def _laid_out(self, transaction: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
+        """The transaction with a node of a group, by the node's number in it from 0."""
+        if charges_own_hops(self.network):
+            transaction = self._exchange(place, transaction.kind, self._ways[place].of_node(number))
+        return events(transaction, model=self.model)
 
     def bias_us(self) -> Number | None:
-        """What the transactions take beyond the model, on the mean [us]."""
+        """Time of the transactions beyond the model, on the mean [us]."""
         if not self.is_known:
             return None
         return doubts.bias_us(self.exchanges, self.network, gap_count=self.link.gap_count)
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """What is not known exactly."""
+        """Inputs that are not known exactly."""
         if not self.is_known:
             return ()
         # The hops of the synchronous packet, of retries and of cycle starts; those of transactions come to them.
@@ -164,8 +144,8 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def _longest(self, kind: TransactionKind) -> dict[str, Number]:
         """Each of these times of the transactions of one kind with the farthest node of each group, the longest."""
-        each = [one.phases for one in self._farthest if one.kind == kind]
-        return {key: reduce(larger, (getattr(one, key) for one in each)) for key in _SHOWN}
+        each = [transaction.phases for transaction in self._farthest if transaction.kind == kind]
+        return {key: reduce(larger, (getattr(phases, key) for phases in each)) for key in _SHOWN}
 
     @cached_property
     def _farthest(self) -> tuple[Exchange, ...]:
@@ -181,39 +161,26 @@ class Ieee1394Cycle(CycleWithStarts):
     def latencies(self) -> tuple[BusLatency, ...]:
         """One read and one write of the farthest node of each group."""
         places = range(len(self.network.groups))
-        found = (self._exchange(place, kind, self._ways[place].last) for place in places for kind in TRANSACTION_KINDS)
+        farthest = (
+            self._exchange(place, kind, self._ways[place].last) for place in places for kind in TRANSACTION_KINDS
+        )
         return tuple(
             BusLatency(
-                one.kind,
-                one.payload_bytes,
-                {"hops": one.link.hops, "gap_count": one.link.gap_count, **one.phases._asdict()},
-                one.group.name,
+                transaction.kind,
+                transaction.payload_bytes,
+                {
+                    "hops": transaction.link.hops,
+                    "gap_count": transaction.link.gap_count,
+                    **transaction.phases._asdict(),
+                },
+                transaction.group.name,
             )
-            for one in found
+            for transaction in farthest
         )
 
-    def stretches(self) -> Iterator[list[BusEvent]]:
-        """What no cycle start interrupts: the synchronous packet, and each transaction."""
-        yield [BusEvent("sync", "sync_us", plain(self.sync_us), "synchronous packet")]
-        for kind in TRANSACTION_KINDS:
-            node = 0
-            for place, group in enumerate(self.network.groups):
-                for one in self._of_each_node(place, kind, int(group.nodes)):
-                    node += 1
-                    yield [part._replace(node=node, transaction=kind) for part in events(one, model=self.model)]
-
-    def _of_each_node(self, place: int, kind: TransactionKind, nodes: int) -> Iterable[Exchange]:
-        """The transaction with each node of a group."""
-        if not charges_own_hops(self.network):
-            return repeat(
-                next(one for one in self.exchanges if one.kind == kind and one.group is self.network.groups[place]),
-                nodes,
-            )
-        return (self._exchange(place, kind, self._ways[place].of_node(number)) for number in range(nodes))
-
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What the cycle could have and does not say."""
-        split = {id(one.group) for one in self.exchanges if one.responder.answer == "split"}
+        """Parts that the profile does not say."""
+        split = {id(transaction.group) for transaction in self.exchanges if transaction.responder.answer == "split"}
         return (
             *super().left_out(),
             *(
@@ -222,9 +189,3 @@ class Ieee1394Cycle(CycleWithStarts):
                 if id(group) in split and not group.worst_extra_us
             ),
         )
-
-
-def _sum(parts_us: Sequence[Number]) -> Number:
-    """The sum of some parts, one or more; of equal ones as a product, which a derivation shows shorter."""
-    first_us = parts_us[0]
-    return len(parts_us) * first_us if all(one is first_us for one in parts_us) else total(parts_us)

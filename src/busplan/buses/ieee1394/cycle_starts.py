@@ -1,12 +1,14 @@
-"""What every schedule of an IEEE 1394 bus has: its delays, its busy retries, the cycle starts between its packets."""
+"""Common to all schedules of an IEEE 1394 bus: delays, busy retries, and the cycle starts between packets."""
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from itertools import chain, repeat
+from itertools import repeat
 from math import ceil
+from typing import Final
 
-from busplan.buses.cycle import BusCycle, BusEvent, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, LeftOut, Run, summed
+from busplan.buses.figure import NONPERIODIC, Ink, by_key
 from busplan.buses.ieee1394 import equations
 from busplan.buses.ieee1394.constants import (
     CYCLE_START_BYTES,
@@ -15,10 +17,44 @@ from busplan.buses.ieee1394.constants import (
     LEAST_ASYNCHRONOUS_US,
     safe_gap_count,
 )
+from busplan.buses.ieee1394.figures import LATENCY, SYNC, TERMS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Link, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, is_broadcast, link_of
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, total
+from busplan.buses.parts import EventKind
+from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, smaller, total
+
+_PHASES: Final = by_key(LATENCY)
+
+
+def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
+    return EventKind(key, label, _PHASES[phase].reference, mark, ink)
+
+
+EVENTS: Final = (
+    EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
+    EventKind("sync", "synchronous packet", SYNC.reference, "S", "sync"),
+    _kind("arbitration", "arbitration", "arbitration_us", "a", "contention"),
+    _kind("request_data", "request data", "request_data_us", ">", "request"),
+    _kind("acknowledge", "acknowledge", "acknowledge_us", "k", "acknowledge"),
+    _kind("hold", "bus held for the response", "hold_us", "h", "response"),
+    _kind("execution", "execution", "execution_us", "=", "work"),
+    _kind("worst_extra", "slowest execution", "worst_extra_us", "x", "work"),
+    _kind("response_data", "response data", "response_data_us", "<", "response"),
+    _kind("subaction_gap", "subaction gap", "subaction_gap_us", ".", "gap"),
+    _kind("arbitration_reset_gap", "arbitration reset gap", "arbitration_reset_gap_us", ":", "long-gap"),
+    EventKind("node_wait", "wait of a node", "broadcast", "w", "gap"),
+    EventKind("allowance", "allowance for a faster node", "idle", "+", "gap"),
+    _kind("host", "host", "host_us", "o", "contention"),
+    EventKind("retry", "busy retry", "profile", "r", "request"),
+    EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (
+    EventKind("read", "reads", "", "R", "in"),
+    EventKind("write", "writes", "", "W", "out"),
+)
+"""What several events make together."""
 
 
 class CycleWithStarts(BusCycle):
@@ -29,6 +65,8 @@ class CycleWithStarts(BusCycle):
     Linux, drivers/firewire/core.h: a cycle start goes each 125 us.
     """
 
+    term_figures = TERMS
+    command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
     model: TimingModelName
 
     def __init__(self, network: Network, model: TimingModelName) -> None:
@@ -36,23 +74,18 @@ class CycleWithStarts(BusCycle):
         self.model = model
         self.link = link_of(network)
 
-    @cached_property
     @abstractmethod
-    def other_terms(self) -> tuple[Term, ...]:
-        """All terms but the cycle starts, whose number follows from them."""
+    def schedule(self) -> Iterator[BusEvent | Run]:
+        """The cycle in the order of its protocol, without retries and the window, which are behind it."""
 
     @property
     @abstractmethod
     def longest_request_us(self) -> Number:
         """Data phase of the longest packet that the host sends to one node [us]."""
 
-    @abstractmethod
-    def stretches(self) -> Iterable[Sequence[BusEvent]]:
-        """The cycle in the order of its protocol, by what no cycle start interrupts."""
-
     @cached_property
     def delays(self) -> Delays:
-        """What does not depend on the packet, over the hops of the farthest node."""
+        """Delays of any packet, over the hops of the farthest node."""
         return self.delays_of(self.link, None)
 
     def delays_of(self, link: Link, shared: Delays | None) -> Delays:
@@ -65,29 +98,20 @@ class CycleWithStarts(BusCycle):
         shared
             The delays over other hops of the bus, where they have been computed.
         """
-        found = delays(link, model=TIMING_MODELS[self.model], alone=self.network.nodes == 1, shared=shared)
+        own = delays(link, model=TIMING_MODELS[self.model], alone=self.network.nodes == 1, shared=shared)
         for key, number in (
-            ("arbitration_us", found.arbitration_us),
-            ("acknowledge_us", found.acknowledge_us),
-            ("subaction_gap_us", found.gaps.subaction_us),
-            ("arbitration_reset_gap_us", found.gaps.arbitration_reset_us),
-            ("gaps_us", found.gaps.both_us),
+            ("arbitration_us", own.arbitration_us),
+            ("acknowledge_us", own.acknowledge_us),
+            ("subaction_gap_us", own.gaps.subaction_us),
+            ("arbitration_reset_gap_us", own.gaps.arbitration_reset_us),
+            ("gaps_us", own.gaps.both_us),
         ):
             named(number, key, LATENCY_SYMBOLS[key])
-        return found
-
-    @cached_property
-    def retries_us(self) -> Number:
-        """Busy retries of the longest request, each with an arbitration reset gap [us]."""
-        retries: Number = self.network.profile.cycle.retries
-        if self.model == "paper" or is_off(retries):
-            return 0.0
-        own, longest_us = self.delays, self.longest_request_us
-        return retries * (own.arbitration_us + longest_us + own.acknowledge_us + own.gaps.arbitration_reset_us)
+        return own
 
     @cached_property
     def cycle_start_us(self) -> Number:
-        """What one cycle start costs: it destroys idle time already run, and goes at S100 [us]."""
+        """Cost of a cycle start: it destroys idle time already run, and goes at S100 [us]."""
         own, link = self.delays, self.link
         data_us = equations.data_phase_us(
             link.hops, hop_us=own.hop_us, packet_bytes=CYCLE_START_BYTES, data_rate_mbit_s=DATA_RATE_MBIT_S["S100"]
@@ -114,21 +138,40 @@ class CycleWithStarts(BusCycle):
         return self.model != "paper" and bool(self.network.profile.bus.cycle_master)
 
     @cached_property
+    def _others_by_term(self) -> dict[str, Number]:
+        return summed(self.runs, (figure.key for figure in TERMS))
+
+    @cached_property
     def _others_us(self) -> Number:
-        return total(one.us for one in self.other_terms)
+        return total(self._others_by_term.values())
 
     @cached_property
     def number_of_starts(self) -> Number:
         """Cycle starts in the cycle [1]."""
         return self.starts(self._others_us) if self._has_starts else 0
 
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire."""
-        starts_us = self.number_of_starts * self.cycle_start_us if self._has_starts else 0.0
-        return (Term("cycle_starts_us", starts_us), *self.other_terms)
+    def written(self) -> Iterator[BusEvent | Run]:
+        """All but the cycle starts: these go between its rounds, and their number rests on it."""
+        yield from self.schedule()
+        retries: Number = self.network.profile.cycle.retries
+        if self.model != "paper" and not is_off(retries):
+            own, longest_us = self.delays, self.longest_request_us
+            retry_us = own.arbitration_us + longest_us + own.acknowledge_us + own.gaps.arbitration_reset_us
+            yield Run((BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request"),), retries)
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
+
+    @property
+    def _start(self) -> BusEvent:
+        return BusEvent("cycle_start", "cycle_starts_us", self.cycle_start_us, "cycle start")
+
+    @cached_property
+    def by_term(self) -> Mapping[str, Number]:
+        """Time of each term, by its key [us]."""
+        starts = (Run((self._start,), self.number_of_starts),) if self._has_starts else ()
+        return self._others_by_term | summed(starts, (self._start.term,))
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
-        """What the cycle grows by if its transactions take longer: there may be more cycle starts, too [us]."""
+        """Growth of the cycle if its transactions take longer: there may be more cycle starts, too [us]."""
         if not self._has_starts:
             return extra_us
         before_us = self._others_us + after_us
@@ -161,34 +204,28 @@ class CycleWithStarts(BusCycle):
 
     @property
     def is_known(self) -> bool:
-        """Whether the error of the model is known: of the one that decides."""
+        """The error of a model is known of the one that decides."""
         return self.model == "standard"
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What the cycle could have and does not say: host time."""
+        """Host time, where the profile does not say it."""
         return () if self.network.profile.host.transaction_us else (LeftOut("host time", "host.transaction_us"),)
 
-    def events(self) -> Iterator[BusEvent]:
+    def each_round(self) -> Iterator[Iterable[BusEvent]]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
-        starts = self.number_of_starts
+        starts, start_us = int(plain(self.number_of_starts)), plain(self.cycle_start_us)
+        start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
-        start = BusEvent("cycle_start", "cycle_starts_us", plain(self.cycle_start_us) if starts else 0.0, "cycle start")
-        for stretch in chain(self.stretches(), self._behind()):
+        for others in map(tuple, super().each_round()):
             while sent < starts and now_us >= sent * CYCLE_US:
                 yield start
-                sent, now_us = sent + 1, now_us + start.us
-            for event in stretch:
-                yield event
-                now_us += event.us
-        for _ in range(int(starts) - sent):
-            yield start
+                sent, now_us = sent + 1, now_us + start_us
+            yield others
+            for event in others:
+                now_us += plain(event.us)
+        yield from repeat(start, starts - sent)
 
-    def _behind(self) -> Iterator[tuple[BusEvent]]:
-        """Retries and the non-periodic window, behind what a schedule sends."""
-        retries = 0 if self.model == "paper" else self.network.profile.cycle.retries
-        if retries:
-            retry_us = plain(self.retries_us) / retries
-            yield from repeat(
-                (BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request"),), retries
-            )
-        yield (BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window"),)
+    def added_before_us(self, sent_us: float) -> float:
+        """The cycle starts that are due before a round [us]."""
+        due = smaller(self.starts(sent_us), self.number_of_starts)
+        return plain(due) * plain(self.cycle_start_us)

@@ -1,10 +1,9 @@
 """IEEE 1394 (FireWire) up to S400, as a kind of bus."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
-from busplan.buses.figure import NONPERIODIC, Ink, by_key
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.constants import (
     CONSTANTS,
@@ -19,15 +18,14 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
-from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE, SYNC
+from busplan.buses.ieee1394.cycle_starts import EVENTS, STRETCHES, CycleWithStarts
+from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE
 from busplan.buses.ieee1394.rules import LIMITS, RULES
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
 from busplan.buses.network import Network
 from busplan.buses.parts import (
     Cost,
-    EventKind,
     Halves,
     Key,
     MeasuredLatencies,
@@ -42,16 +40,8 @@ from busplan.buses.parts import (
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 
-if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
-
-_PHASES: Final = by_key(FIGURES.latency)
 _HOST_STEP_US: Final = 10.0
 """How much slower the host is made, to see what that does to the margin."""
-
-
-def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
-    return EventKind(key, label, _PHASES[phase].reference, mark, ink)
 
 
 def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
@@ -149,29 +139,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         measure="measure latencies, then: busplan calibrate {file} MEASUREMENTS.csv{group} --apply",
         base="time in a node between a request and its response",
     )
-    command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
-    event_kinds = (
-        EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
-        EventKind("sync", "synchronous packet", SYNC.reference, "S", "sync"),
-        _kind("arbitration", "arbitration", "arbitration_us", "a", "contention"),
-        _kind("request_data", "request data", "request_data_us", ">", "request"),
-        _kind("acknowledge", "acknowledge", "acknowledge_us", "k", "acknowledge"),
-        _kind("hold", "bus held for the response", "hold_us", "h", "response"),
-        _kind("execution", "execution", "execution_us", "=", "work"),
-        _kind("worst_extra", "slowest execution", "worst_extra_us", "x", "work"),
-        _kind("response_data", "response data", "response_data_us", "<", "response"),
-        _kind("subaction_gap", "subaction gap", "subaction_gap_us", ".", "gap"),
-        _kind("arbitration_reset_gap", "arbitration reset gap", "arbitration_reset_gap_us", ":", "long-gap"),
-        EventKind("node_wait", "wait of a node", "broadcast", "w", "gap"),
-        EventKind("allowance", "allowance for a faster node", "idle", "+", "gap"),
-        _kind("host", "host", "host_us", "o", "contention"),
-        EventKind("retry", "busy retry", "profile", "r", "request"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("read", "reads", "", "R", "in"),
-        EventKind("write", "writes", "", "W", "out"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),
@@ -198,7 +167,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         {"cycle.retries": 0},
     )
     evidence_data = ("paper", "dvrk", "ieee1394")
-    evidence_profiles = ("paper-two-node", "dvrk")
 
     def cycle(self, network: Network, *, model: str) -> CycleWithStarts:
         """The cycle of a network under one timing model, by its schedule."""
@@ -297,18 +265,11 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             )
         return found
 
-    def evidence(
-        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare what is published of the paper's bench, of the dVRK and of the bus with what the equations give."""
-        from busplan.buses.ieee1394.evidence import kit_sections, standard_sections  # one command alone asks for it
-        from busplan.buses.ieee1394.paper import bus_sections
+    def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
+        """Those of `busplan.buses.ieee1394.evidence`."""
+        from busplan.buses.ieee1394.evidence import FUNCTIONS  # one command alone asks for them
 
-        return (
-            *bus_sections(networks["paper-two-node"], published["paper"]),
-            *kit_sections(networks["dvrk"], published["dvrk"]),
-            *standard_sections(networks["paper-two-node"], published["ieee1394"]),
-        )
+        return FUNCTIONS
 
 
 BUS: Final = Ieee1394()

@@ -9,7 +9,7 @@ from itertools import product
 from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
-from busplan.buses.ieee1394.broadcast_terms import hub_block_bytes, write_block_bytes
+from busplan.buses.ieee1394.broadcast import hub_block_bytes, write_block_bytes
 from busplan.buses.ieee1394.constants import (
     CYCLE_US,
     LEAST_ASYNCHRONOUS_US,

@@ -1,7 +1,7 @@
-"""Table I of the paper, and what it says of the error of the timing model `standard`.
+"""The error of the timing models, from Table I of the paper.
 
-The model is not the bus: on the paper's own bench it gives less than was measured. The difference, and its spread, are
-part of every verdict.
+A model is not the bus: on the paper's own bench `standard` gives less than was measured. The difference, and its
+spread, are part of every verdict.
 
 References
 ----------
@@ -9,47 +9,28 @@ Paper, Table I: one node and the host, gap count 63, S400, write transactions, m
 """
 
 from functools import cache
-from math import sqrt
-from statistics import fmean, stdev
 from typing import Final, NamedTuple
 
 from busplan.buses.ieee1394.constants import DATA_RATE_MBIT_S, MAX_GAP_COUNT, PACKET_OVERHEAD_BYTES, REFERENCE_CABLE_M
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Link, Responder, TimingModelName, transaction
+from busplan.buses.published import Spread, rows_of
 from busplan.sourced import Sourced
 
-
-class Row(NamedTuple):
-    """One row of the table, times in us."""
-
-    payload_bytes: int
-    latency_us: float
-    """T_lant, experiment."""
-    request_and_acknowledge_us: float
-    """T1 + T2, experiment."""
-    theory_us: float
-    """T1 + T2, theory."""
-
-
-TABLE_1: Final = (
-    Row(4, 48.7, 6.0, 3.19),
-    Row(16, 48.9, 6.3, 3.44),
-    Row(32, 57.9, 6.6, 3.76),
-    Row(64, 68.1, 7.5, 4.41),
-    Row(128, 99.9, 9.1, 5.71),
-    Row(256, 158.5, 11.5, 8.32),
-    Row(512, 246.0, 16.9, 13.53),
-    Row(1024, 460.0, 27.4, 23.94),
-)
-BENCH: Final = Link(float(DATA_RATE_MBIT_S["S400"]), MAX_GAP_COUNT, 1, float(REFERENCE_CABLE_M))
+_BENCH: Final = Link(float(DATA_RATE_MBIT_S["S400"]), MAX_GAP_COUNT, 1, float(REFERENCE_CABLE_M))
 """The way of a packet on the bench."""
 
 
 class ModelResidual(NamedTuple):
-    """What was measured less what a timing model gives, for one half of a transaction [us]."""
+    """Measured less computed time of one half of a transaction [us]."""
 
     mean_us: Sourced
     uncertainty_us: Sourced
-    """Standard uncertainty of the next half: sd sqrt(1 + 1/n)."""
+    """Standard uncertainty of the next half: `Spread`."""
+
+
+def measured_halves_us() -> dict[int, float]:
+    """T1 + T2 as measured, by payload in bytes [us]."""
+    return {row["set"]["payload.write_bytes"]: row["published"] for row in rows_of("paper", "bias and U")}
 
 
 @cache
@@ -66,11 +47,14 @@ def residual(model: TimingModelName = "standard") -> ModelResidual:
     >>> round(residual().mean_us, 3), round(residual("paper").mean_us, 3)
     (0.827, 3.131)
     """
-    differences = [row.request_and_acknowledge_us - _first_half_us(row.payload_bytes, model) for row in TABLE_1]
-    number, source = len(differences), f"paper, Table I, less the {model} model at its {len(differences)} payloads"
+    differences = [us - _first_half_us(payload_bytes, model) for payload_bytes, us in measured_halves_us().items()]
+    spread, source = (
+        Spread.of(differences),
+        f"paper, Table I, less the {model} model at its {len(differences)} payloads",
+    )
     return ModelResidual(
         Sourced(
-            fmean(differences),
+            spread.mean,
             unit="us",
             grade="derived",
             source=source,
@@ -78,7 +62,7 @@ def residual(model: TimingModelName = "standard") -> ModelResidual:
             symbol="b",
         ),
         Sourced(
-            stdev(differences) * sqrt(1 + 1 / number),
+            spread.uncertainty,
             unit="us",
             grade="derived",
             source=source,
@@ -92,7 +76,7 @@ def _first_half_us(payload_bytes: int, model: TimingModelName) -> float:
     phases = transaction(
         "write",
         model=TIMING_MODELS[model],
-        link=BENCH,
+        link=_BENCH,
         payload_bytes=payload_bytes,
         overhead_bytes=int(PACKET_OVERHEAD_BYTES),
         responder=Responder(0.0),

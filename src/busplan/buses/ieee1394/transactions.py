@@ -97,8 +97,8 @@ class Ways(NamedTuple):
     last: Number
     """Of the last node of the group."""
 
-    def of_node(self, place: int) -> Number:
-        """Of the node at a place in its group, from 0."""
+    def of_node(self, place: Number) -> Number:
+        """Of the node at a place in its group, from 0; at the mean of places the mean of their hops."""
         return self.first if self.first is self.last else self.first + place
 
 
@@ -121,18 +121,10 @@ def ways(network: Network) -> tuple[Ways, ...]:
 
 def farthest_link(network: Network, name: str) -> Link:
     """The way that the farthest node of a group is charged, by the name of the group."""
-    place = next(place for place, group in enumerate(network.groups) if name in [one.name for one in group.members])
+    place = next(
+        place for place, group in enumerate(network.groups) if name in [member.name for member in group.members]
+    )
     return link_of(network, ways(network)[place].last)
-
-
-class TransactionPart(NamedTuple):
-    """A stretch of a transaction, as a `BusEvent` has it; the time may be of any sort."""
-
-    kind: str
-    term: str
-    us: Number
-    label: str
-    packet: str | None = None
 
 
 class Exchange(NamedTuple):
@@ -147,7 +139,7 @@ class Exchange(NamedTuple):
     execution_uncertainty_us: Number
     """Standard uncertainty of the execution time [us]."""
     phases: Phases
-    parts: tuple[TransactionPart, ...]
+    parts: tuple[BusEvent, ...]
     """What the transaction is made of, in the order of the wire; what the answer does not have is not there.
 
     The idle bus of the gaps is one part here; `events` divides it.
@@ -210,7 +202,7 @@ def exchange(
     )
     uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
     phases = _with_names(phases, suffix)
-    return Exchange(kind, group, link, size, responder, uncertainty_us, phases, tuple(_parts(phases, answer)))
+    return Exchange(kind, group, link, size, responder, uncertainty_us, phases, tuple(_parts(kind, phases, answer)))
 
 
 def _with_names(phases: Phases, suffix: str) -> Phases:
@@ -228,46 +220,41 @@ PACKET_PARTS: Final = (ARBITRATION, "cycle_data_us", "cycle_acknowledge_us")
 """Terms whose parts are one packet's way over the hops."""
 
 
-def _parts(phases: Phases, answer: "Answer") -> Iterator[TransactionPart]:
-    yield from _packet(phases, "request", "host", arbitrates=True)
+def _parts(kind: TransactionKind, phases: Phases, answer: "Answer") -> Iterator[BusEvent]:
+    def part(name: str, term: str, us: Number, label: str, packet: str | None = None) -> BusEvent:
+        return BusEvent(name, f"cycle_{term}_us", us, label, transaction=kind, packet=packet)
+
+    def packet(name: str, sender: Who, *, arbitrates: bool) -> Iterator[BusEvent]:
+        data_us = phases.request_data_us if name == "request" else phases.response_data_us
+        receiver: Who = "node" if sender == "host" else "host"
+        if arbitrates:
+            yield part("arbitration", "arbitration", phases.arbitration_us, f"{sender} arbitration", name)
+        yield part(f"{name}_data", "data", data_us, f"{sender} data", name)
+        yield part("acknowledge", "acknowledge", phases.acknowledge_us, f"{receiver} acknowledge", name)
+
+    yield from packet("request", "host", arbitrates=True)
     if answer == "split":
-        yield TransactionPart("execution", "cycle_execution_us", phases.execution_us, "node execution")
-        yield TransactionPart("worst_extra", "cycle_worst_extra_us", phases.worst_extra_us, "slowest execution")
+        yield part("execution", "execution", phases.execution_us, "node execution")
+        yield part("worst_extra", "worst_extra", phases.worst_extra_us, "slowest execution")
     if answer == "concatenated":
-        yield TransactionPart("hold", "cycle_hold_us", phases.hold_us, "node holds the bus")
+        yield part("hold", "hold", phases.hold_us, "node holds the bus")
     if answer != "unified":
-        yield from _packet(phases, "response", "node", arbitrates=answer == "split")
-    yield TransactionPart("idle", "cycle_idle_us", phases.idle_us, "idle bus of the gaps")
-    yield TransactionPart("host", "cycle_host_us", phases.host_us, "host's own time beyond the gaps")
+        yield from packet("response", "node", arbitrates=answer == "split")
+    yield part("idle", "idle", phases.idle_us, "idle bus of the gaps")
+    host = part("host", "host", phases.host_us, "host's own time beyond the gaps")
+    yield host._replace(rests_on="host.transaction_us")
 
 
-def _packet(phases: Phases, packet: str, sender: Who, *, arbitrates: bool) -> Iterator[TransactionPart]:
-    receiver: Who = "node" if sender == "host" else "host"
-    data_us = phases.request_data_us if packet == "request" else phases.response_data_us
-    if arbitrates:
-        yield TransactionPart(
-            "arbitration",
-            "cycle_arbitration_us",
-            phases.arbitration_us,
-            f"{sender} arbitration",
-            packet=packet,
-        )
-    yield TransactionPart(f"{packet}_data", "cycle_data_us", data_us, f"{sender} data", packet=packet)
-    yield TransactionPart(
-        "acknowledge", "cycle_acknowledge_us", phases.acknowledge_us, f"{receiver} acknowledge", packet=packet
-    )
-
-
-def events(one: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
+def events(exchanged: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
     """The parts of one transaction, of plain numbers; its idle bus is divided by idle period and gap."""
-    before, behind = _added_up(one.phases) if model == "paper" else _by_idle_period(one)
-    for part in one.parts:
+    before, behind = _added_up(exchanged.phases) if model == "paper" else _by_idle_period(exchanged)
+    for part in exchanged.parts:
         if part.kind == "idle":
-            yield from behind
+            yield from (gap._replace(transaction=exchanged.kind) for gap in behind)
         else:
-            yield BusEvent(part.kind, part.term, plain(part.us), part.label, packet=part.packet)
+            yield part
             if part.kind == "worst_extra":
-                yield from before
+                yield from (gap._replace(transaction=exchanged.kind) for gap in before)
 
 
 _Divided = tuple[tuple[BusEvent, ...], tuple[BusEvent, ...]]
@@ -285,12 +272,12 @@ def _added_up(phases: Phases) -> _Divided:
     return (), (subaction, _gap("arbitration_reset_gap", reset_us, "arbitration reset gap"))
 
 
-def _by_idle_period(one: Exchange) -> _Divided:
+def _by_idle_period(exchanged: Exchange) -> _Divided:
     """The gap that each idle period waits for, and what a faster node would take beyond."""
-    phases = one.phases
+    phases = exchanged.phases
     sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
     idle_us = plain(phases.idle_us)
-    if one.responder.answer != "split":
+    if exchanged.responder.answer != "split":
         return (), (_gap("arbitration_reset_gap", idle_us, "arbitration reset gap behind the transaction"),)
     execution_us = plain(phases.execution_us) + plain(phases.worst_extra_us)
     before_us = max(sub_us - execution_us, 0.0)

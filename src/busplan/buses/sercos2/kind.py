@@ -1,14 +1,13 @@
 """SERCOS I and II, as a kind of bus."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import ClassVar, Final
 
-from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
+from busplan.buses.parts import Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
+from busplan.buses.sercos2.cycle import EVENTS, NONE, STRETCHES, WORST, Sercos2Cycle
 from busplan.buses.sercos2.equations import (
     CONSTANTS,
     MOST_DRIVE_BYTES,
@@ -18,13 +17,9 @@ from busplan.buses.sercos2.equations import (
     PERIODS_SOURCE,
     TURNAROUND_US,
 )
-from busplan.buses.sercos2.figures import FIGURES, MDT_BYTES
+from busplan.buses.sercos2.figures import FIGURES
 from busplan.elementwise import plain
 
-if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
-
-_TELEGRAMS: Final = MDT_BYTES.reference
 _FASTEST: Final = 16
 
 LIMITS: Final = (
@@ -72,19 +67,8 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         measure=MEASURE,
         base=BASE,
     )
-    event_kinds = (
-        EventKind("mst", "MST", _TELEGRAMS, "S", "sync"),
-        EventKind("wait", "wait for drives", "profile", "=", "work"),
-        EventKind("at", "AT of a drive", _TELEGRAMS, "<", "response"),
-        EventKind("gap", "gap between two drives", "profile", ".", "gap"),
-        EventKind("record", "record of a drive", _TELEGRAMS, ">", "out"),
-        EventKind("mdt", "MDT, all but the records", _TELEGRAMS, "m", "request"),
-        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (
-        EventKind("at_stretch", "AT", "", "A", "in"),
-        EventKind("mdt_stretch", "MDT", "", "M", "out"),
-    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second ring"),
@@ -96,8 +80,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
         "node.execution.worst_extra_us": Key("T_extra"),
     }
-    evidence_data = ("sercos2", "paper")
-    evidence_profiles = ("sercos2-servo-8",)
+    evidence_data = ("sercos2",)
 
     def cycle(self, network: Network, *, model: str) -> Sercos2Cycle:
         """The cycle of a network under one timing model."""
@@ -127,14 +110,6 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         """The data rate and the gap."""
         bus = network.profile.bus
         return (f"{bus.data_rate_mbit_s} Mbit/s", f"gap of {bus.at_gap_us:g} us between two drives (assumed)")
-
-    def evidence(
-        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
-    ) -> "tuple[EvidenceSection, ...]":
-        """Say which gap between two drives would make the published number of axes fit."""
-        from busplan.buses.sercos2.evidence import axes_of_a_ring  # one command alone asks for it
-
-        return axes_of_a_ring(networks["sercos2-servo-8"], published["sercos2"], published["paper"])
 
 
 BUS: Final = Sercos2()

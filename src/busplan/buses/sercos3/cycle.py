@@ -4,8 +4,10 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Run
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind
 from busplan.buses.sercos import SercosCycle, delays
 from busplan.buses.sercos3.equations import (
     BYTE_US,
@@ -24,6 +26,7 @@ from busplan.buses.sercos3.equations import (
     sync_jitter_us,
     telegrams_us,
 )
+from busplan.buses.sercos3.figures import MDT_TELEGRAMS, TERMS
 from busplan.buses.sercos3.telegrams import SORTS, Telegrams, telegrams_of
 from busplan.elementwise import Number, choose, larger, named, plain, smaller, total
 from busplan.sections.transactions import TransactionKind
@@ -31,8 +34,24 @@ from busplan.sections.transactions import TransactionKind
 TimingModelName = Literal["window", "telegrams"]
 WINDOW: Final[TimingModelName] = "window"
 TELEGRAMS: Final[TimingModelName] = "telegrams"
-_RESTS_ON: Final = {"cycle_wait_us": "bus.at_start_us", "cycle_master_us": "bus.master_delay_us"}
-"""The key that a term comes from alone."""
+
+
+_COSEMA: Final = MDT_TELEGRAMS.reference
+EVENTS: Final = (
+    EventKind("mdt_frame", "MDT, its own fields", _COSEMA, "m", "request"),
+    EventKind("mdt_data", "data to a device", _COSEMA, ">", "out"),
+    EventKind("wait", "wait of the devices", _COSEMA, "w", "sync"),
+    EventKind("at_frame", "AT, its own fields", _COSEMA, "a", "response"),
+    EventKind("at_data", "data of a device", _COSEMA, "<", "in"),
+    EventKind("gap", "gap and padding", _COSEMA, ".", "gap"),
+    EventKind("ring", "ring delay", _COSEMA, "o", "long-gap"),
+    EventKind("jitter", "jitter allowance", _COSEMA, "j", "contention"),
+    EventKind("master", "master", _COSEMA, "=", "work"),
+    EventKind("nonperiodic", "channel for other frames", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
+"""What several events make together."""
 
 
 class Sercos3Cycle(SercosCycle):
@@ -41,6 +60,8 @@ class Sercos3Cycle(SercosCycle):
     The window is that of CoSeMa: by the timing method it asks that the channel for other frames ends before the next
     cycle begins, or before the AT do. What the nodes execute runs beside the telegrams.
     """
+
+    term_figures = TERMS
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
@@ -68,13 +89,13 @@ class Sercos3Cycle(SercosCycle):
         if not self.is_window:
             return 0.0
         delay_us: Number = bus.device_delay_us
-        found = ring_delay_us(
+        around_us = ring_delay_us(
             self.network.nodes,
             device_delay_us=delay_us,
             gap_bytes=bus.gap_bytes,
             component_delay_us=bus.component_delay_us,
         )
-        return named(found, "ring_delay_us", "t_ring")
+        return named(around_us, "ring_delay_us", "t_ring")
 
     @property
     def _jitters(self) -> tuple[int, int]:
@@ -87,7 +108,7 @@ class Sercos3Cycle(SercosCycle):
 
     @cached_property
     def _master_us(self) -> Number:
-        """What the window keeps free for the master [us]."""
+        """Time that the window keeps free for the master [us]."""
         if not self.is_window:
             return 0.0
         delay_us: Number = self.network.profile.bus.master_delay_us
@@ -98,7 +119,7 @@ class Sercos3Cycle(SercosCycle):
 
     @cached_property
     def _start_wait_us(self) -> Number:
-        """What the devices make the AT wait [us]."""
+        """Wait of the AT for the devices [us]."""
         least_us: Number | None = self.network.profile.bus.at_start_us
         return 0.0 if least_us is None or not self.is_window else start_wait_us(least_us, earliest_us=self._earliest_us)
 
@@ -108,24 +129,33 @@ class Sercos3Cycle(SercosCycle):
         before_us = self.network.nonperiodic_us if self._has_ring else 0.0
         return self._telegrams_us("write") + before_us + self._jitters[0] * self.jitter_us
 
-    @cached_property
-    def _sent_us(self) -> dict[str, Number]:
-        return {
-            "cycle_mdt_us": self._telegrams_us("write"),
-            "cycle_wait_us": self._start_wait_us,
-            "cycle_at_us": self._telegrams_us("read"),
-            "cycle_jitter_us": self._jitters[1] * self.jitter_us if self.is_window else 0.0,
-            "cycle_master_us": self._master_us,
-            "cycle_ring_us": self.ring_us if self._has_ring else 0.0,
-            "nonperiodic_us": self.network.nonperiodic_us,
-        }
-
-    def computed_terms(self) -> tuple[Term, ...]:
+    def written(self) -> Iterator[BusEvent | Run]:
         """The telegrams, the wait of the devices, and what the window keeps free."""
-        return tuple(Term(key, us, _RESTS_ON.get(key, "")) for key, us in self._sent_us.items())
+        other = BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "channel for other frames")
+        is_last = self.method == "mdt-at-ucc"
+        jitter_us = self._jitters[1] * self.jitter_us if self.is_window else 0.0
+        yield self._run("write")
+        if not is_last:
+            yield other
+        wait = "wait of the devices before the AT"
+        yield BusEvent("wait", "cycle_wait_us", self._start_wait_us, wait, rests_on="bus.at_start_us")
+        yield self._run("read")
+        ring_us = self.ring_us if self._has_ring else 0.0
+        yield BusEvent("ring", "cycle_ring_us", ring_us, "the last telegram goes round the ring")
+        if is_last:
+            yield other
+        yield BusEvent("jitter", "cycle_jitter_us", jitter_us, "allowances for the jitter")
+        master = "the master's own time before the next cycle"
+        yield BusEvent("master", "cycle_master_us", self._master_us, master, rests_on="bus.master_delay_us")
+
+    def _run(self, kind: TransactionKind) -> Run:
+        """All telegrams of one sort, which a timeline shows device by device."""
+        sort = SORTS[kind]
+        telegrams = BusEvent(f"{sort}_frame", f"cycle_{sort}_us", self._telegrams_us(kind), sort.upper())
+        return Run((telegrams,), laid_out=lambda _: self._telegrams(kind))
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """What is published as a range alone: the delay of a device, the master's jitter, and the gap.
+        """Inputs that are published as a range alone: the delay of a device, the master's jitter, and the gap.
 
         Each is the same in the whole cycle. A wait of the devices may hide some of it.
         """
@@ -133,7 +163,7 @@ class Sercos3Cycle(SercosCycle):
         if not self.is_window or bus.ring_grade == "measured":
             return ()
         jitters, rings = self._jitters[1], 1 if self._has_ring else 0
-        count = total(one.telegrams for one in self.fillings.values())
+        count = total(filling.telegrams for filling in self.fillings.values())
         gap_us: Number = bus.gap_bytes * BYTE_US * (count + (jitters + rings) / 2)
         delays_us: Number = 2 * rings * self.network.nodes * bus.device_delay_us
         return (
@@ -149,7 +179,7 @@ class Sercos3Cycle(SercosCycle):
         least = LeftOut("the devices' least time before the AT, S-0-1006", "bus.at_start_us")
         other = LeftOut("the channel for other frames", "cycle.nonperiodic_us")
         said = ((self.network.profile.bus.at_start_us is not None, least), (self.network.nonperiodic_us, other))
-        return tuple(one for is_said, one in said if not is_said)
+        return tuple(left for is_said, left in said if not is_said)
 
     def figures(self) -> Mapping[str, Number | None]:
         """How many telegrams there are."""
@@ -165,7 +195,7 @@ class Sercos3Cycle(SercosCycle):
     @property
     def feedback_due_us(self) -> Number:
         """The first AT begins then; by the last method it ends with the cycle [us]."""
-        mdt_us, sent = self._telegrams_us("write"), self._sent_us
+        mdt_us, sent = self._telegrams_us("write"), self.by_term
         if not self.is_window:
             return mdt_us
         if self.method == "at-last":
@@ -183,22 +213,6 @@ class Sercos3Cycle(SercosCycle):
             feedback_us=(0.0, self._telegrams_us("read")),
             command_us=(self._start_us(), self._telegrams_us("write")),
             ring_us=self.ring_us,
-        )
-
-    def events(self) -> Iterator[BusEvent]:
-        """Telegram by telegram and device by device."""
-        us = {key: plain(one) for key, one in self._sent_us.items()}
-        other = BusEvent("nonperiodic", "nonperiodic_us", us["nonperiodic_us"], "channel for other frames")
-        is_last = self.method == "mdt-at-ucc"
-        yield from self._telegrams("write")
-        yield from () if is_last else (other,)
-        yield BusEvent("wait", "cycle_wait_us", us["cycle_wait_us"], "wait of the devices before the AT")
-        yield from self._telegrams("read")
-        yield BusEvent("ring", "cycle_ring_us", us["cycle_ring_us"], "the last telegram goes round the ring")
-        yield from (other,) if is_last else ()
-        yield BusEvent("jitter", "cycle_jitter_us", us["cycle_jitter_us"], "allowances for the jitter")
-        yield BusEvent(
-            "master", "cycle_master_us", us["cycle_master_us"], "the master's own time before the next cycle"
         )
 
     def _telegrams(self, kind: TransactionKind) -> Iterator[BusEvent]:
@@ -219,18 +233,18 @@ class Sercos3Cycle(SercosCycle):
 
 def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:
     """The pieces of each telegram of plain numbers: bytes, and the device whose data they are; 0 for other fields."""
-    found = [[(plain(telegrams.first_bytes), 0)]]
+    laid_out = [[(plain(telegrams.first_bytes), 0)]]
     used, node = plain(telegrams.first_bytes), 0
     for place, items in enumerate(telegrams.items):
         size, has_owner = plain(items.size_bytes), place >= _FIELDS
         for _ in range(int(plain(items.pieces))):
             if used + size > MOST_BYTES:
                 used = plain(telegrams.next_bytes)
-                found.append([(used, 0)])
+                laid_out.append([(used, 0)])
             node += has_owner
-            found[-1].append((size, node if has_owner else 0))
+            laid_out[-1].append((size, node if has_owner else 0))
             used += size
-    return found
+    return laid_out
 
 
 _FIELDS: Final = 2

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from functools import reduce
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import ClassVar, Final
 
-from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Cost, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
-from busplan.buses.sercos3.cycle import TELEGRAMS, WINDOW, Sercos3Cycle
+from busplan.buses.sercos3.cycle import EVENTS, STRETCHES, TELEGRAMS, WINDOW, Sercos3Cycle
 from busplan.buses.sercos3.equations import (
     COMPONENT_DELAY_US,
     CONNECTION_BYTES,
@@ -25,14 +24,10 @@ from busplan.buses.sercos3.equations import (
     PERIODS,
     PERIODS_SOURCE,
 )
-from busplan.buses.sercos3.figures import FIGURES, MDT_TELEGRAMS
+from busplan.buses.sercos3.figures import FIGURES
 from busplan.buses.sercos3.telegrams import SORTS, data_bytes, telegrams_of
 from busplan.elementwise import Number, larger, plain
 
-if TYPE_CHECKING:
-    from busplan.buses.published import EvidenceSection
-
-_COSEMA: Final = MDT_TELEGRAMS.reference
 _METHOD: Final = "bus.timing_method"
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
 
@@ -97,19 +92,8 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         measure=MEASURE,
         base=BASE,
     )
-    event_kinds = (
-        EventKind("mdt_frame", "MDT, its own fields", _COSEMA, "m", "request"),
-        EventKind("mdt_data", "data to a device", _COSEMA, ">", "out"),
-        EventKind("wait", "wait of the devices", _COSEMA, "w", "sync"),
-        EventKind("at_frame", "AT, its own fields", _COSEMA, "a", "response"),
-        EventKind("at_data", "data of a device", _COSEMA, "<", "in"),
-        EventKind("gap", "gap and padding", _COSEMA, ".", "gap"),
-        EventKind("ring", "ring delay", _COSEMA, "o", "long-gap"),
-        EventKind("jitter", "jitter allowance", _COSEMA, "j", "contention"),
-        EventKind("master", "master", _COSEMA, "=", "work"),
-        EventKind("nonperiodic", "channel for other frames", NONPERIODIC.reference, "N", "reserve"),
-    )
-    stretch_kinds = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second network"),
@@ -125,7 +109,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         "node.execution.worst_extra_us": Key("T_extra"),
     }
     evidence_data = ("sercos3",)
-    evidence_profiles = ("sercos3-servo-8",)
 
     def cycle(self, network: Network, *, model: str) -> Sercos3Cycle:
         """The cycle of a network under one timing model."""
@@ -171,14 +154,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
             return []
         why = f"the master opens no channel for other frames of less than {LEAST_UCC_US:g} us"
         return [f"Warning: cycle.nonperiodic_us = {given_us:g}: {why}."]
-
-    def evidence(
-        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
-    ) -> "tuple[EvidenceSection, ...]":
-        """Compare the drives that are published of a network with those that the telegrams carry."""
-        from busplan.buses.sercos3.evidence import performance  # one command alone asks for it
-
-        return performance(networks["sercos3-servo-8"], published["sercos3"])
 
 
 BUS: Final = Sercos3()

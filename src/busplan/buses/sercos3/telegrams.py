@@ -1,4 +1,4 @@
-"""What a network sends on SERCOS III: its MDT and AT, filled as the master does."""
+"""MDT and AT of a network on SERCOS III, filled as the master does."""
 
 from typing import Final, NamedTuple
 
@@ -26,17 +26,17 @@ class Telegrams(NamedTuple):
     """All telegrams of one sort, as a network says them. The numbers may be of any sort."""
 
     first_bytes: Number
-    """What the first begins with [bytes]."""
+    """Fields that the first begins with [bytes]."""
     next_bytes: Number
-    """What each other begins with [bytes]."""
+    """Fields that each other begins with [bytes]."""
     items: tuple[Items, ...]
-    """What they carry: service channels, control or status, then the data of each group."""
+    """Service channels, control or status, then the data of each group."""
     name: str
-    """What a derivation calls them."""
+    """Name in a derivation."""
 
     @property
     def filling(self) -> Filling:
-        """They, filled."""
+        """The telegrams, filled."""
         return filled(self.items, first_bytes=self.first_bytes, next_bytes=self.next_bytes, name=self.name)
 
 
@@ -60,7 +60,7 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
         (
             Items(network.nodes, CHANNEL_BYTES),
             Items(network.nodes, DEVICE_BYTES),
-            *(Items(one.nodes, data_bytes(network, size)) for one, size in sizes(network, kind)),
+            *(Items(group.nodes, data_bytes(network, size)) for group, size in sizes(network, kind)),
         ),
         SORTS[kind].upper(),
     )
@@ -68,7 +68,7 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
 
 def sizes(network: Network, kind: TransactionKind) -> list[tuple[Group, Number]]:
     """Each group of nodes with its payload [bytes]."""
-    return [(one, one.write_bytes if kind == "write" else one.read_bytes) for one in network.groups]
+    return [(group, group.write_bytes if kind == "write" else group.read_bytes) for group in network.groups]
 
 
 def data_bytes(network: Network, payload_bytes: Number) -> Number:
@@ -78,6 +78,6 @@ def data_bytes(network: Network, payload_bytes: Number) -> Number:
 
 
 def has_connections(network: Network) -> bool:
-    """Whether cyclic data are connections, each with its control."""
+    """Tell whether cyclic data are connections, each with its control."""
     is_first: bool = network.profile.bus.version == "V1.0"
     return not is_first

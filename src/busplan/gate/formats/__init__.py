@@ -1,70 +1,38 @@
-"""Formats of the gate's report: each is a class and a line in `FORMATS`."""
+"""Formats of the gate's report: each is a function and a line in `FORMATS`."""
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
-
-if TYPE_CHECKING:
-    from busplan.gate.report import CheckReport
+from typing import Final, Literal, NamedTuple
 
 
-class GateFormat(ABC):
-    """One format of the gate's report."""
-
-    @abstractmethod
-    def write(self, report: "CheckReport") -> str:
-        """Write a report."""
-
-    def on_terminal(self, report: "CheckReport", *, width: int) -> str:  # noqa: ARG002 - most formats have one look
-        """Write a report in the colours of a terminal.
-
-        Parameters
-        ----------
-        report
-            The report.
-        width
-            Width of sentences and source lines, in columns.
-        """
-        return self.write(report)
-
-    def log(self, report: "CheckReport") -> list[str]:  # noqa: ARG002 - most formats log nothing
-        """Further lines for standard error."""
-        return []
-
-
-class Registered(NamedTuple):
-    """Location of a format, so that only the requested one is loaded."""
+class GateFormat(NamedTuple):
+    """A format of the gate's report."""
 
     module: str
-    """Module in this folder."""
-    name: str
-    """Name of the class."""
+    """Module in this folder; only that of the requested format is loaded."""
+    function: str
+    """Its function: a report to its text. That of a format for people takes the `width` of a terminal, too."""
     reader: Literal["people", "programs", "builds"]
     """Who reads it. Only what people read is in the encoding of the terminal; all else is UTF-8."""
+    repeats: bool = False
+    """If True, the concise lines go to standard error, too: GitHub shows ten annotations of a severity in a step."""
+
+    @property
+    def write(self) -> Callable[..., str]:
+        """Function that writes a report."""
+        function: Callable[..., str] = getattr(import_module(f"{__name__}.{self.module}"), self.function)
+        return function
 
 
-FORMATS: Final[dict[str, Registered]] = {
-    "concise": Registered("plain", "Concise", "people"),
-    "full": Registered("full", "Full", "people"),
-    "text": Registered("plain", "Concise", "people"),
-    "json": Registered("documents", "Json", "programs"),
-    "github": Registered("github", "GitHub", "builds"),
-    "gitlab": Registered("documents", "GitLab", "builds"),
-    "junit": Registered("junit", "JUnit", "builds"),
-    "sarif": Registered("sarif", "Sarif", "builds"),
-    "markdown": Registered("markdown", "Markdown", "builds"),
+FORMATS: Final[dict[str, GateFormat]] = {
+    "concise": GateFormat("text", "concise", "people"),
+    "full": GateFormat("text", "full", "people"),
+    "text": GateFormat("text", "concise", "people"),
+    "json": GateFormat("documents", "json", "programs"),
+    "github": GateFormat("builds", "github", "builds", repeats=True),
+    "gitlab": GateFormat("documents", "gitlab", "builds"),
+    "junit": GateFormat("builds", "junit", "builds"),
+    "sarif": GateFormat("documents", "sarif", "builds"),
+    "markdown": GateFormat("builds", "markdown", "builds"),
 }
 """Every format by its name, in the order of the help."""
-
-
-def gate_format(name: str) -> GateFormat:
-    """Load one of the formats.
-
-    Parameters
-    ----------
-    name
-        One of `FORMATS`.
-    """
-    place = FORMATS[name]
-    made: type[GateFormat] = getattr(import_module(f"{__name__}.{place.module}"), place.name)
-    return made()

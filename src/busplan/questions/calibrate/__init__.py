@@ -8,14 +8,14 @@ from typing import Any, Literal, Protocol
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, measurements_from, parse_measurements
 from busplan.profile.shipped import locate_measurements
 from busplan.profile.toml import read_bytes
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, checked_models, load_profile
 from busplan.questions.calibrate import calibration as analysis
-from busplan.questions.calibrate.calibration import Calibration, Outlier, PayloadFit
+from busplan.questions.calibrate.calibration import Calibration, ComparedMeasurement, PayloadFit
 from busplan.sections.execution import LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
@@ -67,7 +67,7 @@ class CalibrateAnswer(Answer):
         return self.calibration.payloads
 
     @property
-    def outliers(self) -> tuple[Outlier, ...]:
+    def outliers(self) -> tuple[ComparedMeasurement, ...]:
         """Measurements far from the others, by line: of rows in memory the number of the row, from 1."""
         return self.calibration.outliers
 

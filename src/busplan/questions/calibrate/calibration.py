@@ -11,7 +11,7 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement
 from busplan.questions.calibrate.execution_fit import METHODS, ExecutionForm, Method, fit_execution
-from busplan.questions.calibrate.outliers import Sample, Screening, screen
+from busplan.questions.calibrate.outliers import Sample, screen
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.execution import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
@@ -26,8 +26,11 @@ _EXACT_DECIMALS: Final = 6
 """A picosecond: smaller residuals are rounding of the subtraction."""
 
 
-class Residual(NamedTuple):
-    """One measurement compared with the fit."""
+class ComparedMeasurement(NamedTuple):
+    """One measurement compared with the fit and, where it is an outlier, with the other measurements.
+
+    An outlier above the others is a slow execution, which belongs to `worst_extra_us`; the others contradict one below.
+    """
 
     line: int
     transaction: str
@@ -37,28 +40,12 @@ class Residual(NamedTuple):
     """Both halves, (T1+T2) + (T4+T5), which are subtracted from the latency."""
     execution_us: float
     """T_exec of this measurement."""
-    residual_us: float
-    """T_exec minus that of the fit."""
-
-
-class Outlier(NamedTuple):
-    """One measurement far from the others, compared with them and with the fit.
-
-    Above them it is a slow execution, which belongs to `worst_extra_us`; below, the others contradict it.
-    """
-
-    line: int
-    transaction: str
-    payload_bytes: int
-    latency_us: float
-    packets_us: float
-    execution_us: float
     residual_us: float | None
-    """T_exec minus that of the fit; None outside a table."""
-    expected_us: float
-    """T_exec that the other measurements say."""
+    """T_exec minus that of the fit; None for an outlier outside a table."""
+    expected_us: float | None
+    """T_exec that the other measurements say of an outlier; None in the fit."""
     off_us: float
-    """`execution_us` minus `expected_us`."""
+    """`execution_us` minus `expected_us`; 0 in the fit."""
 
 
 class PayloadFit(NamedTuple):
@@ -107,13 +94,13 @@ class Calibration(NamedTuple):
     execution: LinearExecution | TableExecution
     measurements: int
     """Number of all measurements, the outliers among them."""
-    residuals: tuple[Residual, ...]
+    residuals: tuple[ComparedMeasurement, ...]
     """Of the measurements in the fit."""
     payloads: tuple[PayloadFit, ...]
     rms_residual_us: float
-    largest: Residual
+    largest: ComparedMeasurement
     """The measurement farthest from the fit."""
-    outliers: tuple[Outlier, ...]
+    outliers: tuple[ComparedMeasurement, ...]
     """Measurements far from the others, slow or fast."""
     worst_extra_us: float | None
     """What the slowest execution takes beyond the fit; None where no measurement outside the fit is slow."""
@@ -198,9 +185,15 @@ def calibrate(
         groups[one.payload_bytes].append(one.latency_us - packets_us)
     chosen = form or nodes.node.execution.kind
     fit = fit_execution(groups, chosen, grade=grade, source=source)
-    compared = _compared(raw, fit)
-    residuals = tuple(_residual(compared[place]) for place in kept)
-    outliers = _outliers(compared, screening)
+    fitted_us = {
+        size: plain(fit.execution_us(size)) for size in {one.payload_bytes for one, _ in raw} if fit.covers(size)
+    }
+    compared = [
+        _compared(one, packets_us, fitted_us.get(one.payload_bytes), screening.expected_us.get(place))
+        for place, (one, packets_us) in enumerate(raw)
+    ]
+    residuals, outliers = (tuple(compared[place] for place in places) for places in (kept, sorted(left_out)))
+    residuals_us = _residuals_us(residuals)
     return Calibration(
         profile=profile,
         nodes=nodes,
@@ -210,13 +203,13 @@ def calibrate(
         execution=fit,
         measurements=len(measurements),
         residuals=residuals,
-        payloads=tuple(_payload_fits(compared, halves, left_out=left_out)),
-        rms_residual_us=fmean(one.residual_us**2 for one in residuals) ** 0.5,
-        largest=max(residuals, key=lambda one: abs(one.residual_us)),
+        payloads=tuple(_payload_fits(measurements, compared, halves, fitted_us)),
+        rms_residual_us=fmean(us**2 for us in residuals_us) ** 0.5,
+        largest=max(residuals, key=lambda one: abs(one.residual_us or 0.0)),
         outliers=outliers,
-        worst_extra_us=_worst_extra_us(outliers, residuals),
+        worst_extra_us=_worst_extra_us(outliers, residuals_us),
         unchecked_bytes=screening.unchecked_bytes,
-        uncertainty_us=_uncertainty_us(residuals, fit),
+        uncertainty_us=_uncertainty_us(residuals_us, fit),
         fit_keys=_latencies(profile).fit_keys(network_of(profile), model if way == "timing-model" else None),
         at_most_us=max(one.shortest_us for one in halves.values()),
     )
@@ -298,13 +291,13 @@ def _packets_us(one: Measurement, halves: _Halves, second_us: Mapping[tuple[str,
     return halves[key].latency_us
 
 
-def _uncertainty_us(residuals: Sequence[Residual], fit: LinearExecution | TableExecution) -> float | None:
+def _uncertainty_us(residuals_us: Sequence[float], fit: LinearExecution | TableExecution) -> float | None:
     """Standard deviation of the measurements about the fit [us]; None where the fit uses all of them up."""
     parameters = len(fit.payload_bytes) if isinstance(fit, TableExecution) else 2
-    free = len(residuals) - parameters
+    free = len(residuals_us) - parameters
     if free <= 0:
         return None
-    spread_us = sqrt(sum(one.residual_us**2 for one in residuals) / free)
+    spread_us = sqrt(sum(us**2 for us in residuals_us) / free)
     return round(max(spread_us, float(MEASURED_UNCERTAINTY_US)), 3)
 
 
@@ -341,111 +334,74 @@ def _more(source: str, hidden: int) -> list[str]:
     return [f"{source}: and {hidden} more problems"] if hidden > 0 else []
 
 
-class _Compared(NamedTuple):
-    """One measurement with its T_exec and, where the fit covers its payload, that of the fit [us]."""
-
-    measured: Measurement
-    packets_us: float
-    execution_us: float
-    fitted_us: float | None
-
-    @property
-    def residual_us(self) -> float | None:
-        """T_exec minus that of the fit."""
-        return None if self.fitted_us is None else round(self.execution_us - self.fitted_us, _EXACT_DECIMALS)
-
-
-def _compared(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | TableExecution) -> list[_Compared]:
-    sizes = {one.payload_bytes for one, _ in raw}
-    fitted_us = {size: plain(fit.execution_us(size)) for size in sizes if fit.covers(size)}
-    return [
-        _Compared(
-            one, packets_us, round(one.latency_us - packets_us, _EXACT_DECIMALS), fitted_us.get(one.payload_bytes)
-        )
-        for one, packets_us in raw
-    ]
-
-
-def _residual(one: _Compared) -> Residual:
-    """Comparison of a measurement in the fit, which covers it."""
-    measured, residual_us = one.measured, one.residual_us
-    assert residual_us is not None  # noqa: S101 - for mypy: a fit covers its own payloads
-    return Residual(
-        line=measured.line,
-        transaction=measured.transaction,
-        payload_bytes=measured.payload_bytes,
-        latency_us=measured.latency_us,
-        packets_us=one.packets_us,
-        execution_us=one.execution_us,
-        residual_us=residual_us,
+def _compared(
+    measurement: Measurement, packets_us: float, fitted_us: float | None, expected_us: float | None
+) -> ComparedMeasurement:
+    """Compare a measurement with the fit, where that covers its payload, and with what the others say [us]."""
+    execution_us = round(measurement.latency_us - packets_us, _EXACT_DECIMALS)
+    expected_us = None if expected_us is None else round(expected_us, _EXACT_DECIMALS)
+    return ComparedMeasurement(
+        line=measurement.line,
+        transaction=measurement.transaction,
+        payload_bytes=measurement.payload_bytes,
+        latency_us=measurement.latency_us,
+        packets_us=packets_us,
+        execution_us=execution_us,
+        residual_us=None if fitted_us is None else round(execution_us - fitted_us, _EXACT_DECIMALS),
+        expected_us=expected_us,
+        off_us=0.0 if expected_us is None else round(execution_us - expected_us, _EXACT_DECIMALS),
     )
 
 
-def _outliers(compared: Sequence[_Compared], screening: Screening) -> tuple[Outlier, ...]:
-    found = []
-    for place, expected_us in sorted(screening.expected_us.items()):
-        one, us = compared[place], round(expected_us, _EXACT_DECIMALS)
-        found.append(
-            Outlier(
-                line=one.measured.line,
-                transaction=one.measured.transaction,
-                payload_bytes=one.measured.payload_bytes,
-                latency_us=one.measured.latency_us,
-                packets_us=one.packets_us,
-                execution_us=one.execution_us,
-                residual_us=one.residual_us,
-                expected_us=us,
-                off_us=round(one.execution_us - us, _EXACT_DECIMALS),
-            )
-        )
-    return tuple(found)
+def _residuals_us(compared: Sequence[ComparedMeasurement]) -> list[float]:
+    """Residuals of measurements that the fit covers [us]."""
+    return [one.residual_us for one in compared if one.residual_us is not None]
 
 
-def _worst_extra_us(outliers: Sequence[Outlier], residuals: Sequence[Residual]) -> float | None:
-    """What the slowest of all measurements takes beyond the fit, where some are slow [us]."""
-    slow_us = [one.off_us if one.residual_us is None else one.residual_us for one in outliers if one.off_us > 0]
-    if not slow_us:
+def _worst_extra_us(outliers: Sequence[ComparedMeasurement], residuals_us: Sequence[float]) -> float | None:
+    """Time of the slowest of all measurements beyond the fit, where some are slow [us]."""
+    slow = [one for one in outliers if one.off_us > 0]
+    if not slow:
         return None
-    worst_us = max(*slow_us, *(one.residual_us for one in residuals))
+    worst_us = max(*(one.off_us if one.residual_us is None else one.residual_us for one in slow), *residuals_us)
     return ceil(1000 * worst_us - _PICOSECOND) / 1000
 
 
 def _payload_fits(
-    compared: Sequence[_Compared],
+    measurements: Sequence[Measurement],
+    compared: Sequence[ComparedMeasurement],
     halves: _Halves,
-    *,
-    left_out: frozenset[int],
+    fitted_us: Mapping[int, float],
 ) -> list[PayloadFit]:
     groups: defaultdict[int, list[int]] = defaultdict(list)
     for place, one in enumerate(compared):
-        groups[one.measured.payload_bytes].append(place)
+        groups[one.payload_bytes].append(place)
 
     def of_payload(size: int, places: Sequence[int]) -> PayloadFit:
-        group = [compared[place] for place in places if place not in left_out] or [compared[one] for one in places]
+        in_fit = [place for place in places if compared[place].expected_us is None]
+        group = [compared[place] for place in in_fit or places]
         times_us = [one.execution_us for one in group]
-        by_kind = {
-            kind: [one.execution_us for one in group if one.measured.transaction == kind] for kind in ("read", "write")
-        }
-        halves_us = (one.measured.request_and_acknowledge_us for one in group)
+        by_kind = {kind: [one.execution_us for one in group if one.transaction == kind] for kind in ("read", "write")}
+        halves_us = (measurements[place].request_and_acknowledge_us for place in in_fit or places)
         measured_us = [us for us in halves_us if us is not None]
-        fitted_us = group[0].fitted_us
+        own_us = fitted_us.get(size)
         half_us = median(measured_us) if measured_us else None
-        model_us = median([halves[one.measured.transaction, size].request_and_acknowledge_us for one in group])
+        model_us = median([halves[one.transaction, size].request_and_acknowledge_us for one in group])
         return PayloadFit(
             payload_bytes=size,
             measurements=len(places),
-            latency_us=median([one.measured.latency_us for one in group]),
+            latency_us=median([one.latency_us for one in group]),
             packets_us=median([one.packets_us for one in group]),
             execution_us=median(times_us),
             deviation_us=stdev(times_us) if len(group) > 1 else None,
             range_us=round(max(times_us) - min(times_us), _EXACT_DECIMALS),
-            fitted_us=fitted_us,
-            residual_us=None if fitted_us is None else round(median(times_us) - fitted_us, _EXACT_DECIMALS),
+            fitted_us=own_us,
+            residual_us=None if own_us is None else round(median(times_us) - own_us, _EXACT_DECIMALS),
             read_less_write_us=median(by_kind["read"]) - median(by_kind["write"]) if all(by_kind.values()) else None,
             request_and_acknowledge_us=half_us,
             model_request_and_acknowledge_us=model_us,
             unexplained_us=None if half_us is None else half_us - model_us,
-            left_out=len(left_out.intersection(places)),
+            left_out=len(places) - len(in_fit),
         )
 
     return [of_payload(size, groups[size]) for size in sorted(groups)]

@@ -20,12 +20,11 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns, plural, with_unit
+from busplan.forms.numbers import nouns, plural, sentence_text, with_unit
 from busplan.profile.write import value_text
 from busplan.questions.calibrate.calibration import Calibration, PayloadFit
 from busplan.questions.calibrate.sentences import fit_sentences, slow_and_fast, time_value, warning_sentences
-from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.fit.network import bus_of
 from busplan.questions.words.documents import document, with_profile
 from busplan.sections.execution import LinearExecution, TableExecution
@@ -56,6 +55,7 @@ _MEASURED_COLUMNS: Final = {
 
 
 _WORST: Final = "worst_extra_us"
+_OF_OUTLIERS: Final = ("expected_us", "off_us")
 
 
 def execution_keys(result: Calibration) -> dict[str, object]:
@@ -183,7 +183,7 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         uncertainty_us=result.uncertainty_us,
         at_most_us=result.at_most_us,
         rms_residual_us=result.rms_residual_us,
-        largest_residual=result.largest._asdict(),
+        largest_residual={key: value for key, value in result.largest._asdict().items() if key not in _OF_OUTLIERS},
         outliers=[one._asdict() for one in result.outliers],
         worst_extra_us=result.worst_extra_us,
         unchecked_bytes=list(result.unchecked_bytes),

@@ -5,7 +5,7 @@ from typing import Final
 
 from busplan.forms.blocks import Sentence, ShownValue, count_value, joined, sentence
 from busplan.forms.numbers import nouns
-from busplan.questions.calibrate.calibration import Calibration, Outlier
+from busplan.questions.calibrate.calibration import Calibration, ComparedMeasurement
 from busplan.questions.calibrate.outliers import PAYLOADS_TO_COMPARE, REPETITIONS_TO_COMPARE
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.execution import TableExecution
@@ -78,7 +78,7 @@ def _residual(result: Calibration) -> Sentence:
     said = sentence(
         "Measured less fitted: rms {}, largest {}",
         time_value(result.rms_residual_us, "rms_residual_us"),
-        time_value(one.residual_us, "residual_us"),
+        time_value(one.residual_us or 0.0, "residual_us"),
     )
     if one.residual_us:
         place = sentence(
@@ -141,7 +141,7 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
         )
 
 
-def slow_and_fast(result: Calibration) -> tuple[list[Outlier], list[Outlier]]:
+def slow_and_fast(result: Calibration) -> tuple[list[ComparedMeasurement], list[ComparedMeasurement]]:
     """The outliers that are slow executions, and those that the others contradict."""
     slow = [one for one in result.outliers if one.off_us > 0]
     return slow, [one for one in result.outliers if one.off_us <= 0]
@@ -169,7 +169,7 @@ def _effect(result: Calibration, word: str) -> Sentence:
     return sentence("; not in the fit: the slowest execution takes {} more, worst_extra_us.", worst)
 
 
-def _outlier(one: Outlier) -> Sentence:
+def _outlier(one: ComparedMeasurement) -> Sentence:
     return sentence(
         "line {} ({} at {}: T_exec {} off what the others say)",
         count_value(one.line, "line"),

@@ -24,16 +24,13 @@ from busplan.forms.blocks import (
     sentence,
     state_of,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns, period
+from busplan.forms.numbers import nouns, period, sentence_text
 from busplan.questions.capacity.sentences import uncertainty_parts, verdict_sentences
 from busplan.questions.capacity.verdict import Verdict
-from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS, Capacity, CapacityFigures
 from busplan.questions.fit.network import bus_of, leading_model, network_of
-from busplan.questions.words.documents import document, with_profile
-from busplan.questions.words.figure_tables import Owner, figure_table
+from busplan.questions.words.documents import Owner, document, fields, figure_table, with_profile
 from busplan.questions.words.sentences import safety_record, warnings
 
 
@@ -58,10 +55,10 @@ def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
 
 def _of_all(said: Sequence[Sequence[Sentence]]) -> Iterator[Sentence]:
     """The sentences of each period, and at the end once those that are the same for all."""
-    first, *others = ([sentence_text(one) for one in sentences] for sentences in said)
+    first, *others = ([sentence_text(words) for words in sentences] for sentences in said)
     common = {text for text in first if all(text in other for other in others)}
     for sentences in said:
-        yield from (one for one in sentences if sentence_text(one) not in common)
+        yield from (words for words in sentences if sentence_text(words) not in common)
     yield from (one for one in said[0] if sentence_text(one) in common)
 
 
@@ -94,24 +91,24 @@ def capacity_table(result: Capacity) -> Table:
 def _owners(result: Capacity) -> Iterator[Owner]:
     """A column for each period and timing model, the profile's own model first."""
     leading, deciding = leading_model(result.profile), bus_of(result.profile).deciding_model
-    for figures in result.periods:
+    for results in result.periods:
         several = len(result.periods) > 1
-        group = period(figures[0].period_us) if several else ""
-        for one in sorted(figures, key=lambda each: each.timing_model != leading):
-            rank = 1 if several and len(figures) > 1 and one.timing_model != deciding else 0
-            yield Owner(TableColumn(one.timing_model, group=group, rank=rank), one)
+        group = period(results[0].period_us) if several else ""
+        for figures in sorted(results, key=lambda each: each.timing_model != leading):
+            rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
+            yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures)
 
 
-def _state(key: Figure, one: CapacityFigures) -> State:
+def _state(key: Figure, figures: CapacityFigures) -> State:
     """State of a figure that, by itself, decides whether the cycle fits."""
     match key:
         case figure.VERDICT:
-            return "neutral" if one.verdict is None else state_of(one.verdict == FITS)
+            return "neutral" if figures.verdict is None else state_of(figures.verdict == FITS)
         case figure.MARGIN_CORRECTED:
-            is_short = one.safe_required_us is not None and one.safe_required_us > one.available_us
+            is_short = figures.safe_required_us is not None and figures.safe_required_us > figures.available_us
             return "fails" if is_short else "neutral"
         case figure.MARGIN:
-            return "fails" if TIME in one.exceeded else "neutral"
+            return "fails" if TIME in figures.exceeded else "neutral"
     return "neutral"
 
 
@@ -174,9 +171,9 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
         *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES, figure.LIMITED_BY),
     )
     return [
-        *((one, 0) for one in above),
-        *((one, 1) for one in bus.figures.terms),
-        *((one, 0) for one in below),
+        *((row, 0) for row in above),
+        *((term, 1) for term in bus.figures.terms),
+        *((row, 0) for row in below),
     ]
 
 
@@ -195,7 +192,7 @@ def _results(result: Capacity) -> Iterator[Record]:
     """As the rows, with a list of groups where the profile has some."""
     for figures in result.results:
         record: Record = figures.by_key()
-        yield {**record, "groups": [one.record() for one in figures.groups]} if figures.groups else record
+        yield {**record, "groups": [group.record() for group in figures.groups]} if figures.groups else record
 
 
 def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocument:
@@ -215,31 +212,22 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
     unable = {model.name: bus.cannot_express(network, model=model.name) for model in bus.timing_models}
     return {
         "period_us": verdict.period_us,
-        "timing_model": figures.timing_model,
-        "verdict": figures.verdict,
-        "fits": figures.fits,
-        "circle_refused_by": list(figures.circle_refused_by),
+        **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
         "missed_limits": [need.key for need in verdict.missed_limits],
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **safety_record(figures, result.profile),
-        "available_us": figures.available_us,
-        "required_us": figures.required_us,
-        "margin_us": figures.margin_us,
+        **fields(figures, "available_us", "required_us", "margin_us"),
         **certainty_record(figures),
         "uncertainty_parts": uncertainty_parts(figures),
         "reserve": result.profile.limits.reserve,
-        "not_in_it": [one.key for one in left_out],
+        "not_in_it": [missing.key for missing in left_out],
         "not_applicable": {model: list(keys) for model, keys in unable.items() if keys},
         "cheapest_change": change
         and {
             "changes": change.changes,
             "nodes": change.nodes,
-            "fits": change.figures.fits,
-            "margin_us": change.figures.margin_us,
-            "verdict": change.figures.verdict,
-            "margin_corrected_us": change.figures.margin_corrected_us,
-            "uncertainty_us": change.figures.uncertainty_us,
+            **fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
             "circle_is_untested": change.circle_is_untested,
         },
         "warnings": warnings(result.profile, nodes=figures.nodes, most=figures.safe_nodes or 0),
@@ -249,4 +237,4 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
 
 def certainty_record(figures: CapacityFigures) -> Record:
     """Figures of how sure the verdict is, without its word."""
-    return {one.key: getattr(figures, one.key) for one in figure.CERTAINTY if one is not figure.VERDICT}
+    return fields(figures, *(one.key for one in figure.CERTAINTY if one is not figure.VERDICT))

@@ -1,18 +1,221 @@
-"""What moves the margin: how the corrected margin answers each small change of a network."""
+"""What moves the margin: each small change of a network, and what binds once the first bottleneck is gone."""
 
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Final, NamedTuple
 
+from busplan.buses.cycle import BusCycle, Term
 from busplan.buses.network import Network
-from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
+from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Perturbation
 from busplan.elementwise import existing, plain
+from busplan.errors import BusplanError
 from busplan.profile.toml import override
-from busplan.questions.capacity.perturbations import Perturbed, perturbed
-from busplan.questions.fit.bottleneck import NextBottleneck, next_bottleneck
-from busplan.questions.fit.certainty import VERDICTS, VerdictWord, certainty, limit_codes, time_code, verdict_code
-from busplan.questions.fit.cycle import TIME, available_us, fits_in
+from busplan.questions.fit.certainty import (
+    TIME,
+    VERDICTS,
+    VerdictWord,
+    available_us,
+    certainty,
+    fits_in,
+    limit_codes,
+    time_code,
+    verdict_code,
+)
 from busplan.questions.fit.figures import Capacity
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.network import bus_of, network_of, with_execution, with_payloads, without_execution
+from busplan.questions.fit.node_limit import safe_nodes
+from busplan.sections.alike_nodes import AlikeNodes
+from busplan.sections.base import value_at, with_unchecked
 from busplan.sections.profile import Profile
+
+
+class NextLimit(NamedTuple):
+    """What limits the nodes of one group now, and what would next, the other groups as they are."""
+
+    group: str
+    """Empty where all nodes are alike."""
+    safe_nodes: int
+    """Most nodes that are shown to fit."""
+    limited_by: str
+    """Key of the limit that keeps them from being more."""
+    next_safe_nodes: int
+    """Most nodes without that limit."""
+    next_limited_by: str
+    """Key of the limit that keeps those from being more."""
+
+
+class NextBottleneck(NamedTuple):
+    """What binds now, and what would bind next, by the timing model that decides."""
+
+    limits: tuple[NextLimit, ...]
+    """One for each group of nodes."""
+    binding_term: Term
+    """The largest term of the cycle."""
+    is_gone: bool
+    """Whether something would take that term out of the cycle. If so, the figures below are of the cycle without it;
+    else they are of the cycle as it is."""
+    next_binding_term: Term
+    """The largest other term."""
+    next_margin_corrected_us: float | None
+    """Corrected margin without the largest term; None where nothing takes it out."""
+
+
+def next_bottleneck(profile: Profile) -> NextBottleneck:
+    """Find what binds a network once its first bottleneck is gone.
+
+    A term is taken out at its cause, and the cycle is computed anew: without execution, for one, the bus is idle for
+    longer.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    """
+    network, bus = network_of(profile), bus_of(profile)
+    cycle = bus.cycle(network, model=bus.deciding_model)
+    binding = _largest(cycle)
+    cycles = (bus.cycle(relieved, model=bus.deciding_model) for relieved in _relieved(network))
+    without = next((cycle for cycle in cycles if not _of(cycle, binding.key)), None)
+    return NextBottleneck(
+        limits=tuple(_next_limit(profile, name) for name in network.names),
+        binding_term=binding,
+        is_gone=without is not None,
+        next_binding_term=_largest(without or cycle, but=binding.key),
+        next_margin_corrected_us=None if without is None else plain(certainty(without).margin_corrected_us),
+    )
+
+
+def _next_limit(profile: Profile, group: str) -> NextLimit:
+    nodes, limit = safe_nodes(profile, group=group)
+    return NextLimit(group, nodes, limit, *safe_nodes(profile, group=group, without=limit))
+
+
+def _relieved(network: Network) -> Iterator[Network]:
+    """The network without each cause of a term that can be taken away."""
+    yield without_execution(network)
+    yield network._replace(nonperiodic_us=0.0)
+    for changes in bus_of(network.profile).term_removals:
+        yield network_of(override(network.profile, dict(changes)))
+
+
+def _largest(cycle: BusCycle, *, but: str = "") -> Term:
+    return max((term for term in cycle.terms if term.key != but), key=lambda one: plain(one.us))
+
+
+def _of(cycle: BusCycle, key: str) -> float:
+    return next(plain(term.us) for term in cycle.terms if term.key == key)
+
+
+_EXECUTION_SHARE: Final = 0.1
+_PAYLOAD_STEP_BYTES: Final = 4
+"""A quadlet: payloads are padded to it."""
+
+
+class Perturbed(NamedTuple):
+    """A network with one small change."""
+
+    change: str
+    key: str
+    """What changes: a key of the profile, or a figure of `latency`."""
+    before: Any
+    """Its value; None where it has no single one."""
+    after: Any
+    network: Network | None
+    """None where the change cannot be made."""
+    note: str
+    """Why it cannot be made, or why the margin stays as it is, where it does."""
+
+
+def perturbed(network: Network) -> Iterator[Perturbed]:
+    """Make every small change of a network, one at a time.
+
+    Those of every kind of bus are 10 % more execution time, a node and an axis more of each group, four bytes more of
+    every payload, and a bus reset; a kind has its own before the last.
+    """
+    bus = bus_of(network.profile)
+    yield _slower(network, if_nothing="" if bus.has_execution(network) else "no execution time is on the bus")
+    yield from (_one_node_more(network, alike) for alike in network.alike)
+    yield from (_one_axis_more(network, alike) for alike in network.alike)
+    yield _more_bytes(network)
+    own = bus.perturbations(network)
+    reset = Perturbation("a bus reset", bus.safety.after_reset, if_nothing="it is set so already")
+    yield from (_with_keys(network.profile, one) for one in (*own, *((reset,) if bus.safety.after_reset else ())))
+
+
+def _slower(network: Network, *, if_nothing: str) -> Perturbed:
+    factor = 1 + _EXECUTION_SHARE
+    groups = tuple(
+        with_execution(group, read_us=factor * group.read_execution_us, write_us=factor * group.write_execution_us)
+        for group in network.groups
+    )
+    before, after = (
+        _the_one(us for group in each for us in (group.read_execution_us, group.write_execution_us))
+        for each in (network.groups, groups)
+    )
+    label = f"execution time +{_EXECUTION_SHARE:.0%}"
+    return Perturbed(label, "execution_us", before, after, network._replace(groups=groups), if_nothing)
+
+
+def _one_node_more(network: Network, alike: AlikeNodes) -> Perturbed:
+    more = alike.nodes + 1
+    found = network.asking(alike.name).with_nodes(more)
+    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, found, "")
+
+
+def _one_axis_more(network: Network, alike: AlikeNodes) -> Perturbed:
+    key, axes = alike.node_key("axes"), alike.node.axes + 1
+    found, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
+    note = unknown or ("" if alike.payload.follows_axes else "no payload follows the axes")
+    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, found, note)
+
+
+def _more_bytes(network: Network) -> Perturbed:
+    sizes = [
+        (group.read_bytes + _PAYLOAD_STEP_BYTES, group.write_bytes + _PAYLOAD_STEP_BYTES) for group in network.groups
+    ]
+
+    def change() -> Network:
+        pairs = zip(network.groups, sizes, strict=True)
+        return network._replace(
+            groups=tuple(with_payloads(one, read_bytes=read, write_bytes=write) for one, (read, write) in pairs)
+        )
+
+    before = _the_one(size for one in network.groups for size in (one.read_bytes, one.write_bytes))
+    found, unknown = _if_known(change)
+    label = f"payload +{_PAYLOAD_STEP_BYTES} bytes"
+    return Perturbed(label, "payload_bytes", before, _the_one(size for one in sizes for size in one), found, unknown)
+
+
+def _with_keys(profile: Profile, perturbation: Perturbation) -> Perturbed:
+    """A change that a kind of bus names by keys of the profile."""
+    key, before, after = ", ".join(perturbation.changes), None, None
+    if len(perturbation.changes) == 1:
+        ((_, after),) = perturbation.changes.items()
+        before = value_at(profile, key)
+    if perturbation.why_not:
+        return Perturbed(perturbation.label, key, before, None, None, perturbation.why_not)
+    try:
+        found = network_of(override(profile, dict(perturbation.changes)))
+    except BusplanError as error:
+        return Perturbed(perturbation.label, key, before, after, None, "; ".join(error.problems))
+    return Perturbed(perturbation.label, key, before, after, found, perturbation.if_nothing)
+
+
+def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:
+    """The network after a change, or why its execution time is not known."""
+    try:
+        return change(), ""
+    except ValueError as error:
+        return None, f"not known: {error}"
+
+
+def _in(alike: AlikeNodes) -> str:
+    return f" in {alike.name}" if alike.name else ""
+
+
+def _the_one(values: Iterable[Any]) -> Any:
+    """The value that all share; None where they differ."""
+    first, *others = values
+    return first if all(other == first for other in others) else None
 
 
 class Standing(NamedTuple):
@@ -77,7 +280,7 @@ def sensitivity(profile: Profile) -> Sensitivity:
     """
     network = network_of(profile)
     now = standing(network)
-    effects = [_effect(one, now) for one in perturbed(network)]
+    effects = [_effect(change, now) for change in perturbed(network)]
     effects.sort(key=lambda one: (one.margin_change_us is None, -abs(one.margin_change_us or 0.0)))
     return Sensitivity(profile, bus_of(profile).deciding_model, now, tuple(effects), next_bottleneck(profile))
 
@@ -85,7 +288,7 @@ def sensitivity(profile: Profile) -> Sensitivity:
 def sensitivities(capacity: Capacity) -> tuple[Sensitivity, ...]:
     """What moves the margin at each period of a capacity result."""
     periods_us = (results[0].period_us for results in capacity.periods)
-    return tuple(sensitivity(override(capacity.profile, {"cycle.period_us": one})) for one in periods_us)
+    return tuple(sensitivity(override(capacity.profile, {"cycle.period_us": period_us})) for period_us in periods_us)
 
 
 def standing(network: Network) -> Standing:

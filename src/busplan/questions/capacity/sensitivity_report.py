@@ -2,13 +2,17 @@
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Final
+from xml.etree.ElementTree import SubElement
 
-from busplan.buses.figure import MARGIN_CORRECTED, VERDICT, unit_of
+from busplan.buses.cycle import Term
+from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
+from busplan.forms.bars import ROW, SignedBar, draw_bars, draw_zero
 from busplan.forms.blocks import (
     Block,
     Cell,
     Chart,
+    Drawing,
     JsonDocument,
     Record,
     Report,
@@ -17,21 +21,180 @@ from busplan.forms.blocks import (
     Table,
     TableColumn,
     TableRow,
+    count_value,
     figure_value,
     joined,
     sentence,
 )
-from busplan.forms.numbers import listed, period_value
-from busplan.questions.capacity.drawing import SensitivityDrawing
-from busplan.questions.capacity.next_bottleneck import next_bottleneck_record, next_bottleneck_sentence
+from busplan.forms.lines import Line
+from busplan.forms.numbers import decimals_of, listed, nouns, period_value, sentence_text
+from busplan.forms.svg import Scale, drawing, markup
 from busplan.questions.capacity.report import capacity_document, capacity_report
-from busplan.questions.capacity.sensitivity import Effect, Sensitivity, Standing
+from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Sensitivity, Standing
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import FITS, limits_behind
 from busplan.questions.fit.figures import Capacity
 from busplan.questions.fit.network import bus_of
-from busplan.questions.words.documents import with_profile
+from busplan.questions.words.documents import fields, with_profile
 from busplan.sections.profile import Profile
+
+_DECIMALS: Final = 3
+_NARROWEST: Final = 10
+"""Least columns of the bars in characters."""
+_TAKES, _ADDS, _ZERO = "-", "+", "|"
+
+
+class SensitivityDrawing(Drawing):
+    """A bar for each change that can be made, on one scale.
+
+    Parameters
+    ----------
+    found
+        What moves the margin.
+    """
+
+    def __init__(self, sensitivity: Sensitivity) -> None:
+        self._bars = [
+            _bar(effect.change, effect.margin_change_us)
+            for effect in sensitivity.effects
+            if effect.margin_change_us is not None
+        ]
+        self._margin_us = sensitivity.now.margin_corrected_us
+        self._least_us = min((bar.start_us for bar in self._bars), default=0.0)
+        self._most_us = max((bar.end_us for bar in self._bars), default=0.0)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing moves the margin: then there is no bar to see."""
+        return self._least_us == self._most_us
+
+    @property
+    def shows_the_end(self) -> bool:
+        """Whether the scale reaches to where nothing is left of the margin."""
+        return self._least_us <= -self._margin_us < 0
+
+    def svg(self) -> str | None:
+        """Draw a bar below the name of each change."""
+        if self.is_empty:
+            return None
+        root = drawing("What each small change does to the corrected margin", css="chart sensitivity")
+        scale = Scale(self._least_us, self._most_us)
+        bottom = len(self._bars) * ROW
+        draw_zero(root, scale, top=0, bottom=bottom)
+        if self.shows_the_end:
+            draw_zero(root, scale, top=0, bottom=bottom, at=-self._margin_us, css="edge")
+        draw_bars(root, self._bars, scale, y=0)
+        root.set("height", str(scale.marks(SubElement(root, "g"), top=bottom, bottom=bottom)))
+        return markup(root)
+
+    def characters(self, width: int) -> list[Line] | None:
+        """Draw a row for each change: its name, its bar and its figure."""
+        return None if self.is_empty else [Line(row, "drawn") for row in self._rows(width)]
+
+    def _rows(self, width: int) -> Iterator[str]:
+        names = max(len(bar.label) for bar in self._bars)
+        figures = max(len(bar.words) for bar in self._bars)
+        columns = max(_NARROWEST, width - names - figures - 5)
+        left, right = _shared(columns, least=self._least_us, most=self._most_us)
+        for one in self._bars:
+            size = _columns(
+                one.value, self._least_us if one.value < 0 else self._most_us, left if one.value < 0 else right
+            )
+            takes, adds = (_TAKES * size, "") if one.value < 0 else ("", _ADDS * size)
+            bar = f"{takes.rjust(left)}{_ZERO}{adds.ljust(right)}"
+            yield f"{one.label.ljust(names)}  {bar}  {one.words.rjust(figures)}"
+
+
+def _bar(change: str, us: float) -> SignedBar:
+    return SignedBar(change, us, decimals_of(us, _DECIMALS, signed=True), "us", "takes" if us < 0 else "hides")
+
+
+def _shared(columns: int, *, least: float, most: float) -> tuple[int, int]:
+    """Share columns between the left and the right of zero; a side with a bar has one at least."""
+    left = round(columns * -least / (most - least))
+    left = max(left, 1) if least < 0 else 0
+    left = min(left, columns - 1) if most > 0 else columns
+    return left, columns - left
+
+
+def _columns(us: float, of_us: float, columns: int) -> int:
+    """Columns of a bar: none only for no change at all."""
+    return max(1, round(columns * us / of_us)) if us else 0
+
+
+def next_bottleneck_sentence(found: NextBottleneck, profile: Profile) -> Sentence:
+    """Say what binds once the largest term, or the limit of the nodes, is gone.
+
+    Parameters
+    ----------
+    found
+        The bottlenecks.
+    profile
+        The network.
+    """
+    term, behind = (_term(one, profile) for one in (found.binding_term, found.next_binding_term))
+    term_us, behind_us, margin_us = (
+        ShownValue(us, key, "us", 3)
+        for us, key in (
+            (found.binding_term.us, "binding_term_us"),
+            (found.next_binding_term.us, "next_binding_term_us"),
+            (found.next_margin_corrected_us, "next_margin_corrected_us"),
+        )
+    )
+    if found.is_gone:
+        text = f"Next bottleneck: without {term}, now {{}}, the largest term is {behind}, {{}}, and the margin {{}}"
+        of_term = sentence(text, term_us, behind_us, margin_us)
+    else:
+        text = f"Next bottleneck: behind {term}, {{}}, which no key takes away, comes {behind}, {{}}"
+        of_term = sentence(text, term_us, behind_us)
+    limits = map(_limit, found.limits)
+    return joined(joined(of_term, *limits, by="; "), Sentence((".",)), by="")
+
+
+def _limit(found: NextLimit) -> Sentence:
+    """Say what limits the nodes, or those of a group, now and next."""
+    of = f" of {found.group}" if found.group else ""
+    return sentence(
+        f"without the limit of {found.limited_by}, now at {{}} {nouns(found.safe_nodes, 'node')}{of}, the next limit "
+        f"is {found.next_limited_by}, at {{}} {nouns(found.next_safe_nodes, 'node')}",
+        count_value(found.safe_nodes, SAFE_NODES.key),
+        count_value(found.next_safe_nodes, "next_safe_nodes"),
+    )
+
+
+def _term(term: Term, profile: Profile) -> str:
+    return by_key(bus_of(profile).figures.terms)[term.key].label
+
+
+def next_bottleneck_record(bottleneck: NextBottleneck, profile: Profile) -> Record:
+    """Of the document: what binds now and next, with the sentence that says it."""
+    return {
+        "binding_term": bottleneck.binding_term.name,
+        "binding_term_us": bottleneck.binding_term.us,
+        "next_binding_term": bottleneck.next_binding_term.name,
+        "next_binding_term_us": bottleneck.next_binding_term.us,
+        "next_margin_corrected_us": bottleneck.next_margin_corrected_us,
+        **_limits(bottleneck.limits),
+        "text": sentence_text(next_bottleneck_sentence(bottleneck, profile)),
+    }
+
+
+def _limits(found: Sequence[NextLimit]) -> Record:
+    """What limits the nodes; of groups a list, and nothing for the whole."""
+    each = [
+        {
+            "safe_limited_by": one.limited_by,
+            "safe_nodes": one.safe_nodes,
+            "next_safe_limited_by": one.next_limited_by,
+            "next_safe_nodes": one.next_safe_nodes,
+        }
+        for one in found
+    ]
+    if not found[0].group:
+        return each[0]
+    named = [{"name": one.group, **record} for one, record in zip(found, each, strict=True)]
+    return {**dict.fromkeys(each[0]), "groups": named}
+
 
 _DIGITS = 4
 """Digits of what changes: enough to see a tenth of it."""
@@ -62,39 +225,41 @@ def _of_periods(found: Sequence[Sensitivity]) -> Iterator[Block]:
         yield from sensitivity_blocks(one)
 
 
-def sensitivity_blocks(found: Sensitivity) -> Iterator[Block]:
+def sensitivity_blocks(sensitivity: Sensitivity) -> Iterator[Block]:
     """What moves the margin at one period.
 
     Parameters
     ----------
-    found
+    sensitivity
         The effects of all changes.
     """
-    yield sensitivity_table(found)
-    drawn = SensitivityDrawing(found)
+    yield sensitivity_table(sensitivity)
+    drawn = SensitivityDrawing(sensitivity)
     if not drawn.is_empty:
-        change = _capital(found.effects[0].change)
+        change = _capital(sensitivity.effects[0].change)
         sides = "a bar to the left takes from it, one to the right adds to it"
         caption = Sentence((f"{change} moves the margin most; {sides}, in us",))
         legend = Sentence(("The red line is where nothing is left of the margin.",)) if drawn.shows_the_end else None
         yield Chart(drawn, caption, legend)
-    yield _headline(found)
-    yield from (Sentence((f"{_capital(one.change)}: {one.note}.",)) for one in found.effects if one.note)
-    yield next_bottleneck_sentence(found.next_bottleneck, found.profile)
+    yield _headline(sensitivity)
+    yield from (
+        Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in sensitivity.effects if effect.note
+    )
+    yield next_bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.profile)
 
 
-def sensitivity_table(found: Sensitivity) -> Table:
+def sensitivity_table(sensitivity: Sensitivity) -> Table:
     """Every change with what it does to the margin, the largest effect first.
 
     Parameters
     ----------
-    found
+    sensitivity
         The effects of all changes.
     """
     caption = sentence(
-        f"What moves the margin of {{}} at {{}}, by the {found.timing_model} model",
-        figure_value(MARGIN_CORRECTED, found.now.margin_corrected_us),
-        period_value(found.profile.cycle.period_us),
+        f"What moves the margin of {{}} at {{}}, by the {sensitivity.timing_model} model",
+        figure_value(MARGIN_CORRECTED, sensitivity.now.margin_corrected_us),
+        period_value(sensitivity.profile.cycle.period_us),
     )
     columns = (
         TableColumn("what changes", kind="words"),
@@ -103,25 +268,25 @@ def sensitivity_table(found: Sensitivity) -> Table:
         TableColumn("then", "us", group="margin"),
         TableColumn("verdict then", kind="words", wraps=True),
     )
-    rows = (TableRow(tuple(_cells(one, found))) for one in found.effects)
+    rows = (TableRow(tuple(_cells(effect, sensitivity))) for effect in sensitivity.effects)
     return Table(columns, tuple(rows), caption)
 
 
-def _cells(one: Effect, found: Sensitivity) -> Iterator[Cell]:
-    yield one.change
-    yield _step(one)
-    yield ShownValue(one.margin_change_us, "margin_change_us", "us", 3, signed=True)
-    then = None if one.then is None else one.then.margin_corrected_us
+def _cells(effect: Effect, sensitivity: Sensitivity) -> Iterator[Cell]:
+    yield effect.change
+    yield _step(effect)
+    yield ShownValue(effect.margin_change_us, "margin_change_us", "us", 3, signed=True)
+    then = None if effect.then is None else effect.then.margin_corrected_us
     yield figure_value(MARGIN_CORRECTED, then)
-    yield _verdict(one.then, found.profile)
+    yield _verdict(effect.then, sensitivity.profile)
 
 
-def _step(one: Effect) -> Cell:
+def _step(effect: Effect) -> Cell:
     """From which value to which; nothing where the change has no single one."""
-    if one.before is None or one.after is None:
+    if effect.before is None or effect.after is None:
         return ""
-    before = ShownValue(one.before, one.key, digits=_DIGITS)
-    after = ShownValue(one.after, one.key, unit_of(one.key), digits=_DIGITS)
+    before = ShownValue(effect.before, effect.key, digits=_DIGITS)
+    after = ShownValue(effect.after, effect.key, unit_of(effect.key), digits=_DIGITS)
     return sentence("{} -> {}", before, after)
 
 
@@ -133,16 +298,16 @@ def _verdict(then: Standing | None, profile: Profile) -> Cell:
     why = list(limits_behind(then))
     if not why and then.verdict == FITS and not then.safe:
         why = [f"unsafe {bus_of(profile).safety.setting}"]
-    return Sentence((shown, *(f", {one}" for one in why)), "neutral" if _is_well(then) else "fails")
+    return Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if _is_well(then) else "fails")
 
 
-def _is_well(one: Standing) -> bool:
-    return one.verdict == FITS and one.safe
+def _is_well(standing: Standing) -> bool:
+    return standing.verdict == FITS and standing.safe
 
 
-def _headline(found: Sensitivity) -> Sentence:
+def _headline(sensitivity: Sensitivity) -> Sentence:
     """Say which change moves the margin most, and after which ones all is no longer well."""
-    first = found.effects[0]
+    first = sensitivity.effects[0]
     if not first.margin_change_us:
         return Sentence(("None of these changes moves the margin.",))
     then = None if first.then is None else first.then.margin_corrected_us
@@ -151,20 +316,20 @@ def _headline(found: Sensitivity) -> Sentence:
         ShownValue(first.margin_change_us, "margin_change_us", "us", 3, signed=True),
         figure_value(MARGIN_CORRECTED, then),
     )
-    return joined(most, *_after_each(found))
+    return joined(most, *_after_each(sensitivity))
 
 
-def _after_each(found: Sensitivity) -> Iterator[Sentence]:
+def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
     """Say what becomes of a cycle that is shown to fit."""
-    if found.now.verdict != FITS:
+    if sensitivity.now.verdict != FITS:
         return
-    made = [(one.change, one.then) for one in found.effects if one.then is not None]
+    made = [(effect.change, effect.then) for effect in sensitivity.effects if effect.then is not None]
     lost = [change for change, then in made if then.verdict != FITS]
-    unsafe = [change for change, then in made if then.verdict == FITS and found.now.safe and not then.safe]
+    unsafe = [change for change, then in made if then.verdict == FITS and sensitivity.now.safe and not then.safe]
     if lost:
         yield Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
     if unsafe:
-        yield Sentence((f"Its {bus_of(found.profile).safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
+        yield Sentence((f"Its {bus_of(sensitivity.profile).safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
     if not lost and not unsafe:
         yield Sentence(("The cycle is shown to fit after each of them alone.",))
 
@@ -182,31 +347,27 @@ def sensitivity_document(result: Capacity, verdicts: Sequence[Verdict], found: S
     return whole
 
 
-def _rows(found: Sensitivity) -> Iterator[Record]:
+def _rows(sensitivity: Sensitivity) -> Iterator[Record]:
     """One row for each change."""
-    for one in found.effects:
+    for effect in sensitivity.effects:
         yield {
-            "period_us": found.profile.cycle.period_us,
-            "timing_model": found.timing_model,
-            **_record(one, found.profile),
+            "period_us": sensitivity.profile.cycle.period_us,
+            "timing_model": sensitivity.timing_model,
+            **_record(effect, sensitivity.profile),
         }
 
 
-def _record(one: Effect, profile: Profile) -> Record:
-    then = one.then
+def _record(effect: Effect, profile: Profile) -> Record:
+    then = effect.then
     safety = bus_of(profile).safety.figure
     own: dict[str, Any] = {} if safety is None else {safety.key: None if then is None else then.safe}
     return {
-        "change": one.change,
-        "key": one.key,
-        "from": one.before,
-        "to": one.after,
-        "margin_change_us": one.margin_change_us,
-        "margin_corrected_us": None if then is None else then.margin_corrected_us,
-        "uncertainty_us": None if then is None else then.uncertainty_us,
-        "verdict": None if then is None else then.verdict,
-        "exceeded": None if then is None else list(then.exceeded),
-        "not_shown": None if then is None else list(then.not_shown),
+        "change": effect.change,
+        "key": effect.key,
+        "from": effect.before,
+        "to": effect.after,
+        "margin_change_us": effect.margin_change_us,
+        **fields(then, "margin_corrected_us", "uncertainty_us", "verdict", "exceeded", "not_shown"),
         **own,
-        "note": one.note or None,
+        "note": effect.note or None,
     }

@@ -37,9 +37,9 @@ from busplan.questions.fit.figures import CapacityFigures, GroupCapacity
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import UNTESTED_CIRCLE, changeable
 from busplan.questions.plan.freedoms import PERIOD
-from busplan.questions.words.key_values import change_meanings, settings_sentence
 from busplan.questions.words.sentences import (
     broken_limits,
+    change_meanings,
     evidence_sentence,
     execution_grades,
     execution_sentence,
@@ -47,6 +47,7 @@ from busplan.questions.words.sentences import (
     not_applicable,
     refused_circle,
     reset_sentence,
+    settings_sentence,
     warning_sentences,
 )
 from busplan.sections.profile import Profile
@@ -101,9 +102,9 @@ def _assumed(figures: CapacityFigures, profile: Profile) -> Iterator[Sentence]:
     """Say which assumptions carry much of the cycle or of its doubt, and how its execution time is known."""
     heavy = heavy_assumptions(figures, profile)
     if heavy:
-        said = (f"{listed(one.keys, 'and')}, which {one.carries}" for one in heavy)
+        said = (f"{listed(assumption.keys, 'and')}, which {assumption.carries}" for assumption in heavy)
         yield Sentence((f"Assumed: {'; '.join(said)}.",), "warns")
-    if not (any(one.is_execution for one in heavy) and execution_grades(profile) == "assumed"):
+    if not (any(assumption.is_execution for assumption in heavy) and execution_grades(profile) == "assumed"):
         yield from execution_sentence(profile)
 
 
@@ -149,7 +150,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
 
 def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
     """What the uncertainty is made of, the largest first."""
-    whole = sum(float(one.us) ** 2 for one in figures.doubts)
+    whole = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     return [
         {
             "input": one.key,
@@ -181,7 +182,7 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
     bus = bus_of(profile)
     left = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
     if left:
-        yield Sentence((f"Not in it: {', '.join(f'{one.label} ({one.key})' for one in left)}.",))
+        yield Sentence((f"Not in it: {', '.join(f'{missing.label} ({missing.key})' for missing in left)}.",))
 
 
 def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
@@ -200,8 +201,11 @@ def _carries(figures: CapacityFigures) -> Sentence:
     safely = "" if figures.safe else " on a bus that is set safely"
     if figures.groups:
         each = (
-            sentence(f"{one.name} up to {{}} {nouns(one.safe_nodes or 0, 'node')} ({one.safe_limited_by})", _safe(one))
-            for one in figures.groups
+            sentence(
+                f"{group.name} up to {{}} {nouns(group.safe_nodes or 0, 'node')} ({group.safe_limited_by})",
+                _safe(group),
+            )
+            for group in figures.groups
         )
         return Sentence((f"Shown to fit{safely}, one group at a time: ", *joined(*each, by=", ").parts, "."))
     return Sentence(
@@ -212,8 +216,8 @@ def _carries(figures: CapacityFigures) -> Sentence:
     )
 
 
-def _safe(one: GroupCapacity) -> ShownValue:
-    return count_value(one.safe_nodes or 0)
+def _safe(group: GroupCapacity) -> ShownValue:
+    return count_value(group.safe_nodes or 0)
 
 
 def _nodes(nodes: int, axes: int) -> Sentence:

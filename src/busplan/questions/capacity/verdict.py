@@ -48,12 +48,14 @@ def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:
 def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
     profile = override(capacity.profile, {"cycle.period_us": results[0].period_us})
     model = bus_of(profile).deciding_model
-    deciding = next((one for one in results if one.timing_model == model), None) or figures(profile, model=model)
+    deciding = next((result for result in results if result.timing_model == model), None) or figures(
+        profile, model=model
+    )
     change, no_change = advice(profile, deciding)
     return Verdict(
         period_us=deciding.period_us,
         deciding=deciding,
-        others=tuple(one for one in results if one is not deciding),
+        others=tuple(result for result in results if result is not deciding),
         missed_limits=missed_limits(profile),
         after_reset=after_reset(profile, deciding),
         change=change,

@@ -7,7 +7,7 @@ from busplan.forms.blocks import Report
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Periods, ProfileLike, load_profile, one_or_several, whole
-from busplan.questions.circle.record import CircleTest
+from busplan.questions.circle.figures import CircleTest
 
 
 class CircleTestAnswer(Answer, CircleTest):
@@ -46,7 +46,7 @@ class CircleTestAnswer(Answer, CircleTest):
             `every` is no whole number from 1 on.
         """
         from busplan.forms.csv_rows import csv_blocks
-        from busplan.questions.circle.trace import TRACE_COLUMNS, trace_records
+        from busplan.questions.circle.contour import TRACE_COLUMNS, trace_records
 
         return csv_blocks(trace_records(self, every=whole(every, name="every")), columns=TRACE_COLUMNS)
 

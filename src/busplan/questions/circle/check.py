@@ -1,11 +1,18 @@
-"""The circle test for a search: the failures of many variants of one profile. Only a test loads the simulation."""
+"""Circle tests of the variants of a profile, and of a comparison; only running one loads the simulation."""
 
-from typing import Final
+from collections.abc import Callable
+from itertools import count
+from typing import TYPE_CHECKING, Final
 
 from busplan.errors import BusplanError
-from busplan.progress import Progress
+from busplan.progress import Progress, part_of
+from busplan.questions.fit.circle_refusal import path_steps
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us, skew_us
 from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from busplan.questions.circle.figures import CircleFigures
+
 
 MOST_STEPS: Final = 10_000_000
 """Most steps of a circle that a gate runs: seconds, and a few hundred megabytes."""
@@ -80,10 +87,33 @@ def failures_within(profile: Profile, *, most_steps: int) -> tuple[str, ...] | N
     most_steps
         Most simulated steps of each axis.
     """
-    from busplan.questions.fit.circle_move import path_steps
-
     try:
         steps = path_steps(profile)
     except BusplanError as error:
         return error.problems
     return None if steps > most_steps else CircleCheck()(profile)
+
+
+ComputeCircleFigures = Callable[["Profile"], "CircleFigures"]
+"""Runs the circle test of a profile."""
+
+
+def circle_tests(progress: Progress | None = None, *, of: int = 2) -> ComputeCircleFigures:
+    """Make the function that runs the circle test of each of some profiles, with one progress for all.
+
+    Parameters
+    ----------
+    progress
+        Called from time to time with the work done and the total work.
+    of
+        How many profiles [1].
+    """
+    number = count()
+
+    def run(profile: "Profile") -> "CircleFigures":
+        from busplan.questions.circle.roundness import circle_test
+
+        part = None if progress is None else part_of(progress, number=next(number), of=of)
+        return circle_test(profile, explain=False, progress=part).results[0]
+
+    return run

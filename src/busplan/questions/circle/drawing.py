@@ -1,17 +1,228 @@
-"""The circle with its error magnified, as in ballbar reports."""
+"""The circle with its error magnified, as in ballbar reports; in characters, the error over the angle."""
 
 from collections.abc import Iterator, Sequence
-from math import cos, radians, sin
-from typing import Final
+from math import ceil, cos, floor, log10, radians, sin
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.forms.blocks import Drawing
 from busplan.forms.lines import Line
+from busplan.forms.numbers import ROUNDING_UM
+from busplan.forms.scale import ring_step
 from busplan.forms.svg import drawing, markup, text_at
-from busplan.questions.circle.characters import contour_lines
-from busplan.questions.circle.contour_profile import ContourProfile
-from busplan.questions.circle.scale import ERROR_SHARE, Magnified, magnified
+from busplan.questions.circle.contour import ContourProfile
 from busplan.servo.path import Direction
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+Number = TypeVar("Number", float, "NDArray[np.float64]")
+
+ERROR_SHARE: Final = 0.25
+"""Largest drawn error as a share of the drawn radius."""
+_WIDEST: Final = 3.0
+"""A tolerance is drawn up to this multiple of the largest error: a larger ring would flatten the error."""
+_FLAT: Final = 0.1
+"""Errors whose spread is a smaller share of the largest would look like one line above zero."""
+_NANOMETRES_BELOW_UM: Final = 0.1
+
+
+class LengthUnit(NamedTuple):
+    """Unit that lengths are written in."""
+
+    name: str
+    per_um: float
+    """How many of it are 1 um."""
+
+    def text(self, length_um: float) -> str:
+        """Write a round length with its unit."""
+        return f"{length_um * self.per_um:g} {self.name}"
+
+
+def length_unit(largest_um: float) -> LengthUnit:
+    """Choose a unit in which a small length is no row of zeros.
+
+    Examples
+    --------
+    >>> length_unit(19.0).text(5.0), length_unit(0.02).text(0.005)
+    ('5 um', '5 nm')
+    """
+    return LengthUnit("um", 1.0) if largest_um >= _NANOMETRES_BELOW_UM else LengthUnit("nm", 1e3)
+
+
+class Magnified(NamedTuple):
+    """Scale of a circle with its error magnified."""
+
+    largest_mm: float
+    """Error at the edge: the largest error, or the tolerance if that is larger."""
+    ring_um: float
+    """Distance between rings."""
+    tolerance_mm: float | None
+    """Ring of the tolerance; None if there is none or it lies far outside."""
+
+    def times(self, radius_mm: float) -> float:
+        """Magnification of the error relative to the circle."""
+        return ERROR_SHARE / self.largest_mm * radius_mm
+
+    def radius(self, error_mm: Number) -> Number:
+        """Drawn radius of an error, as a multiple of the drawn nominal radius."""
+        return 1 + ERROR_SHARE / self.largest_mm * error_mm
+
+    @property
+    def unit(self) -> LengthUnit:
+        """Unit of its errors."""
+        return length_unit(self.largest_mm * 1e3)
+
+    @property
+    def ring_text(self) -> str:
+        """Distance between rings with its unit."""
+        return self.unit.text(self.ring_um)
+
+    @property
+    def rings_mm(self) -> tuple[float, ...]:
+        """Errors at the rings, from the innermost one to the outermost; the nominal circle is 0."""
+        most = floor(self.largest_mm * 1e3 / self.ring_um + 1e-9)
+        return tuple(ring * self.ring_um / 1e3 for ring in range(-most, most + 1))
+
+
+def magnified(largest_mm: float, *, tolerance_mm: float | None) -> Magnified | None:
+    """Find the scale of a circle; None if there is no error to show.
+
+    Parameters
+    ----------
+    largest_mm
+        Largest contour error, without its sign [mm].
+    tolerance_mm
+        Largest contour error that is allowed, where there is a limit [mm].
+
+    Examples
+    --------
+    >>> magnified(0.019, tolerance_mm=0.025).rings_mm
+    (-0.02, -0.01, 0.0, 0.01, 0.02)
+    """
+    if largest_mm * 1e3 < ROUNDING_UM:
+        return None
+    drawn = tolerance_mm if tolerance_mm is not None and 0 < tolerance_mm <= _WIDEST * largest_mm else None
+    edge_mm = max(largest_mm, drawn or 0.0)
+    return Magnified(edge_mm, ring_step(edge_mm * 1e3), drawn)
+
+
+class ErrorRange(NamedTuple):
+    """Range of a scale of errors."""
+
+    bottom_um: float
+    top_um: float
+
+    @property
+    def largest_um(self) -> float:
+        """Its end that is further from zero, without its sign."""
+        return max(abs(self.bottom_um), abs(self.top_um))
+
+    @property
+    def zero_outside(self) -> str:
+        """Note that zero is not on the scale; empty if it is."""
+        if self.bottom_um > 0:
+            return "0 lies below"
+        return "0 lies above" if self.top_um < 0 else ""
+
+
+def error_range(low_um: float, high_um: float) -> ErrorRange:
+    """Range from the smallest to the largest error and zero; without zero if the errors would look like one line.
+
+    Parameters
+    ----------
+    low_um, high_um
+        Smallest and largest error, signed [um].
+
+    Examples
+    --------
+    >>> error_range(2.0, 19.0)
+    ErrorRange(bottom_um=0.0, top_um=19.0)
+    >>> error_range(502.456, 502.458)
+    ErrorRange(bottom_um=502.456, top_um=502.458)
+    """
+    spread_um, largest_um = high_um - low_um, max(abs(low_um), abs(high_um))
+    if low_um * high_um > 0 and ROUNDING_UM <= spread_um < _FLAT * largest_um:
+        return ErrorRange(low_um, high_um)
+    return ErrorRange(min(0.0, low_um), max(0.0, high_um))
+
+
+_COLUMNS: Final = (72, 60, 48, 36, 24)
+"""Possible widths of a plot: one column for 5, 6, 7.5, 10 or 15 degrees. The widest that fits is used."""
+_ROWS: Final = 9
+
+
+def contour_lines(profile: ContourProfile, *, width: int) -> list[Line]:
+    """Draw the smallest and largest error of each part of the circle, of which one at least is no rounding.
+
+    Parameters
+    ----------
+    profile
+        Contour error around the circle; its number of sectors is a multiple of each of `_COLUMNS`.
+    width
+        Columns of the whole drawing.
+    """
+    low_mm = min(value for value in profile.low_mm if value is not None)
+    high_mm = max(value for value in profile.high_mm if value is not None)
+    scale = error_range(low_mm * 1e3, high_mm * 1e3)
+    unit = length_unit(scale.largest_um)
+    edges = _edges(scale)
+    labels = _labels(edges, per_um=unit.per_um)
+    gutter = max(len(text) for text in (*labels, unit.name, "deg"))
+    room = width - gutter - len(" |")
+    columns = next((one for one in _COLUMNS if one <= room), _COLUMNS[-1])
+    axis = "".join(f"{angle:<{columns // 4}}" for angle in (0, 90, 180, 270)).rstrip()
+    rows = zip(labels, _rows(profile.condensed(sectors=columns), edges), strict=True)
+    return [
+        Line(", ".join(filter(None, (f"{unit.name:>{gutter}}", scale.zero_outside))), "drawn"),
+        *(Line(f"{text:>{gutter}} |{cells}".rstrip(), "drawn") for text, cells in rows),
+        Line(f"{'deg':>{gutter}}  {axis}", "drawn"),
+    ]
+
+
+def _edges(scale: ErrorRange) -> list[float]:
+    """Edges of the rows [um], from top to bottom; the ends are those of the scale, without rounding."""
+    height_um = (scale.top_um - scale.bottom_um) / _ROWS
+    return [*(scale.top_um - number * height_um for number in range(_ROWS)), scale.bottom_um]
+
+
+def _labels(edges: list[float], *, per_um: float) -> list[str]:
+    """Label of each row: both ends of the scale, with digits that tell them apart, and zero."""
+    top, bottom = edges[0] * per_um, edges[-1] * per_um
+    # A tenth of the scale, or finer.
+    decimals = max(1, ceil(1 - log10(top - bottom)))
+    ends = {0: _number(top, decimals), _ROWS - 1: _number(bottom, decimals)}
+    labels = []
+    for number in range(_ROWS):
+        zero = ("0",) if _holds_zero(edges, number) else ()
+        end = (ends[number],) if number in ends else ()
+        labels.append(", ".join(dict.fromkeys((*zero, *end))))
+    return labels
+
+
+def _number(value: float, decimals: int) -> str:
+    """Write a number with its sign; 0 if nothing is left of it."""
+    text = f"{value:+.{decimals}f}"
+    return text if float(text) else "0"
+
+
+def _rows(profile: ContourProfile, edges: list[float]) -> Iterator[str]:
+    """Cells of each row, from top to bottom."""
+    for number in range(_ROWS):
+        upper, lower = edges[number], edges[number + 1]
+        empty = "-" if _holds_zero(edges, number) else " "
+        yield "".join(
+            "#" if low is not None and high is not None and low * 1e3 <= upper and high * 1e3 >= lower else empty
+            for low, high in zip(profile.low_mm, profile.high_mm, strict=True)
+        )
+
+
+def _holds_zero(edges: list[float], number: int) -> bool:
+    upper, lower = edges[number], edges[number + 1]
+    return lower <= 0.0 < upper or (number == 0 and upper == 0.0)
+
 
 _WIDTH: Final = 470
 HEIGHT: Final = 400

@@ -6,8 +6,7 @@ from string import Formatter
 from typing import Any, Final, NamedTuple
 
 from busplan.elementwise import existing
-from busplan.questions.fit.certainty import FITS, limits_behind
-from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.certainty import FITS, TIME, limits_behind
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.machine import CONTOUR_MEASURES
@@ -47,10 +46,10 @@ class _Saying(NamedTuple):
     """Message template of a failure; {beyond} is the distance between {value} and {limit}."""
 
     words: str
-    key: str = ""
-    """The figure that fails."""
-    unit: str = ""
+    unit: str = "um"
     decimals: int = 3
+    key: str = ""
+    """The figure that fails, if it is not the name of the failure without min_."""
     limit_key: str = ""
     """Key of the limit, if it is not the name of the failure."""
     limit_decimals: int | None = None
@@ -60,15 +59,10 @@ class _Saying(NamedTuple):
 
 _FAILURES: Final[dict[str, _Saying]] = {
     "required_us": _Saying(
-        "the cycle does not fit the bus: {value} needed of {limit}",
-        "required_us",
-        "us",
-        limit_key="available_us",
-        limit_decimals=3,
+        "the cycle does not fit the bus: {value} needed of {limit}", "us", limit_key="available_us", limit_decimals=3
     ),
     "safe_required_us": _Saying(
         "the cycle is not shown to fit the bus: with bias, uncertainty and reserve {value} needed of {limit}",
-        "safe_required_us",
         "us",
         limit_key="available_us",
         limit_decimals=3,
@@ -77,28 +71,18 @@ _FAILURES: Final[dict[str, _Saying]] = {
     "circle_not_followed": _Saying(
         "the table did not follow the circle (not the whole turn, or an error above the radius): "
         "it went {value} of {limit} round the centre",
-        "covered_deg",
         "deg",
         0,
+        key="covered_deg",
         limit_decimals=0,
     ),
-    "min_phase_margin_deg": _Saying(
-        "the phase margin of {value} is {beyond} under its {limit}", "phase_margin_deg", "deg", 2
-    ),
-    "min_gain_margin_db": _Saying(
-        "the gain margin of {value} is {beyond} under its {limit}", "gain_margin_db", "dB", 2
-    ),
-    "mean_contour_error_mm": _Saying(
-        "the mean contour error of {value} is {beyond} over its {limit}", "mean_contour_error_mm", "um"
-    ),
-    "max_contour_error_mm": _Saying(
-        "the largest contour error of {value} is {beyond} over its {limit}", "max_contour_error_mm", "um"
-    ),
+    "min_phase_margin_deg": _Saying("the phase margin of {value} is {beyond} under its {limit}", "deg", 2),
+    "min_gain_margin_db": _Saying("the gain margin of {value} is {beyond} under its {limit}", "dB", 2),
+    "mean_contour_error_mm": _Saying("the mean contour error of {value} is {beyond} over its {limit}"),
+    "max_contour_error_mm": _Saying("the largest contour error of {value} is {beyond} over its {limit}"),
     "not_settled": _Saying(
         "the loops and their friction take more than {limit} to settle, so that the turn is not measured",
-        "",
         "s",
-        0,
         limit_decimals=0,
     ),
     _WITHOUT_TURN: _Saying(
@@ -106,12 +90,8 @@ _FAILURES: Final[dict[str, _Saying]] = {
         'set circle.path = "iso230-4", or take out tolerance.circular_deviation_mm = {limit}',
         limit_unit="mm",
     ),
-    "circular_deviation_mm": _Saying(
-        "the circular deviation G of {value} is {beyond} over its {limit}", "circular_deviation_mm", "um"
-    ),
+    "circular_deviation_mm": _Saying("the circular deviation G of {value} is {beyond} over its {limit}"),
 }
-
-
 _OF_TIME: Final = ("required_us", "safe_required_us")
 
 
@@ -152,7 +132,7 @@ class Failure(NamedTuple):
         saying, value, limit = _FAILURES[known], self.value or 0.0, self.limit or 0.0
         limit_key = saying.limit_key or self.name
         numbers = {
-            "value": Stated(value, saying.key, saying.unit, saying.decimals),
+            "value": Stated(value, saying.key or self.name.removeprefix("min_"), saying.unit, saying.decimals),
             "limit": Stated(limit, limit_key, saying.limit_unit or saying.unit, saying.limit_decimals),
             "beyond": Stated(abs(value - limit), limit_key, saying.unit, saying.decimals),
         }
@@ -171,9 +151,9 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
     The two margins may come from different axes. If either loop is unstable, all are None.
     """
     axes = (run.margins_x, run.margins_y)
-    if not all(one.stable for one in axes):
+    if not all(axis.stable for axis in axes):
         return None, None, None
-    gains = [one.gain_margin_db for one in axes if one.gain_margin_db is not None]
+    gains = [axis.gain_margin_db for axis in axes if axis.gain_margin_db is not None]
     phase = min(axes, key=lambda one: inf if one.phase_margin_deg is None else one.phase_margin_deg)
     return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
 
@@ -190,7 +170,7 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
     """
     network = network_of(profile)
     behind = limits_behind(capacity)
-    broken = [one for one in bus_of(profile).limits if one.key in behind]
+    broken = [limit for limit in bus_of(profile).limits if limit.key in behind]
     late: tuple[Failure, ...] = ()
     if TIME in capacity.exceeded:
         late = (Failure("required_us", capacity.required_us, capacity.available_us),)
@@ -199,9 +179,12 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
     return (
         *(
             Failure(
-                one.failure or one.key, existing(one.value(network)), existing(one.most(network)), one.words(network)
+                limit.failure or limit.key,
+                existing(limit.value(network)),
+                existing(limit.most(network)),
+                limit.words(network),
             )
-            for one in broken
+            for limit in broken
         ),
         *late,
     )

@@ -9,17 +9,14 @@ from typing import Final
 
 from busplan.profile.toml import at_periods
 from busplan.progress import Progress
-from busplan.questions.circle.contributions import Contribution, Setup, contributions, sources
-from busplan.questions.circle.estimate import announce, estimate
 from busplan.questions.circle.failures import (
     bus_failures,
     circle_failures,
     tightest_margins,
 )
-from busplan.questions.circle.record import CircleFigures, CircleTest
-from busplan.questions.circle.setup import bus, setup
-from busplan.questions.fit.circle_move import loop_timing, path_setpoints
-from busplan.questions.fit.circle_refusal import require_circle
+from busplan.questions.circle.figures import CircleFigures, CircleTest
+from busplan.questions.circle.setup import Contribution, Setup, announce, bus, contributions, estimate, setup, sources
+from busplan.questions.fit.circle_refusal import loop_timing, path_setpoints, require_circle
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us
 from busplan.sections.machine import CONTOUR_MEASURES
@@ -110,8 +107,8 @@ def circle_test(
         setup(variant) if capacity.fits else _timing(variant)
         for variant, capacity in zip(variants, capacities, strict=True)
     ]
-    simulated = [one for one in setups if isinstance(one, Setup)]
-    ranked = [sources(one) if with_contributions and isinstance(one, Setup) else {} for one in setups]
+    simulated = [prepared for prepared in setups if isinstance(prepared, Setup)]
+    ranked = [sources(prepared) if with_contributions and isinstance(prepared, Setup) else {} for prepared in setups]
     passing = [source for each in ranked for source in each.values()]
     counter.expect(*simulated, *passing)
     announce(estimate(simulated, passing))
@@ -137,7 +134,7 @@ class _Counter:
         self._done = 0
 
     def expect(self, *setups: Setup) -> None:
-        self._expected += sum(2 * one.steps for one in setups)
+        self._expected += sum(2 * prepared.steps for prepared in setups)
 
     def run(self, one: Setup) -> CircleRun:
         before = self._done

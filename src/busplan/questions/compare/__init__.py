@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several
@@ -29,7 +29,9 @@ class CompareAnswer(Answer, KindComparison):
         KeyError
             The kind was not asked for.
         """
-        return {one.kind if isinstance(one, NotOnKind) else one.figures.kind: one for one in self.kinds}[kind]
+        return {
+            machine.kind if isinstance(machine, NotOnKind) else machine.figures.kind: machine for machine in self.kinds
+        }[kind]
 
     def svg(self, *, note: str = "") -> str:
         """Draw the most axes over the period, a line for each kind of bus, as an SVG file.
@@ -44,8 +46,8 @@ class CompareAnswer(Answer, KindComparison):
         BusplanError
             No kind of bus can have the machine.
         """
+        from busplan.questions.compare.drawing import compare_svg
         from busplan.questions.compare.report import headline
-        from busplan.questions.compare.svg import compare_svg
 
         if not self.compared:
             raise BusplanError("there is nothing to draw: no kind of bus that was asked for can have this machine")

@@ -10,7 +10,7 @@ from busplan.nearest import did_you_mean
 from busplan.profile.conversion import AssumedKey, converted
 from busplan.profile.toml import override
 from busplan.progress import Progress
-from busplan.questions.circle.circle_tests import ComputeCircleFigures, circle_tests
+from busplan.questions.circle.check import ComputeCircleFigures, circle_tests
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.circle_refusal import STEP
 from busplan.questions.fit.figures import CapacityFigures, after_reset, figures
@@ -18,14 +18,13 @@ from busplan.questions.fit.inputs import given
 from busplan.questions.fit.network import varied_nodes
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.questions.plan.freedoms import PERIOD
-from busplan.questions.plan.settings import needed_settings
-from busplan.questions.plan.smallest_period import SmallestPeriod, smallest_period
+from busplan.questions.plan.smallest_period import SmallestPeriod, needed_settings, smallest_period
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
 from busplan.servo.checks import dividing_step_us
 
 if TYPE_CHECKING:
-    from busplan.questions.circle.record import CircleFigures
+    from busplan.questions.circle.figures import CircleFigures
 
 _ROUND_US: Final = 1000.0
 """Periods of a curve are halves and doubles of it, which buses with some periods alone know, too [us]."""
@@ -82,8 +81,12 @@ class MachineOnKind(NamedTuple):
         """What is assumed of the host's own time, by its own profile, too: then it has no rank among known hosts."""
         key = kind_named(self.profile.bus.kind).key_of("host")
         inputs = [given(self.profile, key)] if self.is_own and key else []
-        own = (AssumedKey(one.name, one.value, "profile") for one in inputs if one.grade == "assumed" and one.value)
-        return (*own, *(one for one in self.assumed if one.key == key))
+        own = (
+            AssumedKey(known.name, known.value, "profile")
+            for known in inputs
+            if known.grade == "assumed" and known.value
+        )
+        return (*own, *(assumed for assumed in self.assumed if assumed.key == key))
 
 
 class NotOnKind(NamedTuple):
@@ -104,7 +107,7 @@ class KindComparison(NamedTuple):
     @property
     def compared(self) -> tuple[MachineOnKind, ...]:
         """The kinds that can have the machine."""
-        return tuple(one for one in self.kinds if isinstance(one, MachineOnKind))
+        return tuple(machine for machine in self.kinds if isinstance(machine, MachineOnKind))
 
     @property
     def counted(self) -> str:
@@ -156,7 +159,7 @@ def compare(
         Called now and then with the parts of all circle tests that are done, and all of them.
     """
     own = profile.bus.kind
-    names = tuple(kinds) if kinds is not None else (own, *(one for one in kind_names() if one != own))
+    names = tuple(kinds) if kinds is not None else (own, *(kind for kind in kind_names() if kind != own))
     found = [_on_kind(profile, name) for name in names]
     periods_us = _curve_periods(profile, [one.smallest.us for one in found if isinstance(one, MachineOnKind)])
     found = [one if isinstance(one, NotOnKind) else one._replace(curve=_curve(one, periods_us)) for one in found]
@@ -173,7 +176,7 @@ def _on_kind(profile: Profile, kind: str) -> MachineOnKind | NotOnKind:
         return NotOnKind(kind, error.problems)
     needed = {} if kind == profile.bus.kind else needed_settings(other.profile)
     if needed:
-        assumed = (one for one in other.assumed if one.key not in needed)
+        assumed = (assumed for assumed in other.assumed if assumed.key not in needed)
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
         other = other._replace(profile=override(other.profile, dict(needed)), assumed=(*tried, *assumed))
     found = figures(other.profile, model=kind_named(kind).deciding_model)
@@ -204,7 +207,7 @@ def most_safe_axes(profile: Profile) -> SafeAxes:
     varied = varied_nodes(profile)
     nodes, limit = safe_nodes(profile, group=varied.name)
     each = int(varied.node.axes)
-    others = sum(int(one.nodes) * int(one.node.axes) for one in profile.alike_nodes if one.name != varied.name)
+    others = sum(int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name)
     axes = None if not each else others + nodes * each if nodes else 0
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
 
@@ -212,29 +215,29 @@ def most_safe_axes(profile: Profile) -> SafeAxes:
 def _curve_periods(profile: Profile, smallest_us: Sequence[float | None]) -> tuple[float, ...]:
     """Periods about the smallest ones and the profile's own, which is among them [us]."""
     own_us = profile.cycle.period_us
-    marks_us = [own_us, *(one for one in smallest_us if one is not None)]
+    marks_us = [own_us, *(us for us in smallest_us if us is not None)]
     first, last = floor(log2(min(marks_us) / _ROUND_US)) - 1, ceil(log2(max(marks_us) / _ROUND_US)) + 1
     every = ceil((last - first + 1) / _MOST_POINTS)
     round_us = (_ROUND_US * 2.0**power for power in range(first, last + 1) if power % every == 0)
-    return tuple(sorted({own_us, *(one for one in round_us if MIN_STEP_US <= one <= MAX_TIME_US)}))
+    return tuple(sorted({own_us, *(us for us in round_us if MIN_STEP_US <= us <= MAX_TIME_US)}))
 
 
-def _curve(one: MachineOnKind, periods_us: Sequence[float]) -> tuple[SafeAxes, ...]:
-    return tuple(most_safe_axes(override(one.profile, {PERIOD: period_us})) for period_us in periods_us)
+def _curve(machine: MachineOnKind, periods_us: Sequence[float]) -> tuple[SafeAxes, ...]:
+    return tuple(most_safe_axes(override(machine.profile, {PERIOD: period_us})) for period_us in periods_us)
 
 
-def _circle(one: MachineOnKind, run: ComputeCircleFigures) -> CircleAtSmallest | None:
+def _circle(machine: MachineOnKind, run: ComputeCircleFigures) -> CircleAtSmallest | None:
     """The circle at the smallest period, in steps that divide it."""
-    if one.smallest.us is None:
+    if machine.smallest.us is None:
         return None
-    step_us = dividing_step_us(one.smallest.us, most_us=one.profile.servo.step_us)
+    step_us = dividing_step_us(machine.smallest.us, most_us=machine.profile.servo.step_us)
     try:
-        found = run(override(one.profile, {PERIOD: one.smallest.us, STEP: step_us}))
+        found = run(override(machine.profile, {PERIOD: machine.smallest.us, STEP: step_us}))
     except BusplanError as error:
         return CircleAtSmallest(step_us, None, error.problems)
     return CircleAtSmallest(step_us, found, tuple(failure.text for failure in found.failures))
 
 
-def fitting(found: KindComparison) -> Iterator[MachineOnKind]:
+def fitting(comparison: KindComparison) -> Iterator[MachineOnKind]:
     """The kinds on which the machine is shown to fit its period, on a bus that is set safely."""
-    return (one for one in found.compared if one.figures.verdict == FITS and one.figures.safe)
+    return (machine for machine in comparison.compared if machine.figures.verdict == FITS and machine.figures.safe)

@@ -9,7 +9,7 @@ from busplan.profile.revision import load_revision
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, argument, checked_models, finite, load_profile
-from busplan.questions.circle.circle_tests import circle_tests
+from busplan.questions.circle.check import circle_tests
 from busplan.questions.diff import difference as analysis
 from busplan.questions.diff.difference import CircleSide, ComparedFigure, Difference, KeyDifference
 from busplan.sections.profile import Profile
@@ -76,7 +76,7 @@ class DiffAnswer(Answer):
         BusplanError
             As for `regressions`.
         """
-        from busplan.questions.diff.headline import regression_words
+        from busplan.questions.diff.report import regression_words
 
         worse = self.regressions(tolerance_percent=tolerance_percent)
         return regression_words(self._found, worse, tolerance=tolerance_percent) if worse else ""

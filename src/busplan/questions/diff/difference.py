@@ -12,7 +12,7 @@ from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.errors import BusplanError
 from busplan.profile.keys import KeyValue, dotted_keys
-from busplan.questions.circle.circle_tests import ComputeCircleFigures
+from busplan.questions.circle.check import ComputeCircleFigures
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.fit.certainty import FITS, VERDICTS
 from busplan.questions.fit.figures import CapacityFigures, figures
@@ -20,7 +20,7 @@ from busplan.questions.fit.network import bus_of, model_names
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
-    from busplan.questions.circle.record import CircleFigures
+    from busplan.questions.circle.figures import CircleFigures
 
 Judgement = Literal["better", "worse", "same", "neutral"]
 
@@ -226,7 +226,7 @@ def _figures(
     circles: tuple[CircleSide, CircleSide] | None,
 ) -> Iterator[ComparedFigure]:
     buses = (bus_of(a), bus_of(b))
-    groups = tuple(dict.fromkeys(one.name for one in (*a.group, *b.group)))
+    groups = tuple(dict.fromkeys(group.name for group in (*a.group, *b.group)))
     plan = (*plan_figures(*buses), *_of_groups(groups, known.SAFE_NODES))
     yield from _compared("plan", plan, _plan(a), _plan(b))
     deciding = (("deciding", buses[0].deciding_model, buses[1].deciding_model),)
@@ -247,8 +247,8 @@ def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:
         yield figure._replace(key=f"group.{name}.{figure.key}", label=f"{figure.label} of {name}")
 
 
-def _counts(found: CapacityFigures, figure: Figure) -> _Figures:
-    return {f"group.{one.name}.{figure.key}": getattr(one, figure.key) for one in found.groups}
+def _counts(figures: CapacityFigures, figure: Figure) -> _Figures:
+    return {f"group.{one.name}.{figure.key}": getattr(one, figure.key) for one in figures.groups}
 
 
 def _plan(profile: Profile) -> _Figures:

@@ -1,20 +1,30 @@
 """`busplan.evidence`."""
 
 from dataclasses import dataclass
-from functools import partial
+from typing import NamedTuple
 
+from busplan.buses import kind_named, kind_names
+from busplan.buses.published import Tested, parts_tested
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import plural
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.evidence.figures import (
-    KindEvidence,
-    kind_evidence,
-    known_kinds,
-    paper_circles,
-    paper_evidence,
-)
+from busplan.questions.evidence.rows import EvidenceSection, sections_of
+
+_PAPER = ("ieee1394", "paper")
+"""Kind of bus and data file of the paper."""
+
+
+class KindEvidence(NamedTuple):
+    """What is known of one kind of bus; no section where nothing is."""
+
+    kind: str
+    title: str
+    """What the kind is called."""
+    tested: Tested
+    """Which parts of it figures of others test."""
+    sections: tuple[EvidenceSection, ...]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -35,13 +45,13 @@ class EvidenceAnswer(Answer):
 
     def report(self) -> Report:
         """The answer in blocks."""
-        from busplan.questions.evidence.report import evidence_report, paper_report
+        from busplan.questions.evidence.report import evidence_report
 
-        return paper_report(self.kinds[0].sections) if self.paper else evidence_report(self.kinds)
+        return evidence_report(self.kinds, paper=self.paper)
 
     def _headline(self) -> str:
-        figures = sum(len(section.comparisons) for one in self.kinds for section in one.sections)
-        return f"{plural(figures, 'comparison')} on {', '.join(one.kind for one in self.kinds)}"
+        figures = sum(len(section.comparisons) for kind in self.kinds for section in kind.sections)
+        return f"{plural(figures, 'comparison')} on {', '.join(kind.kind for kind in self.kinds)}"
 
 
 def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress | None = None) -> EvidenceAnswer:
@@ -74,9 +84,16 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
     >>> one.quantity, one.published, one.computed, one.grade
     ('8 bytes, 11 bits of identifier, worst stuffing', 135, 135.0, 'published')
     """
-    circles = partial(paper_circles, progress=progress)
+    if paper and kind is not None:
+        raise BusplanError(f"kind {kind!r}: goes without paper=True, which is of one kind")
+    if kind not in (None, *kind_names()):
+        raise BusplanError(f"{kind}: no such kind of bus; there are {', '.join(kind_names())}")
+
+    def known(name: str, *only: str) -> KindEvidence:
+        bus = kind_named(name)
+        sections = (found for data in only or bus.evidence_data for found in sections_of(bus, data, progress=progress))
+        return KindEvidence(name, bus.title, parts_tested(bus.evidence_data), tuple(sections))
+
     if paper:
-        if kind is not None:
-            raise BusplanError(f"kind {kind!r}: goes without paper=True, which is of one kind")
-        return EvidenceAnswer((paper_evidence(circles=circles),), paper=True)
-    return EvidenceAnswer(tuple(kind_evidence(name, circles=circles) for name in known_kinds(kind)))
+        return EvidenceAnswer((known(*_PAPER),), paper=True)
+    return EvidenceAnswer(tuple(map(known, kind_names() if kind is None else (kind,))))

@@ -1,11 +1,10 @@
-"""Answers of `busplan evidence`, and of `busplan paper`, the paper's part of it."""
+"""Report of `evidence`, and of `paper`, which is the part of the paper."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
 from busplan.buses import kind_named
-from busplan.buses.published import Comparison, EvidenceSection
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -19,7 +18,8 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
 )
-from busplan.questions.evidence.figures import KindEvidence
+from busplan.questions.evidence import KindEvidence
+from busplan.questions.evidence.rows import Comparison
 from busplan.questions.words.documents import document, parts_by
 from busplan.questions.words.sentences import evidence_sentence
 
@@ -30,105 +30,71 @@ _DECIMALS: Final = {"mm": 6, "1": 4, "bytes": 0, "bits": 0}
 _MICROSECOND_DECIMALS: Final = 3
 _RESIDUAL_DECIMALS: Final = 4
 
-"""A comparison with its index in the document's figures."""
 
-
-def paper_report(sections: Sequence[EvidenceSection]) -> Report:
-    """Report of `paper`: one row for each published figure, one group of columns for each method.
-
-    Parameters
-    ----------
-    sections
-        The published tables and passages.
-    """
-    return Report(
-        Sentence(("Published figures beside computed ones",)),
-        lambda: tuple(_sections(sections)),
-        partial(paper_document, sections),
-        lambda: paper_records(sections),
-    )
-
-
-def paper_records(sections: Sequence[EvidenceSection]) -> list[Record]:
-    """One row for each published figure and method."""
-    return [
-        {
-            **comparison._asdict(),
-            "grade": None if comparison.published is None else comparison.grade,
-            "residual": comparison.residual,
-            "relative_residual": comparison.relative_residual,
-        }
-        for section in sections
-        for comparison in section.comparisons
-    ]
-
-
-def paper_document(sections: Sequence[EvidenceSection]) -> JsonDocument:
-    """Document of `busplan paper --format json`."""
-    return document(
-        "paper",
-        notes={section.title: section.note for section in sections},
-        figures=paper_records(sections),
-    )
-
-
-def evidence_report(kinds: Sequence[KindEvidence]) -> Report:
-    """Report of `evidence`: kind by kind, and which have none.
+def evidence_report(kinds: Sequence[KindEvidence], *, paper: bool = False) -> Report:
+    """Report of `evidence`: kind by kind, and which have none. That of `paper` is the tables of its one kind.
 
     Parameters
     ----------
     kinds
-        What is known of each kind.
+        The figures of each kind.
+    paper
+        Whether it is the report of `paper`.
     """
+    title = "Published figures beside" if paper else "What others have published or measured, beside"
     return Report(
-        Sentence(("What others have published or measured, beside computed figures",)),
-        lambda: tuple(_kinds(kinds)),
-        partial(evidence_document, kinds),
-        lambda: evidence_records(kinds),
+        Sentence((f"{title} computed {'ones' if paper else 'figures'}",)),
+        lambda: tuple(_blocks(kinds, paper=paper)),
+        partial(_document, kinds, paper=paper),
+        lambda: _records(kinds, paper=paper),
     )
 
 
-def evidence_records(kinds: Sequence[KindEvidence]) -> list[Record]:
-    """One row for each figure and method, with its kind in front."""
+def _records(kinds: Sequence[KindEvidence], *, paper: bool) -> list[Record]:
+    """One row for each figure and method; beside the paper with kind and data file in front."""
     return [
-        {"kind": one.kind, "data": section.data, **record}
-        for one in kinds
-        for section in one.sections
-        for record in paper_records([section])
+        {
+            **({} if paper else {"kind": kind.kind, "data": section.data}),
+            **comparison._asdict(),
+            "residual": comparison.residual,
+            "relative_residual": comparison.relative_residual,
+        }
+        for kind in kinds
+        for section in kind.sections
+        for comparison in section.comparisons
     ]
 
 
-def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
-    """Document of `busplan evidence --format json`."""
+def _document(kinds: Sequence[KindEvidence], *, paper: bool) -> JsonDocument:
+    known: JsonDocument = {
+        "kinds": [kind.kind for kind in kinds],
+        "without": [kind.kind for kind in kinds if not kind.sections],
+        "set_by": [{"kind": kind.kind, **part} for kind in kinds for part in parts_by(kind.tested.set_by)],
+        "tested": [{"kind": kind.kind, **part} for kind in kinds for part in parts_by(kind.tested.parts)],
+        "not_tested": [{"kind": kind.kind, "part": part} for kind in kinds for part in kind.tested.untested],
+    }
     return document(
-        "evidence",
-        kinds=[one.kind for one in kinds],
-        without=[one.kind for one in kinds if not one.sections],
-        set_by=[{"kind": one.kind, **part} for one in kinds for part in parts_by(one.tested.set_by)],
-        tested=[{"kind": one.kind, **part} for one in kinds for part in parts_by(one.tested.parts)],
-        not_tested=[{"kind": one.kind, "part": part} for one in kinds for part in one.tested.untested],
-        notes={section.title: section.note for one in kinds for section in one.sections},
-        figures=evidence_records(kinds),
+        "paper" if paper else "evidence",
+        **({} if paper else known),
+        notes={section.title: section.note for kind in kinds for section in kind.sections},
+        figures=_records(kinds, paper=paper),
     )
 
 
-def _kinds(kinds: Sequence[KindEvidence]) -> Iterator[Block]:
-    for one in kinds:
-        yield from evidence_sentence(kind_named(one.kind))
-        yield from _sections(one.sections)
-
-
-def _sections(sections: Sequence[EvidenceSection]) -> Iterator[Chapter]:
-    for section in sections:
-        yield Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(section.comparisons)))
+def _blocks(kinds: Sequence[KindEvidence], *, paper: bool) -> Iterator[Block]:
+    for kind in kinds:
+        if not paper:
+            yield from evidence_sentence(kind_named(kind.kind))
+        for section in kind.sections:
+            yield Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(section.comparisons)))
 
 
 def _table(comparisons: Sequence[Comparison]) -> Table:
-    methods = list(dict.fromkeys(one.method for one in comparisons))
-    is_weighed = any(one.uncertainty is not None for one in comparisons)
+    methods = list(dict.fromkeys(comparison.method for comparison in comparisons))
+    is_weighed = any(comparison.uncertainty is not None for comparison in comparisons)
     rows: dict[str, dict[str, Comparison]] = {}
-    for one in comparisons:
-        rows.setdefault(one.quantity, {})[one.method] = one
+    for comparison in comparisons:
+        rows.setdefault(comparison.quantity, {})[comparison.method] = comparison
     columns = (
         *(
             TableColumn("figure", kind="words", wraps=True),
@@ -155,18 +121,20 @@ def _row(by_method: dict[str, Comparison], methods: Sequence[str], *, is_weighed
     first = next(iter(by_method.values()))
     published = ShownValue(first.published, "published", first.unit, digits=_DIGITS)
     compared = (cell for method in methods for cell in _compared(by_method.get(method), is_weighed=is_weighed))
-    return TableRow((first.quantity, first.unit, published, "" if first.published is None else first.grade, *compared))
+    return TableRow((first.quantity, first.unit, published, first.grade or "", *compared))
 
 
-def _compared(one: Comparison | None, *, is_weighed: bool) -> tuple[Cell, ...]:
-    if one is None:
+def _compared(comparison: Comparison | None, *, is_weighed: bool) -> tuple[Cell, ...]:
+    if comparison is None:
         return ("",) * (3 + is_weighed)
-    decimals = _DECIMALS.get(one.unit, _MICROSECOND_DECIMALS)
-    doubt = ShownValue(one.uncertainty, "uncertainty", one.unit, decimals, fixed=True)
+    decimals = _DECIMALS.get(comparison.unit, _MICROSECOND_DECIMALS)
+    doubt = ShownValue(comparison.uncertainty, "uncertainty", comparison.unit, decimals, fixed=True)
     # Smaller values are rounding of the printed figure.
     return (
-        ShownValue(one.computed, "computed", one.unit, decimals, fixed=True),
+        ShownValue(comparison.computed, "computed", comparison.unit, decimals, fixed=True),
         *((doubt,) if is_weighed else ()),
-        ShownValue(one.residual, "residual", one.unit, max(decimals, _RESIDUAL_DECIMALS), signed=True, fixed=True),
-        ShownValue(one.relative_residual, "relative_residual", "%", 1, signed=True, fixed=True),
+        ShownValue(
+            comparison.residual, "residual", comparison.unit, max(decimals, _RESIDUAL_DECIMALS), signed=True, fixed=True
+        ),
+        ShownValue(comparison.relative_residual, "relative_residual", "%", 1, signed=True, fixed=True),
     )

@@ -11,9 +11,8 @@ from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
 from busplan.questions.explain import derivation as analysis
-from busplan.questions.explain.derivation import Derivation, Explanation
-from busplan.questions.explain.latency import latency_names
-from busplan.questions.explain.register import figures_of
+from busplan.questions.explain.bus import latency_names
+from busplan.questions.explain.derivation import Derivation, Explanation, figures_of
 from busplan.sections.profile import Profile
 from busplan.sourced import Input
 
@@ -39,8 +38,7 @@ class ExplainAnswer(Answer):
 
     def report(self) -> Report:
         """The answer in blocks."""
-        from busplan.questions.explain.assumptions import assumptions_report
-        from busplan.questions.explain.report import explain_report
+        from busplan.questions.explain.report import assumptions_report, explain_report
 
         if self.derivations:
             return explain_report(Explanation(self.profile, self.derivations))

@@ -9,12 +9,10 @@ from typing import Final
 
 from busplan.elementwise import Traced
 from busplan.progress import Progress
-from busplan.questions.circle.figures import CIRCLE_FIGURES, JITTER
-from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.figures import CIRCLE_FIGURES, JITTER, CircleFigures
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.explain.capacity import capacity_figures
-from busplan.questions.explain.latency import remembered
-from busplan.questions.explain.trace import found
+from busplan.questions.explain.bus import capacity_figures, remembered
+from busplan.questions.explain.formulas import found
 from busplan.questions.fit.inputs import traced, traced_profile
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.machine import CONTOUR_MEASURES, AxisKeys
@@ -102,7 +100,7 @@ def circle_figures(
 
 def simulated_inputs(profile: Profile) -> tuple[Input, ...]:
     """Inputs of a profile's circle test; nothing is simulated."""
-    return tuple(one.given for one in _simulation_inputs(profile) if one.given is not None)
+    return tuple(number.given for number in _simulation_inputs(profile) if number.given is not None)
 
 
 def _delay(profile: Profile, key: str, result: CircleFigures, required: Traced) -> Traced:
@@ -137,7 +135,7 @@ def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Tra
     if key in ("servo_grade", "ideal_drive"):
         graded = sorted(profile.servo.grades.model_fields_set) if key == "servo_grade" else ()
         keys = ("servo.grade", *(f"servo.grades.{name}" for name in graded))
-        return found(value, _WAYS[key], tuple(traced(profile, one) for one in keys))
+        return found(value, _WAYS[key], tuple(traced(profile, key) for key in keys))
     if key in _PATH:
         return found(value, _WAYS[key], tuple(_path_inputs(profile, key)))
     if not result.bus_fits:
@@ -175,7 +173,7 @@ def _loop_inputs(profile: Profile) -> Iterator[Traced]:
     sampled = "cycle.period_us" if profile.servo.loop == "host" else "servo.step_us"
     yield from (traced(profile, key) for key in ("servo.loop", sampled))
     keys = {f"servo.{axis}{key}" for axis in ("", "x.", "y.") for key in _LOOP_KEYS}
-    yield from (one for one in _simulation_inputs(profile) if one.given and one.given.name in keys)
+    yield from (number for number in _simulation_inputs(profile) if number.given and number.given.name in keys)
 
 
 def _simulation_inputs(profile: Profile) -> Iterator[Traced]:

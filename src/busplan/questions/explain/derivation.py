@@ -1,26 +1,98 @@
-"""Derive a figure: every step to it, in symbols and in numbers, and all its inputs.
+"""Derive a figure: every step to it, in symbols and in numbers, and all its inputs."""
 
-The functions that compute the figure are called with traced numbers (`busplan.questions.explain.trace`), so that the
-steps are what was executed. A simulation or a search is one step.
-"""
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from types import MappingProxyType
+from typing import Final, Literal, NamedTuple
 
-from collections.abc import Iterator, Sequence
-from typing import Final, NamedTuple
-
-from busplan.buses.figure import BIAS, CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure
+from busplan.buses.bus import Bus
+from busplan.buses.figure import BIAS, CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, VERDICT_FIGURES, Figure, by_key
 from busplan.elementwise import Traced
 from busplan.errors import BusplanError
 from busplan.profile.toml import at_periods
 from busplan.progress import Progress
-from busplan.questions.explain.capacity import VERDICT_KEYS, capacity_figures, verdict_figure
-from busplan.questions.explain.formulas import formula_text
-from busplan.questions.explain.latency import TracedLatencies, latency_figures, latency_names, traced_latencies
-from busplan.questions.explain.register import CommandName, figure_named, figures_of
-from busplan.questions.explain.trace import inputs, lines
+from busplan.questions.circle.figures import CIRCLE_BY_KEY
+from busplan.questions.explain.bus import (
+    VERDICT_KEYS,
+    TracedLatencies,
+    capacity_figures,
+    latency_figures,
+    latency_names,
+    traced_latencies,
+    verdict_figure,
+)
+from busplan.questions.explain.formulas import formula_text, inputs, lines
 from busplan.questions.fit.inputs import choosing_keys
 from busplan.questions.fit.network import bus_of, leading_model, model_names, network_of
 from busplan.sections.profile import Profile
 from busplan.sourced import Input
+
+CommandName = Literal["latency", "capacity", "circle-test"]
+
+_HOLDERS: Final[Mapping[str, tuple[CommandName, str]]] = MappingProxyType(
+    {
+        **dict.fromkeys(("changes", "circle_is_untested"), ("capacity", "cheapest_change")),
+        **dict.fromkeys(("change", "key", "from", "to", "margin_change_us", "note"), ("capacity", "sensitivity")),
+        **dict.fromkeys(
+            (
+                *("binding_term_us", "next_binding_term", "next_binding_term_us", "next_margin_corrected_us"),
+                *("next_safe_nodes", "next_safe_limited_by"),
+            ),
+            ("capacity", "next_bottleneck"),
+        ),
+        **dict.fromkeys(("input", "label", "standard_uncertainty_us", "share"), ("capacity", "uncertainty_parts")),
+        **dict.fromkeys(("name", "value", "limit", "limit_is_default"), ("circle-test", "failures")),
+        **dict.fromkeys(("source", "removed_mm"), ("circle-test", "contributions")),
+    }
+)
+"""Figure that contains a key, for keys inside a figure."""
+
+
+def figures_of(bus: Bus) -> dict[CommandName, dict[str, Figure]]:
+    """Figures by command and key. Without a command, a key means that of the first command that has it."""
+    return {
+        "capacity": by_key((*bus.figures.capacity, *VERDICT_FIGURES)),
+        "latency": by_key(bus.figures.latency),
+        "circle-test": dict(CIRCLE_BY_KEY),
+    }
+
+
+def figure_named(name: str, *, bus: Bus) -> tuple[CommandName, Figure]:
+    """Find a figure by its name.
+
+    Parameters
+    ----------
+    name
+        A key ("required_us"), or a command and a key ("circle-test.required_us"). A key inside a figure ("removed_mm")
+        means that figure.
+    bus
+        The kind of bus.
+
+    Raises
+    ------
+    BusplanError
+        There is none; the message suggests similar names.
+
+    Examples
+    --------
+    >>> from busplan.buses import kind_named
+    >>> figure_named("latency.gaps_us", bus=kind_named("ieee1394"))[1].meaning
+    'both gaps, after each transaction'
+    """
+    register = figures_of(bus)
+    for command, figures in register.items():
+        key = name.removeprefix(f"{command}.")
+        if key in figures and name in (key, f"{command}.{key}"):
+            return command, figures[key]
+    before, _, inner = name.rpartition(".")
+    held = _HOLDERS.get(inner)
+    if held is not None and before in ("", held[0]):
+        return held[0], register[held[0]][held[1]]
+    known = [key for figures in register.values() for key in figures]
+    close = get_close_matches(name.rpartition(".")[2], known, n=3, cutoff=0.5)
+    hint = f", did you mean {' or '.join(dict.fromkeys(close))}" if close else ""
+    raise BusplanError(f"{name or repr(name)}: no such figure{hint}? Without a figure, explain lists them all")
+
 
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 """From the weakest to the strongest; "given" values are choices, not knowledge."""
@@ -78,7 +150,7 @@ class Derivation(NamedTuple):
     @property
     def weakest_grade(self) -> str:
         """Grade of the least well known input."""
-        return min((one.grade for one in self.inputs), key=_GRADES.index, default=_GRADES[-1])
+        return min((given.grade for given in self.inputs), key=_GRADES.index, default=_GRADES[-1])
 
 
 class Explanation(NamedTuple):
@@ -177,7 +249,7 @@ def explained_figures(profile: Profile) -> Iterator[tuple[CommandName, Figure]]:
     bus = bus_of(profile)
     has_bias = bus.cycle(network_of(profile), model=bus.deciding_model).bias_us() is not None
     for command, figures in figures_of(bus).items():
-        yield from ((command, one) for one in figures.values() if has_bias or one != BIAS)
+        yield from ((command, figure) for figure in figures.values() if has_bias or figure != BIAS)
 
 
 def assumptions(profile: Profile) -> tuple[Input, ...]:
@@ -207,12 +279,16 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
             found.setdefault(one.name, one)
     # An execution time is a fact, not a choice: without a grade it is the least well known input.
     choices = choosing_keys(bus_of(profile))
-    executions = tuple(one.node_key("execution.") for one in profile.alike_nodes)
+    executions = tuple(alike.node_key("execution.") for alike in profile.alike_nodes)
     known = (
-        one
-        for one in found.values()
-        if one.grade != "given"
-        or (one.name.startswith(executions) and not one.name.endswith(choices) and not one.source.startswith("default"))
+        given
+        for given in found.values()
+        if given.grade != "given"
+        or (
+            given.name.startswith(executions)
+            and not given.name.endswith(choices)
+            and not given.source.startswith("default")
+        )
     )
     return tuple(sorted(known, key=lambda one: -1 if one.grade == "given" else _GRADES.index(one.grade)))
 
@@ -239,15 +315,15 @@ def _traced(
 
 
 def _steps(profile: Profile, traced: Traced, command: CommandName, figure: Figure) -> Iterator[Step]:
-    for one in lines(traced):
-        known = figure if one is traced else _known(profile, one.key, command)
+    for line in lines(traced):
+        known = figure if line is traced else _known(profile, line.key, command)
         yield Step(
             key=known.key,
-            symbol=figure.symbol if one is traced else one.symbol,
+            symbol=figure.symbol if line is traced else line.symbol,
             reference=known.reference,
-            formula=formula_text(one, in_numbers=False),
-            numbers=formula_text(one, in_numbers=True),
-            value=one.value,
+            formula=formula_text(line, in_numbers=False),
+            numbers=formula_text(line, in_numbers=True),
+            value=line.value,
             unit=known.unit,
         )
 

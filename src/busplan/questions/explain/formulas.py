@@ -1,11 +1,11 @@
-"""Write the lines of a derivation in symbols and in numbers."""
+"""What stands behind a traced number: its steps and inputs, and its formula in symbols and in numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from inspect import signature
 from typing import Final
 
 from busplan.elementwise import CHOSEN, COMPARISON, FUNCTION, OPERATIONS, Number, Traced, value_of
-from busplan.sourced import DIGITS, SYMBOLS, Equation, Input, Sourced, short
+from busplan.sourced import DIGITS, SYMBOLS, Equation, Input, Sourced, input_of, short
 
 _ATOM: Final = 4
 _MOST_TERMS: Final = 24
@@ -121,7 +121,7 @@ def _chained(operand: Traced) -> list[Number]:
 def _shortened(name: str, terms: Sequence[Number], *, in_numbers: bool) -> tuple[str, int]:
     """The first operands and the last: nobody reads a sum of hundreds."""
     operation = OPERATIONS[name]
-    each = [_written(one, in_numbers=in_numbers)[0] for one in (*terms[:_SHOWN_TERMS], terms[-1])]
+    each = [_written(term, in_numbers=in_numbers)[0] for term in (*terms[:_SHOWN_TERMS], terms[-1])]
     each.insert(-1, f"... {len(terms) - len(each)} more ...")
     if operation.rank == FUNCTION:
         return f"{operation.sign}({', '.join(each)})", FUNCTION
@@ -166,3 +166,48 @@ def formula_of(equation: Equation) -> str:
     first, *others = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
     found = equation.function(first, **dict(zip(names[1:], others, strict=True)))
     return found.symbol or formula_text(found, in_numbers=False)
+
+
+def found(value: object, words: str, parts: Iterable[Number]) -> Traced:
+    """A result without an equation, as of a search or a simulation: it has no steps, but all inputs of its parts.
+
+    Parameters
+    ----------
+    value
+        The result.
+    words
+        Its method.
+    parts
+        Numbers that it depends on.
+    """
+    leaves = inputs(Traced(value, parts=tuple(parts)))
+    return Traced(value, formula=words, parts=tuple(Traced(leaf.value, given=leaf) for leaf in leaves))
+
+
+def lines(figure: Traced) -> Iterator[Traced]:
+    """Every named number behind a figure, in the order of computation; the figure is last."""
+    yield from (number for number in _visit(figure) if not number.given and (number.symbol or number is figure))
+
+
+def inputs(figure: Traced) -> Iterator[Input]:
+    """Inputs of a figure: keys of the profile and constants, each once."""
+    found: dict[tuple[str, str], Input] = {}
+    for number in _visit(figure):
+        for leaf in (number.given, *(input_of(part) for part in number.parts if isinstance(part, Sourced))):
+            if leaf is not None:
+                found.setdefault((leaf.name, leaf.symbol), leaf)
+    yield from found.values()
+
+
+def _visit(figure: Traced) -> Iterator[Traced]:
+    """Every number behind a figure once, its parts before it; a sum of thousands is deeper than Python recurses."""
+    seen: set[int] = set()
+    waiting = [(figure, False)]
+    while waiting:
+        one, has_parts_behind = waiting.pop()
+        if has_parts_behind:
+            yield one
+        elif id(one) not in seen:
+            seen.add(id(one))
+            waiting.append((one, True))
+            waiting.extend((part, False) for part in reversed(one.parts) if isinstance(part, Traced))

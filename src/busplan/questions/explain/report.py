@@ -1,13 +1,15 @@
-"""Answer of `busplan explain PROFILE FIGURE`: every step to a figure, and its inputs."""
+"""Answer of `busplan explain`: every step to a figure and its inputs; without one, assumptions and all figures."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
+from busplan.buses.bus import Bus
 from busplan.forms import blocks
 from busplan.forms.blocks import (
     Block,
     Calculation,
+    Cell,
     Chapter,
     Code,
     JsonDocument,
@@ -28,16 +30,126 @@ from busplan.questions.capacity.report import capacity_document
 from busplan.questions.capacity.sensitivity import sensitivities
 from busplan.questions.capacity.sensitivity_report import sensitivity_document
 from busplan.questions.capacity.verdict import verdicts
-from busplan.questions.explain.assumptions import INPUT_COLUMNS, input_cells
-from busplan.questions.explain.capacity import OF_DOCUMENT, OF_SENSITIVITY
-from busplan.questions.explain.derivation import Derivation, Explanation, Step
+from busplan.questions.explain.bus import OF_DOCUMENT, OF_SENSITIVITY
+from busplan.questions.explain.derivation import Derivation, Explanation, Step, explained_figures
+from busplan.questions.explain.formulas import formula_of
 from busplan.questions.fit.figures import capacity
-from busplan.questions.words.documents import document, with_profile
-from busplan.sourced import DIGITS, short
+from busplan.questions.fit.network import bus_of
+from busplan.questions.words.documents import document, fields, with_profile
+from busplan.sections.profile import Profile
+from busplan.sourced import DIGITS, EQUATIONS, Input, short
+
+_MEANING: Final = TableColumn("meaning", kind="words", rank=4, leaves="below", wraps=True)
+INPUT_COLUMNS: Final = (
+    TableColumn("name", kind="words", wraps=True),
+    TableColumn("value"),
+    TableColumn("unit", kind="words", rank=1, leaves="below", wraps=True),
+    TableColumn("grade", kind="words", rank=2, leaves="below"),
+    TableColumn("source", kind="words", rank=3, leaves="below", wraps=True),
+)
+"""Columns of an input: what it is, and how well it is known."""
+_FIGURES: Final = (
+    *(TableColumn(heading, kind="words") for heading in ("command", "figure")),
+    TableColumn("eq", kind="words", rank=2),
+    TableColumn("unit", kind="words", rank=1),
+    TableColumn("what it is", kind="words", wraps=True),
+)
+
+
+def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report:
+    """Report of `explain PROFILE`: the assumptions behind its figures, and all figures that can be explained.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    assumptions
+        The inputs of its figures.
+    """
+    caption = Sentence(("What the figures of ", Code(profile.name), " rest on, the least well known first"))
+    return Report(
+        Sentence(("The figures of ", Code(profile.name))),
+        lambda: (
+            assumptions_table(assumptions)._replace(caption=caption),
+            _figure_table(profile),
+        ),
+        partial(assumptions_document, profile, assumptions),
+        lambda: figure_rows(profile),
+    )
+
+
+def assumptions_table(assumptions: Sequence[Input]) -> Table:
+    """Table of inputs, one row each.
+
+    Parameters
+    ----------
+    assumptions
+        The inputs.
+    """
+    rows = (TableRow((*input_cells(given), given.meaning)) for given in assumptions)
+    return Table((*INPUT_COLUMNS, _MEANING), tuple(rows), stacks=True)
+
+
+def figure_rows(profile: Profile) -> list[Record]:
+    """One row for each figure that can be explained."""
+    return [
+        {"command": command, "figure": one.key, **fields(one, "symbol", "unit", "reference", "meaning")}
+        for command, one in explained_figures(profile)
+    ]
+
+
+def equation_rows() -> list[Record]:
+    """One row for each equation: numbers, formula, function and source."""
+    return [
+        {
+            "reference": one.reference,
+            "formula": f"{one.symbol} = {formula_of(one)}",
+            "function": name,
+            "source": one.source,
+        }
+        for name, one in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
+    ]
+
+
+def constant_rows(bus: Bus) -> list[Record]:
+    """One row for each constant: value, unit, grade and source."""
+    return [
+        {"name": name, "value": float(one), **fields(one, "unit", "grade", "source", "meaning")}
+        for name, one in bus.constants.items()
+    ]
+
+
+def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> JsonDocument:
+    """Document of `busplan explain PROFILE --format json`: the inputs of the figures, and the whole registry."""
+    return document(
+        "explain",
+        profile=profile.name,
+        assumptions=[given._asdict() for given in assumptions],
+        figures=figure_rows(profile),
+        equations=equation_rows(),
+        constants=constant_rows(bus_of(profile)),
+    )
+
+
+def input_cells(given: Input) -> tuple[Cell, ...]:
+    """Cells of one input."""
+    value = ShownValue(given.value, "value", given.unit, digits=DIGITS)
+    return Code(given.name), value, given.unit, given.grade, given.source
+
+
+def _figure_table(profile: Profile) -> Table:
+    rows = (
+        TableRow((command, Code(one.key), one.reference, one.unit, one.meaning))
+        for command, one in explained_figures(profile)
+    )
+    return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
+
 
 _NONE: Final = Words("none")
 _NAMING: Final = ("name", "source", "input", "change")
 """Keys that name a part of a value, the first that it has."""
+_MOST_REPEATED: Final = 100
+"""A longer list of inputs is not shown again: with 200 messages there are 200 of 800 rows."""
 _SYMBOL: Final = TableColumn("symbol", kind="words")
 
 
@@ -53,7 +165,7 @@ def explain_report(explanation: Explanation) -> Report:
     name = found.profile.name
     return Report(
         Sentence(("Where ", Code(found.derivations[0].figure.key), " of ", Code(name), " comes from")),
-        lambda: [_section(one, name) for one in found.derivations],
+        lambda: tuple(_sections(found)),
         partial(_explain_document, found),
         lambda: with_profile(name, [record for one in found.derivations for record in _step_records(one)]),
     )
@@ -61,92 +173,99 @@ def explain_report(explanation: Explanation) -> Report:
 
 def _in_words(explanation: Explanation) -> Explanation:
     """Fill in the value of figures that are sentences or changes: the report of `capacity` makes them."""
-    return explanation._replace(derivations=tuple(_with_words(one, explanation) for one in explanation.derivations))
+    return explanation._replace(
+        derivations=tuple(_with_words(derivation, explanation) for derivation in explanation.derivations)
+    )
 
 
-def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
-    key = one.figure.key
+def _with_words(derivation: Derivation, explanation: Explanation) -> Derivation:
+    key = derivation.figure.key
     if key not in (*OF_DOCUMENT, *OF_SENSITIVITY, "text", "warnings", "cheapest_change"):
-        return one
-    result = capacity(explanation.profile, periods_us=[one.period_us])
+        return derivation
+    result = capacity(explanation.profile, periods_us=[derivation.period_us])
     if key in OF_SENSITIVITY:
         found = sensitivity_document(result, verdicts(result), sensitivities(result))
     else:
         found = capacity_document(result, verdicts(result))
     value = found["verdicts"][0][key]
-    *before, last = one.steps
-    return one._replace(value=value, steps=(*before, last._replace(value=value)))
+    *before, last = derivation.steps
+    return derivation._replace(value=value, steps=(*before, last._replace(value=value)))
 
 
 def _explain_document(explanation: Explanation) -> JsonDocument:
     return document(
         "explain",
         profile=explanation.profile.name,
-        derivations=[_derivation(one) for one in explanation.derivations],
+        derivations=[_derivation(derivation) for derivation in explanation.derivations],
     )
 
 
-def _derivation(one: Derivation) -> JsonDocument:
+def _derivation(derivation: Derivation) -> JsonDocument:
     return {
-        "command": one.command,
-        "figure": one.figure.key,
-        "symbol": one.figure.symbol,
-        "unit": one.figure.unit,
-        "reference": one.figure.reference,
-        "meaning": one.figure.meaning,
-        "timing_model": one.timing_model,
-        "transaction": one.transaction,
-        "period_us": one.period_us,
-        "value": one.value,
-        "weakest_grade": one.weakest_grade,
-        "steps": [step._asdict() for step in one.steps],
-        "inputs": [input_._asdict() for input_ in one.inputs],
+        "command": derivation.command,
+        "figure": derivation.figure.key,
+        **fields(derivation.figure, "symbol", "unit", "reference", "meaning"),
+        **fields(derivation, "timing_model", "transaction", "period_us", "value", "weakest_grade"),
+        "steps": [step._asdict() for step in derivation.steps],
+        "inputs": [input_._asdict() for input_ in derivation.inputs],
     }
 
 
-def _step_records(one: Derivation) -> Iterator[Record]:
+def _step_records(derivation: Derivation) -> Iterator[Record]:
     """One row for each step; a figure that is itself an input has one row, without a formula."""
-    figure = one.figure
-    itself = Step(figure.key, figure.symbol, figure.reference, "", "", one.value, figure.unit)
-    for number, step in enumerate(one.steps or (itself,), start=1):
+    figure = derivation.figure
+    itself = Step(figure.key, figure.symbol, figure.reference, "", "", derivation.value, figure.unit)
+    for number, step in enumerate(derivation.steps or (itself,), start=1):
         yield {
-            "command": one.command,
+            "command": derivation.command,
             "figure": figure.key,
-            "timing_model": one.timing_model,
-            "transaction": one.transaction,
-            "period_us": one.period_us,
+            **fields(derivation, "timing_model", "transaction", "period_us"),
             "step": number,
-            "reference": step.reference,
-            "symbol": step.symbol,
-            "formula": step.formula,
-            "numbers": step.numbers,
+            **fields(step, "reference", "symbol", "formula", "numbers"),
             "value": json_text(step.value) if _has_names(step.value) else step.value,
             "unit": step.unit,
         }
 
 
-def _section(one: Derivation, profile: str) -> Chapter:
-    """The result, its meaning, every step to it, and the inputs."""
-    figure = one.figure
-    kind = f"{one.transaction}, " if one.transaction else ""
+def _sections(explanation: Explanation) -> Iterator[Chapter]:
+    """A section for each derivation; a long list of inputs stands once."""
+    first: dict[tuple[Input, ...], Derivation] = {}
+    for derivation in explanation.derivations:
+        earlier = first.setdefault(derivation.inputs, derivation)
+        is_shown = earlier is derivation or len(derivation.inputs) <= _MOST_REPEATED
+        below = _inputs(derivation) if is_shown else _same_inputs(derivation, earlier)
+        yield _section(derivation, explanation.profile.name, below)
+
+
+def _same_inputs(derivation: Derivation, earlier: Derivation) -> Sentence:
+    kind = f"{earlier.transaction}, " if earlier.transaction else ""
+    words = f"It starts from the {len(derivation.inputs)} inputs of {kind}{earlier.timing_model} model"
+    return Sentence((f"{words}; the least well known is {derivation.weakest_grade}.",))
+
+
+def _section(derivation: Derivation, profile: str, below: Block) -> Chapter:
+    """The result, its meaning, every step to it, and what stands below them: the inputs."""
+    figure = derivation.figure
+    kind = f"{derivation.transaction}, " if derivation.transaction else ""
     title = Sentence(
         (
-            *(Code(figure.key), " of ", Code(profile), " at ", period_value(one.period_us)),
-            *(f", {kind}{one.timing_model} model: ", *_result_parts(one)),
+            *(Code(figure.key), " of ", Code(profile), " at ", period_value(derivation.period_us)),
+            *(f", {kind}{derivation.timing_model} model: ", *_result_parts(derivation)),
         )
     )
     about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}.",))
-    steps = Calculation(tuple(map(_step, one.steps)))
-    found: tuple[Block, ...] = (about, steps, _inputs(one))
-    return Chapter(title, found)
+    steps = Calculation(tuple(map(_step, derivation.steps)))
+    return Chapter(title, (about, steps, below))
 
 
-def _result_parts(one: Derivation) -> tuple[Part, ...]:
+def _result_parts(derivation: Derivation) -> tuple[Part, ...]:
     """The result in a sentence: one figure, or the keys that a change sets."""
-    if isinstance(one.value, dict) and "changes" in one.value:
-        settings = (Sentence((Code(key), " = ", ShownValue(new, key))) for key, new in one.value["changes"].items())
+    if isinstance(derivation.value, dict) and "changes" in derivation.value:
+        settings = (
+            Sentence((Code(key), " = ", ShownValue(new, key))) for key, new in derivation.value["changes"].items()
+        )
         return joined(*settings, by=", ").parts
-    found = _result(one.value, one.figure.key, one.figure.unit)
+    found = _result(derivation.value, derivation.figure.key, derivation.figure.unit)
     return (found if isinstance(found, ShownValue) else found.text,)
 
 
@@ -159,14 +278,14 @@ def _result(value: object, key: str, unit: str) -> ShownValue | Words:
         changes = value.get("changes", value)
         return Words(", ".join(f"{changed} = {new}" for changed, new in changes.items()))
     if isinstance(value, list) and _has_names(value):
-        names = (next(one[key] for key in _NAMING if key in one) for one in value)
+        names = (next(item[key] for key in _NAMING if key in item) for item in value)
         return Words(", ".join(names))
     return ShownValue(value, key, unit, digits=DIGITS)
 
 
 def _has_names(value: object) -> bool:
     """Whether a value has named parts."""
-    return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(one, dict) for one in value))
+    return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(item, dict) for item in value))
 
 
 def _step(step: Step) -> blocks.CalculationStep:
@@ -178,7 +297,7 @@ def _step(step: Step) -> blocks.CalculationStep:
     return blocks.CalculationStep(step.reference, step.symbol, formula, numbers, result)
 
 
-def _inputs(one: Derivation) -> Table:
-    rows = (TableRow((Code(given.symbol), *input_cells(given))) for given in one.inputs)
-    caption = Sentence((f"It starts from these; the least well known is {one.weakest_grade}.",))
+def _inputs(derivation: Derivation) -> Table:
+    rows = (TableRow((Code(given.symbol), *input_cells(given))) for given in derivation.inputs)
+    caption = Sentence((f"It starts from these; the least well known is {derivation.weakest_grade}.",))
     return Table((_SYMBOL, *INPUT_COLUMNS), tuple(rows), caption, stacks=True)

@@ -52,13 +52,13 @@ def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssu
     profile
         The network.
     """
-    variance = sum(float(one.us) ** 2 for one in figures.doubts)
+    variance = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     shares: list[_Share] = [
-        ((one.key,), float(one.us) ** 2 / variance, "U squared") for one in figures.doubts if variance
+        ((doubt.key,), float(doubt.us) ** 2 / variance, "U squared") for doubt in figures.doubts if variance
     ]
-    shares += [((one.rests_on,), plain(one.us) / figures.required_us, "the required time") for one in figures.terms]
+    shares += [((term.rests_on,), plain(term.us) / figures.required_us, "the required time") for term in figures.terms]
     # What is no key has no grade, and execution times are no term or doubt of one key.
-    shares = [one for one in shares if one[1] > _MUCH and _is_assumed(profile, one[0][0])]
+    shares = [share for share in shares if share[1] > _MUCH and _is_assumed(profile, share[0][0])]
     shares += _of_execution(figures, profile, variance)
     said: dict[tuple[str, ...], list[str]] = {}
     for keys, share, whole in shares:
@@ -75,15 +75,15 @@ def _is_assumed(profile: Profile, key: str) -> bool:
 def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> list[_Share]:
     """The shares of the assumed execution times: what of its terms goes without them, and their part of U squared."""
     network, bus = network_of(profile)._replace(period_us=figures.period_us), bus_of(profile)
-    assumed = [one for one in network.groups if _counts(one, network)]
+    assumed = [group for group in network.groups if _counts(group, network)]
     if not assumed:
         return []
-    without = network._replace(groups=tuple(_at_once(one) if one in assumed else one for one in network.groups))
+    without = network._replace(groups=tuple(_at_once(group) if group in assumed else group for group in network.groups))
     cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(one.key(_EXECUTION) for one in assumed)
     whole_us, rest_us = (_doubt_us(each) for each in (figures.doubts, cycle.doubts()))
-    rest = {one.key: plain(one.us) for one in cycle.terms}
+    rest = {term.key: plain(term.us) for term in cycle.terms}
     # A term that grows, as the wait for a gap does, is none of theirs.
-    carried_us = sum(max(0.0, plain(one.us) - rest[one.key]) for one in figures.terms)
+    carried_us = sum(max(0.0, plain(term.us) - rest[term.key]) for term in figures.terms)
     of_time = (keys, carried_us / figures.required_us, "the required time")
     return [(keys, whole_us * (whole_us - rest_us) / variance, "U squared"), of_time] if variance else [of_time]
 
@@ -102,4 +102,4 @@ def _at_once(group: Group) -> Group:
 
 def _doubt_us(doubts: Sequence[Any]) -> float:
     """The standard uncertainty that all execution times give a cycle [us]."""
-    return sum(float(one.us) for one in doubts if one.key.endswith(f".{_EXECUTION}"))
+    return sum(float(doubt.us) for doubt in doubts if doubt.key.endswith(f".{_EXECUTION}"))

@@ -1,11 +1,6 @@
-"""How sure it is that a cycle fits: the bias of the timing model, and the uncertainty of what it rests on.
+"""What a cycle needs, what its slice gives it, and how sure it is that it fits."""
 
-References
-----------
-JCGM 100 (GUM): the combined standard uncertainty of independent inputs (5.1), and its expansion (6.2).
-"""
-
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import reduce
 from math import inf
 from typing import Final, Literal, NamedTuple, Protocol
@@ -14,9 +9,64 @@ from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
-from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total
-from busplan.questions.fit.cycle import TIME, available_us, fits_in, time_limit
-from busplan.questions.fit.network import bus_of
+from busplan.buses.time_slice import time_slice_us
+from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total, within
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.profile import Profile
+
+TIME: Final = "time"
+"""Key of the limit that is none of the bus: the cycle takes longer than its slice."""
+
+
+def cycle_of(profile: Profile, *, model: str, nodes: int | None = None) -> BusCycle:
+    """The cycle of a profile under a timing model.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    model
+        Timing model.
+    nodes
+        Nodes on the bus [1]; without it the profile's own number.
+    """
+    network = network_of(profile)
+    return bus_of(profile).cycle(network if nodes is None else network.with_nodes(nodes), model=model)
+
+
+def available_us(network: Network) -> Number:
+    """Share of the period that is for communication, alpha T_s of (1) [us]."""
+    return time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
+
+
+def fits_in(required_us: Number, *, available_us: Number) -> Number:
+    """Tell whether a cycle fits its share of the period; one that fills it exactly does.
+
+    Examples
+    --------
+    >>> fits_in(0.1 + 0.2, available_us=0.3)
+    True
+    """
+    return within(required_us, available_us)
+
+
+def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
+    """The limits of closed forms: those of a network's kind of bus, without safety and doubts, and time the last."""
+    bus = bus_of(network.profile)
+    time = time_limit(lambda one: bus.cycle(one, model=model).most_required_us)
+    return (*(limit.nominal for limit in bus.limits if not limit.is_safety), time)
+
+
+def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
+    """The limit of time: what a network needs [us] against its share of the period."""
+    return Limit(
+        TIME,
+        "{value:.3f} us needed of {most:.3f} us",
+        needed_us,
+        available_us,
+        failure="required_us",
+    )
+
 
 VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
 FITS: Final[VerdictWord] = "fits"
@@ -60,7 +110,7 @@ def certainty(cycle: BusCycle) -> Certainty:
     """
     network, bias_us, doubts = cycle.network, cycle.bias_us(), cycle.doubts()
     extra_us: Number = 0.0 if bias_us is None else bias_us
-    combined_us = square_root(total(one.us * one.us for one in doubts))
+    combined_us = square_root(total(doubt.us * doubt.us for doubt in doubts))
     expanded_us = COVERAGE * named(combined_us, "combined_uncertainty_us", "u_c")
     longer_us = cycle.added_us(extra_us)
     uncertain_us = cycle.added_us(expanded_us, after_us=extra_us)
@@ -77,22 +127,22 @@ def certainty(cycle: BusCycle) -> Certainty:
 
 def limit_codes(network: Network) -> dict[str, Number]:
     """The place among `VERDICTS` of each limit of the bus by key, those of safety left out."""
-    return {one.key: one.verdict_code(network) for one in bus_of(network.profile).limits if not one.is_safety}
+    return {limit.key: limit.verdict_code(network) for limit in bus_of(network.profile).limits if not limit.is_safety}
 
 
-def time_code(found: Certainty, network: Network) -> Number:
+def time_code(weighed: Certainty, network: Network) -> Number:
     """The place among `VERDICTS` of the limit of time.
 
     Parameters
     ----------
-    found
+    weighed
         The certainty of the network's cycle.
     network
         The network.
     """
     given_us = available_us(network)
-    is_shown = fits_in(found.safe_required_us, available_us=given_us)
-    best_us: Number = found.margin_corrected_us + found.uncertainty_us
+    is_shown = fits_in(weighed.safe_required_us, available_us=given_us)
+    best_us: Number = weighed.margin_corrected_us + weighed.uncertainty_us
     least_us: Number = -FIT_ROUNDING * given_us
     return choose(is_shown, KEPT, choose(best_us < least_us, BROKEN, NOT_SHOWN_KEPT))
 
@@ -118,9 +168,9 @@ class Judged(Protocol):
         """Keys of the limits that may be kept; None as the verdict."""
 
 
-def limits_behind(one: Judged) -> tuple[str, ...]:
+def limits_behind(judged: Judged) -> tuple[str, ...]:
     """Keys of the limits of the bus that a verdict rests on, without time: the broken ones, or those not shown."""
-    keys = (one.not_shown or ()) if one.verdict == NOT_SHOWN else one.exceeded
+    keys = (judged.not_shown or ()) if judged.verdict == NOT_SHOWN else judged.exceeded
     return tuple(key for key in keys if key != TIME)
 
 

@@ -1,19 +1,22 @@
 """Why the circle that a profile asks for cannot be run: the one place that says so, and nothing is simulated.
 
-Every command that gives a verdict asks here, so that all say the same of a profile, at the key that causes it.
+Every command that gives a verdict asks here, so that all say the same of a profile, at the key that causes it. Of a
+circle that can be run, its loops and its length are told at the end.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import inf
 from typing import Any, Final, Literal
 
-from busplan.questions.fit.cycle import available_us, cycle_of, fits_in
+from busplan.questions.fit.certainty import available_us, cycle_of, fits_in
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us, skew_us
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.base import Section, value_at
+from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.checks import LARGEST, ParameterError, Refused, no_multiple, parameters
-from busplan.servo.parameters import LONGEST_DELAY_PERIODS, Axis, Delivery, LoopTiming
+from busplan.servo.parameters import FINEST_ENCODER_MM, LONGEST_DELAY_PERIODS, Axis, Delivery, LoopTiming
 from busplan.servo.runnable import (
     LONGEST_SETTLING_US,
     Move,
@@ -163,8 +166,6 @@ def _move(profile: Profile, axes: Sequence[Axis]) -> list[Refused]:
     least = [*_unfit(profile, axes, 0.0 if is_turn else None)]
     if least or not is_turn or not any(_unfit(profile, axes, LONGEST_SETTLING_US)):
         return least
-    from busplan.questions.fit.circle_move import path_settling_us  # only what the lead-in decides loads numpy
-
     return [*_unfit(profile, axes, path_settling_us(profile))]
 
 
@@ -233,4 +234,61 @@ def move_of(profile: Profile, settling_us: float | None) -> Move:
 
 def parameters_in(section: Section, of: type) -> dict[str, Any]:
     """The parameters of the servo core in a section, to which a kind of bus may have added keys."""
-    return section.model_dump(include={one.name for one in parameters(of)})
+    return section.model_dump(include={parameter.name for parameter in parameters(of)})
+
+
+_REST_SHARE: Final = 1e-3
+"""What settling may leave of the smallest contour tolerance."""
+
+
+def loop_timing(profile: Profile) -> LoopTiming:
+    """Timing of a profile's position loops, in a circle that can be run."""
+    servo = profile.servo
+    return LoopTiming(
+        period_us=profile.cycle.period_us, step_us=servo.step_us, loop=servo.loop, interpolation=servo.interpolation
+    )
+
+
+def loop_axes(profile: Profile) -> tuple[Axis, Axis]:
+    """Both axes of a profile with the delays of their loops, in a circle that can be run."""
+    x, y = (
+        replace(axis_of(profile, name), delay_us=delay_us)
+        for name, delay_us in zip(AXIS_NAMES, loop_delays_us(profile), strict=True)
+    )
+    return x, y
+
+
+def path_steps(profile: Profile) -> int:
+    """Count the simulated steps of each axis; nothing is simulated [1].
+
+    Raises
+    ------
+    ParameterError
+        The circle cannot be run.
+    """
+    require_circle(profile)
+    return path_setpoints(profile) * loop_timing(profile).steps_per_period
+
+
+def path_setpoints(profile: Profile) -> int:
+    """Count the set-points of a profile's circle, which can be run [1]."""
+    return move_of(profile, path_settling_us(profile)).setpoints
+
+
+def path_settling_us(profile: Profile) -> float | None:
+    """Time of the lead-in at constant speed: None on a trapezoid, infinite if the loops do not settle [us]."""
+    if profile.circle.path == "trapezoid":
+        return None
+    from busplan.servo.measured_part import REST_MM, settling_time_us  # only what the lead-in decides loads numpy
+
+    tolerances_mm = [getattr(profile.tolerance, name) for name in CONTOUR_MEASURES]
+    least_mm = min((tolerance_mm for tolerance_mm in tolerances_mm if tolerance_mm), default=None)
+    x, y = loop_axes(profile)
+    found = settling_time_us(
+        x,
+        y,
+        timing=loop_timing(profile),
+        feed_mm_per_min=profile.circle.feed_mm_per_min,
+        rest_mm=REST_MM if least_mm is None else max(_REST_SHARE * least_mm, FINEST_ENCODER_MM),
+    )
+    return inf if found is None else found

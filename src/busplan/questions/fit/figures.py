@@ -16,16 +16,18 @@ from busplan.elementwise import Number, choose, existing, larger, plain
 from busplan.profile.toml import at_periods, override
 from busplan.questions.fit.certainty import (
     FITS,
+    TIME,
     VERDICTS,
     Certainty,
     VerdictWord,
+    available_us,
     certainty,
+    fits_in,
     limit_codes,
     time_code,
     verdict_code,
 )
 from busplan.questions.fit.circle_refusal import circle_refusals
-from busplan.questions.fit.cycle import TIME, available_us, fits_in
 from busplan.questions.fit.figure_values import FigureValues
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.fit.node_limit import largest_nodes, safe_nodes
@@ -281,8 +283,8 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     exceeded = (*broken, *((TIME,) if late else ()))
     decides = model == bus.deciding_model
     counts = (
-        GroupCapacity(one.name, int(one.nodes), int(one.nodes) * one.node.axes, one.node.axes, model, profile)
-        for one in profile.alike_nodes
+        GroupCapacity(alike.name, int(alike.nodes), int(alike.nodes) * alike.node.axes, alike.node.axes, model, profile)
+        for alike in profile.alike_nodes
     )
     return CapacityFigures(
         kind=bus.kind,
@@ -301,7 +303,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
 
 
 _UNDECIDED: Final[dict[str, Any]] = {
-    **{one.key: None for one in CERTAINTY if one.key not in COUNTS},
+    **{figure.key: None for figure in CERTAINTY if figure.key not in COUNTS},
     "doubts": (),
 }
 
@@ -318,22 +320,22 @@ def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[st
     }
 
 
-def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
+def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
     """Figures of how sure the verdict is that follow by operators alone.
 
     Parameters
     ----------
-    found
+    weighed
         The certainty of the cycle. Its numbers may be of any sort.
     cycle
         The cycle under the timing model that decides.
     """
     return {
-        "bias_us": found.bias_us,
-        "margin_corrected_us": found.margin_corrected_us,
-        "uncertainty_us": found.known_uncertainty_us,
-        "safe_required_us": found.safe_required_us,
-        "safe_min_period_us": shortest_us(cycle.network, found.safe_required_us, is_shown=True),
+        "bias_us": weighed.bias_us,
+        "margin_corrected_us": weighed.margin_corrected_us,
+        "uncertainty_us": weighed.known_uncertainty_us,
+        "safe_required_us": weighed.safe_required_us,
+        "safe_min_period_us": shortest_us(cycle.network, weighed.safe_required_us, is_shown=True),
     }
 
 

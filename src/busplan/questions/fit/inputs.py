@@ -114,11 +114,11 @@ def traced_profile(profile: Profile) -> Profile:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if is_number or (isinstance(value, str) and _chooses(profile, key)):
             found = with_unchecked(found, key, traced(profile, key))
-    for one in profile.alike_nodes:
-        execution, key = one.node.execution, one.node_key(_TABLE)
+    for alike in profile.alike_nodes:
+        execution, key = alike.node.execution, alike.node_key(_TABLE)
         if isinstance(execution, TableExecution):
             table = GivenTable(execution.time_us)
-            symbol = f"table,{one.name}" if one.name else "table"
+            symbol = f"table,{alike.name}" if alike.name else "table"
             table.given = given(profile, key)._replace(symbol=symbol, value=f"{len(execution.time_us)} points")
             found = with_unchecked(found, key, table)
     return found

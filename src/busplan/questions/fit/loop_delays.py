@@ -1,8 +1,10 @@
 """The delay that a bus puts into the position loops; nothing is simulated."""
 
+from itertools import accumulate
+
 from busplan.buses.cycle import BusCycle
 from busplan.elementwise import plain
-from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.fit.network import bus_of
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
@@ -61,13 +63,12 @@ def _deciding_cycle(profile: Profile) -> BusCycle:
 def _first_and_last_us(cycle: BusCycle) -> tuple[float, float]:
     """When the commands of the first and the last node with axes take effect, from the start of the cycle [us]."""
     network = cycle.network
-    own = bus_of(network.profile)
-    arrived_us = own.arrivals_us(cycle)
-    groups = [group for group in network.groups for _ in range(int(group.nodes))]
-    moved = [node for node, group in enumerate(groups, start=1) if group.axes] or list(arrived_us)
+    ends = list(accumulate(int(plain(group.nodes)) for group in network.groups))
+    moved = [place for place, group in enumerate(network.groups) if group.axes] or range(len(ends))
 
-    def effect_us(node: int) -> float:
+    def effect_us(place: int, node: int) -> float:
         # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
-        return min(arrived_us[node], plain(network.period_us)) + cycle.taking_us(groups[node - 1])
+        return min(cycle.arrival_us(node), plain(network.period_us)) + cycle.taking_us(network.groups[place])
 
-    return effect_us(moved[0]), effect_us(moved[-1])
+    first = moved[0]
+    return effect_us(first, [0, *ends][first] + 1), effect_us(moved[-1], ends[moved[-1]])

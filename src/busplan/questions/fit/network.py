@@ -44,7 +44,7 @@ def _group(members: Sequence[AlikeNodes]) -> Group:
     read_us, write_us = execution.execution_us(read_bytes), execution.execution_us(write_bytes)
     return Group(
         said=said,
-        nodes=said.nodes if len(members) == 1 else total(one.nodes for one in members),
+        nodes=said.nodes if len(members) == 1 else total(member.nodes for member in members),
         axes=said.node.axes,
         read_bytes=read_bytes,
         write_bytes=write_bytes,
@@ -120,4 +120,4 @@ def leading_model(profile: Profile) -> str:
 
 def without_execution(network: Network) -> Network:
     """The same network, whose nodes execute in no time."""
-    return network._replace(groups=tuple(with_execution(one, read_us=0.0, write_us=0.0) for one in network.groups))
+    return network._replace(groups=tuple(with_execution(group, read_us=0.0, write_us=0.0) for group in network.groups))

@@ -1,13 +1,13 @@
 """The largest number of nodes that a bus carries, and what keeps it from being larger."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 from busplan.buses.network import Network
 from busplan.buses.parts import Limit
 from busplan.elementwise import Number, choose, larger, plain, rounded_up, smaller, total
-from busplan.questions.fit.certainty import limits_to_be_safe
-from busplan.questions.fit.cycle import limits_with_time
+from busplan.questions.fit.certainty import limits_to_be_safe, limits_with_time
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
@@ -65,7 +65,7 @@ def safe_nodes(profile: Profile, *, group: str = "", without: str | None = None)
         Number of nodes [1], and the key of the limit.
     """
     network = network_of(profile).asking(group)
-    return _with_key(network, [one for one in limits_to_be_safe(network) if one.key != without])
+    return _with_key(network, [limit for limit in limits_to_be_safe(network) if limit.key != without])
 
 
 def _with_key(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:
@@ -88,10 +88,12 @@ def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_
         No answer is larger [1].
     """
     nodes: Number = ceiling
+    # Limits that keep the same ceiling ask one network, whose parts are computed once.
+    full = lru_cache(maxsize=1)(network.with_nodes)
     found: dict[int, Number] = {}
     for index in sorted(range(len(limits)), key=lambda one: limits[one].is_slow):
         # One more, so that a limit that keeps the ceiling does not give its name to the answer of another.
-        found[index] = _most_within(limits[index], network, int(_greatest(nodes)) + 1)
+        found[index] = _most_within(limits[index], network, full, int(_greatest(nodes)) + 1)
         nodes = smaller(nodes, found[index])
     place: Number = len(limits) - 1  # time, where none keeps any out
     for index in reversed(range(len(limits))):
@@ -103,13 +105,13 @@ _VALUE_COST: Final = 30
 """Operations on each element that the value of a limit takes, about; comparing it takes one."""
 
 
-def _most_within(limit: Limit, network: Network, ceiling: int) -> Number:
+def _most_within(limit: Limit, network: Network, full: Callable[[int], Network], ceiling: int) -> Number:
     """The most nodes within one limit, which stays broken once it is, in the way that touches fewer elements.
 
     A value that varies over few axes of an array is cheap: it is asked for every number of nodes, and counted how often
     it holds. Otherwise few numbers of nodes are asked, by halves.
     """
-    over = limit.is_broken(network.with_nodes(ceiling))
+    over = limit.is_broken(full(ceiling))
     whole = _size(over)
     if not _any(over):
         return ceiling

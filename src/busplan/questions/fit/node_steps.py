@@ -92,9 +92,9 @@ def telling_periods(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float
         Its steps, one for each timing model of interest.
     """
     own_us = profile.cycle.period_us
-    carrying = [one for one in steps if one.from_us]
-    lasts = [one.from_us[-1] * 1.25 for one in carrying]
-    needed = [one.from_us[min(one.own_nodes, len(one.from_us)) - 1] * 1.25 for one in carrying]
+    carrying = [step for step in steps if step.from_us]
+    lasts = [carrier.from_us[-1] * 1.25 for carrier in carrying]
+    needed = [carrier.from_us[min(carrier.own_nodes, len(carrier.from_us)) - 1] * 1.25 for carrier in carrying]
     to_us = max(2 * own_us, *needed, min(4 * own_us, max(lasts, default=0.0)), 0.0)
-    from_us = min(own_us, *(one.from_us[0] for one in carrying), to_us / 4) / 1.25
+    from_us = min(own_us, *(carrier.from_us[0] for carrier in carrying), to_us / 4) / 1.25
     return from_us, min(to_us, 4 * MAX_TIME_US)

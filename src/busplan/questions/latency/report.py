@@ -19,8 +19,7 @@ from busplan.forms.blocks import (
 )
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.latency.figures import LatencyResult, Transaction, with_payload
-from busplan.questions.words.documents import document, with_profile
-from busplan.questions.words.figure_tables import Owner, figure_table
+from busplan.questions.words.documents import Owner, document, figure_table, with_profile
 from busplan.questions.words.sentences import execution_sentence, not_applicable, warning_sentences
 
 

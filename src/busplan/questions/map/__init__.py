@@ -5,7 +5,7 @@ from concurrent.futures import Executor
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile
@@ -32,8 +32,8 @@ class MapAnswer(Answer, TradeOff):
         note
             Words behind the title.
         """
+        from busplan.questions.map.drawing import map_svg
         from busplan.questions.map.report import headline
-        from busplan.questions.map.svg import map_svg
 
         return map_svg(self, title=f"{sentence_text(headline(self))} {note}".rstrip())
 

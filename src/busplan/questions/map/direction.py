@@ -1,14 +1,18 @@
-"""A direction of a map: a key and its values."""
+"""A direction of a map: a key and its values, given or chosen about what fits."""
 
+from math import ceil
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.parts import Value
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
+from busplan.forms.scale import round_numbers
 from busplan.profile.write import whole
-from busplan.questions.fit.network import network_of, varied_nodes
+from busplan.questions.fit.circle_refusal import step_refusals
+from busplan.questions.fit.network import bus_of, network_of, varied_nodes
+from busplan.questions.fit.node_steps import NodeSteps, node_steps, telling_periods
 from busplan.questions.sweep.grid import Values, require_keys
-from busplan.sections.base import value_at
+from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 
 AXES: Final = "axes"
@@ -55,7 +59,7 @@ def nodes_with(axes: Value, profile: Profile, *, nodes_key: str) -> int:
     >>> nodes_with(12, load("paper-4ms").profile, nodes_key="bus.nodes")
     3
     """
-    alike = next(one for one in profile.alike_nodes if one.nodes_key == nodes_key)
+    alike = next(alike for alike in profile.alike_nodes if alike.nodes_key == nodes_key)
     each = int(alike.node.axes)
     others = int(plain(network_of(profile).axes)) - int(alike.nodes) * each
     own = axes - others if isinstance(axes, int) else 0
@@ -101,5 +105,53 @@ def checked_direction(
         raise BusplanError(
             f"{option} {key}: {values.size:,} values; a map shows up to {MOST_VALUES} of a key. A sweep takes more"
         )
-    found = [whole(one) for one in values.part(0, values.size).tolist()]
+    found = [whole(value) for value in values.part(0, values.size).tolist()]
     return Direction(key, tuple(found if values.has_words else sorted(found)))
+
+
+_FACTORS: Final = ((1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 2, 5), (1,))
+"""Round numbers of a decade, the finest choice first."""
+_MOST: Final = 20
+"""Most values of a direction, but for the profile's own."""
+_BEYOND: Final = 2
+"""Nodes drawn beyond the most that fit."""
+
+
+def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direction:
+    """Choose the values of `AXES` or of `PERIOD` about what fits.
+
+    Parameters
+    ----------
+    key
+        `AXES` or `PERIOD`.
+    profile
+        The network.
+    with_circle
+        Whether circles are run, though the profile may not ask for one.
+    """
+    varied = varied_nodes(profile)
+    steps = node_steps(profile, model=bus_of(profile).deciding_model, group=varied.name)
+    from_us, to_us = telling_periods(profile, [steps])
+    if key == AXES:
+        nodes, each = _nodes(steps, to_us), int(varied.node.axes)
+        if not each:  # nodes without axes are counted themselves
+            return Direction(varied.nodes_key, nodes)
+        others = own_value(AXES, profile) - steps.own_nodes * each
+        return Direction(AXES, tuple(others + one * each for one in nodes))
+    own_us = own_value(PERIOD, profile)
+    least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
+    known = [known_us for known_us in bus_of(profile).periods.us if least_us <= known_us <= most_us]
+    periods_us = (
+        known[:: ceil(len(known) / _MOST)] if known else round_numbers(least_us, most_us, most=_MOST, decades=_FACTORS)
+    )
+    if with_circle or profile.asks_for_circle:
+        # Periods whose circle can be run; all, where the step goes with none.
+        periods_us = [period_us for period_us in periods_us if not any(step_refusals(profile, period_us))] or periods_us
+    return Direction(PERIOD, tuple(sorted({*periods_us, own_us})))
+
+
+def _nodes(steps: NodeSteps, to_us: float) -> tuple[int, ...]:
+    """Numbers of nodes, from one to some beyond the most that fit the longest period drawn."""
+    last = min(max(steps.own_nodes + 1, steps.max_nodes(to_us) + _BEYOND), MAX_COUNT)
+    step = next(one for one in (f * 10**p for p in range(7) for f in (1, 2, 5)) if last <= _MOST * one)
+    return tuple(sorted({1, steps.own_nodes, *range(step, min(last + step, MAX_COUNT + 1), step)}))

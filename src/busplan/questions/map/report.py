@@ -8,6 +8,7 @@ from busplan.forms.blocks import (
     Chart,
     Code,
     JsonDocument,
+    OwnPicture,
     Record,
     Report,
     Sentence,
@@ -20,131 +21,136 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns
+from busplan.forms.numbers import nouns, sentence_text
 from busplan.questions.fit.network import bus_of
-from busplan.questions.map.cells import Cell, Region
-from busplan.questions.map.characters import map_lines
-from busplan.questions.map.labels import LOOKS, limit_words, looks_of, map_title, setting_words, state_words
-from busplan.questions.map.svg import STYLE, map_svg
-from busplan.questions.map.trade_off import TradeOff
-from busplan.questions.sweep.top import payload_sentences
-from busplan.questions.words.documents import document, with_profile
-from busplan.questions.words.own_picture import OwnPicture
+from busplan.questions.map.drawing import (
+    LOOKS,
+    STYLE,
+    limit_words,
+    looks_of,
+    map_lines,
+    map_svg,
+    map_title,
+    setting_words,
+    state_words,
+)
+from busplan.questions.map.trade_off import Cell, Region, TradeOff
+from busplan.questions.sweep.digest import payload_sentences
+from busplan.questions.words.documents import document, fields, with_profile
 from busplan.questions.words.sentences import refused_circle
 
 
-def map_report(found: TradeOff) -> Report:
+def map_report(trade_off: TradeOff) -> Report:
     """Report of `map`."""
     return Report(
-        Sentence(("Map of ", Code(found.profile.name))),
-        lambda: tuple(_blocks(found)),
-        partial(map_document, found),
-        lambda: with_profile(found.profile.name, map_document(found)["cells"]),
+        Sentence(("Map of ", Code(trade_off.profile.name))),
+        lambda: tuple(_blocks(trade_off)),
+        partial(map_document, trade_off),
+        lambda: with_profile(trade_off.profile.name, map_document(trade_off)["cells"]),
     )
 
 
-def _blocks(found: TradeOff) -> Iterator[Block]:
+def _blocks(trade_off: TradeOff) -> Iterator[Block]:
     """How much fits and whether this design does, the picture, and what limits each region."""
-    yield from refused_circle(found.profile)
-    yield headline(found)
-    yield from _remarks(found)
-    yield map_chart(found)
-    yield regions_table(found)
+    yield from refused_circle(trade_off.profile)
+    yield headline(trade_off)
+    yield from _remarks(trade_off)
+    yield map_chart(trade_off)
+    yield regions_table(trade_off)
 
 
-def headline(found: TradeOff) -> Sentence:
+def headline(trade_off: TradeOff) -> Sentence:
     """Say how many settings fit, and what this design does."""
-    drawn, fitting = len(found.cells), sum(cell.state == "fits" for cell in found.cells)
-    circle = " with a circle that passes" if found.with_circle else ""
+    drawn, fitting = len(trade_off.cells), sum(cell.state == "fits" for cell in trade_off.cells)
+    circle = " with a circle that passes" if trade_off.with_circle else ""
     counts = sentence(
         f"{{}}: {{}} of {{}} {nouns(drawn, 'setting')} are shown to fit{circle}.",
-        Code(found.profile.name),
+        Code(trade_off.profile.name),
         count_value(fitting),
         count_value(drawn),
     )
-    own = found.own
+    own = trade_off.own
     if own is None:
         return joined(counts, Sentence(("This design is not on the map: it has other values.",)))
-    limit = limit_words(own, found.profile)
-    text = f"This design ({setting_words(found, own)}): {state_words(own.state, found)}{limit and f', {limit}'}."
+    limit = limit_words(own, trade_off.profile)
+    text = (
+        f"This design ({setting_words(trade_off, own)}): {state_words(own.state, trade_off)}{limit and f', {limit}'}."
+    )
     tone = LOOKS[own.state].tone
     return joined(Sentence(counts.parts, "fails" if tone == "neutral" else tone), Sentence((text,)))
 
 
-def _remarks(found: TradeOff) -> Iterator[Sentence]:
+def _remarks(trade_off: TradeOff) -> Iterator[Sentence]:
     """Say what is not drawn or not judged, and why."""
-    missing = found.not_drawn
+    missing = trade_off.not_drawn
     if missing:
         number = count_value(len(missing))
         yield sentence(f"{{}} {nouns(len(missing), 'setting')} cannot exist, as {missing[0].reason}.", number)
-    if any(cell.state == "circle not judged" for cell in found.cells):
+    if any(cell.state == "circle not judged" for cell in trade_off.cells):
         yield Sentence(("Not every circle is judged: no contour tolerance is asked for.",), "warns")
-    yield from payload_sentences(found.profile, (found.x.key, found.y.key))
+    yield from payload_sentences(trade_off.profile, (trade_off.x.key, trade_off.y.key))
 
 
-def map_chart(found: TradeOff) -> Chart:
+def map_chart(trade_off: TradeOff) -> Chart:
     """The picture, with how much fits and what lies along which direction."""
-    svg = partial(map_svg, found, title=sentence_text(headline(found)), inline=True)
-    fitting = sum(cell.state == "fits" for cell in found.cells)
-    marked = "" if found.own is None else ", this design marked"
-    caption = sentence(f"{{}} of {{}} settings fit, {map_title(found)}{marked}", *_counts(fitting, len(found.cells)))
-    return Chart(OwnPicture(svg, partial(map_lines, found), stylesheet=STYLE), caption)
+    svg = partial(map_svg, trade_off, title=sentence_text(headline(trade_off)), inline=True)
+    fitting = sum(cell.state == "fits" for cell in trade_off.cells)
+    marked = "" if trade_off.own is None else ", this design marked"
+    caption = sentence(
+        f"{{}} of {{}} settings fit, {map_title(trade_off)}{marked}", *_counts(fitting, len(trade_off.cells))
+    )
+    return Chart(OwnPicture(svg, partial(map_lines, trade_off), stylesheet=STYLE), caption)
 
 
 def _counts(*numbers: int) -> tuple[ShownValue, ...]:
-    return tuple(count_value(one) for one in numbers)
+    return tuple(count_value(number) for number in numbers)
 
 
-def regions_table(found: TradeOff) -> Table:
+def regions_table(trade_off: TradeOff) -> Table:
     """How many cells each region has, and what limits it; the legend of the picture."""
     columns = (
         TableColumn("state", kind="words"),
         TableColumn("limited by", kind="words", wraps=True),
         TableColumn("settings"),
     )
-    rows = (_region_row(found, one) for one in found.regions)
+    rows = (_region_row(trade_off, region) for region in trade_off.regions)
     return Table(columns, tuple(rows), Sentence(("What limits each region",)))
 
 
-def _region_row(found: TradeOff, one: Region) -> TableRow:
-    look = looks_of(found)[one.state, one.limited_by]
-    name = Swatch(look.ink, look.mark, state_words(one.state, found))
-    cells = count_value(one.cells, "cells")
-    return TableRow((name, limit_words(one, found.profile), cells))
+def _region_row(trade_off: TradeOff, region: Region) -> TableRow:
+    look = looks_of(trade_off)[region.state, region.limited_by]
+    name = Swatch(look.ink, look.mark, state_words(region.state, trade_off))
+    cells = count_value(region.cells, "cells")
+    return TableRow((name, limit_words(region, trade_off.profile), cells))
 
 
-def map_document(found: TradeOff) -> JsonDocument:
+def map_document(trade_off: TradeOff) -> JsonDocument:
     """Document of `busplan map --format json`."""
     return document(
         "map",
-        profile=found.profile.name,
-        timing_model=bus_of(found.profile).deciding_model,
-        x={"key": found.x.key, "values": list(found.x.values)},
-        y={"key": found.y.key, "values": list(found.y.values)},
-        with_circle=found.with_circle,
-        design=None if found.own is None else _record(found, found.own),
-        regions=[{**one._asdict(), "limited_by": list(one.limited_by)} for one in found.regions],
-        cells=[_record(found, cell) for cell in found.cells],
-        not_drawn=[{found.x.key: one.x, found.y.key: one.y, "reason": one.reason} for one in found.not_drawn],
+        profile=trade_off.profile.name,
+        timing_model=bus_of(trade_off.profile).deciding_model,
+        x={"key": trade_off.x.key, "values": list(trade_off.x.values)},
+        y={"key": trade_off.y.key, "values": list(trade_off.y.values)},
+        with_circle=trade_off.with_circle,
+        design=None if trade_off.own is None else _record(trade_off, trade_off.own),
+        regions=[fields(region, *region._fields) for region in trade_off.regions],
+        cells=[_record(trade_off, cell) for cell in trade_off.cells],
+        not_drawn=[
+            {trade_off.x.key: absent.x, trade_off.y.key: absent.y, "reason": absent.reason}
+            for absent in trade_off.not_drawn
+        ],
     )
 
 
-def _record(found: TradeOff, cell: Cell) -> Record:
+def _record(trade_off: TradeOff, cell: Cell) -> Record:
     """A cell as plain data, its values under the keys of the directions, as in a row of a sweep."""
-    safety = bus_of(found.profile).safety.figure
+    safety = bus_of(trade_off.profile).safety.figure
     return {
-        found.x.key: cell.x,
-        found.y.key: cell.y,
-        "nodes": cell.nodes,
-        "axes": cell.axes,
-        "state": cell.state,
-        "limited_by": list(cell.limited_by),
-        "binding_term": cell.binding_term,
-        "verdict": cell.verdict,
-        "margin_corrected_us": cell.margin_corrected_us,
-        "uncertainty_us": cell.uncertainty_us,
+        trade_off.x.key: cell.x,
+        trade_off.y.key: cell.y,
+        **fields(cell, "nodes", "axes", "state", "limited_by", "binding_term", "verdict"),
+        **fields(cell, "margin_corrected_us", "uncertainty_us"),
         **({} if safety is None else {safety.key: cell.is_safe}),
-        "circle_refused_by": list(cell.circle_refused_by),
-        "circle_passed": cell.circle_passed,
+        **fields(cell, "circle_refused_by", "circle_passed"),
     }

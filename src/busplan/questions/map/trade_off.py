@@ -1,22 +1,236 @@
 """The map of a profile: a sweep over two keys, with the verdict and its limit in each cell."""
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from math import isnan
+from typing import Any, Final, Literal, NamedTuple, Protocol, TypeVar, get_args
 
 from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.progress import Progress
-from busplan.questions.fit.cycle import TIME
-from busplan.questions.fit.network import bus_of
-from busplan.questions.map.cells import CELL_FIGURES, STATES, Cell, MapPoint, NotDrawn, Region, cell_of
-from busplan.questions.map.circles import Mapper, Place, judged
-from busplan.questions.map.direction import AXES, PERIOD, Direction, nodes_with, own_value, profile_key
-from busplan.questions.map.ranges import default_direction
+from busplan.questions.circle.roundness import circle_test
+from busplan.questions.circle.setup import NOTHING, announce, estimate, setup
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, TIME, VerdictWord
+from busplan.questions.fit.circle_refusal import refusals
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.map.direction import (
+    AXES,
+    PERIOD,
+    Direction,
+    default_direction,
+    nodes_with,
+    own_value,
+    profile_key,
+)
 from busplan.questions.sweep.blocks import sweep
 from busplan.questions.sweep.grid import Grid, Listed
 from busplan.sections.profile import Profile
+
+State = Literal[
+    "fits",
+    "circle fails",
+    "circle not judged",
+    "circle cannot be run",
+    "not shown to fit",
+    "unsafe",
+    "does not fit",
+]
+STATES: Final[tuple[State, ...]] = get_args(State)
+"""In the order of reports."""
+CELL_FIGURES: Final = (
+    *("nodes", "axes", "verdict", "binding_term", "exceeded", "not_shown", "circle_refused_by"),
+    *("margin_corrected_us", "uncertainty_us"),
+)
+"""Columns of a sweep that a cell is made of."""
+
+
+class MapPoint(NamedTuple):
+    """One combination of values that a profile can have."""
+
+    changes: dict[str, Value]
+    """New values by key of the profile."""
+    profile: Profile
+    """The profile with them."""
+
+
+class Cell(NamedTuple):
+    """The verdict at one setting."""
+
+    x: Value
+    y: Value
+    nodes: int
+    axes: int
+    state: State
+    limited_by: tuple[str, ...]
+    """Limits that are broken; of a circle that fails, what it does not hold, and of one that cannot be run, the keys
+    that refuse it; none where it fits."""
+    binding_term: str
+    """The largest term of the cycle."""
+    verdict: VerdictWord
+    margin_corrected_us: float
+    uncertainty_us: float | None
+    """None where nothing is known of it."""
+    is_safe: bool
+    circle_refused_by: tuple[str, ...] = ()
+    """Keys for which its circle cannot be run, whatever the state."""
+    circle_passed: bool | None = None
+    """None where no circle was run, or no tolerance judges it."""
+
+
+class NotDrawn(NamedTuple):
+    """A combination of values that no profile can have."""
+
+    x: Value
+    y: Value
+    reason: str
+
+
+class Region(NamedTuple):
+    """All cells of one state with one limit."""
+
+    state: State
+    limited_by: tuple[str, ...]
+    binding_term: str | None
+    """The largest term of the cycle, where time is the limit."""
+    cells: int
+
+
+def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value) -> Cell:
+    """Make a cell before any circle.
+
+    Parameters
+    ----------
+    setting
+        The setting.
+    figures
+        `CELL_FIGURES` of a sweep at the setting, under the timing model that decides.
+    x, y
+        Values of the map's directions.
+    """
+    network = network_of(setting.profile)
+    unsafe = tuple(
+        limit.key for limit in bus_of(setting.profile).limits if limit.is_safety and limit.is_broken(network)
+    )
+    verdict = figures["verdict"]
+    keys = figures["not_shown" if verdict == NOT_SHOWN else "exceeded"]
+    broken = tuple(key for key in keys if key != TIME) or (TIME,)
+    refused = tuple(figures["circle_refused_by"])
+    state, limits = _judged(verdict, broken=broken, unsafe=unsafe, refused=refused)
+    return Cell(
+        x=x,
+        y=y,
+        nodes=int(figures["nodes"]),
+        axes=int(figures["axes"]),
+        state=state,
+        limited_by=limits,
+        binding_term=figures["binding_term"],
+        verdict=verdict,
+        margin_corrected_us=figures["margin_corrected_us"],
+        uncertainty_us=None if isnan(figures["uncertainty_us"]) else figures["uncertainty_us"],
+        is_safe=not unsafe,
+        circle_refused_by=refused,
+    )
+
+
+def _judged(
+    verdict: VerdictWord, *, broken: tuple[str, ...], unsafe: tuple[str, ...], refused: tuple[str, ...]
+) -> tuple[State, tuple[str, ...]]:
+    """State and limits: what does not fit is never called unsafe, and what is unsafe never a fit."""
+    if verdict == DOES_NOT_FIT:
+        return verdict, broken
+    if unsafe:
+        return "unsafe", unsafe
+    if verdict != FITS:
+        return verdict, broken
+    return ("circle cannot be run", refused) if refused else (verdict, ())
+
+
+_AT_ONCE: Final = 16
+"""Circle tests between two reports of the progress."""
+
+Place = tuple[int, int]
+"""Row and column of a cell."""
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+class Mapper(Protocol):
+    """The built-in `map`, here or in other processes."""
+
+    def __call__(self, function: Callable[[Task], Result], tasks: Iterable[Task], /) -> Iterable[Result]:
+        """Return the results in the order of the tasks."""
+
+
+class _Task(NamedTuple):
+    """The circle test of one setting; a process can be handed it."""
+
+    profile: Profile
+    changes: dict[str, object]
+
+
+class _Judgement(NamedTuple):
+    passed: bool | None
+    failures: tuple[str, ...]
+
+
+def _judge(task: _Task) -> _Judgement:
+    (result,) = circle_test(override(task.profile, task.changes), explain=False).results
+    return _Judgement(result.passed, tuple(failure.name for failure in result.failures))
+
+
+def judged(
+    profile: Profile,
+    fitting: Mapping[Place, tuple[Cell, MapPoint]],
+    *,
+    mapper: Mapper,
+    progress: Progress | None,
+) -> dict[Place, Cell]:
+    """Run the circle tests of cells that fit, after saying what many of them cost.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    fitting
+        Cells and their settings.
+    mapper
+        How the tests are run.
+    progress
+        Called now and then with the tests that are done, and all of them.
+
+    Returns
+    -------
+    dict
+        The same cells, with what their circle says.
+    """
+    cost, runs = NOTHING, dict[Place, _Task]()
+    cells = {place: cell for place, (cell, _) in fitting.items()}
+    for place, (cell, setting) in fitting.items():
+        # A profile that asks for no circle has none to be refused until now.
+        refused = tuple(cause.name for cause in refusals(setting.profile))
+        if refused:
+            cells[place] = cell._replace(state="circle cannot be run", limited_by=refused, circle_refused_by=refused)
+        else:
+            cost = cost.then(estimate((), [setup(setting.profile)]))
+            runs[place] = _Task(profile, dict(setting.changes))
+    announce(cost)
+    places = list(runs)
+    for start in range(0, len(places), _AT_ONCE):
+        part = places[start : start + _AT_ONCE]
+        for place, found in zip(part, mapper(_judge, [runs[place] for place in part]), strict=True):
+            cells[place] = _with_circle(cells[place], found)
+        if progress is not None:
+            progress(start + len(part), len(places))
+    return cells
+
+
+def _with_circle(cell: Cell, found: _Judgement) -> Cell:
+    cell = cell._replace(circle_passed=found.passed)
+    if found.passed is False:
+        return cell._replace(state="circle fails", limited_by=found.failures)
+    return cell if found.passed else cell._replace(state="circle not judged")
+
 
 MOST_CIRCLES: Final = 1000
 """Most circle tests of a map."""
@@ -45,7 +259,7 @@ class TradeOff(NamedTuple):
     @property
     def own_place(self) -> Place | None:
         """Row and column of the profile's own setting; None if it is not on the map."""
-        own_x, own_y = (own_value(one.key, self.profile) for one in (self.x, self.y))
+        own_x, own_y = (own_value(direction.key, self.profile) for direction in (self.x, self.y))
         if own_x not in self.x.values or own_y not in self.y.values:
             return None
         return self.y.values.index(own_y), self.x.values.index(own_x)
@@ -121,7 +335,7 @@ def trade_off(
         x = default_direction(AXES if is_free else PERIOD, profile, with_circle=with_circle)
     if y is None:
         y = default_direction(AXES if x.key == PERIOD else PERIOD, profile, with_circle=with_circle)
-    key_x, key_y = (profile_key(one.key, profile) for one in (x, y))
+    key_x, key_y = (profile_key(direction.key, profile) for direction in (x, y))
     if key_x == key_y:
         raise BusplanError(f"{x.key} across and {y.key} up both vary {key_x}; give two keys")
     settings = {
@@ -131,7 +345,7 @@ def trade_off(
     }
     found = {place: one for place, one in settings.items() if isinstance(one, MapPoint)}
     if not found:
-        reason = next(one for one in settings.values() if not isinstance(one, MapPoint))
+        reason = next(value for value in settings.values() if not isinstance(value, MapPoint))
         raise BusplanError(f"no setting of this map can exist: {reason}")
     cells = {
         (row, column): cell_of(found[row, column], figures, x=x.values[column], y=y.values[row])

@@ -13,10 +13,10 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, finite, items, load_profile, plain, values_by_key, whole
 from busplan.questions.circle.check import CircleCheck
 from busplan.questions.plan import planning as analysis
-from busplan.questions.plan.machine import nodes_for_axes
+from busplan.questions.plan.constraints import nodes_for_axes
 from busplan.questions.plan.planning import Plan
 from busplan.questions.plan.search import MAX_CIRCLES
-from busplan.questions.plan.settings import needed_settings
+from busplan.questions.plan.smallest_period import needed_settings
 from busplan.sections.profile import Profile
 
 __all__ = ["PlanAnswer", "needed_settings", "plan"]

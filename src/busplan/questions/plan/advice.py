@@ -7,8 +7,8 @@ from busplan.profile.toml import override
 from busplan.questions.circle.check import failures_within, rests_on
 from busplan.questions.fit.figures import CapacityFigures, figures
 from busplan.questions.fit.network import bus_of
+from busplan.questions.plan.constraints import with_nodes
 from busplan.questions.plan.freedoms import freed
-from busplan.questions.plan.machine import with_nodes
 from busplan.questions.plan.search import Search
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
@@ -43,7 +43,7 @@ class Cure(NamedTuple):
 
 def changeable(profile: Profile) -> tuple[str, ...]:
     """What may be changed unless a user says otherwise, in words, the cheapest first."""
-    return tuple(one.label for one in freed(profile, None))
+    return tuple(freedom.label for freedom in freed(profile, None))
 
 
 def cure(profile: Profile, *, circle_steps: int | None = None) -> Cure:
@@ -98,9 +98,9 @@ def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
     return _change(profile, more, nodes=nodes), more.why
 
 
-def _change(profile: Profile, found: Cure, *, nodes: int) -> Change | None:
-    if found.changes is None:
+def _change(profile: Profile, cure: Cure, *, nodes: int) -> Change | None:
+    if cure.changes is None:
         return None
-    after = override(profile, dict(found.changes))
+    after = override(profile, dict(cure.changes))
     decided = figures(after, model=bus_of(after).deciding_model)
-    return Change(found.changes, nodes, decided, circle_is_untested=found.circle_failures is None)
+    return Change(cure.changes, nodes, decided, circle_is_untested=cure.circle_failures is None)

@@ -2,35 +2,27 @@
 
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterator, Sequence
+from decimal import ROUND_CEILING, Decimal
 from functools import partial
 from itertools import count
-from math import inf
-from typing import TYPE_CHECKING, Final, NamedTuple
+from math import ceil, inf
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 from busplan.buses.parts import Cost
-from busplan.elementwise import plain, within
+from busplan.elementwise import FIT_ROUNDING, plain, within
 from busplan.errors import BusplanError
+from busplan.questions.fit.certainty import fits_in
 from busplan.questions.fit.circle_refusal import STEP
-from busplan.questions.fit.cycle import fits_in
 from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.plan.constraints import goes_with_step
-from busplan.questions.plan.machine import (
+from busplan.questions.plan.constraints import (
     NODES_KEY,
     Changes,
+    goes_with_step,
     least_cut_bytes,
     payload_keys,
     rooms,
     with_nodes,
     with_payload_within,
-)
-from busplan.questions.plan.short_numbers import (
-    MOST_RATIO,
-    PERIOD_DIGITS,
-    PERIOD_STEP_US,
-    RATIOS,
-    ListedNumbers,
-    NumberGrid,
-    ShortNumbers,
 )
 from busplan.sections.base import MAX_TIME_US
 from busplan.servo.checks import dividing_step_us
@@ -38,6 +30,97 @@ from busplan.servo.checks import dividing_step_us
 if TYPE_CHECKING:
     from busplan.questions.plan.search import Search
     from busplan.sections.profile import Profile
+
+
+class NumberGrid(Protocol):
+    """Numbers at places from 1 on, ascending."""
+
+    def number(self, place: int) -> float:
+        """The number at a place; infinite beyond the last."""
+
+    def place(self, least: float) -> int:
+        """The place of the smallest number that is no less than another one, but for float rounding."""
+
+
+class ListedNumbers(NamedTuple):
+    """Numbers of a list.
+
+    Parameters
+    ----------
+    numbers
+        They, ascending.
+
+    Examples
+    --------
+    >>> known = ListedNumbers((250.0, 500.0))
+    >>> known.place(300.0), known.number(2), known.number(3)
+    (2, 500.0, inf)
+    """
+
+    numbers: tuple[float, ...]
+
+    def number(self, place: int) -> float:
+        """The number at a place; infinite beyond the last."""
+        return self.numbers[place - 1] if place <= len(self.numbers) else inf
+
+    def place(self, least: float) -> int:
+        """The place of the smallest number that is no less than another one, but for float rounding."""
+        return bisect_left(self.numbers, least * (1 - FIT_ROUNDING)) + 1
+
+
+class ShortNumbers(NamedTuple):
+    """The multiples of a step that have a few significant digits, in decimal arithmetic: 3 * 0.1 is 0.3.
+
+    Parameters
+    ----------
+    step
+        The smallest number, in its own unit.
+    digits
+        Most significant digits of the multiple: with two, 98, 99, 100, 110, 120 steps.
+    """
+
+    step: float
+    digits: int
+
+    def number(self, place: int) -> float:
+        """The number at a place from 1 on, ascending.
+
+        Examples
+        --------
+        >>> [ShortNumbers(0.1, 1).number(place) for place in (1, 9, 10, 11)]
+        [0.1, 0.9, 1.0, 2.0]
+        """
+        return float(self._multiple(place) * Decimal(str(self.step)))
+
+    def place(self, least: float) -> int:
+        """The place of the smallest number that is no less than another one, but for float rounding.
+
+        Examples
+        --------
+        >>> [ShortNumbers(100, 3).number(ShortNumbers(100, 3).place(least)) for least in (0, 1087.2, 1100, 123_456)]
+        [100.0, 1100.0, 1100.0, 124000.0]
+        """
+        steps = ceil(Decimal(least * (1 - FIT_ROUNDING)) / Decimal(str(self.step)))
+        blocks = max(0, len(str(steps)) - self.digits)
+        rounded = int((Decimal(steps) / 10**blocks).to_integral_value(ROUND_CEILING))
+        first: int = 10 ** (self.digits - 1)
+        return max(1, rounded + blocks * 9 * first)
+
+    def _multiple(self, place: int) -> int:
+        first: int = 10 ** (self.digits - 1)
+        blocks = max(0, (place - first) // (9 * first))
+        scale: int = 10**blocks
+        return (place - blocks * 9 * first) * scale
+
+
+RATIOS: Final = ShortNumbers(0.01, 2)
+"""Slice ratios that are advised."""
+MOST_RATIO: Final = 0.9
+"""Largest slice ratio that is advised: the host computes in the rest of the period. Chosen."""
+PERIOD_DIGITS: Final = 3
+"""Significant digits of a period that is advised, in its step."""
+PERIOD_STEP_US: Final = 1.0
+"""Step of periods where no circle asks for another [us]."""
 
 RATIO: Final = "cycle.slice_ratio"
 PERIOD: Final = "cycle.period_us"
@@ -65,8 +148,8 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
     """Everything that may be changed in a network, the cheapest first; the step of a circle where it must change."""
     network = network_of(profile)
     own = (
-        Freedom(one.name, one.label, one.cost, one.keys, partial(_of_bus, one.name))
-        for one in bus_of(profile).settings(network)
+        Freedom(setting.name, setting.label, setting.cost, setting.keys, partial(_of_bus, setting.name))
+        for setting in bus_of(profile).settings(network)
     )
     found = (
         *own,
@@ -102,25 +185,25 @@ def freed(
         The network has no freedom of that name, or its value was asked for.
     """
     known = freedoms(profile)
-    still = [one for one in known if not set(one.keys) <= set(asked)]
+    still = [freedom for freedom in known if not set(freedom.keys) <= set(asked)]
     if names is None:
-        return tuple(one for one in still if one.cost in DEFAULT_COSTS)
-    said = ", ".join(one.name for one in known)
+        return tuple(freedom for freedom in still if freedom.cost in DEFAULT_COSTS)
+    said = ", ".join(freedom.name for freedom in known)
     kind = f"{profile.bus.kind} with groups" if profile.group else profile.bus.kind
     unknown = [
         f"{option} {name}: there is nothing of that name to free on a bus of kind {kind}; there are {said}"
         for name in names
-        if name not in {one.name for one in known}
+        if name not in {freedom.name for freedom in known}
     ]
     fixed = [
-        f"{option} {one.name}: {' and '.join(key for key in one.keys if key in asked)} was given a value, which is "
-        "kept; give one of them"
-        for one in known
-        if one.name in names and one not in still
+        f"{option} {freedom.name}: {' and '.join(key for key in freedom.keys if key in asked)} was given a value, "
+        "which is kept; give one of them"
+        for freedom in known
+        if freedom.name in names and freedom not in still
     ]
     if unknown or fixed:
         raise BusplanError(*unknown, *fixed)
-    return tuple(one for one in still if one.name in names)
+    return tuple(freedom for freedom in still if freedom.name in names)
 
 
 def _of_bus(name: str, search: "Search", changes: Changes, _cheaper: Sequence[Freedom]) -> Iterator[Changes]:
@@ -173,7 +256,7 @@ def _payloads(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) ->
 
     sizes = sizes[: bisect_left(sizes, x=True, key=lambda size: cut(size) is None)]
     # Below a point after which a table of execution times falls, a smaller payload may take longer.
-    from_bytes = max(one.node.execution.ascends_from_bytes for one in profile.alike_nodes)
+    from_bytes = max(alike.node.execution.ascends_from_bytes for alike in profile.alike_nodes)
     rising = bisect_left(sizes, x=True, key=lambda size: size < from_bytes)
     first = bisect_left(
         sizes, x=True, hi=rising, key=lambda size: search.reaches({**changes, **(cut(size) or {})}, cheaper)
@@ -237,7 +320,7 @@ def period_grid(profile: "Profile") -> NumberGrid:
     """Periods that are advised: those that the bus knows, or short ones; no circle refuses one for its step."""
     known = bus_of(profile).periods.us
     if known:
-        return ListedNumbers(tuple(one for one in known if goes_with_step(profile, one)))
+        return ListedNumbers(tuple(us for us in known if goes_with_step(profile, us)))
     return ShortNumbers(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
 
 

@@ -8,9 +8,7 @@ from busplan.profile.keys import flat
 from busplan.profile.toml import override
 from busplan.questions.plan.constraints import Need
 from busplan.questions.plan.freedoms import PERIOD, Freedom, freed
-from busplan.questions.plan.frontier import frontier
-from busplan.questions.plan.option import Impossible, Option, option
-from busplan.questions.plan.relaxations import Relaxation, relaxations
+from busplan.questions.plan.options import Impossible, Option, Relaxation, frontier, option, relaxations
 from busplan.questions.plan.search import MAX_CIRCLES, FindCircleFailures, Search
 from busplan.sections.profile import Profile
 
@@ -108,14 +106,14 @@ def plan(
     search = Search(goal, circle=circle, kept=kept, max_circles=max_circles)
     steps = [*_steps(search, levels)]
     found = [*steps, *frontier(goal, search, levels)]
-    has_plan = any(isinstance(one, Option) and one.recommended for one in steps)
+    has_plan = any(isinstance(step, Option) and step.recommended for step in steps)
     return Plan(
         profile=profile,
         goal=goal,
         wanted={key: value for key, value in asked.items() if _differs(profile, goal, key)},
-        free=tuple(one.name for one in levels),
-        options=tuple(one for one in found if isinstance(one, Option)),
-        impossible=tuple(one for one in found if isinstance(one, Impossible)),
+        free=tuple(level.name for level in levels),
+        options=tuple(offer for offer in found if isinstance(offer, Option)),
+        impossible=tuple(offer for offer in found if isinstance(offer, Impossible)),
         binding=None if has_plan else search.binding(levels),
         relaxations=()
         if has_plan
@@ -126,9 +124,9 @@ def plan(
 
 def _differs(profile: Profile, goal: Profile, key: str) -> bool:
     """Whether two profiles differ in a key, or in one of a section; other changes may be needed for either alone."""
-    own, asked = (dict(flat(one.model_dump())) for one in (profile, goal))
+    own, asked = (dict(flat(side.model_dump())) for side in (profile, goal))
     keys = [one for one in {**own, **asked} if one == key or one.startswith(f"{key}.")]
-    return any(own.get(one) != asked.get(one) for one in keys)
+    return any(own.get(key) != asked.get(key) for key in keys)
 
 
 def _steps(search: Search, levels: Sequence[Freedom]) -> Iterator[Option | Impossible]:
@@ -145,5 +143,5 @@ def _steps(search: Search, levels: Sequence[Freedom]) -> Iterator[Option | Impos
         if not number or search.is_bounded(freed_now):
             yield option(search, title, search.furthest({}, freed_now), held_by=binding.key)
         elif binding.why != said:
-            yield Impossible(", ".join(one.label for one in freed_now), binding.why, search.proven)
+            yield Impossible(", ".join(freedom.label for freedom in freed_now), binding.why, search.proven)
             said = binding.why

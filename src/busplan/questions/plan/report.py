@@ -1,11 +1,14 @@
-"""Answer of `busplan plan`."""
+"""Answer of `busplan plan`: its sentences, the table of its options, and its document."""
 
 from collections.abc import Iterator
 from functools import partial
+from typing import Final
 
-from busplan.buses.figure import AXES, NODES
+from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES, UNCERTAINTY
+from busplan.buses.parts import Value as BusValue
 from busplan.forms.blocks import (
     Block,
+    Cell,
     Code,
     JsonDocument,
     Part,
@@ -13,24 +16,34 @@ from busplan.forms.blocks import (
     Report,
     Sentence,
     ShownValue,
+    Table,
+    TableColumn,
+    TableRow,
     Words,
+    attribute_value,
     figure_value,
+    joined,
     sentence,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import listed, nouns, period_value
+from busplan.forms.numbers import MISSING, listed, nouns, period_value, sentence_text
 from busplan.profile.keys import flat
-from busplan.questions.fit.figures import after_reset
+from busplan.questions.fit.certainty import FITS, limits_behind
+from busplan.questions.fit.figures import COUNTS, after_reset
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.constraints import CIRCLE
 from busplan.questions.plan.freedoms import PERIOD, freedoms
-from busplan.questions.plan.option import Option
-from busplan.questions.plan.options_report import options_table
+from busplan.questions.plan.options import Option, Relaxation
 from busplan.questions.plan.planning import Plan
-from busplan.questions.plan.relaxations import Relaxation
-from busplan.questions.words.documents import document, with_profile
-from busplan.questions.words.key_values import NewValues, change_meanings, settings_sentence
-from busplan.questions.words.sentences import margin_parts, reset_sentence, warning_sentences
+from busplan.questions.words.documents import document, fields, with_profile
+from busplan.questions.words.sentences import (
+    NewValues,
+    change_meanings,
+    key_value,
+    margin_parts,
+    reset_sentence,
+    settings_sentence,
+    warning_sentences,
+)
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
 
@@ -48,17 +61,17 @@ def plan_report(plan: Plan) -> Report:
 def _blocks(plan: Plan) -> Iterator[Block]:
     """The recommendation, or what stands in its way; a row for each step of the search, and what could be reached."""
     yield _headline(plan)
-    yield from (_relaxed(plan, one) for one in plan.relaxations)
+    yield from (_relaxed(plan, relaxation) for relaxation in plan.relaxations)
     yield from _warnings(plan)
     yield options_table(plan)
     mark = "" if plan.recommended is None else "* recommended. "
     yield Sentence((f"{mark}'Held by' is what keeps a row from passing, or its value from being better.",))
     if not all(option.proven for option in plan.options):
         yield Sentence(("? not proven: the search for a period was cut short (--max-circles).",))
-    for one in plan.impossible:
-        proven = "" if one.proven else " (not proven: the search was cut short, --max-circles)"
-        reason = ShownValue(one.reason, "reason")
-        yield sentence(f"{one.title.capitalize()}: none, {{}}{proven}.", reason)
+    for impossible in plan.impossible:
+        proven = "" if impossible.proven else " (not proven: the search was cut short, --max-circles)"
+        reason = ShownValue(impossible.reason, "reason")
+        yield sentence(f"{impossible.title.capitalize()}: none, {{}}{proven}.", reason)
 
 
 # --- sentences ------------------------------------------------------------------------------------------------
@@ -103,24 +116,24 @@ def _headline(plan: Plan) -> Sentence:
 
 def _freed(plan: Plan, before: str | None = None) -> str:
     """What may be changed, in words; only what is cheaper than the freedom of a key."""
-    known = [one for one in freedoms(plan.goal) if one.name in plan.free]
-    cost = next((one.cost for one in known if before in one.keys), None)
-    labels = [one.label for one in known if cost is None or one.cost < cost]
+    known = [freedom for freedom in freedoms(plan.goal) if freedom.name in plan.free]
+    cost = next((freedom.cost for freedom in known if before in freedom.keys), None)
+    labels = [freedom.label for freedom in known if cost is None or freedom.cost < cost]
     return listed(labels, "and") if labels else "anything else"
 
 
-def _relaxed(plan: Plan, one: Relaxation) -> Sentence:
+def _relaxed(plan: Plan, relaxation: Relaxation) -> Sentence:
     """Say what would be enough, and what to set then."""
-    changes = _settings(plan.goal, one.changes).parts if one.changes else ("nothing to change",)
-    if one.value is not None:
-        value = ShownValue(one.value, one.relaxed)
-        return Sentence((f"Enough would be {one.relaxed} = ", value, ": ", *changes, "."))
-    what = "leave out the circle" if one.relaxed == CIRCLE else f"free the {_label(plan, one.relaxed)}"
+    changes = _settings(plan.goal, relaxation.changes).parts if relaxation.changes else ("nothing to change",)
+    if relaxation.value is not None:
+        value = ShownValue(relaxation.value, relaxation.relaxed)
+        return Sentence((f"Enough would be {relaxation.relaxed} = ", value, ": ", *changes, "."))
+    what = "leave out the circle" if relaxation.relaxed == CIRCLE else f"free the {_label(plan, relaxation.relaxed)}"
     return Sentence((f"Enough would be to {what}: ", *changes, "."))
 
 
 def _label(plan: Plan, name: str) -> str:
-    return next(one.label for one in freedoms(plan.goal) if one.name == name)
+    return next(freedom.label for freedom in freedoms(plan.goal) if freedom.name == name)
 
 
 def _goal(plan: Plan) -> tuple[Part, ...]:
@@ -152,39 +165,21 @@ def _options(plan: Plan) -> list[Record]:
 
 
 def _record(plan: Plan, option: Option) -> Record:
-    one, profile = option.deciding, option.profile
-    others = option.others
+    figures, profile, others = option.deciding, option.profile, option.others
     return {
         "title": option.title,
         "changes": plan.all_changes(option),
         "recommended": option.recommended,
-        "timing_model": one.timing_model,
-        "verdict": one.verdict,
-        "fits": one.fits,
-        "circle_refused_by": list(one.circle_refused_by),
+        **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
         "fits_other_model": all(other.fits for other in others) if others else None,
-        "margin_us": one.margin_us,
+        "margin_us": figures.margin_us,
         "margin_other_model_us": min((other.margin_us for other in others), default=None),
-        "bias_us": one.bias_us,
-        "margin_corrected_us": one.margin_corrected_us,
-        "uncertainty_us": one.uncertainty_us,
-        "binding_term": one.binding_term,
-        "passes": option.passes,
-        "held_by": option.held_by,
-        "proven": option.proven,
-        "circle_passed": option.circle_passed,
+        **fields(figures, "bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
+        **fields(option, "passes", "held_by", "proven", "circle_passed"),
         "circle_failures": list(option.circle_failures or ()),
-        "nodes": one.nodes,
-        "axes": one.axes,
-        "max_nodes": one.max_nodes,
-        "max_axes": one.max_axes,
-        "limited_by": one.limited_by,
-        "safe_nodes": one.safe_nodes,
-        "safe_axes": one.safe_axes,
-        "safe_limited_by": one.safe_limited_by,
-        "period_us": one.period_us,
+        **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
         "slice_ratio": profile.cycle.slice_ratio,
-        **{key: getattr(one, key) for key in bus_of(profile).figures.planned},
+        **fields(figures, *bus_of(profile).figures.planned),
         **{f"{kind}_bytes": int(getattr(network_of(profile).groups[0], f"{kind}_bytes")) for kind in TRANSACTION_KINDS},
     }
 
@@ -213,7 +208,102 @@ def plan_document(plan: Plan) -> JsonDocument:
         period_is_kept=plan.period_is_kept,
         recommended_changes=recommended,
         binding=None if plan.binding is None else {"constraint": plan.binding.key, "why": plan.binding.why},
-        relaxations=[one._asdict() for one in plan.relaxations],
+        relaxations=[relaxation._asdict() for relaxation in plan.relaxations],
         options=_options(plan),
-        impossible=[one._asdict() for one in plan.impossible],
+        impossible=[impossible._asdict() for impossible in plan.impossible],
     )
+
+
+def options_table(plan: Plan) -> Table:
+    """Settings and results of each option; the recommended one has a mark."""
+    columns = (
+        TableColumn("option", kind="words"),
+        TableColumn("", kind="words"),
+        TableColumn("set", kind="words", wraps=True),
+        TableColumn("largest term", kind="words", rank=2),
+        *(TableColumn(heading, kind="words") for heading in ("held by", "circle")),
+        *(TableColumn(heading, "us") for heading in ("margin", "+/-")),
+        *(TableColumn(heading, group="safe", rank=1) for heading in ("nodes", "axes")),
+    )
+    return Table(columns, tuple(map(_row, plan.options)), heads=2)
+
+
+def _row(option: Option) -> TableRow:
+    passed = option.circle_passed
+    circle: Cell = MISSING if option.circle_failures is None else "not judged"
+    if passed is not None:
+        circle = Words("passes", "passes") if passed else Words("FAILS", "fails")
+    if option.deciding.circle_refused_by:
+        circle = Words("cannot be run", "fails")
+    cells: tuple[Cell, ...] = (
+        option.title,
+        "*" * option.recommended + "?" * (not option.proven),
+        _short(option.profile, option.changes),
+        bus_of(option.profile).figures.term_label(option.deciding.binding_term),
+        ShownValue(option.held_by, "held_by"),
+        circle,
+        *option_margin(option),
+        *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES)),
+    )
+    return TableRow(cells, highlighted=option.recommended)
+
+
+def option_margin(option: Option) -> tuple[ShownValue, ShownValue]:
+    """Margin less the bias, and its uncertainty.
+
+    Parameters
+    ----------
+    option
+        The option.
+    """
+    margin, doubt = (attribute_value(figure, option.deciding) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
+    one = option.deciding
+    # A margin beyond its uncertainty is none of the causes where limits of the bus are.
+    beyond_us = (one.margin_corrected_us or 0.0) - (one.uncertainty_us or 0.0)
+    is_enough = one.verdict == FITS or (beyond_us > 0 and limits_behind(one))
+    return margin._replace(state="neutral" if is_enough else "fails"), doubt
+
+
+_SHORT: Final = {
+    "bus.nodes": "{} nodes",
+    "cycle.period_us": "{}",
+    "cycle.slice_ratio": "ratio {}",
+    "servo.step_us": "step {}",
+    "payload.read_bytes": "read {} bytes",
+    "payload.write_bytes": "write {} bytes",
+    "payload.read_bytes_per_axis": "read {} bytes an axis",
+    "payload.write_bytes_per_axis": "write {} bytes an axis",
+}
+
+
+_BOTH: Final = ("payload.read_bytes", "payload.write_bytes")
+
+
+def _short(profile: Profile, changes: NewValues) -> Cell:
+    """The settings of an option, in a few words."""
+    if not changes:
+        return MISSING
+    sizes = {key: value for key, value in changes.items() if key in _BOTH}
+    alike = len(sizes) == len(_BOTH) and len(set(sizes.values())) == 1
+    shown = {key: value for key, value in changes.items() if not alike or key != _BOTH[-1]}
+    own = {name: key.short for name, key in bus_of(profile).keys.items() if key.short}
+    words = {**_SHORT, **own, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
+    return joined(
+        *(
+            sentence(_counted(words[key], value), _short_value(key, value))
+            if key in words
+            else settings_sentence({key: value}, meanings={})
+            for key, value in shown.items()
+        ),
+        by=", ",
+    )
+
+
+def _counted(words: str, value: BusValue) -> str:
+    """The words of a value, of one byte or node in the singular."""
+    return words.replace(" bytes", " byte").replace(" nodes", " node") if value == 1 else words
+
+
+def _short_value(key: str, value: BusValue) -> ShownValue:
+    found = key_value(key, value)
+    return found._replace(unit=period_value(float(value)).unit) if key.endswith("_us") else found

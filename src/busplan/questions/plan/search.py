@@ -12,10 +12,8 @@ from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.questions.fit.circle_refusal import STEP
 from busplan.questions.fit.network import network_of
-from busplan.questions.plan.constraints import CIRCLE, Need, keeps_limits, most_asking, needs, refused_period
-from busplan.questions.plan.freedoms import PERIOD, RATIO, Freedom, longest_period_us
-from busplan.questions.plan.machine import Changes
-from busplan.questions.plan.short_numbers import MOST_RATIO
+from busplan.questions.plan.constraints import CIRCLE, Changes, Need, keeps_limits, most_asking, needs, refused_period
+from busplan.questions.plan.freedoms import MOST_RATIO, PERIOD, RATIO, Freedom, longest_period_us
 from busplan.sections.profile import Profile
 
 FindCircleFailures = Callable[[Profile], tuple[str, ...]]
@@ -90,8 +88,8 @@ class Search:
         kept = self._least(cheaper, changes)
         if kept is not None:
             return kept
-        for one in dearest.values(self, changes, cheaper):
-            found = None if self.kept & set(one) else self._least(cheaper, {**changes, **one})
+        for change in dearest.values(self, changes, cheaper):
+            found = None if self.kept & set(change) else self._least(cheaper, {**changes, **change})
             if found is not None:
                 return found
         return None
@@ -180,9 +178,9 @@ class Search:
         yield from self.combinations(changes, cheaper)
         if not last.gives_time:
             proven = self.proven
-            for one in last.values(self, changes, cheaper):
-                if not self.kept & set(one):
-                    yield from self.combinations({**changes, **one}, cheaper)
+            for change in last.values(self, changes, cheaper):
+                if not self.kept & set(change):
+                    yield from self.combinations({**changes, **change}, cheaper)
             self.proven = proven
 
     def furthest(self, changes: Changes, levels: Sequence[Freedom]) -> Changes:
@@ -198,21 +196,21 @@ class Search:
     def least_needed_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
         """The shortest period that gives all constraints what they ask, with some freedoms [us]."""
         ratio = self.most_ratio(changes, levels)
-        return min(self.needed_us(one, ratio=ratio) for one in self.combinations(changes, levels))
+        return min(self.needed_us(combination, ratio=ratio) for combination in self.combinations(changes, levels))
 
     def most_ratio(self, changes: Changes, levels: Sequence[Freedom]) -> float:
         """The largest slice ratio with some freedoms [1]."""
         own = self.ratio(changes)
-        return max(own, MOST_RATIO) if any(one.cost == Cost.HOST_TIME for one in levels) else own
+        return max(own, MOST_RATIO) if any(level.cost == Cost.HOST_TIME for level in levels) else own
 
     def most_period_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
         """The longest period with some freedoms [us]."""
-        is_free = any(one.cost == Cost.PERIOD for one in levels)
+        is_free = any(level.cost == Cost.PERIOD for level in levels)
         return longest_period_us(self._own) if is_free else self.period_us(changes)
 
     def is_bounded(self, levels: Sequence[Freedom]) -> bool:
         """Whether some freedoms have an end: no period is free, and no limit of the bus is broken."""
-        return all(one.cost != Cost.PERIOD for one in levels) and self.least_needed_us({}, levels) < inf
+        return all(level.cost != Cost.PERIOD for level in levels) and self.least_needed_us({}, levels) < inf
 
     def reaches(self, changes: Changes, levels: Sequence[Freedom]) -> bool:
         """Whether the bus fits with some freedoms, whatever its circle."""

@@ -1,15 +1,16 @@
-"""The smallest period at which a network is shown to fit, with every limit of its bus."""
+"""The smallest period that carries a machine, and the settings of a bus without which none does."""
 
 from math import inf
 from typing import Final, NamedTuple
 
 from busplan.buses.bus import Bus
+from busplan.buses.network import Network
 from busplan.elementwise import plain, within
 from busplan.forms.numbers import period
 from busplan.profile.toml import override
 from busplan.questions.fit.certainty import certainty
 from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.plan.constraints import Need, keeps_limits, most_asking, shown
+from busplan.questions.plan.constraints import Changes, Need, keeps_limits, most_asking, shown
 from busplan.questions.plan.freedoms import PERIOD, longest_period_us
 from busplan.sections.base import MIN_STEP_US
 from busplan.sections.profile import Profile
@@ -77,3 +78,29 @@ def _between(profile: Profile, short_us: float, long_us: float) -> float:
         else:
             short_us = middle_us
     return long_us
+
+
+def needed_settings(profile: Profile) -> Changes:
+    """The cheapest setting of the bus with which some slice carries the network, where none does now.
+
+    Parameters
+    ----------
+    profile
+        The network.
+
+    Returns
+    -------
+    dict
+        New value by dotted key; empty where none is needed, or none is enough.
+    """
+    network = network_of(profile)
+    if _is_carried(network):
+        return {}
+    each = sorted(bus_of(profile).settings(network), key=lambda setting: setting.cost)
+    changes = (dict(values) for setting in each for values in setting.values)
+    return next((one for one in changes if _is_carried(network_of(override(profile, dict(one))))), {})
+
+
+def _is_carried(network: Network) -> bool:
+    """Whether some period carries a network."""
+    return all(need.period_us(1.0) < inf for need in shown(network))

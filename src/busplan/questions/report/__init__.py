@@ -11,8 +11,7 @@ from busplan.printable import has_controls
 from busplan.profile.changes import NO_CHANGES
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several
-from busplan.questions.base.origin import Origin, origin_of
+from busplan.questions.base.inputs import Origin, ProfileLike, load_profile, one_or_several, origin_of
 from busplan.questions.report.all_answers import AllAnswers, answers_of_each
 from busplan.questions.report.page import ReportedProfile, page_report
 from busplan.questions.words.documents import changed_report
@@ -37,16 +36,16 @@ class ReportAnswer(Answer):
     @property
     def answers(self) -> tuple[AllAnswers, ...]:
         """All answers for each profile."""
-        return tuple(one.answer for one in self.profiles)
+        return tuple(profile.answer for profile in self.profiles)
 
     def report(self) -> Report:
         """The answer in blocks."""
         page, changes = page_report(self.profiles, title=self.title), self.profiles[0].changes
         # As on the command line, where all profiles have the same ones.
-        return changed_report(page, changes) if all(one.changes == changes for one in self.profiles) else page
+        return changed_report(page, changes) if all(profile.changes == changes for profile in self.profiles) else page
 
     def _headline(self) -> str:
-        return "; ".join(f"{one.profile.name}: {one.verdict.deciding.verdict}" for one in self.answers)
+        return "; ".join(f"{answer.profile.name}: {answer.verdict.deciding.verdict}" for answer in self.answers)
 
 
 def report(
@@ -98,9 +97,12 @@ def report(
         raise BusplanError(f"title {title!r}: expected words in one line, without control characters")
     # A profile is iterable, too: over its sections.
     given = [profiles] if isinstance(profiles, Profile) else one_or_several(profiles, name="profiles")
-    loaded = [load_profile(one) for one in given]
+    loaded = [load_profile(profile) for profile in given]
     if origins is None:
-        origins = [origin_of(one) if isinstance(one, Profile) else (os.fspath(one), NO_CHANGES) for one in given]
+        origins = [
+            origin_of(profile) if isinstance(profile, Profile) else (os.fspath(profile), NO_CHANGES)
+            for profile in given
+        ]
     named = list(origins)
     if len(named) != len(given):
         raise BusplanError(f"origins: {len(named)} for {plural(len(given), 'profile')}; expected one for each")

@@ -7,8 +7,8 @@ from busplan.errors import BusplanError
 from busplan.progress import Progress, part_of
 from busplan.questions.capacity.sensitivity import Sensitivity, sensitivity
 from busplan.questions.capacity.verdict import Verdict, verdicts
-from busplan.questions.circle.contour_profile import ContourProfile, drawn_profile
-from busplan.questions.circle.record import CircleFigures, CircleTest
+from busplan.questions.circle.contour import ContourProfile, drawn_profile
+from busplan.questions.circle.figures import CircleFigures, CircleTest
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.explain.derivation import assumptions
 from busplan.questions.fit.circle_refusal import circle_refusals
@@ -72,7 +72,7 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
     bus = capacity(profile)
     own_us = profile.cycle.period_us
     near_us = (own_us * factor for factor in _PERIOD_FACTORS if MIN_STEP_US <= own_us * factor <= MAX_TIME_US)
-    periods_us = [one for one in near_us if one == own_us or bus_of(profile).periods.knows(one)]
+    periods_us = [us for us in near_us if us == own_us or bus_of(profile).periods.knows(us)]
     plan, no_schedule = _schedule(profile)
     no_circle = tuple(cause.message for cause in circle_refusals(profile))
     is_run = with_circle and profile.asks_for_circle and not no_circle

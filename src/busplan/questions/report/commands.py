@@ -2,7 +2,7 @@
 
 import os
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from busplan.forms.blocks import Command, JsonDocument
@@ -12,7 +12,7 @@ from busplan.questions.capacity.report import capacity_document
 from busplan.questions.capacity.sensitivity_report import sensitivity_document
 from busplan.questions.capacity.verdict import verdicts
 from busplan.questions.circle.report import circle_document
-from busplan.questions.explain.assumptions import assumptions_document
+from busplan.questions.explain.report import assumptions_document
 from busplan.questions.latency.report import latency_document
 from busplan.questions.map.report import map_document
 from busplan.questions.report.all_answers import AllAnswers
@@ -24,7 +24,8 @@ class Source(NamedTuple):
     """A command and the JSON document that it writes."""
 
     command: Command
-    document: JsonDocument
+    document: Callable[[], JsonDocument]
+    """Computed when it is asked for: it has figures that no page shows."""
 
     @property
     def line(self) -> Command:
@@ -71,8 +72,8 @@ def period_option(period_us: float) -> tuple[str, str]:
 
 def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
     """Options of the changes, quoted for a shell; --period with the profile's period [us]."""
-    for one in changes.each:
-        yield from period_option(period_us) if one.option == "--period" else (one.option, shell_word(one.text))
+    for change in changes.each:
+        yield from period_option(period_us) if change.option == "--period" else (change.option, shell_word(change.text))
 
 
 def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[str, Source]:
@@ -87,29 +88,44 @@ def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[s
     changes
         KeyChanges of its file, which the commands repeat.
     """
-    each = tuple(word for (one, *_) in answer.periods.periods for word in period_option(one.period_us))
     found: dict[str, Source] = {}
 
-    def add(name: str, purpose: str, document: JsonDocument, *options: str, own: KeyChanges = changes) -> None:
+    def add(
+        name: str,
+        purpose: str,
+        document: Callable[[], JsonDocument],
+        *options: str,
+        command: str | None = None,
+        own: KeyChanges = changes,
+    ) -> None:
         changed = change_options(own, period_us=answer.profile.cycle.period_us)
-        words = ("busplan", str(document["command"]), shell_word(argument), *options, *changed, "--format", "json")
-        line = " ".join(words)
-        found[name] = Source(Command(line, purpose), changed_document(document, own))
+        words = ("busplan", command or name, shell_word(argument), *options, *changed, "--format", "json")
+        found[name] = Source(Command(" ".join(words), purpose), lambda: changed_document(document(), own))
 
     # Neither latency nor the list of explain takes --period.
     elsewhere = KeyChanges(tuple(one for one in changes.each if one.option != "--period"))
-    bus, periods = answer.capacity, answer.periods
-    document = sensitivity_document(bus, (answer.verdict,), (answer.sensitivity,))
-    add("capacity", "verdict, timing models, terms, what moves the margin", document, "--sensitivity")
-    add("latency", "latencies, part by part", latency_document(answer.latency), own=elsewhere)
-    if answer.schedule is not None:
-        add("timeline", "the cycle event by event", timeline_document(answer.schedule))
-    others = changes.without(key="cycle.period_us")
-    add("axes", "axes against period", capacity_document(periods, verdicts(periods)), *each, own=others)
-    add("map", "period against axes, cell by cell", map_document(answer.trade_off))
-    if answer.circle is not None:
-        document = circle_document(answer.circle)
-        add("circle", "the circle and its error sources", document, "--contributions")
-    document = assumptions_document(answer.profile, answer.assumptions)
-    add("explain", "what the figures rest on", document, own=elsewhere)
+    add(
+        "capacity",
+        "verdict, timing models, terms, what moves the margin",
+        lambda: sensitivity_document(answer.capacity, (answer.verdict,), (answer.sensitivity,)),
+        "--sensitivity",
+    )
+    add("latency", "latencies, part by part", lambda: latency_document(answer.latency), own=elsewhere)
+    schedule, circle = answer.schedule, answer.circle
+    if schedule is not None:
+        add("timeline", "the cycle event by event", lambda: timeline_document(schedule))
+    add(
+        "axes",
+        "axes against period",
+        lambda: capacity_document(answer.periods, verdicts(answer.periods)),
+        *(word for (figures, *_) in answer.periods.periods for word in period_option(figures.period_us)),
+        command="capacity",
+        own=changes.without(key="cycle.period_us"),
+    )
+    add("map", "period against axes, cell by cell", lambda: map_document(answer.trade_off))
+    if circle is not None:
+        purpose = "the circle and its error sources"
+        add("circle", purpose, lambda: circle_document(circle), "--contributions", command="circle-test")
+    assumptions = answer.assumptions
+    add("explain", "what the figures rest on", lambda: assumptions_document(answer.profile, assumptions), own=elsewhere)
     return found

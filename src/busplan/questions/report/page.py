@@ -36,22 +36,18 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import MISSING, plural
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
-from busplan.questions.circle.sentences import verdict_words
-from busplan.questions.explain.assumptions import assumptions_table
+from busplan.questions.circle.report import verdict_words
+from busplan.questions.explain.report import assumptions_table
 from busplan.questions.fit.assumed import heavy_assumptions
 from busplan.questions.fit.network import bus_of
 from busplan.questions.report.all_answers import AllAnswers
-from busplan.questions.report.bus import (
-    axes_part,
-    bus_question,
-    map_part,
-    models_part,
-    sensitivity_part,
-    terms_part,
-    timeline_part,
-)
-from busplan.questions.report.circle import circle_part, circle_question, sources_part
 from busplan.questions.report.commands import Sources, shell_word, sources
+from busplan.questions.report.parts import (
+    bus_question,
+    circle_question,
+    part,
+    parts,
+)
 from busplan.questions.words.documents import document
 
 _MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
@@ -114,8 +110,8 @@ def _document(subjects: Sequence[_Subject]) -> JsonDocument:
     return document(
         "report",
         profiles=[
-            {"profile": one.name, "answers": {name: source.document for name, source in one.sources.items()}}
-            for one in subjects
+            {"profile": subject.name, "answers": {name: source.document() for name, source in subject.sources.items()}}
+            for subject in subjects
         ],
     )
 
@@ -125,8 +121,8 @@ def _blocks(subjects: Sequence[_Subject]) -> Iterator[Block]:
         yield from _chapter(subjects[0])
         return
     yield Chapter(Sentence(("Comparison",)), (_comparison(subjects),), "comparison", "comparison")
-    for one in subjects:
-        yield Chapter(Sentence((Code(one.name),)), tuple(_chapter(one)), key=one.key)
+    for subject in subjects:
+        yield Chapter(Sentence((Code(subject.name),)), tuple(_chapter(subject)), key=subject.key)
 
 
 def _chapter(subject: _Subject) -> Iterator[Block]:
@@ -139,19 +135,10 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     if answer.no_circle:
         questions = questions[::-1]  # the cause first
     lines = (found[name].line for name in ("capacity", "circle") if name in found)
-    yield Chapter(Sentence(("Verdict",)), (*_assumed(answer), *questions, *lines), "verdict")
-    yield models_part(answer, found)
-    yield timeline_part(answer, found)
-    yield terms_part(answer, found)
-    yield sensitivity_part(answer, found)
-    yield axes_part(answer, found)
-    yield map_part(answer, found)
-    yield circle_part(answer, found)
-    ranked = sources_part(answer, found)
-    if ranked is not None:
-        yield ranked
+    yield part("verdict", "Verdict", (*_assumed(answer), *questions, *lines))
+    yield from parts(answer, found)
     assumptions = (assumptions_table(answer.assumptions), found["explain"].line)
-    yield Chapter(Sentence(("What it rests on",)), assumptions, "assumptions")
+    yield part("assumptions", "What it rests on", assumptions)
     yield _commands(found)
 
 
@@ -162,8 +149,8 @@ _MOST_NAMED: Final = 6
 def _assumed(answer: AllAnswers) -> Iterator[Sentence]:
     """Say which keys of the profile are assumed, before any figure that rests on them; those that carry most first."""
     heavy = heavy_assumptions(answer.verdict.deciding, answer.profile)
-    names = [one.name for one in answer.assumptions if one.grade == "assumed" and "." in one.name]
-    names.sort(key=lambda name: not any(one.covers(name) for one in heavy))
+    names = [given.name for given in answer.assumptions if given.grade == "assumed" and "." in given.name]
+    names.sort(key=lambda name: not any(assumption.covers(name) for assumption in heavy))
     if names:
         parts = [part for name in names[:_MOST_NAMED] for part in (Code(name), ", ")][:-1]
         more = len(names) - _MOST_NAMED
@@ -175,7 +162,7 @@ def _assumed(answer: AllAnswers) -> Iterator[Sentence]:
 def _facts(subject: _Subject) -> Facts:
     """Settings of the bus, and the PROFILE argument."""
     bus, figures = bus_of(subject.answer.profile), subject.answer.capacity.results[0]
-    setup = (one for one in bus.figures.setup if one.key in bus.figures.headings)
+    setup = (figure for figure in bus.figures.setup if figure.key in bus.figures.headings)
 
     def item(name: str, figure: Figure) -> tuple[str, ShownValue]:
         unit = "us" if figure.unit == "us" else ""
@@ -192,12 +179,12 @@ def _facts(subject: _Subject) -> Facts:
     )
 
 
-def _commands(found: Sources) -> Chapter:
+def _commands(sources: Sources) -> Chapter:
     columns = (TableColumn("what", kind="words"), TableColumn("command", kind="words"))
-    rows = tuple(TableRow((source.command.purpose, source.command)) for source in found.values())
+    rows = tuple(TableRow((source.command.purpose, source.command)) for source in sources.values())
     line = "The JSON document of one of these commands has each figure above, with all its digits."
     table = Table(columns, rows, Sentence(("Commands",)), stacks=True)
-    return Chapter(Sentence(("How to get every figure again",)), (Sentence((line,)), table), "commands")
+    return part("commands", "How to get every figure again", (Sentence((line,)), table))
 
 
 def _comparison(subjects: Sequence[_Subject]) -> Table:
@@ -214,7 +201,7 @@ def _comparison(subjects: Sequence[_Subject]) -> Table:
         *(TableColumn(CIRCLE_BY_KEY[key].symbol, group="contour error, um") for key in _MEASURES),
         TableColumn("circle", kind="words"),
     )
-    rows = tuple(TableRow(_compared(one)) for one in subjects)
+    rows = tuple(TableRow(_compared(subject)) for subject in subjects)
     return Table(columns, rows, Sentence(("All profiles, each under the timing model that decides",)))
 
 

@@ -22,12 +22,12 @@ from busplan.questions.base.inputs import Models, ProfileLike, checked_models, l
 from busplan.questions.sweep.asked import Sweep, checked_sweep
 from busplan.questions.sweep.blocks import Column, SweepBlock
 from busplan.questions.sweep.circle_run import sweep_blocks
+from busplan.questions.sweep.digest import Digest, default_columns
 from busplan.questions.sweep.execution import Here, Work, require_executor
 from busplan.questions.sweep.grid import Array, Grid
 from busplan.questions.sweep.plot import FigureData
-from busplan.questions.sweep.top import Digest, default_columns
+from busplan.questions.sweep.rows import rows_writer
 from busplan.questions.sweep.values import axis_values
-from busplan.questions.sweep.writers import rows_writer
 from busplan.sections.profile import Profile
 
 __all__ = [

@@ -16,15 +16,17 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Limit, Value
 from busplan.elementwise import Number
 from busplan.questions.fit.certainty import (
+    TIME,
     VERDICTS,
     certainty,
+    fits_in,
     limit_codes,
     limits_to_be_safe,
+    limits_with_time,
     time_code,
     verdict_code,
 )
 from busplan.questions.fit.circle_refusal import loop_refusals, run_refusals
-from busplan.questions.fit.cycle import TIME, fits_in, limits_with_time
 from busplan.questions.fit.figures import COUNTS, certainty_numbers, numeric_figures
 from busplan.questions.fit.loop_delays import acts_at_once
 from busplan.questions.fit.network import bus_of, network_of
@@ -41,8 +43,6 @@ _CAUSES_KEPT: Final = 1 << 16
 Word: TypeAlias = str | float | list[str] | None
 """What stands in a column that is no array of numbers: a word, a value of a key that also takes words, a list, or
 nothing."""
-Cell: TypeAlias = Word
-"""One figure of one row."""
 
 _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
 
@@ -90,13 +90,13 @@ class SweepBlock(NamedTuple):
         """One column under each timing model."""
         return [(self.varied if name in self.varied else figures)[name] for figures in self.models]
 
-    def row(self, index: int, names: Sequence[str]) -> dict[str, Cell]:
+    def row(self, index: int, names: Sequence[str]) -> dict[str, Word]:
         """One row, by its index in `rows`: a point under one timing model."""
         point, model = divmod(index, len(self.models))
         where = np.unravel_index(point, self.chunk.shape)
         return {name: self._value(self.columns(name)[model], where) for name in names}
 
-    def _value(self, column: Column, where: tuple[np.intp, ...]) -> Cell:
+    def _value(self, column: Column, where: tuple[np.intp, ...]) -> Word:
         found: float = np.broadcast_to(column.values, self.chunk.shape)[where].item()
         return found if column.words is None else column.words[int(found)]
 

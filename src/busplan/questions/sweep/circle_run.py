@@ -5,7 +5,7 @@ from itertools import groupby, islice
 from typing import Final
 
 from busplan.progress import Progress
-from busplan.questions.circle.estimate import NOTHING, Estimate, announce
+from busplan.questions.circle.setup import NOTHING, Estimate, announce
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import CHUNK_POINTS, SweepBlock, sweep
 from busplan.questions.sweep.circles import (

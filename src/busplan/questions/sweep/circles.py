@@ -8,10 +8,9 @@ import numpy as np
 
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
-from busplan.questions.circle.estimate import NOTHING, Estimate, estimate
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.circle.setup import bus, setup
+from busplan.questions.circle.setup import NOTHING, Estimate, bus, estimate, setup
 from busplan.questions.fit.circle_refusal import require_circle
 from busplan.questions.sweep.blocks import Column, SweepBlock
 from busplan.questions.sweep.grid import Array, Grid

@@ -11,9 +11,8 @@ from busplan.forms.picture import styled
 from busplan.forms.plot_area import MARGIN_PERCENT, PlotArea, Ruler, choices, draw_across, draw_plot_area, numbers
 from busplan.forms.svg import LINE, PHONE, drawing, inside, markup, paragraph, text_at
 from busplan.questions.sweep.grid import Array
-from busplan.questions.sweep.scales import PlotScale
-from busplan.questions.sweep.words import Panel, Plotted, caption
-from busplan.questions.words.axes import CURVES, draw_mark
+from busplan.questions.sweep.plotted import Panel, PlotScale, Plotted, caption
+from busplan.questions.words.drawings import CURVES, draw_mark
 
 _CURVES: Final = 300
 """Height of curves, in px."""

@@ -10,8 +10,7 @@ from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import SweepBlock
 from busplan.questions.sweep.grid import Grid
 from busplan.questions.sweep.panels import sweep_svg
-from busplan.questions.sweep.scales import key_label, plot_scale, plotted_figure
-from busplan.questions.sweep.words import Panel, Plotted
+from busplan.questions.sweep.plotted import Panel, Plotted, key_label, plot_scale, plotted_figure
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from types import MappingProxyType
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from busplan.forms import RowsForm
 from busplan.forms.blocks import JsonDocument
 from busplan.forms.csv_rows import csv_cell
 from busplan.printable import json_text
@@ -136,3 +137,35 @@ def _texts(column: Column, front: str, *, is_json: bool) -> Array:
             missing = "null" if is_json else ""
             texts = [missing if text == "nan" else text for text in texts]
     return np.array([front + text for text in texts] if front else texts, dtype=object).reshape(values.shape)
+
+
+class RowsWriter(Protocol):
+    """Writes the rows of a sweep; nothing before the first block, for a point may be refused."""
+
+    points: int
+    """Good size of a block."""
+
+    def add(self, block: SweepBlock) -> None:
+        """Write a block; blocks come in the order of the grid."""
+
+    def finish(self, *, complete: bool) -> None:
+        """Write what stands behind the rows: the file is valid, and says if it is not complete."""
+
+
+def rows_writer(form: RowsForm, sweep: Sweep, write: Callable[[bytes], object]) -> RowsWriter:
+    """Make the writer of a form.
+
+    Parameters
+    ----------
+    form
+        The form.
+    sweep
+        What the rows are of.
+    write
+        Writes bytes to the destination.
+    """
+    if form != "parquet":
+        return TextWriter(form, sweep, write)
+    from busplan.questions.sweep.parquet import ParquetWriter
+
+    return ParquetWriter(sweep, write)

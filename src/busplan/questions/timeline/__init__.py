@@ -5,7 +5,7 @@ from typing import Final
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole
 from busplan.questions.fit.network import bus_of, network_of
@@ -87,7 +87,7 @@ def timeline(
     --------
     >>> import busplan
     >>> answer = busplan.timeline("paper-4ms", transaction=("read", 1))
-    >>> [(one.kind, round(one.duration_us, 3)) for one in answer.events][1:4]
+    >>> [(event.kind, round(event.duration_us, 3)) for event in answer.events][1:4]
     [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.733)]
     """
     network = load_profile(profile)
@@ -113,7 +113,7 @@ def _transaction(asked: object, profile: Profile) -> tuple[str, int]:
             text = f"{kind}:{node}"
         case _:
             raise BusplanError(f'transaction {asked!r}: expected one of one node, as ("read", 1)')
-    kinds, nodes = [one.key for one in bus_of(profile).stretch_kinds], int(network_of(profile).nodes)
+    kinds, nodes = [kind.key for kind in bus_of(profile).stretch_kinds], int(network_of(profile).nodes)
     if kind in kinds and 1 <= node <= nodes:
         return kind, node
     expected = f"{' or '.join(kinds)} and a node from 1 to {nodes}" if kinds else "none: this bus has no transactions"

@@ -4,18 +4,17 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from busplan.buses.parts import IDLE
-from busplan.forms.legend import legend_lines
-from busplan.forms.lines import BLANK, Line
+from busplan.forms.lines import BLANK, Line, legend_lines
 from busplan.forms.scale import ticks
 from busplan.questions.fit.network import bus_of
 from busplan.questions.timeline.events import Event, Schedule
-from busplan.questions.timeline.kinds import kind_of
 from busplan.questions.timeline.lanes import (
     Lane,
     beyond,
     drawn_window,
     event_lanes,
     has_event_lanes,
+    kind_of,
     node_lanes,
     only_owner,
     overruns,
@@ -43,50 +42,50 @@ _WINDOW: Final = "^"
 _PERIOD_MARKS: Final = {NEEDED: "#", LEFT: ".", BEYOND: _OVER, REST: "-"}
 
 
-def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
+def timeline_lines(schedule: Schedule, *, width: int) -> list[Line]:
     """Draw the whole period as a strip, what each timing model leaves of the slice, and the window in lanes.
 
     Parameters
     ----------
-    plan
-        The schedule, narrowed to its window.
+    schedule
+        The cycle, narrowed to its window.
     width
         Width of the drawing, in columns.
     """
     width = max(width, NARROWEST)
-    window = drawn_window(plan)
+    window = drawn_window(schedule)
     lanes = _event_rows(window, width=width) if has_event_lanes(window) else _node_rows(window, width=width)
-    return [*_strip(plan, width=width), BLANK, *lanes]
+    return [*_strip(schedule, width=width), BLANK, *lanes]
 
 
-def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
+def _strip(schedule: Schedule, *, width: int) -> Iterator[Line]:
     """The whole period in one row, transaction by transaction, the time beyond its slice, and a row for each model."""
-    parts, behind, bars = stretches(plan.cycle_events), rest(plan), model_bars(plan)
-    styles = {one.kind: kind_of(plan.profile, one.kind) for one in parts}
-    rows = {"cycle": [(styles[one.kind].mark, one.event) for one in parts]}
+    parts, behind, bars = stretches(schedule.cycle_events), rest(schedule), model_bars(schedule)
+    styles = {part.kind: kind_of(schedule.profile, part.kind) for part in parts}
+    rows = {"cycle": [(styles[part.kind].mark, part.event) for part in parts]}
     legend = [f"{style.mark} {style.label}" for style in styles.values()]
     if behind is not None:
         rows["cycle"].append((_PERIOD_MARKS[REST], behind))
-    for one in bars:
-        rows[one.timing_model] = [(_PERIOD_MARKS[part.label], _event(plan, part)) for part in one.spans]
-    shown = {part.label for one in bars for part in one.spans}
-    if overruns(plan):
-        rows["over"] = [(_OVER, beyond(plan))]
+    for bar in bars:
+        rows[bar.timing_model] = [(_PERIOD_MARKS[part.label], _event(schedule, part)) for part in bar.spans]
+    shown = {part.label for bar in bars for part in bar.spans}
+    if overruns(schedule):
+        rows["over"] = [(_OVER, beyond(schedule))]
     legend += [f"{mark} {label}" for label, mark in _PERIOD_MARKS.items() if label in shown]
-    if not plan.is_whole:
-        rows["window"] = [(_WINDOW, _event(plan, PeriodPart("", plan.from_us, plan.to_us)))]
+    if not schedule.is_whole:
+        rows["window"] = [(_WINDOW, _event(schedule, PeriodPart("", schedule.from_us, schedule.to_us)))]
         legend.append(f"{_WINDOW} shown below")
     gutter = max(map(len, rows))
-    bar = _Bar(0.0, period_end_us(plan, bars), width - gutter - 3)
-    yield Line(f"{period_title(plan)}, {bar.per_column}", "heading")
+    scale = _Bar(0.0, period_end_us(schedule, bars), width - gutter - 3)
+    yield Line(f"{period_title(schedule)}, {scale.per_column}", "heading")
     for label, row in rows.items():
-        yield Line(f"{label:<{gutter}} |{bar.cells(row)}|", "fails" if label == "over" else "drawn")
-    yield bar.scale(gutter + 2)
+        yield Line(f"{label:<{gutter}} |{scale.cells(row)}|", "fails" if label == "over" else "drawn")
+    yield scale.scale(gutter + 2)
     yield from legend_lines(legend, width=width)
 
 
-def _event(plan: Schedule, part: PeriodPart) -> Event:
-    return plan.cycle_events[0]._replace(start_us=part.start_us, end_us=part.end_us)
+def _event(schedule: Schedule, part: PeriodPart) -> Event:
+    return schedule.cycle_events[0]._replace(start_us=part.start_us, end_us=part.end_us)
 
 
 def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:

@@ -1,7 +1,7 @@
 """One communication cycle as a schedule: each event begins where the one before it ends.
 
-This is an independent way to the time that a cycle needs: `capacity` has a closed form, here the events of the bus are
-added one by one, and the end of the last one must be the same.
+`capacity` counts the events of the cycle by runs; here they are laid out and added one by one, and the end of the last
+one must be the same.
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,8 +12,9 @@ from typing import Final, NamedTuple
 from busplan.buses.cycle import BusEvent
 from busplan.buses.figure import Figure
 from busplan.buses.parts import IDLE
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.fit.certainty import cycle_of, fits_in
 from busplan.questions.fit.figures import CapacityFigures, figures
 from busplan.questions.fit.network import bus_of, leading_model, network_of
 from busplan.sections.profile import Profile
@@ -124,10 +125,10 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> plan = schedule(load("paper-two-node").profile)
-    >>> [event.kind for event in plan.events][2:5]
+    >>> cycle = schedule(load("paper-two-node").profile)
+    >>> [event.kind for event in cycle.events][2:5]
     ['request_data', 'acknowledge', 'execution']
-    >>> abs(plan.used_us - plan.figures.required_us) < 1e-9
+    >>> abs(cycle.used_us - cycle.figures.required_us) < 1e-9
     True
     """
     network, bus = network_of(profile), bus_of(profile)
@@ -150,7 +151,7 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
 
 
 def zoom(
-    plan: Schedule,
+    laid_out: Schedule,
     *,
     from_us: float | None = None,
     to_us: float | None = None,
@@ -160,7 +161,7 @@ def zoom(
 
     Parameters
     ----------
-    plan
+    laid_out
         The schedule.
     from_us, to_us
         Start and end of the window, from the start of the cycle [us]; by default the schedule's own.
@@ -172,11 +173,11 @@ def zoom(
     BusplanError
         The window is empty.
     """
-    start_us = max(plan.from_us, plan.from_us if from_us is None else from_us)
-    end_us = min(plan.to_us, plan.to_us if to_us is None else to_us)
-    span = f"the cycle runs from 0 to {plan.end_us:.12g} us"
+    start_us = max(laid_out.from_us, laid_out.from_us if from_us is None else from_us)
+    end_us = min(laid_out.to_us, laid_out.to_us if to_us is None else to_us)
+    span = f"the cycle runs from 0 to {laid_out.end_us:.12g} us"
     if transaction is not None:
-        own = [event for event in plan.cycle_events if (event.transaction, event.node) == transaction]
+        own = [event for event in laid_out.cycle_events if (event.transaction, event.node) == transaction]
         if not own:
             raise BusplanError(f"{transaction[0]}:{transaction[1]}: no such transaction in this cycle")
         start_us, end_us = max(start_us, own[0].start_us), min(end_us, own[-1].end_us)
@@ -187,15 +188,15 @@ def zoom(
             f"{word} {value:.12g} us" for word, value in (("from", from_us), ("to", to_us)) if value is not None
         )
         raise BusplanError(f"the window {shown} shows nothing: {span}")
-    return plan._replace(from_us=start_us, to_us=end_us)
+    return laid_out._replace(from_us=start_us, to_us=end_us)
 
 
-def totals(plan: Schedule) -> tuple[Total, ...]:
+def totals(laid_out: Schedule) -> tuple[Total, ...]:
     """Sum the events of a window by kind, in order of first appearance."""
     sums: dict[str, list[float]] = {}
-    for event in plan.events:
+    for event in laid_out.events:
         sums.setdefault(event.kind, []).append(event.duration_us)
-    window_us = plan.to_us - plan.from_us
+    window_us = laid_out.to_us - laid_out.from_us
     return tuple(Total(kind, len(parts), fsum(parts), fsum(parts) / window_us) for kind, parts in sums.items())
 
 
@@ -205,11 +206,12 @@ def _laid_out(parts: Iterable[BusEvent]) -> Iterator[Event]:
     Compensated summation (Neumaier) keeps rounding from growing with the number of events.
     """
     total_us = lost_us = start_us = 0.0
-    for one in parts:
-        larger_us, smaller_us = max(total_us, one.us), min(total_us, one.us)
+    for part in parts:
+        us = plain(part.us)
+        larger_us, smaller_us = max(total_us, us), min(total_us, us)
         total_us = larger_us + smaller_us
         lost_us += (larger_us - total_us) + smaller_us
         end_us = total_us + lost_us
         if end_us > start_us:
-            yield Event(one.kind, one.node, one.transaction, one.packet, start_us, end_us, one.term, one.label)
+            yield Event(part.kind, part.node, part.transaction, part.packet, start_us, end_us, part.term, part.label)
             start_us = end_us

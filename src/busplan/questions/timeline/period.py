@@ -26,7 +26,7 @@ class PeriodPart(NamedTuple):
 
 
 class ModelBar(NamedTuple):
-    """What one timing model needs of the slice."""
+    """Time of the slice that a timing model needs."""
 
     timing_model: str
     figures: CapacityFigures
@@ -51,37 +51,38 @@ class ModelBar(NamedTuple):
             yield PeriodPart(REST, used_us, self.figures.period_us)
 
 
-def model_bars(plan: Schedule) -> tuple[ModelBar, ...]:
-    """What each timing model that can express the profile needs of its slice.
+def model_bars(schedule: Schedule) -> tuple[ModelBar, ...]:
+    """Time of the slice that each timing model needs which can express the profile.
 
     Parameters
     ----------
-    plan
-        The schedule, under one of them.
+    schedule
+        The cycle, under one of them.
     """
-    drawn = plan.figures
+    drawn = schedule.figures
     return tuple(
-        ModelBar(model, drawn if model == drawn.timing_model else figures(plan.profile, model=model))
-        for model in model_names(plan.profile)
+        ModelBar(model, drawn if model == drawn.timing_model else figures(schedule.profile, model=model))
+        for model in model_names(schedule.profile)
     )
 
 
-def period_end_us(plan: Schedule, bars: tuple[ModelBar, ...]) -> float:
+def period_end_us(schedule: Schedule, bars: tuple[ModelBar, ...]) -> float:
     """End of the period, or of a cycle that takes longer [us]."""
-    return max(plan.figures.period_us, plan.end_us, *(one.figures.required_us for one in bars))
+    return max(schedule.figures.period_us, schedule.end_us, *(bar.figures.required_us for bar in bars))
 
 
-def rest(plan: Schedule) -> Event | None:
+def rest(schedule: Schedule) -> Event | None:
     """The part of the period behind slice and cycle; None if there is none."""
-    if plan.end_us >= plan.figures.period_us:
+    if schedule.end_us >= schedule.figures.period_us:
         return None
-    return plan.cycle_events[-1]._replace(start_us=plan.end_us, end_us=plan.figures.period_us)
+    return schedule.cycle_events[-1]._replace(start_us=schedule.end_us, end_us=schedule.figures.period_us)
 
 
-def period_title(plan: Schedule) -> str:
+def period_title(schedule: Schedule) -> str:
     """Title of the strip above the lanes."""
-    figures = plan.figures
+    figures = schedule.figures
     period, slice_ = time_text(figures.period_us), time_text(figures.available_us)
-    if overruns(plan):
-        return f"The period of {period} us: its cycle of {time_text(plan.end_us)} us is beyond its slice of {slice_} us"
+    if overruns(schedule):
+        cycle = time_text(schedule.end_us)
+        return f"The period of {period} us: its cycle of {cycle} us is beyond its slice of {slice_} us"
     return f"The period of {period} us and its slice of {slice_} us"

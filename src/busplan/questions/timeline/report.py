@@ -11,6 +11,7 @@ from busplan.forms.blocks import (
     Chart,
     Code,
     JsonDocument,
+    OwnPicture,
     Part,
     Record,
     Report,
@@ -26,49 +27,46 @@ from busplan.forms.blocks import (
     sentence,
     state_of,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import period_value
+from busplan.forms.numbers import period_value, sentence_text
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.network import bus_of
 from busplan.questions.timeline.characters import timeline_lines
 from busplan.questions.timeline.events import EVENTS, SHARE, TOTAL, Schedule, Total, totals
-from busplan.questions.timeline.kinds import kind_of
-from busplan.questions.timeline.lanes import charged, drawn_window, overruns
+from busplan.questions.timeline.lanes import charged, drawn_window, kind_of, overruns
 from busplan.questions.timeline.period import model_bars
 from busplan.questions.timeline.svg import STYLE, is_coarse, timeline_svg
 from busplan.questions.words.documents import document
-from busplan.questions.words.own_picture import OwnPicture
 from busplan.questions.words.sentences import refused_circle, safety_record, story, warnings
 
 _TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
 
 
-def timeline_report(plan: Schedule) -> Report:
+def timeline_report(schedule: Schedule) -> Report:
     """Report of `timeline`."""
     return Report(
-        Sentence(("Timeline of ", Code(plan.profile.name))),
-        lambda: tuple(_blocks(plan)),
-        partial(timeline_document, plan),
-        partial(timeline_records, plan),
+        Sentence(("Timeline of ", Code(schedule.profile.name))),
+        lambda: tuple(_blocks(schedule)),
+        partial(timeline_document, schedule),
+        partial(timeline_records, schedule),
     )
 
 
-def _blocks(plan: Schedule) -> Iterator[Block]:
+def _blocks(schedule: Schedule) -> Iterator[Block]:
     """Whether the cycle fits, the cycle to scale, and the total of each kind of event."""
-    yield from refused_circle(plan.profile)
-    yield headline(plan)
-    yield from (Sentence((words,), "warns") for words in _warnings(plan))
-    yield margins_sentence(plan)
-    yield timeline_chart(plan)
-    yield totals_table(plan)
+    yield from refused_circle(schedule.profile)
+    yield headline(schedule)
+    yield from (Sentence((words,), "warns") for words in _warnings(schedule))
+    yield margins_sentence(schedule)
+    yield timeline_chart(schedule)
+    yield totals_table(schedule)
 
 
-def headline(plan: Schedule) -> Sentence:
+def headline(schedule: Schedule) -> Sentence:
     """Say what the cycle leaves of its slice under its timing model, and the verdict if this model decides."""
-    figures = plan.figures
+    figures = schedule.figures
     parts: tuple[Part, ...] = (
-        *(Code(plan.profile.name), " at ", period_value(figures.period_us), ": "),
-        *story(figures, plan.profile),
+        *(Code(schedule.profile.name), " at ", period_value(figures.period_us), ": "),
+        *story(figures, schedule.profile),
         f" by the {figures.timing_model} model",
     )
     if figures.verdict is None:
@@ -78,83 +76,83 @@ def headline(plan: Schedule) -> Sentence:
     return Sentence((*parts, "; verdict: ", verdict, "."), state)
 
 
-def timeline_chart(plan: Schedule) -> Chart:
+def timeline_chart(schedule: Schedule) -> Chart:
     """The cycle to scale.
 
     Parameters
     ----------
-    plan
-        The schedule, narrowed to its window.
+    schedule
+        The cycle, narrowed to its window.
     """
-    window = drawn_window(plan)
+    window = drawn_window(schedule)
     caption = joined(_most(window), charged(window), by="; ")
     legend = Sentence(("A bar is a whole transaction.",)) if is_coarse(window) else None
-    svg = partial(timeline_svg, plan, title=sentence_text(headline(plan)), inline=True)
-    picture = OwnPicture(svg, partial(timeline_lines, plan), stylesheet=STYLE)
+    svg = partial(timeline_svg, schedule, title=sentence_text(headline(schedule)), inline=True)
+    picture = OwnPicture(svg, partial(timeline_lines, schedule), stylesheet=STYLE)
     return Chart(picture, caption, legend)
 
 
 def _most(window: Schedule) -> Sentence:
     """Say what takes most of the window."""
     model = f"by the {window.figures.timing_model} model"
-    busy = [one for one in totals(window) if one.kind != IDLE.key]
+    busy = [each for each in totals(window) if each.kind != IDLE.key]
     if not busy:
         return Sentence((f"Nothing but idle time {model}",))
-    most = max(busy, key=lambda one: one.total_us)
+    most = max(busy, key=lambda each: each.total_us)
     label = kind_of(window.profile, most.kind).label
     taken = ShownValue(most.total_us, TOTAL.key, "us", TOTAL.decimals)
     return sentence(f"Mostly {label}, {{}} {model}", taken)
 
 
-def margins_sentence(plan: Schedule) -> Sentence:
+def margins_sentence(schedule: Schedule) -> Sentence:
     """Say what each timing model leaves of the slice."""
     margins = (
-        sentence(f"{{}} by the {one.timing_model} model", figure_value(MARGIN, one.figures.margin_us))
-        for one in model_bars(plan)
+        sentence(f"{{}} by the {bar.timing_model} model", figure_value(MARGIN, bar.figures.margin_us))
+        for bar in model_bars(schedule)
     )
     return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
 
 
-def totals_table(plan: Schedule) -> Table:
+def totals_table(schedule: Schedule) -> Table:
     """Total time of each kind of event in the window.
 
     Parameters
     ----------
-    plan
-        The schedule, narrowed to its window.
+    schedule
+        The cycle, narrowed to its window.
     """
-    whole = "the cycle" if overruns(plan) else "the slice"
-    part = whole if plan.is_whole else "the window"
+    whole = "the cycle" if overruns(schedule) else "the slice"
+    part = whole if schedule.is_whole else "the window"
     return Table(
         (
             *(TableColumn("kind", kind="words"), TableColumn("eq", kind="words", rank=1)),
             *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
-        tuple(_total_row(plan, one) for one in totals(plan)),
-        sentence(f"What takes {part}, {{}}", ShownValue(plan.to_us - plan.from_us, "duration_us", "us", 3)),
+        tuple(_total_row(schedule, each) for each in totals(schedule)),
+        sentence(f"What takes {part}, {{}}", ShownValue(schedule.to_us - schedule.from_us, "duration_us", "us", 3)),
     )
 
 
-def _total_row(plan: Schedule, one: Total) -> TableRow:
-    kind = kind_of(plan.profile, one.kind)
-    values = (attribute_value(figure, one) for figure in _TOTAL_FIGURES)
+def _total_row(schedule: Schedule, total: Total) -> TableRow:
+    kind = kind_of(schedule.profile, total.kind)
+    values = (attribute_value(figure, total) for figure in _TOTAL_FIGURES)
     return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 
-def _warnings(plan: Schedule) -> list[str]:
-    return warnings(plan.profile, nodes=plan.figures.nodes, most=0)
+def _warnings(schedule: Schedule) -> list[str]:
+    return warnings(schedule.profile, nodes=schedule.figures.nodes, most=0)
 
 
-def _facts(plan: Schedule) -> JsonDocument:
+def _facts(schedule: Schedule) -> JsonDocument:
     """The document without events: figures of the whole cycle, and the window."""
-    figures = plan.figures
+    figures = schedule.figures
     return document(
         "timeline",
-        profile=plan.profile.name,
+        profile=schedule.profile.name,
         timing_model=figures.timing_model,
         period_us=figures.period_us,
         nodes=figures.nodes,
-        **{key: getattr(figures, key) for key in bus_of(plan.profile).figures.headings},
+        **{key: getattr(figures, key) for key in bus_of(schedule.profile).figures.headings},
         required_us=figures.required_us,
         available_us=figures.available_us,
         margin_us=figures.margin_us,
@@ -163,30 +161,30 @@ def _facts(plan: Schedule) -> JsonDocument:
         fits=figures.fits,
         circle_refused_by=list(figures.circle_refused_by),
         verdict=figures.verdict,
-        **safety_record(figures, plan.profile),
-        warnings=_warnings(plan),
-        from_us=plan.from_us,
-        to_us=plan.to_us,
+        **safety_record(figures, schedule.profile),
+        warnings=_warnings(schedule),
+        from_us=schedule.from_us,
+        to_us=schedule.to_us,
     )
 
 
-def timeline_document(plan: Schedule) -> JsonDocument:
+def timeline_document(schedule: Schedule) -> JsonDocument:
     """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
     margins = [
-        {"timing_model": one.timing_model, REQUIRED.key: one.figures.required_us, MARGIN.key: one.figures.margin_us}
-        for one in model_bars(plan)
+        {"timing_model": bar.timing_model, REQUIRED.key: bar.figures.required_us, MARGIN.key: bar.figures.margin_us}
+        for bar in model_bars(schedule)
     ]
-    totals_ = [one._asdict() for one in totals(plan)]
-    return {**_facts(plan), "margins": margins, "events": _event_records(plan), "totals": totals_}
+    totals_ = [each._asdict() for each in totals(schedule)]
+    return {**_facts(schedule), "margins": margins, "events": _event_records(schedule), "totals": totals_}
 
 
-def timeline_records(plan: Schedule) -> list[Record]:
+def timeline_records(schedule: Schedule) -> list[Record]:
     """One row for each event, with profile and timing model in front."""
-    head = {"profile": plan.profile.name, "timing_model": plan.figures.timing_model}
-    return [{**head, **record} for record in _event_records(plan)]
+    head = {"profile": schedule.profile.name, "timing_model": schedule.figures.timing_model}
+    return [{**head, **record} for record in _event_records(schedule)]
 
 
-def _event_records(plan: Schedule) -> list[Record]:
+def _event_records(schedule: Schedule) -> list[Record]:
     """One row for each event of the window."""
     return [
         {
@@ -197,7 +195,7 @@ def _event_records(plan: Schedule) -> list[Record]:
             "start_us": event.start_us,
             "end_us": event.end_us,
             "duration_us": event.duration_us,
-            "equation": kind_of(plan.profile, event.kind).reference,
+            "equation": kind_of(schedule.profile, event.kind).reference,
         }
-        for event in plan.events
+        for event in schedule.events
     ]

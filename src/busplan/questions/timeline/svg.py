@@ -5,19 +5,19 @@ from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.forms.blocks import figure_value
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import figure_text
+from busplan.forms.numbers import figure_text, sentence_text
 from busplan.forms.picture import styled
 from busplan.forms.svg import LINE, PHONE, Scale, drawing, inside, markup, paragraph, text_at
 from busplan.questions.timeline.events import SHARE, Event, Schedule, totals
-from busplan.questions.timeline.kinds import event_title, kind_of
 from busplan.questions.timeline.lanes import (
     Stretch,
     beyond,
     charged,
     drawn_window,
     event_lanes,
+    event_title,
     has_event_lanes,
+    kind_of,
     node_lanes,
     only_owner,
     overruns,
@@ -57,32 +57,32 @@ STYLE: Final = """\
 """Rules of the drawing."""
 
 
-def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
+def timeline_svg(schedule: Schedule, *, title: str, inline: bool = False) -> str:
     """Draw the period as a strip, the margin of each timing model, the window in lanes, and a legend with totals.
 
     It fills the width of its container, from 320 px on.
 
     Parameters
     ----------
-    plan
-        The schedule, narrowed to its window.
+    schedule
+        The cycle, narrowed to its window.
     title
         Title: its message in a sentence.
     inline
         If True, leave out style sheet, verdict, subject and legend: the page has them.
     """
     root = drawing(title, css="chart timeline")
-    SubElement(root, "desc").text = sentence_text(subject(plan))
+    SubElement(root, "desc").text = sentence_text(subject(schedule))
     body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
-    window = drawn_window(plan)
-    height = 0 if inline else _above(body, plan, window, title=title) + _GAP
-    height = _strip(body, plan, window, y=height)
+    window = drawn_window(schedule)
+    height = 0 if inline else _above(body, schedule, window, title=title) + _GAP
+    height = _strip(body, schedule, window, y=height)
     if has_event_lanes(window):
         height = _event_lanes(body, window, y=height + _GAP)
     else:
         height = _node_lanes(body, window, y=height + _GAP, coarse=inline and is_coarse(window))
     if not inline:
-        height = _legend(body, plan, y=height + _GAP) + _GAP
+        height = _legend(body, schedule, y=height + _GAP) + _GAP
     root.set("height", str(height))
     return markup(root) if inline else styled(markup(root), css=STYLE)
 
@@ -92,53 +92,55 @@ def is_coarse(window: Schedule) -> bool:
     return len(window.events) > _MOST_BARS
 
 
-def _above(body: Element, plan: Schedule, window: Schedule, *, title: str) -> int:
+def _above(body: Element, schedule: Schedule, window: Schedule, *, title: str) -> int:
     """Draw the verdict and the subject as text, and return the y below them."""
-    height = paragraph(body, title, y=8, css="head" if plan.figures.fits else "head bad")
+    height = paragraph(body, title, y=8, css="head" if schedule.figures.fits else "head bad")
     return paragraph(body, sentence_text(charged(window)), y=height, css="small")
 
 
-def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
+def _strip(body: Element, schedule: Schedule, window: Schedule, *, y: int) -> int:
     """Draw the whole period as one bar, transaction by transaction, and one for each timing model."""
-    parts, bars, behind = stretches(plan.cycle_events), model_bars(plan), rest(plan)
-    y = _strip_legend(body, plan, parts, bars, y=paragraph(body, period_title(plan), y=y, css="head")) + 4
-    scale = Scale(0.0, period_end_us(plan, bars))
+    parts, bars, behind = stretches(schedule.cycle_events), model_bars(schedule), rest(schedule)
+    y = _strip_legend(body, schedule, parts, bars, y=paragraph(body, period_title(schedule), y=y, css="head")) + 4
+    scale = Scale(0.0, period_end_us(schedule, bars))
     if behind is not None:
         scale.rect(body, behind, y=y, height=_BAR, css="track", title=_tip(REST, behind))
-    if overruns(plan):
-        _over(body, plan, scale, y=y - 3, height=_BAR + 6)
-    _Bars(body, plan, scale).draw(plan.cycle_events, y=y, height=_BAR, coarse=True)
-    if window.from_us > 0 or window.to_us < plan.end_us:
-        shown_part = plan.cycle_events[0]._replace(start_us=window.from_us, end_us=window.to_us)
+    if overruns(schedule):
+        _over(body, schedule, scale, y=y - 3, height=_BAR + 6)
+    _Bars(body, schedule, scale).draw(schedule.cycle_events, y=y, height=_BAR, coarse=True)
+    if window.from_us > 0 or window.to_us < schedule.end_us:
+        shown_part = schedule.cycle_events[0]._replace(start_us=window.from_us, end_us=window.to_us)
         scale.rect(body, shown_part, y=y - 2, height=_BAR + 4, css="window", title=_tip("drawn below", shown_part))
     top, y, ends = y + _BAR, y + _BAR + 4, []
-    for one in bars:
-        y = _model(body, one, scale, y=y)
+    for bar in bars:
+        y = _model(body, bar, scale, y=y)
         ends.append(y)
-    if behind is not None or overruns(plan):
-        x = f"{scale.percent(plan.figures.available_us):.5g}%"
-        css = "edge" if overruns(plan) else "end"
+    if behind is not None or overruns(schedule):
+        x = f"{scale.percent(schedule.figures.available_us):.5g}%"
+        css = "edge" if overruns(schedule) else "end"
         # Not through the words between the bars.
-        for from_, to in ((top - _BAR - 3, top + 3), *((one - _THIN - 4, one) for one in ends)):
+        for from_, to in ((top - _BAR - 3, top + 3), *((end - _THIN - 4, end) for end in ends)):
             SubElement(body, "line", {"x1": x, "x2": x, "y1": str(from_), "y2": str(to), "class": css})
     return scale.marks(body, top=y, bottom=y)
 
 
-def _model(body: Element, one: ModelBar, scale: Scale, *, y: int) -> int:
+def _model(body: Element, bar: ModelBar, scale: Scale, *, y: int) -> int:
     """Draw what a timing model needs and leaves of the slice, and return the y below it."""
-    text_at(body, f"{one.timing_model}: {one.words}", x="0", y=y + 14, css="small")
-    for part in one.spans:
+    text_at(body, f"{bar.timing_model}: {bar.words}", x="0", y=y + 14, css="small")
+    for part in bar.spans:
         css = _PERIOD_CSS[part.label]
-        tip = f"{part.label} by the {one.timing_model} model, {time_text(part.end_us - part.start_us)} us"
+        tip = f"{part.label} by the {bar.timing_model} model, {time_text(part.end_us - part.start_us)} us"
         scale.rect(body, part, y=y + LINE, height=_THIN, css=css, title=tip)
     return y + LINE + _THIN + 2
 
 
-def _strip_legend(body: Element, plan: Schedule, parts: Iterable[Stretch], bars: Iterable[ModelBar], *, y: int) -> int:
+def _strip_legend(
+    body: Element, schedule: Schedule, parts: Iterable[Stretch], bars: Iterable[ModelBar], *, y: int
+) -> int:
     """Draw the colours of the strip and of the models, wrapped for a phone, and return the y below them."""
-    kinds = (kind_of(plan.profile, one.kind) for one in parts)
+    kinds = (kind_of(schedule.profile, part.kind) for part in parts)
     colours: dict[str, str] = {kind.label: kind.ink for kind in kinds}
-    colours |= {part.label: _PERIOD_CSS[part.label] for one in bars for part in one.spans}
+    colours |= {part.label: _PERIOD_CSS[part.label] for bar in bars for part in bar.spans}
     x = 0
     for label, css in colours.items():
         width = 30 + 7 * len(label)
@@ -150,15 +152,15 @@ def _strip_legend(body: Element, plan: Schedule, parts: Iterable[Stretch], bars:
     return y + LINE
 
 
-def _over(parent: Element, plan: Schedule, scale: Scale, *, y: int, height: int) -> None:
+def _over(parent: Element, schedule: Schedule, scale: Scale, *, y: int, height: int) -> None:
     """Shade the time beyond the slice, behind the bars."""
-    part = beyond(plan)
+    part = beyond(schedule)
     scale.rect(parent, part, y=y, height=height, css="over", title=_tip("beyond the slice", part))
 
 
-def _edge(parent: Element, plan: Schedule, scale: Scale, *, y: int, height: int) -> None:
+def _edge(parent: Element, schedule: Schedule, scale: Scale, *, y: int, height: int) -> None:
     """Draw the end of the slice as a line, in front of the bars."""
-    x = f"{scale.percent(plan.figures.available_us):.5g}%"
+    x = f"{scale.percent(schedule.figures.available_us):.5g}%"
     SubElement(parent, "line", {"x1": x, "x2": x, "y1": str(y), "y2": str(y + height), "class": "edge"})
 
 
@@ -170,7 +172,7 @@ class _Bars(NamedTuple):
     """Draws bars."""
 
     parent: Element
-    plan: Schedule
+    schedule: Schedule
     scale: Scale
 
     def draw(self, events: Sequence[Event], *, y: int, height: int, coarse: bool = False) -> None:
@@ -179,13 +181,13 @@ class _Bars(NamedTuple):
             for event in events:
                 self._bar(event.kind, event_title(event), event, y=y, height=height)
             return
-        for one in stretches(events):
-            label = kind_of(self.plan.profile, one.kind).label
-            owner = label if one.event.node is None else f"{one.kind} of node {one.event.node}"
-            self._bar(one.kind, owner, one.event, y=y, height=height)
+        for stretch in stretches(events):
+            label = kind_of(self.schedule.profile, stretch.kind).label
+            owner = label if stretch.event.node is None else f"{stretch.kind} of node {stretch.event.node}"
+            self._bar(stretch.kind, owner, stretch.event, y=y, height=height)
 
     def _bar(self, kind: str, title: str, event: Event, *, y: int, height: int) -> None:
-        css = kind_of(self.plan.profile, kind).ink
+        css = kind_of(self.schedule.profile, kind).ink
         self.scale.rect(self.parent, event, y=y, height=height, css=css, title=_tip(title, event))
 
 
@@ -235,16 +237,16 @@ def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
     return below
 
 
-def _legend(body: Element, plan: Schedule, *, y: int) -> int:
+def _legend(body: Element, schedule: Schedule, *, y: int) -> int:
     """Draw the meaning of each colour and its total, and return the y below them."""
     text_at(body, "kind", x="20", y=y + 15, css="head")
     text_at(body, "us", x="240", y=y + 15, css="head", anchor="end")
     text_at(body, "share, %", x="310", y=y + 15, css="head", anchor="end")
-    for one in totals(plan):
+    for total in totals(schedule):
         y += LINE
-        kind = kind_of(plan.profile, one.kind)
+        kind = kind_of(schedule.profile, total.kind)
         SubElement(body, "rect", {"class": kind.ink, "y": str(y + 4), "width": "12", "height": "12"})
         text_at(body, kind.label, x="20", y=y + 15)
-        text_at(body, time_text(one.total_us), x="240", y=y + 15, anchor="end")
-        text_at(body, figure_text(figure_value(SHARE, one.share)), x="310", y=y + 15, anchor="end")
+        text_at(body, time_text(total.total_us), x="240", y=y + 15, anchor="end")
+        text_at(body, figure_text(figure_value(SHARE, total.share)), x="310", y=y + 15, anchor="end")
     return y + LINE

@@ -1,37 +1,64 @@
-"""Sentences that several answers share: what refuses a circle, warns, is unknown or is not tested."""
+"""Sentences that several answers share: settings, what refuses a circle, warns, is unknown or is not tested."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from busplan.buses.figure import (
-    AVAILABLE,
-    MARGIN,
-    MARGIN_CORRECTED,
-    REQUIRED,
-    UNCERTAINTY,
-    UTILISATION,
-)
+from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, UNCERTAINTY, UTILISATION
+from busplan.buses.parts import Value as BusValue
 from busplan.buses.published import parts_tested
-from busplan.forms.blocks import (
-    Code,
-    Part,
-    Record,
-    Sentence,
-    ShownValue,
-    attribute_value,
-    joined,
-    sentence,
-)
+from busplan.forms.blocks import Code, Part, Record, Sentence, ShownValue, attribute_value, joined, sentence
 from busplan.forms.numbers import period_value
-from busplan.questions.fit.certainty import limits_behind
+from busplan.profile.write import value_text
+from busplan.questions.fit.certainty import TIME, limits_behind
 from busplan.questions.fit.circle_refusal import circle_refusals
-from busplan.questions.fit.cycle import TIME
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
     from busplan.buses.bus import Bus
+
+
+NewValues = Mapping[str, BusValue]
+"""New values of a profile by dotted key."""
+
+
+def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes: bool = True) -> Sentence:
+    """Write each key with its new value and its meaning.
+
+    Parameters
+    ----------
+    changes
+        The new values.
+    meanings
+        Note on a change, by key, for keys that need one.
+    quotes
+        If True, text values are quoted, as in a profile.
+    """
+    return joined(
+        *(
+            Sentence((f"{key} = ", *_part(key, value, quotes), f" ({meanings[key]})" if key in meanings else ""))
+            for key, value in changes.items()
+        ),
+        by=", ",
+    )
+
+
+def change_meanings(bus: "Bus") -> dict[str, str]:
+    """What a change of a key means on the machine, for keys that do not say so."""
+    return {name: key.meaning for name, key in bus.keys.items() if key.meaning}
+
+
+def key_value(key: str, value: object) -> ShownValue:
+    """The new value of one key, with its place in the JSON document."""
+    return ShownValue(value, key)
+
+
+def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
+    if isinstance(value, list):
+        return (value_text(value),)
+    found = key_value(key, value)
+    return ('"', found, '"') if quotes and isinstance(value, str) else (found,)
 
 
 def refused_circle(profile: Profile) -> Iterator[Sentence]:
@@ -84,8 +111,8 @@ def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterato
 def execution_grades(profile: Profile) -> str | None:
     """Grade of the execution time; where groups differ, each with the groups that have it. None without a grade."""
     names: dict[str, list[str]] = {}
-    for one in profile.alike_nodes:
-        names.setdefault(one.node.execution.grade or "without a grade", []).append(one.name)
+    for alike in profile.alike_nodes:
+        names.setdefault(alike.node.execution.grade or "without a grade", []).append(alike.name)
     if len(names) == 1:
         return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
     return ", ".join(f"{grade} of {' and '.join(each)}" for grade, each in names.items())
@@ -160,7 +187,7 @@ def margin_parts(figures: CapacityFigures) -> tuple[Part, ...]:
     figures
         Figures under the timing model that decides.
     """
-    margin, doubt = (attribute_value(one, figures) for one in (MARGIN_CORRECTED, UNCERTAINTY))
+    margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
 
 

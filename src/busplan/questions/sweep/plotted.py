@@ -1,0 +1,200 @@
+"""The figure that a sweep's picture shows: its scales, its values under each timing model, and its caption."""
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from busplan.buses.figure import NODES, PERIOD, Figure, unit_of
+from busplan.forms.blocks import ShownValue, figure_value
+from busplan.forms.numbers import SILENT_UNITS, factor_of, with_unit
+from busplan.profile.kinds import words_of
+from busplan.questions.fit.network import bus_of
+from busplan.questions.sweep.asked import column_figures
+from busplan.questions.sweep.grid import Array, Values
+from busplan.sections.base import value_at
+from busplan.sections.profile import Profile
+
+_DIGITS: Final = 4
+_NO_UNITS: Final = ("_per_s", "_mbit_s", "_mm_s")
+"""Ends of keys that a label keeps as they are."""
+
+
+class PlotScale(NamedTuple):
+    """One varied key along an axis."""
+
+    label: str
+    """What it is, with its unit."""
+    places: Array
+    """Where its values stand: the values themselves, or 0, 1, 2 and so on for choices."""
+    labels: tuple[str, ...]
+    """Names of choices; empty on a number line."""
+    are_whole: bool
+    """Whether all values are whole numbers."""
+    own: float | None
+    """Place of this design; None if it is not on the axis."""
+
+    @property
+    def are_choices(self) -> bool:
+        """Whether the values are choices that no number line joins."""
+        return bool(self.labels)
+
+
+def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> PlotScale:
+    """Make the scale of a key.
+
+    Words, and numbers of a key that takes words, too, such as a gap count, are choices; so are numbers that do not
+    ascend. Others stand on a number line.
+
+    Parameters
+    ----------
+    profile
+        The network: this design.
+    key
+        Dotted key.
+    axis
+        Its values.
+    as_cells
+        If True, numbers that are not evenly spaced are choices, too: cells of a map are equally wide.
+    """
+    values, own = axis.part(0, axis.size), value_at(profile, key)
+    are_words = values.dtype == object or bool(words_of(profile, key))
+    are_choices = are_words or not _on_a_line(values, evenly=as_cells)
+    whole = values.dtype != object and bool(np.equal(np.mod(values, 1), 0).all())
+    label = key_label(profile, key)
+    if not are_choices:
+        inside = isinstance(own, int | float) and values.min() <= own <= values.max()
+        return PlotScale(label, values, (), whole, float(own) if inside else None)
+    names = tuple(_name(one) for one in values.tolist())
+    place = names.index(_name(own)) if _name(own) in names else None
+    return PlotScale(label, np.arange(values.size), names, whole, place)
+
+
+def _on_a_line(values: Array, *, evenly: bool) -> bool:
+    """Whether numbers ascend, in equal steps if `evenly`."""
+    steps = np.diff(values)
+    return bool((steps > 0).all() and (not evenly or np.allclose(steps, steps[:1], rtol=1e-6)))
+
+
+def _name(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else f"{value:.6g}"
+
+
+def key_label(profile: Profile, key: str) -> str:
+    """Name a key in words, with its unit.
+
+    Examples
+    --------
+    >>> from busplan.profile.shipped import load
+    >>> profile = load("paper-4ms").profile
+    >>> [key_label(profile, key) for key in ("cycle.period_us", "bus.gap_count", "payload.read_bytes")]
+    ['period T_s, us', 'gap count', 'payload read, bytes']
+    """
+    setup = {f"bus.{one.key}": one for one in bus_of(profile).figures.setup}
+    figure = {"cycle.period_us": PERIOD, "bus.nodes": NODES, **setup}.get(key)
+    if figure is not None:
+        return figure_label(figure)
+    unit = "" if key.endswith(_NO_UNITS) else unit_of(key)
+    name = key.removesuffix(f"_{unit.replace('/', '_per_')}".lower()) if unit else key
+    return ", ".join(filter(None, (name.replace(".", " ").replace("_", " "), unit)))
+
+
+def plotted_figure(profile: Profile, name: str) -> tuple[Figure, float]:
+    """The registered figure of a column, and the factor to the unit that it is drawn in.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    name
+        Name of the column: a figure, or one of a group.
+    """
+    figure = column_figures(profile).get(name)
+    if figure is None:
+        return Figure(name, name, "", "", key_label(profile, name)), 1.0
+    return figure, factor_of(figure_value(figure, 0.0))
+
+
+def figure_label(figure: Figure) -> str:
+    """Name a figure with its unit, as a heading of a table does."""
+    unit = figure.column or figure.unit
+    return ", ".join(filter(None, (figure.label or figure.key, "" if unit in SILENT_UNITS else unit)))
+
+
+class Panel(NamedTuple):
+    """The values under one timing model."""
+
+    model: str
+    number: int
+    """Number of the model among those asked for, from 0: its colour."""
+    values: Array
+    """In the unit of the label, shaped as the scales; NaN for a missing value."""
+    unsafe: Array
+    """Where the network is not set safely."""
+
+
+class Plotted(NamedTuple):
+    """A figure over one or two keys."""
+
+    figure: Figure
+    scales: tuple[PlotScale, ...]
+    """Of two, the first lies up and the second across."""
+    panels: tuple[Panel, ...]
+    deciding: str
+    """The timing model that decides."""
+    safety: str
+    """What must be set safely on this kind of bus."""
+
+    @property
+    def label(self) -> str:
+        """What is drawn, with its unit."""
+        return figure_label(self.figure)
+
+    @property
+    def has_zero(self) -> bool:
+        """Whether the figure is a difference, whose zero is a limit."""
+        return self.figure.scale is not None
+
+    @property
+    def any_unsafe(self) -> bool:
+        """Whether a point is not set safely."""
+        return any(bool(one.unsafe.any()) for one in self.panels)
+
+    @property
+    def told(self) -> Panel | None:
+        """The panel that the caption tells of: that of the model that decides, where it has one."""
+        return next((one for one in self.panels if one.model == self.deciding), next(iter(self.panels), None))
+
+    def value_at_own(self, panel: Panel) -> float | None:
+        """The figure at this design; None if it is no point of the grid."""
+        places = []
+        for one in self.scales:
+            found = np.flatnonzero(one.places == one.own) if one.own is not None else np.array([], dtype=int)
+            if not found.size:
+                return None
+            places.append(int(found[0]))
+        value = float(panel.values[tuple(places)])
+        return None if np.isnan(value) else value
+
+
+def caption(plotted: Plotted) -> str:
+    """Say in one sentence what the figure shows."""
+    panel = plotted.told
+    if panel is None:
+        return f"No timing model gives {plotted.figure.label or plotted.figure.key} here."
+    known = panel.values[np.isfinite(panel.values)]
+    own = plotted.value_at_own(panel)
+    by = f"by the {panel.model} model"
+    design = "" if own is None else f"; this design has {_text(plotted, own)}"
+    name = plotted.figure.label or plotted.figure.key
+    if plotted.has_zero and known.min() < 0 <= known.max():
+        fitting, line = int((known >= 0).sum()), "line" if len(plotted.scales) > 1 else "dashed line"
+        settings = f"{fitting:,} of {known.size:,} settings"
+        return f"A {name} of 0 or more in {settings} {by}, on one side of the {line}{design}."
+    least, most = _text(plotted, float(known.min())), _text(plotted, float(known.max()))
+    spread = least if least == most else f"{least} to {most}"
+    return f"{name[:1].upper()}{name[1:]} {by}: {spread}{design}."
+
+
+def _text(plotted: Plotted, value: float) -> str:
+    unit = plotted.figure.column or plotted.figure.unit
+    return with_unit(ShownValue(value, unit=unit, digits=_DIGITS))
