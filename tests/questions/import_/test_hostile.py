@@ -49,7 +49,16 @@ REFUSED = {
     ),
     "no masters": ("<masters/>", ":1: 0 masters"),
     "half a root": ("<EtherCATConfig><Config>", r":1:\d+: not valid XML: no element found"),
-    "no table": ("BO_ 99 Door\n", r":2: not a valid DBC: .*line 2"),
+    "no table": ("BO_ 99 Door\n", ":2:1: not a valid DBC: invalid syntax"),
+    "an identifier twice": (
+        "BO_ 256 A: 8 X\nBO_ 256 B: 8 X\n",
+        ":2: message B has the identifier of A: a bus has each once",
+    ),
+    "two buses": (
+        "<NetworkDefinition xmlns='http://kayak.2codeornot2code.org/1.0'><Document/>"
+        "<Bus name='M'><Message id='0x1' name='A'/></Bus><Bus name='N'><Message id='0x1' name='A'/></Bus></NetworkDefinition>",
+        ":1: messages of 2 buses, M, N: a profile is one bus; export one",
+    ),
     "a signal cut off": ("BO_ 256 A: 8 X\n SG_ B : 0|16@1+ (1,", ":2: ends within a signal: cut off"),
     "no PDO": ("[DeviceInfo]\nProductName=x\n", ":1: no PDO that is sent"),
     "no number": (

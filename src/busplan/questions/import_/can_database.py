@@ -1,5 +1,6 @@
 """Databases of CAN messages, by cantools: DBC, KCD, SYM, ARXML. Identifiers, lengths, cycle times, bit rate."""
 
+import logging
 import re
 from typing import Any, Final
 
@@ -20,7 +21,7 @@ _NAMED: Final = {
 """Where a message's name stands."""
 _SIGNALS: Final = re.compile(r"^[ \t]*(?:SG_|VAL_|SIG_VALTYPE_|SG_MUL_VAL_) .*$", re.MULTILINE)
 _WHOLE_SIGNAL: Final = re.compile(r"\s*SG_ .*\[.*\].*\"\s*\S")
-_LINE: Final = re.compile(r"at line (\d+)")
+_LINE: Final = re.compile(r"Invalid syntax at line (\d+), column (\d+)")
 _KILO: Final = 1000
 _MOST_BIT_RATE: Final = 10_000_000
 
@@ -57,23 +58,30 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
     for line, content in enumerate(text.split("\n"), start=1):
         if match := re.match(_NAMED[dialect], content):
             lines.setdefault(match[1], line)
-    for message in database.messages:
-        facts = machine.messages.setdefault(message.frame_id + EXTENDED * bool(message.is_extended_frame), {})
-        place = machine.place(lines.get(message.name, 1))
-        facts["name"] = Fact(message.name, place)
-        facts["payload_bytes"] = Fact(message.length, place)
-        facts["is_fd"] = Fact(bool(message.is_fd), place)
-        if message.cycle_time:
-            facts["period_us"] = Fact(message.cycle_time * _KILO, place)
-    if not machine.messages:
+    if not database.messages:
         raise machine.refusal(1, f"a {title} without messages")
     _bit_rate(database, machine)
+    for message in database.messages:
+        line = lines.get(message.name, 1)
+        place, number = machine.place(line), message.frame_id + EXTENDED * bool(message.is_extended_frame)
+        if number in machine.messages:
+            other = machine.messages[number]["name"].value
+            raise machine.refusal(line, f"message {message.name} has the identifier of {other}: a bus has each once")
+        facts = machine.messages[number] = {
+            "name": Fact(message.name, place),
+            "payload_bytes": Fact(message.length, place),
+            "is_fd": Fact(bool(message.is_fd), place),
+        }
+        if message.cycle_time:
+            facts["period_us"] = Fact(message.cycle_time * _KILO, place)
     return machine
 
 
 def _loaded(text: str, name: str, title: str, dialect: str) -> Any:
     from cantools.database import load_string
 
+    # What it warns of is refused here, or no matter.
+    logging.getLogger("cantools").addHandler(logging.NullHandler())
     if dialect == "dbc":
         last = text.rstrip().rpartition("\n")[2]
         if last.lstrip().startswith("SG_ ") and not _WHOLE_SIGNAL.match(last):
@@ -83,9 +91,10 @@ def _loaded(text: str, name: str, title: str, dialect: str) -> Any:
     try:
         return load_string(text, dialect, strict=False)
     except Exception as error:  # noqa: BLE001 - the readers of formats fail in many ways
-        message = " ".join(str(error).replace(">>!<<", "").split())[:200]
-        line = _LINE.search(message)
-        raise BusplanError(f"{name}:{line[1] if line else 1}: not a valid {title}: {message}") from None
+        message = " ".join(str(error).removeprefix(f"{title}: ").split())[:200]
+        found = _LINE.search(message)
+        place = f"{found[1]}:{found[2]}" if found else "1"
+        raise BusplanError(f"{name}:{place}: not a valid {title}: {'invalid syntax' if found else message}") from None
 
 
 def _bit_rate(database: Any, machine: Reading) -> None:
