@@ -259,7 +259,7 @@ def test_what_moves_the_margin_is_asked_for(run: Run) -> None:
 def test_what_moves_the_margin_as_a_process(run: Run, tmp_path: Path) -> None:
     done = run("capacity", "paper-1ms", "--sensitivity", "--set", "bus.gap_count=7", cwd=tmp_path, env={})
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("With --set bus.gap_count=7.\npaper-1ms at 1 ms: fits.")
+    assert done.stdout.startswith("With --set bus.gap_count=7.\n\npaper-1ms  IEEE 1394, 2 nodes, 8 axes, 1 ms ")
     assert "\nWhat moves the margin of 296.144 us at 1 ms, by the standard model\n" in done.stdout
     (reset,) = (line.split() for line in done.stdout.splitlines() if line.startswith("a bus reset") and "->" in line)
     assert reset[3:] == ["7", "->", "63", "-66.081", "230.064", "fits"]
@@ -269,17 +269,24 @@ def test_capacity_as_a_table_begins_with_the_verdict(run: Run) -> None:
     done = run("capacity", "paper-4ms")
     assert (done.returncode, done.stderr) == (0, "")
     assert re.match(
-        r"paper-4ms at 4 ms: fits\. Margin 1730\.064 us \+/- 6\.311 us of 2000\.000 us, less a bias of 6\.616 us\. "
-        r"Largest doubt: execution time, 54% of U squared\.\nNot in it: host time \(host\.transaction_us\), ",
+        r"paper-4ms  IEEE 1394, 2 nodes, 8 axes, 4 ms +FITS\n  \[#+\.+\| +\]\n"
+        r"  used +270 us of the 2000 that the bus may use, 13 %\n  free +1730 us, \+/- 6\n",
         done.stdout,
     )
+    whole = run("capacity", "paper-4ms", "--all").stdout
+    assert (
+        "\npaper-4ms at 4 ms: fits. Margin 1730.064 us +/- 6.311 us of 2000.000 us, less a bias of 6.616 us. Largest "
+        "doubt: execution time, 54% of U squared.\nNot in it: host time (host.transaction_us), "
+    ) in whole
+    assert "(4)" in whole
+    assert "(4)" not in done.stdout
 
 
 def test_the_papers_equations_are_said_to_disagree_and_decide_nothing(run: Run) -> None:
     done = run("capacity", "paper-4ms", "--period", "500us")
     assert done.returncode == 0
-    assert done.stdout.startswith("paper-4ms at 500 us: does not fit. Margin -19.936 us +/- 6.311 us of 250.000 us, ")
-    assert "\nThe paper model says otherwise: 207.117 us needed of 250.000 us. It decides nothing.\n" in done.stdout
+    assert "  short by        20 us, +/- 6\n" in done.stdout
+    assert "  paper model     says otherwise, 207 us needed of 250, but does not decide\n" in done.stdout
     assert not any(verdict["models_agree"] for verdict in verdicts(run, "paper-4ms", "--period", "500us"))
 
 

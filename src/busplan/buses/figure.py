@@ -147,10 +147,10 @@ AVAILABLE: Final = Figure(
     "alpha T_s",
     by(time_slice.time_slice_us),
     "share of the period that is for communication",
-    "available alpha T_s",
+    "available time",
 )
 REQUIRED: Final = Figure(
-    "required_us", "T_need", _SLICE, "what the whole cycle needs, N T_cs", "required N T_cs", better="less"
+    "required_us", "T_need", _SLICE, "what the whole cycle needs, N T_cs", "required time", better="less"
 )
 NONPERIODIC: Final = Figure(
     "nonperiodic_us",

@@ -139,7 +139,7 @@ def give(report: "Report", form: Form) -> None:
     if form == "table":
         from busplan.forms import terminal
 
-        emit_text(terminal.text(report, width=terminal_width(), styled=is_styled()))
+        emit_text(terminal.text(report, width=terminal_width(), height=terminal_height(), styled=is_styled()))
     else:
         emit_document(render(report, form))
 
@@ -151,6 +151,15 @@ def terminal_width() -> int | None:
     from shutil import get_terminal_size
 
     return max(get_terminal_size().columns, _NARROWEST)
+
+
+def terminal_height() -> int | None:
+    """Lines of the terminal, by LINES if that is set; None if standard output is none."""
+    if not sys.stdout.isatty():
+        return None
+    from shutil import get_terminal_size
+
+    return get_terminal_size().lines
 
 
 def columns() -> int:

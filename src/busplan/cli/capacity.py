@@ -1,6 +1,6 @@
 """`busplan capacity`."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,10 @@ from busplan.cli.options import (
     timing_models,
 )
 from busplan.profile.changes import NO_CHANGES, KeyChanges
+
+if TYPE_CHECKING:
+    from busplan.forms.blocks import Command
+    from busplan.questions.capacity import CapacityAnswer
 
 
 @takes_changes()
@@ -39,9 +43,10 @@ def capacity_command(
 ) -> None:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
-    The verdict comes first: fits, not shown to fit, or does not fit, always by the timing model that decides on this
-    bus, with its margin, its uncertainty U, the largest doubt and the cheapest change. The other timing models, on
-    IEEE 1394 the paper's closed form, stand beside it. Times are in us. A report: it exits 0 whatever the verdict is.
+    A card comes first: fits, not shown to fit, or does not fit, always by the timing model that decides on this bus;
+    how much of the period is used and free, the fastest period, room for more nodes, and what to measure or change. The
+    figures behind it follow; a low terminal shows them with --all. Times are in us. A report: it exits 0 whatever the
+    verdict is.
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
@@ -55,4 +60,16 @@ def capacity_command(
             timing_model=timing_models(timing, plan),
             sensitivity=sensitivity,
         )
-        give(found.report())
+        give(found.report()._replace(next_commands=_next(str(profile), found, changes)))
+
+
+def _next(argument: str, found: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
+    """What to ask next of the same profile."""
+    from busplan.forms.blocks import Command
+    from busplan.questions.base.shell import change_options, shell_word
+
+    changed = " ".join((shell_word(argument), *change_options(changes, period_us=found.profile.cycle.period_us)))
+    all_well = all(verdict.all_well for verdict in found.verdicts)
+    second = "circle-test" if all_well else "plan"
+    asked = (f"capacity {changed} --sensitivity", f"{second} {changed}", f"report {changed}")
+    return tuple(Command(f"busplan {words}") for words in asked)

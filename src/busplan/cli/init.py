@@ -107,7 +107,7 @@ def init_command(
         text, taken = starter_text(source, name=path.stem), []
     write_file(path, text.encode(), overwrite=force)
     defaults = [f"not given, so taken: {' '.join(taken)}"] if taken else []
-    say(*defaults, f"wrote {path}", _verdict(text), f"next: busplan capacity {shown}")
+    say(*defaults, f"wrote {path}", *_card(text), f"next: busplan capacity {shown}")
 
 
 def _with_settings(text: str, *, name: str) -> str:
@@ -193,10 +193,10 @@ def _asked(words: str, default: _Answer) -> _Answer:
     return answer
 
 
-def _verdict(text: str) -> str:
-    """The verdict of a new profile, in a sentence."""
+def _card(text: str) -> list[str]:
+    """The card of a new profile, in lines."""
     from busplan.profile.toml import decode, validate
     from busplan.questions.capacity import capacity
 
     report = str(capacity(validate(decode(text.encode(), name="profile"))))
-    return report.partition("\n")[0]
+    return report.partition("\n\n")[0].splitlines()

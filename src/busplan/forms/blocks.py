@@ -7,7 +7,7 @@ writes every block in its own way.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Final, Literal, NamedTuple
 
 from busplan.buses.figure import Figure, Ink
 from busplan.forms.lines import Line
@@ -116,6 +116,8 @@ class TableColumn(NamedTuple):
     """Where the column goes then: out of the table, or to a line below its row."""
     wraps: bool = False
     """If True, a narrow terminal wraps the words of the column at spaces."""
+    is_detail: bool = False
+    """If True, the column is shown only in a whole answer."""
 
     @property
     def name(self) -> str:
@@ -239,6 +241,59 @@ class Question(NamedTuple):
     facts: Facts
 
 
+class Gauge(NamedTuple):
+    """How a period is used: shares of it, 0..1."""
+
+    used: float
+    """More than 1 if it does not suffice."""
+    doubt: float
+    """The uncertainty of what is used."""
+    free_until: float
+    """Where the reserve begins."""
+    most: float
+    """The share that may be used, with the reserve."""
+    state: State
+
+    def stretches(self) -> "list[Stretch]":
+        """Cut the period into stretches, in this order: used, in doubt, free, to stay free, and of other use."""
+        ends = (self.used, self.used + self.doubt, self.free_until, self.most, 1.0)
+        states: tuple[State, ...] = (self.state, "warns", "neutral", "neutral", "neutral")
+        cut: list[Stretch] = []
+        for name, letter, end, state in zip(_STRETCHES, "#~.r ", ends, states, strict=True):
+            start = cut[-1].end if cut else 0.0
+            cut.append(Stretch(name, letter, start, min(1.0, max(start, end)), state))
+        return cut
+
+
+_STRETCHES: Final = ("used", "doubt", "free", "reserve", "other")
+
+
+class Stretch(NamedTuple):
+    """A part of a period."""
+
+    name: str
+    letter: str
+    start: float
+    """Its ends as shares of the period, 0..1."""
+    end: float
+    state: State
+
+
+class Card(NamedTuple):
+    """The first answer: whose verdict it is, the verdict, a bar of the period, and named lines."""
+
+    subject: Sentence
+    verdict: Words
+    gauge: Gauge | None
+    lines: tuple[tuple[str, Sentence], ...]
+
+
+class Detail(NamedTuple):
+    """Blocks that only a whole answer shows."""
+
+    blocks: "tuple[Block, ...]"
+
+
 class Chapter(NamedTuple):
     """Blocks under a title."""
 
@@ -250,7 +305,7 @@ class Chapter(NamedTuple):
     """Anchor that links point to; empty if none does."""
 
 
-Block = Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Chapter
+Block = Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Card | Detail | Chapter
 
 
 class Report(NamedTuple):
@@ -267,7 +322,11 @@ class Report(NamedTuple):
     is_page: bool = False
     """If True, every form shows the title; other answers may be part of a page."""
     is_whole: bool = False
-    """If True, rows of detail are shown, and a narrow terminal leaves out no column."""
+    """If True, details are shown, and a narrow terminal leaves out no column."""
+    next_commands: tuple[Command, ...] = ()
+    """What to ask next."""
+    is_card_enough: bool = False
+    """If True, a terminal too low for all of it shows no more than its cards."""
 
 
 def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:

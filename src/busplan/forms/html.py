@@ -19,7 +19,7 @@ from busplan.forms.picture import DARK, fills
 from busplan.printable import json_text, printable_lines
 
 _TYPES: Final = ("ShownValue", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
-_BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Calculation", "Question", "Chapter")
+_BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Calculation", "Question", "Card", "Chapter")
 
 
 def page(report: Report) -> str:

@@ -8,6 +8,7 @@ from typing import Final
 from busplan.forms.blocks import (
     Block,
     Calculation,
+    Card,
     Cell,
     Chapter,
     Chart,
@@ -149,6 +150,10 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
             yield from (f"- {_sentence(words)}" for words in block.sentences)
             if block.facts.items:
                 yield from ("", f"{_facts(block.facts)}.")
+        case Card():
+            yield from (f"{_sentence(block.subject)}: **{escaped(block.verdict.text)}**", "")
+            rows = ([escaped(label), _cell(words)] for label, words in block.lines)
+            yield from table([" ", " "], rows, left=2)
         case Chapter():
             yield from (f'<a id="{block.key}"></a>', "") if block.key else ()
             yield f"{'#' * level} {_sentence(block.title)}"

@@ -5,7 +5,20 @@ from math import isnan
 from typing import Final
 
 from busplan.buses.figure import unit_of
-from busplan.forms.blocks import Bar, Block, Cell, Chapter, Part, Report, Sentence, ShownValue, Swatch, Table, Words
+from busplan.forms.blocks import (
+    Bar,
+    Block,
+    Cell,
+    Chapter,
+    Detail,
+    Part,
+    Report,
+    Sentence,
+    ShownValue,
+    Swatch,
+    Table,
+    Words,
+)
 from busplan.forms.lines import Line, Mark
 from busplan.printable import printable
 
@@ -201,16 +214,34 @@ def shown_blocks(report: Report) -> Sequence[Block]:
     report
         The answer.
     """
-    return report.blocks() if report.is_whole else list(_without_details(report.blocks()))
+    return list(_with_details(report.blocks()) if report.is_whole else _without_details(report.blocks()))
+
+
+def _with_details(blocks: Sequence[Block]) -> Iterator[Block]:
+    for block in blocks:
+        if isinstance(block, Detail):
+            yield from _with_details(block.blocks)
+        elif isinstance(block, Chapter):
+            yield block._replace(blocks=tuple(_with_details(block.blocks)))
+        else:
+            yield block
 
 
 def _without_details(blocks: Sequence[Block]) -> Iterator[Block]:
     for block in blocks:
+        if isinstance(block, Detail):
+            continue
         if isinstance(block, Chapter):
             yield block._replace(blocks=tuple(_without_details(block.blocks)))
         elif isinstance(block, Table):
-            rows = tuple(row for row in block.rows if not row.is_detail)
-            yield block._replace(rows=rows)
+            numbers = [number for number, column in enumerate(block.columns) if not column.is_detail]
+            rows = tuple(
+                row._replace(cells=tuple(row.cells[number] for number in numbers))
+                for row in block.rows
+                if not row.is_detail
+            )
+            heads = sum(number < block.heads for number in numbers)
+            yield block._replace(columns=tuple(block.columns[number] for number in numbers), rows=rows, heads=heads)
             left_out = left_out_sentence(len(block.rows) - len(rows))
             yield from [Sentence((left_out,))] if left_out else []
         else:

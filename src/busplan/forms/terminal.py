@@ -1,15 +1,17 @@
 """An answer as lines of text: coloured for a terminal, plain for a pipe or a file."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Final
+from typing import Final, cast
 
 from busplan.forms.blocks import (
     Block,
     Calculation,
     CalculationStep,
+    Card,
     Chapter,
     Chart,
     Command,
+    Detail,
     Facts,
     Question,
     Report,
@@ -18,6 +20,7 @@ from busplan.forms.blocks import (
     Snippet,
     Table,
 )
+from busplan.forms.cards import card_lines
 from busplan.forms.lines import BLANK, Line, plain_text, styled_text, wrapped
 from busplan.forms.numbers import part_text, sentence_line, with_unit
 from busplan.forms.text_tables import table_lines
@@ -26,7 +29,7 @@ WIDTH: Final = 80
 """Width of a drawing if there is no terminal, in columns."""
 
 
-def text(report: Report, *, width: int | None = None, styled: bool = False) -> str:
+def text(report: Report, *, width: int | None = None, height: int | None = None, styled: bool = False) -> str:
     """Write an answer as lines of text.
 
     Parameters
@@ -35,11 +38,24 @@ def text(report: Report, *, width: int | None = None, styled: bool = False) -> s
         The answer.
     width
         Width of the terminal, in columns; None without one: then no line is wrapped and no table narrowed.
+    height
+        Lines of the terminal; where all of an answer does not fit, it may be its cards alone.
     styled
         If True, write the colours of a terminal.
     """
-    blocks = [Chapter(report.title, tuple(report.blocks()))] if report.is_page else report.blocks()
-    lines = block_lines(blocks, width=width, is_whole=report.is_whole)
+    blocks = [*report.blocks()]
+    last = max((number for number, block in enumerate(blocks) if isinstance(block, Card)), default=None)
+    if last is not None and width is not None:
+        card = cast("Card", blocks[last])
+        names = ("next", *("" for _ in report.next_commands))
+        commands = zip(names, (Sentence((command.line,)) for command in report.next_commands), strict=False)
+        blocks[last] = card._replace(lines=(*card.lines, *commands))
+    found = [Chapter(report.title, tuple(blocks))] if report.is_page else blocks
+    lines = [*block_lines(found, width=width, is_whole=report.is_whole)]
+    # The shell's prompt takes a line.
+    folds = report.is_card_enough and not report.is_whole
+    if folds and height is not None and last is not None and len(lines) >= height:
+        lines = [*block_lines(blocks[: last + 1], width=width), Line("--all shows the figures behind it.")]
     return styled_text(lines) if styled else plain_text(lines)
 
 
@@ -94,6 +110,10 @@ def _lines(block: Block, width: int | None, *, is_whole: bool) -> Sequence[Line]
             head = Line(f"{block.question} {block.answer.text}", block.answer.state)
             inside: tuple[Block, ...] = (*block.sentences, block.facts)
             return [*wrapped(head, width), *block_lines(inside, width=width, is_whole=is_whole)]
+        case Card():
+            return card_lines(block, width)
+        case Detail():
+            return [*block_lines(block.blocks, width=width, is_whole=True)] if is_whole else []
         case Chapter():
             title = wrapped(sentence_line(block.title)._replace(tone="title"), width)
             return [*title, *block_lines(block.blocks, width=width, is_whole=is_whole)]

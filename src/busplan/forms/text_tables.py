@@ -191,7 +191,7 @@ def table_lines(table: Table, *, width: int | None = None, is_whole: bool = Fals
     columns = {
         number: _column(table.columns[number], rows, number)
         for number, column in enumerate(table.columns)
-        if column.kind != "drawing"
+        if column.kind != "drawing" and (is_whole or not column.is_detail)
     }
     extents = {number: Extent.of(table.columns[number], one.heads, one.cells) for number, one in columns.items()}
     chosen = arrangement(table, extents, width=width, is_whole=is_whole)

@@ -144,12 +144,14 @@ def test_one_table_a_payload_and_one_for_all_periods(profile: Profile) -> None:
     assert heads.count("\nfigure ") == 3
     result = capacity(profile, periods_us=[1000.0, 500.0])
     text = render(capacity_report(result, verdicts(result)), "table")
-    assert text.count("\navailable alpha T_s") == 1
+    assert text.count("\navailable time") == 1
     assert re.search(r" 1 ms +1 ms +500 us +500 us\n", text)
     assert re.search(r" paper +standard +paper +standard\n", text)
     # What holds for all periods is said once, at the end.
-    assert text.count("Not in it: ") == text.count("The execution time behind these figures is") == 1
-    assert text.index("at 500 us: ") < text.index("Not in it: ")
+    assert text.count("  not included ") == text.count("  largest part ") == 1
+    assert text.index(" 500 us ") < text.index("  not included ")
+    whole = render(capacity_report(result, verdicts(result))._replace(is_whole=True), "table")
+    assert whole.count("Not in it: ") == whole.count("The execution time behind these figures is") == 1
 
 
 def test_what_fails_is_marked_where_it_stands_and_the_rest_is_detail(profile: Profile) -> None:

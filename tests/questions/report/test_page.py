@@ -26,10 +26,11 @@ from busplan.forms.numbers import cell_text, sentence_text
 from busplan.forms.picture import INKS
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.base.shell import shell_word
 from busplan.questions.fit.figures import capacity
 from busplan.questions.fit.node_steps import node_steps, telling_periods
 from busplan.questions.report.all_answers import AllAnswers, all_answers
-from busplan.questions.report.commands import shell_word, sources
+from busplan.questions.report.commands import sources
 from busplan.questions.report.page import ReportedProfile, page_report
 from busplan.questions.words.drawings import LEFT, AxesDrawing, TermsDrawing
 from busplan.sections.profile import Profile

@@ -91,7 +91,7 @@ class Answer(ABC):
 
     def _headline(self) -> str:
         """The answer in one line."""
-        return next(block_lines(self.report().blocks())).text
+        return " ".join(next(block_lines(self.report().blocks())).text.split())
 
     def __str__(self) -> str:
         return render(self.report(), "table").removesuffix("\n")

@@ -11,6 +11,7 @@ from busplan.forms.blocks import (
     Block,
     Cell,
     Code,
+    Detail,
     JsonDocument,
     Record,
     Report,
@@ -25,6 +26,7 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import nouns, period, sentence_text
+from busplan.questions.capacity.card import card
 from busplan.questions.capacity.sentences import uncertainty_parts, verdict_sentences
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import FITS, TIME
@@ -41,13 +43,16 @@ def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
         lambda: tuple(_blocks(result, verdicts)),
         partial(capacity_document, result, verdicts),
         lambda: with_profile(result.profile.name, capacity_records(result)),
+        is_card_enough=True,
     )
 
 
 def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
+    for number, verdict in enumerate(verdicts, start=1):
+        yield card(verdict, result.profile, is_brief=number < len(verdicts))
     said = [list(verdict_sentences(verdict, result.profile)) for verdict in verdicts]
-    yield from said[0] if len(said) == 1 else _of_all(said)
+    yield Detail(tuple(said[0] if len(said) == 1 else _of_all(said)))
     yield capacity_table(result)
     if result.profile.group:
         yield groups_table(result)
@@ -83,6 +88,7 @@ def capacity_table(result: Capacity) -> Table:
         [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)],
         owners,
         caption=caption,
+        hides_equations=True,
         is_detail=lambda figure: figure.key not in shown,
         state=_state,
     )

@@ -217,6 +217,7 @@ def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], found: Seq
         blocks=lambda: (*report.blocks(), *_of_periods(found)),
         document=partial(sensitivity_document, result, verdicts, found),
         records=lambda: with_profile(result.profile.name, [row for one in found for row in _rows(one)]),
+        is_card_enough=False,
     )
 
 

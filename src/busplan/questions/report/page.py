@@ -35,13 +35,14 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import MISSING, plural
 from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.questions.base.shell import shell_word
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.circle.report import verdict_words
 from busplan.questions.explain.report import assumptions_table
 from busplan.questions.fit.assumed import heavy_assumptions
 from busplan.questions.fit.network import bus_of
 from busplan.questions.report.all_answers import AllAnswers
-from busplan.questions.report.commands import Sources, shell_word, sources
+from busplan.questions.report.commands import Sources, sources
 from busplan.questions.report.parts import (
     bus_question,
     circle_question,

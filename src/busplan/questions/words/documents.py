@@ -85,6 +85,7 @@ def figure_table(
     *,
     caption: Sentence,
     unit: bool = True,
+    hides_equations: bool = False,
     is_detail: Callable[[Figure], bool] = lambda _figure: False,
     state: Callable[[Figure, Any], State] = lambda _figure, _figures: "neutral",
 ) -> Table:
@@ -100,12 +101,15 @@ def figure_table(
         Caption of the table.
     unit
         If False, the column of units is left out: the caption says the unit.
+    hides_equations
+        If True, the column of equations and sources is shown only in a whole answer.
     is_detail
         Whether the row of a figure is shown only in a whole answer.
     state
         State of a figure of an owner's object, beside that of a truth.
     """
-    head = [TableColumn("figure", kind="words"), TableColumn("eq", kind="words", rank=_FIRST_TO_LEAVE)]
+    equation = TableColumn("eq", kind="words", rank=_FIRST_TO_LEAVE, is_detail=hides_equations)
+    head = [TableColumn("figure", kind="words"), equation]
     head += [TableColumn("unit", kind="words")] if unit else []
     shown = []
     for figure, level in rows:

@@ -1,0 +1,196 @@
+"""The card of a verdict: what a person reads first."""
+
+from collections.abc import Iterator
+from itertools import islice
+from math import ceil, floor, isfinite, log10
+from typing import TYPE_CHECKING, Final
+
+from busplan.buses.published import parts_tested
+from busplan.buses.rule import contradicts
+from busplan.elementwise import plain
+from busplan.forms.blocks import Card, Code, Gauge, Sentence, State, Words, joined
+from busplan.forms.numbers import listed, period, plural
+from busplan.profile.toml import override
+from busplan.questions.capacity.verdict import Verdict
+from busplan.questions.fit.assumed import heavy_assumptions
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
+from busplan.questions.fit.circle_refusal import circle_refusals
+from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.plan.freedoms import PERIOD
+from busplan.questions.words.sentences import broken_limits, change_meanings, settings_sentence, warnings
+from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from busplan.buses.cycle import Term
+
+_FIGURES: Final = 3
+"""Digits of a time whose uncertainty is unknown."""
+_ALMOST: Final = 1 - 1e-9
+"""For rounding."""
+_Line = tuple[str, Sentence]
+
+
+def card(verdict: Verdict, profile: Profile, *, is_brief: bool = False) -> Card:
+    """Say the verdict, how full the period is, what is free, what would fit, and what the verdict rests on.
+
+    Parameters
+    ----------
+    verdict
+        The verdict on one period.
+    profile
+        The network.
+    is_brief
+        Whether lines that are the same for every period are left out.
+    """
+    figures, bus = verdict.deciding, bus_of(profile)
+    at_period = override(profile, {PERIOD: verdict.period_us})
+    counts = (plural(figures.nodes, "node"), plural(figures.axes, "axis"), period(verdict.period_us))
+    subject = Sentence((Code(profile.name), f"  {bus.title}, {', '.join(counts)}"))
+    lines = [*_reasons(verdict, at_period), *_times(figures, at_period), *_room(verdict, at_period)]
+    if not is_brief:
+        lines += _rests_on(verdict, at_period)
+    return Card(subject, _verdict(verdict), _gauge(figures, at_period), tuple(lines))
+
+
+def _verdict(verdict: Verdict) -> Words:
+    figures = verdict.deciding
+    word = (figures.verdict or "").upper()
+    but = "" if verdict.all_well or figures.verdict != FITS else ", BUT"
+    state: State = "passes" if verdict.all_well else "fails" if figures.verdict == DOES_NOT_FIT or but else "warns"
+    return Words(f"{word}{but}", state)
+
+
+def _gauge(figures: CapacityFigures, profile: Profile) -> Gauge:
+    available_us, whole_us = figures.available_us, max(figures.period_us, _used_us(figures))
+    return Gauge(
+        used=_used_us(figures) / whole_us,
+        doubt=(figures.uncertainty_us or 0.0) / whole_us,
+        free_until=available_us * (1 - profile.limits.reserve) / whole_us,
+        most=available_us / whole_us,
+        state="passes" if figures.verdict == FITS else "fails",
+    )
+
+
+def _used_us(figures: CapacityFigures) -> float:
+    """What the cycle takes of its slice, with the bias of the model [us]."""
+    return figures.available_us - (figures.margin_corrected_us or 0.0)
+
+
+def _reasons(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
+    """Why the machine does not run as planned, beside time."""
+    figures, bus = verdict.deciding, bus_of(profile)
+    for cause in circle_refusals(profile):
+        yield "circle", Sentence((f"cannot be run: {cause.message}",), "fails")
+    for words in broken_limits(figures, profile):
+        yield "limit", Sentence((words,), "fails" if figures.verdict == DOES_NOT_FIT else "warns")
+    if not figures.safe:
+        yield "unsafe", Sentence((bus.safety.setting,), "fails")
+    if figures.verdict == FITS:
+        for need in verdict.missed_limits:
+            words = need.words(ratio=profile.cycle.slice_ratio, most_us=verdict.period_us)
+            yield "[limits]", Sentence((words,), "fails")
+
+
+def _times(figures: CapacityFigures, profile: Profile) -> Iterator[_Line]:
+    doubt_us, margin_us = figures.uncertainty_us, (figures.margin_corrected_us or 0.0)
+    of_us = _us(figures.available_us, None)
+    share = f"{_used_us(figures) / figures.available_us:.0%}".replace("%", " %")
+    of = of_us if profile.cycle.slice_ratio == 1 else f"the {of_us} that the bus may use"
+    yield "used", Sentence((f"{_us(_used_us(figures), doubt_us)} us of {of}, {share}",))
+    doubt = "" if doubt_us is None else f", +/- {_us(doubt_us, doubt_us)}"
+    kept_us = figures.available_us * profile.limits.reserve
+    kept = f"; {_us(kept_us, doubt_us)} must stay free" if kept_us else ""
+    yield ("short by" if margin_us < 0 else "free"), Sentence((f"{_us(abs(margin_us), doubt_us)} us{doubt}{kept}",))
+    fastest_us = figures.safe_min_period_us
+    if fastest_us is None:
+        yield "fastest period", Sentence(("none that the bus knows is long enough",), "fails")
+    else:
+        yield "fastest period", Sentence((f"{period(_up(fastest_us, doubt_us))}{_kept_by(figures, profile)}",))
+
+
+def _kept_by(figures: CapacityFigures, profile: Profile) -> str:
+    """Say what keeps the period from being shorter, where that is not the time of the cycle."""
+    network, bus, fastest_us = network_of(profile), bus_of(profile), figures.safe_min_period_us or 0.0
+    if plain(bus.periods.from_us((figures.safe_required_us or 0.0) / network.slice_ratio)) >= fastest_us:
+        return ""
+    limits = (limit for limit in bus.limits if limit.period is not None)
+    holding = (limit for limit in limits if plain(limit.shown.period_us(network)) >= fastest_us * _ALMOST)
+    return "".join(f", for {limit.key}" for limit in islice(holding, 1))
+
+
+def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
+    """Nodes that fit beside those there are; the cure, where there is none or the machine does not run as planned."""
+    figures = verdict.deciding
+    spare = [(one.name or "nodes", (one.safe_nodes or 0) - one.nodes) for one in figures.counts]
+    if verdict.all_well and any(number > 0 for _, number in spare):
+        each = (
+            f"{number} more{f' of {name}' if figures.groups else f' {name}'}" for name, number in spare if number > 0
+        )
+        yield "room for", Sentence((listed([*each], "or"),))
+        return
+    if verdict.all_well:
+        yield "room for", Sentence(("no more nodes",))
+    change, label = verdict.change, "one more" if verdict.all_well else "cure"
+    if change is None:
+        yield label, Sentence((f"none: {verdict.no_change}",))
+        return
+    meanings = change_meanings(bus_of(profile))
+    settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
+    after = change.figures
+    left = f", which leaves {_us(after.margin_corrected_us or 0.0, after.uncertainty_us)} us"
+    untested = "; the circle is another one then" if change.circle_is_untested else ""
+    yield label, joined(settings, Sentence((f"{left}{untested}",)), by="")
+
+
+def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
+    """The largest part, and what the verdict does not have, does not know, or nobody has tested."""
+    figures, bus = verdict.deciding, bus_of(profile)
+    largest: Term = max(figures.terms, key=lambda term: plain(term.us))
+    yield (
+        "largest part",
+        Sentence((f"{bus.figures.term_label(largest.name)}, {_us(plain(largest.us), figures.uncertainty_us)} us",)),
+    )
+    for assumption in heavy_assumptions(figures, profile):
+        yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure it first",), "warns")
+    left_out = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
+    if left_out:
+        yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in left_out)),))
+    tested = parts_tested(bus.evidence_data)
+    words = "; ".join(
+        filter(
+            None,
+            (
+                ", ".join(f"{part} ({by})" for part, by in tested.parts.items()),
+                f"not tested: {', '.join(tested.untested)}" if tested.untested else "",
+            ),
+        )
+    )
+    yield "tested", Sentence((words or "not against figures of others",))
+    for other in verdict.others:
+        if contradicts(other.fits, figures):
+            said = f"{_us(other.required_us, figures.uncertainty_us)} us needed of {_us(other.available_us, None)}"
+            yield f"{other.timing_model} model", Sentence((f"says otherwise, {said}, but does not decide",), "warns")
+    if verdict.after_reset is not None:
+        keys = ", ".join(f"{key} = {value}" for key, value in bus.safety.after_reset.items())
+        yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
+    for warning in warnings(profile, nodes=figures.nodes, most=figures.safe_nodes or 0):
+        yield "beware", Sentence((warning,), "warns")
+
+
+def _us(us: float, doubt_us: float | None) -> str:
+    """A time in digits that its doubt allows."""
+    return f"{us:.{_decimals(us, doubt_us)}f}"
+
+
+def _up(us: float, doubt_us: float | None) -> float:
+    """A time rounded up to those digits."""
+    scale: float = 10.0 ** _decimals(us, doubt_us)
+    return ceil(us * scale - 1e-6) / scale
+
+
+def _decimals(us: float, doubt_us: float | None) -> int:
+    """Decimals down to the first digit of the doubt, or of three digits without one."""
+    if doubt_us and isfinite(doubt_us):
+        return max(0, -floor(log10(doubt_us)))
+    return max(0, _FIGURES - 1 - floor(log10(us))) if us else 0

@@ -1,0 +1,107 @@
+"""The card: what a person reads first."""
+
+import re
+from math import floor, log10
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import busplan
+from busplan.forms.blocks import Card, Command, Gauge
+from busplan.forms.numbers import sentence_text
+from busplan.forms.terminal import text
+from busplan.questions.capacity import CapacityAnswer
+
+SHIPPED = ("paper-4ms", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos2-servo-8", "sercos3-servo-8")
+
+
+def card_of(answer: CapacityAnswer) -> tuple[str, dict[str, str]]:
+    """The verdict and the lines of the first card."""
+    card = next(block for block in answer.report().blocks() if isinstance(block, Card))
+    return card.verdict.text, {label: sentence_text(words) for label, words in card.lines}
+
+
+def test_every_kind_says_how_full_how_fast_and_how_many_more() -> None:
+    for name in SHIPPED:
+        verdict, lines = card_of(busplan.capacity(name))
+        assert verdict == "FITS"
+        assert {"used", "free", "fastest period", "room for", "largest part", "tested"} <= {*lines}
+        assert not re.search("slice|squared|JCGM|alpha", " ".join(lines.values()))
+
+
+def test_used_and_free_are_the_figures_of_the_verdict() -> None:
+    answer = busplan.capacity("ethercat-servo-8")
+    figures = answer.verdicts[0].deciding
+    assert (figures.margin_corrected_us, figures.uncertainty_us, figures.safe_nodes) == pytest.approx(
+        (895.144, 40.195, 106), abs=1e-3
+    )
+    _, lines = card_of(answer)
+    assert lines["used"] == "105 us of 1000, 10 %"
+    assert lines["free"] == "895 us, +/- 40; 100 must stay free"
+    # 209.79 us + 44.76 us before SYNC0 at half of the period: 509.1 us, and up.
+    assert lines["fastest period"] == "510 us, for sync0"
+    assert lines["room for"] == "98 more nodes"
+    assert lines["assumed"] == "bus.master_us: measure it first"
+
+
+def test_the_cure_stands_where_there_is_something_to_cure() -> None:
+    verdict, lines = card_of(busplan.capacity("ethercat-servo-8", period_us=500))
+    assert verdict == "NOT SHOWN TO FIT"
+    assert lines["limit"] == "the last command comes at 209.8 +/- 44.8 us, SYNC0 at 250.0 us"
+    assert lines["cure"].startswith("bus.sync_shift = 0.6 (drives act, and sample, later), which leaves 395 us")
+    verdict, lines = card_of(busplan.capacity("paper-4ms", period_us=500))
+    assert verdict == "DOES NOT FIT"
+    assert lines["short by"] == "20 us, +/- 6"
+    assert lines["paper model"] == "says otherwise, 207 us needed of 250, but does not decide"
+    assert "room for" not in lines
+    verdict, lines = card_of(busplan.capacity(busplan.load_profile("paper-1ms", changes={"bus.gap_count": 3})))
+    assert verdict == "FITS, BUT"
+    assert lines["unsafe"] == "gap count"
+
+
+@settings(max_examples=30, deadline=None)
+@given(name=st.sampled_from(SHIPPED), period_us=st.sampled_from([250, 1000, 2000, 4000, 64000]))
+def test_what_is_used_and_free_fills_what_the_bus_may_use(name: str, period_us: int) -> None:
+    answer = busplan.capacity(name, period_us=period_us)
+    figures = answer.verdicts[0].deciding
+    _, lines = card_of(answer)
+    used = float(lines["used"].split()[0])
+    free = float(lines["free"].split()[0]) if "free" in lines else -float(lines["short by"].split()[0])
+    unit = (
+        10.0 ** min(0, floor(log10(figures.uncertainty_us))) if figures.uncertainty_us else figures.available_us / 100
+    )
+    assert used + free == pytest.approx(figures.available_us, abs=1.01 * unit)
+
+
+@given(
+    used=st.floats(0, 3),
+    doubt=st.floats(0, 2),
+    most=st.floats(0, 1),
+    reserve=st.floats(0, 1),
+)
+def test_the_stretches_of_a_bar_fill_it(used: float, doubt: float, most: float, reserve: float) -> None:
+    gauge = Gauge(used, doubt, most * (1 - reserve), most, "passes")
+    stretches = gauge.stretches()
+    assert [stretch.start for stretch in stretches] == [0.0, *(stretch.end for stretch in stretches[:-1])]
+    assert stretches[-1].end == 1.0
+    assert stretches[0].end == min(1.0, used)
+
+
+def test_a_low_terminal_shows_the_card_alone_unless_all_was_asked_for() -> None:
+    report = busplan.capacity("gantry-24").report()._replace(next_commands=(Command("busplan report gantry-24"),))
+    low = text(report, width=80, height=24).splitlines()
+    assert len(low) < 24
+    assert max(map(len, low)) <= 80
+    assert low[-2:] == ["  next            busplan report gantry-24", "--all shows the figures behind it."]
+    high, whole = text(report, width=80, height=90), text(report._replace(is_whole=True), width=80, height=24)
+    assert "corrected margin" in high
+    assert "Largest doubt" in whole
+    assert "next" not in text(report)
+
+
+def test_other_forms_have_the_card() -> None:
+    answer = busplan.capacity("paper-4ms", period_us=500)
+    assert '<p class="answer">DOES NOT FIT</p>' in answer.html
+    assert '<rect class="used fails" x="0.000%" y="0" width="' in answer.html
+    assert "| short by | 20 us, +/- 6 |" in busplan.forms.render(answer.report(), "markdown")
