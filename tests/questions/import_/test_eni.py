@@ -165,7 +165,8 @@ def test_a_value_says_its_line_and_grade(tmp_path: Path) -> None:
     assert "read_bytes = 14            # published: machine.xml:" in answer.text
     assert "Not known, so assumed: bus.sync_shift = 0.5, " in answer.sentences()[-1]
     assert answer.profile.bus.housekeeping_bytes == (4, 4, 1, 2, 0)
-    assert answer.sentences()[-2] == str(busplan.capacity(answer.profile)).partition("\n")[0]
+    card = str(busplan.capacity(answer.profile)).partition("\n\n")[0].splitlines()
+    assert list(answer.sentences()[-1 - len(card) : -1]) == card
 
 
 BITS = [

@@ -1,5 +1,6 @@
 """Scans of a bus, LinuxCNC's file, databases of messages, CANopen files: one of each dialect, of our own making."""
 
+import pickle
 from pathlib import Path
 from typing import Any, Final
 
@@ -184,3 +185,12 @@ def test_a_second_pdo_goes_where_the_profile_can_say_it(case: str, tmp_path: Pat
     assert profile.group[0].read_bytes == size
     found = [(each.identifier, each.payload_bytes, each.period_us) for each in profile.message]
     assert [each for each in found if each[0] != 0x705] == messages
+
+
+def test_the_answer_has_every_form_and_can_be_pickled(tmp_path: Path) -> None:
+    answer = imported("machine.xml", "slaves.txt")
+    assert pickle.loads(pickle.dumps(answer)).to_dict() == answer.to_dict()
+    for ending in ("json", "csv", "md", "html", "txt"):
+        answer.save(tmp_path / f"answer.{ending}")
+        assert "delay_us" in (tmp_path / f"answer.{ending}").read_text(encoding="utf-8")
+    assert repr(answer) == "<ImportAnswer: machine EtherCAT, 4 nodes, 2 axes, 500 us FITS>"

@@ -30,9 +30,17 @@ _COLUMNS = (
 
 
 def sentences(answer: "ImportAnswer") -> list[str]:
-    """What a user must know of the profile: what files say, the verdict, and what stays unknown."""
+    """What a user must know of the profile: what files say, the card of `capacity`, and what stays unknown."""
+    return [*answer.remarks, *_card(answer), *_unknown(answer)]
+
+
+def _card(answer: "ImportAnswer") -> list[str]:
     from busplan.questions.capacity import capacity
 
+    return str(capacity(answer.profile)).partition("\n\n")[0].splitlines()
+
+
+def _unknown(answer: "ImportAnswer") -> list[str]:
     unknown: dict[str, list[str]] = {}
     for row in assumed(answer.rows):
         section = (
@@ -42,8 +50,7 @@ def sentences(answer: "ImportAnswer") -> list[str]:
         values = unknown.setdefault(f"{section}{inner}.{row.key}", [])
         values += [value for value in [short_text(row.fact.value)] if value not in values]
     listed = ", ".join(f"{key} = {' or '.join(values)}" for key, values in unknown.items())
-    verdict = str(capacity(answer.profile)).partition("\n")[0]
-    return [*answer.remarks, verdict, *([f"Not known, so assumed: {listed}."] if listed else [])]
+    return [f"Not known, so assumed: {listed}."] if listed else []
 
 
 def import_report(answer: "ImportAnswer") -> Report:
@@ -51,7 +58,11 @@ def import_report(answer: "ImportAnswer") -> Report:
     records = [_record(row) for row in answer.rows]
     return Report(
         sentence("{}, from files of the machine", Code(answer.profile.name)),
-        lambda: [*(Sentence((text,)) for text in sentences(answer)), _table(records)],
+        lambda: [
+            Sentence((" ".join(_card(answer)[0].split()),)),
+            *(Sentence((text,)) for text in (*answer.remarks, *_unknown(answer))),
+            _table(records),
+        ],
         lambda: document("import", name=answer.profile.name, values=records, remarks=list(answer.remarks)),
         lambda: records,
     )

@@ -69,7 +69,8 @@ def updated(
     if differing and take is None:
         raise BusplanError(f"{name} and the files differ; --take file or --take profile says which counts:", *differing)
     machine.remarks += [f"{'changed' if take == 'file' else 'kept'}: {said}" for said in differing]
-    machine.remarks += [f"added: {key} = {short_text(row.plain)}" for key, row in changes.items() if key not in known]
+    asked = {*known, *(key.removesuffix("_per_axis") for key in removed)}
+    machine.remarks += [f"added: {key} = {short_text(row.plain)}" for key, row in changes.items() if key not in asked]
     machine.remarks += [f"added: {row.section}" for row in added if row.key == "identifier"]
     values = {key: row.plain for key, row in changes.items()}
     # With LF alone, and without a mark, offsets are those of the text.
