@@ -292,6 +292,10 @@ class BusCycle(ABC):
         """The kind's own figures beside the terms, by key; None for one that these groups of nodes do not have."""
         return {}
 
+    def card_lines(self) -> tuple[tuple[str, str], ...]:
+        """What only this kind says on the card of a verdict: labels and words, of plain numbers."""
+        return ()
+
     def latencies(self) -> tuple[BusLatency, ...]:
         """How long things take; a kind without transactions has its cycle."""
         phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}

@@ -61,6 +61,41 @@ def test_the_cure_stands_where_there_is_something_to_cure() -> None:
 
 
 @settings(max_examples=30, deadline=None)
+@given(
+    period_us=st.sampled_from([2500, 4000, 20000]),
+    jitters_us=st.lists(st.integers(0, 9000), min_size=3, max_size=3),
+    deadlines_us=st.lists(st.sampled_from([812.5, 3000, 5000, 10000]), min_size=3, max_size=3),
+)
+def test_can_says_its_load_and_the_message_closest_to_its_deadline(
+    period_us: int, jitters_us: list[int], deadlines_us: list[float]
+) -> None:
+    names = ("sdo-request", "sdo-response", "heartbeats")
+    changes: dict[str, float] = {"cycle.period_us": period_us}
+    changes |= {f"message.{name}.jitter_us": us for name, us in zip(names, jitters_us, strict=True)}
+    changes |= {f"message.{name}.deadline_us": us for name, us in zip(names, deadlines_us, strict=True)}
+    profile = busplan.load_profile("can-servo-8", changes=changes)
+    answer = busplan.capacity(profile)
+    _, lines = card_of(answer)
+    assert lines["load"] == f"{100 * answer.verdicts[0].deciding.bus_load:.1f} %, 80 allowed".replace(".0 ", " ")
+    phases = {
+        row.transaction: row.phases
+        for row in busplan.latency(profile, timing_model="worst-stuffing").transactions
+        if row.transaction in names
+    }
+    shares = {name: phase.worst_response_us / phase.deadline_us for name, phase in phases.items()}
+    latest = lines["latest message"].split(",")[0]
+    assert shares[latest] == max(shares.values())
+    us, deadline_us = phases[latest].worst_response_us, phases[latest].deadline_us
+    assert lines["latest message"] == f"{latest}, {us:.1f} us of {deadline_us:.1f}".replace(".0", "")
+
+
+def test_can_without_messages_has_none_that_is_late() -> None:
+    _, lines = card_of(busplan.capacity(busplan.load_profile("can-servo-8").model_copy(update={"message": ()})))
+    assert "load" in lines
+    assert "latest message" not in lines
+
+
+@settings(max_examples=30, deadline=None)
 @given(name=st.sampled_from(SHIPPED), period_us=st.sampled_from([250, 1000, 2000, 4000, 64000]))
 def test_what_is_used_and_free_fills_what_the_bus_may_use(name: str, period_us: int) -> None:
     answer = busplan.capacity(name, period_us=period_us)

@@ -12,7 +12,7 @@ from busplan.buses.can.figures import BUS_LOAD, TERMS
 from busplan.buses.can.response import Response
 from busplan.buses.can.streams import Stream, frame_sizes, streams
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import is_higher, last_cyclic, response, waits
+from busplan.buses.can.waiting import is_higher, last_cyclic, messages, response, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
@@ -265,6 +265,17 @@ class CanCycle(BusCycle):
         left = self.network.profile.limits.max_load - self._messages_load
         return choose(left > 0, self._in_cycle_us / larger(left, FIT_ROUNDING), inf)
 
+    def card_lines(self) -> tuple[tuple[str, str], ...]:
+        """The load of what is allowed, and the message that comes closest to its deadline."""
+        most = self.network.profile.limits.max_load
+        load = ("load", f"{_short(100 * plain(self.load))} %, {_short(100 * most)} allowed")
+        if not self._messages:
+            return (load,)
+        latest, worst = messages(self.traffic, is_stuffed=self.is_stuffed).latest()
+        if worst is None:
+            return load, ("latest message", f"{latest.name}, without a worst-case response time")
+        return load, ("latest message", f"{latest.name}, {_short(worst.us)} us of {_short(latest.deadline_us)}")
+
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
         ends = ((pdos.name, pdos.group) for pdos in self.traffic.pdos)
@@ -335,6 +346,11 @@ def _numbered(parts_us: Mapping[str, Number], **others: Number) -> dict[str, Num
     """The figures of a latency with the sum of its parts."""
     deadline_us = others.pop("deadline_us")
     return {**others, **parts_us, "worst_response_us": total(parts_us.values()), "deadline_us": deadline_us}
+
+
+def _short(number: float) -> str:
+    """A number with one decimal, where it is not whole."""
+    return f"{number:.1f}".removesuffix(".0")
 
 
 def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Number:

@@ -218,6 +218,20 @@ class Messages:
                 first_us=start.first_us[behind],
             )
 
+    def latest(self) -> tuple[Stream, Response | None]:
+        """The message of plain numbers with the largest response over its deadline, and its response."""
+        # Bounds come in closed form: few exact responses are left to find.
+        ranked = sorted(self.by_priority(), key=self.bound_share, reverse=True)
+        latest, largest = ranked[0], 0.0
+        for own in ranked:
+            if self.bound_share(own) <= largest:
+                break
+            response = self.response(own)
+            share = inf if response is None else response.us / own.deadline_us
+            if share > largest:
+                latest, largest = own, share
+        return latest, self.response(latest)
+
     def bound_share(self, own: Stream) -> Points:
         """A bound of the response over the deadline; infinite where the load of the bus leaves no response [1]."""
         behind, sender = self._behind(own), own.sender()

@@ -47,7 +47,7 @@ def card(verdict: Verdict, profile: Profile, *, is_brief: bool = False) -> Card:
     at_period = override(profile, {PERIOD: verdict.period_us})
     counts = (plural(figures.nodes, "node"), plural(figures.axes, "axis"), period(verdict.period_us))
     subject = Sentence((Code(profile.name), f"  {bus.title}, {', '.join(counts)}"))
-    lines = [*_reasons(verdict, at_period), *_times(figures, at_period), *_room(verdict, at_period)]
+    lines = [*_reasons(verdict, at_period), *_times(figures, at_period), *_own(at_period), *_room(verdict, at_period)]
     if not is_brief:
         lines += _rests_on(verdict, at_period)
     return Card(subject, _verdict(verdict), _gauge(figures, at_period), tuple(lines))
@@ -107,6 +107,13 @@ def _times(figures: CapacityFigures, profile: Profile) -> Iterator[_Line]:
         yield "fastest period", Sentence(("none that the bus knows is long enough",), "fails")
     else:
         yield "fastest period", Sentence((f"{period(_up(fastest_us, doubt_us))}{_kept_by(figures, profile)}",))
+
+
+def _own(profile: Profile) -> Iterator[_Line]:
+    """Lines of the kind of bus."""
+    bus = bus_of(profile)
+    lines = bus.cycle(network_of(profile), model=bus.deciding_model).card_lines()
+    return ((label, Sentence((words,))) for label, words in lines)
 
 
 def _kept_by(figures: CapacityFigures, profile: Profile) -> str:
