@@ -79,7 +79,7 @@ _Operator: TypeAlias = "Callable[[Traced, Any], Traced]"
 
 def _operators(name: str) -> tuple[_Operator, _Operator]:
     """An operator of traced numbers, and the one that a number on its left asks."""
-    return lambda own, other: _computed(name, own, other), lambda own, other: _computed(name, other, own)
+    return lambda own, operand: _computed(name, own, operand), lambda own, operand: _computed(name, operand, own)
 
 
 class Traced:
@@ -175,7 +175,7 @@ def _is_switch(operand: Number, value: int) -> bool:
 
 def _applied(name: str, *numbers: Number) -> Number:
     """An operation on numbers that are not all plain."""
-    if any(isinstance(one, Traced) for one in numbers):
+    if any(isinstance(number, Traced) for number in numbers):
         return _computed(name, *numbers)
     import numpy as np
 
@@ -209,8 +209,8 @@ def existing(number: Number) -> float | None:
     >>> existing(2.5), existing(inf)
     (2.5, None)
     """
-    found = plain(number)
-    return None if isinf(found) else found
+    value = plain(number)
+    return None if isinf(value) else value
 
 
 def within(number: Number, most: Number) -> Number:
@@ -225,7 +225,7 @@ def within(number: Number, most: Number) -> Number:
     return number <= bound
 
 
-def larger(one: Number, other: Number) -> Number:
+def larger(left: Number, right: Number) -> Number:
     """The larger of two numbers, the first of equals.
 
     Examples
@@ -233,12 +233,12 @@ def larger(one: Number, other: Number) -> Number:
     >>> larger(2, 3.0)
     3.0
     """
-    if isinstance(one, _PLAIN) and isinstance(other, _PLAIN):
-        return max(one, other)
-    return _applied("larger", one, other)
+    if isinstance(left, _PLAIN) and isinstance(right, _PLAIN):
+        return max(left, right)
+    return _applied("larger", left, right)
 
 
-def smaller(one: Number, other: Number) -> Number:
+def smaller(left: Number, right: Number) -> Number:
     """The smaller of two numbers, the first of equals.
 
     Examples
@@ -246,9 +246,9 @@ def smaller(one: Number, other: Number) -> Number:
     >>> smaller(2, 3.0)
     2
     """
-    if isinstance(one, _PLAIN) and isinstance(other, _PLAIN):
-        return min(one, other)
-    return _applied("smaller", one, other)
+    if isinstance(left, _PLAIN) and isinstance(right, _PLAIN):
+        return min(left, right)
+    return _applied("smaller", left, right)
 
 
 def is_off(number: Number) -> bool:
@@ -378,7 +378,7 @@ def next_entry(table: Sequence[float], least: Number, *, words: str) -> Number:
     (7, inf)
     """
     if isinstance(least, (*_PLAIN, Traced)):
-        return pointwise(lambda one: next(iter(table[bisect_left(table, one) :]), inf), least, words=words)
+        return pointwise(lambda number: next(iter(table[bisect_left(table, number) :]), inf), least, words=words)
     import numpy as np
 
     return np.append(np.asarray(table, dtype=float), inf)[np.searchsorted(table, least)]
@@ -410,16 +410,16 @@ def interpolated(places: Sequence[float], values: Sequence[float], place: Number
         x0, y0, x1, y1 = xs[left], ys[left], xs[index], ys[index]
         return np.where(x1 == place, y1, y0 + (y1 - y0) * (place - x0) / np.where(x1 > x0, x1 - x0, 1))
     at = bisect_left(places, value_of(place))
-    is_point, found = places[at] == value_of(place), values[at]
-    between: Number = found
+    is_point, value = places[at] == value_of(place), values[at]
+    between: Number = value
     if not is_point:
-        between = values[at - 1] + (found - values[at - 1]) * (place - places[at - 1]) / (places[at] - places[at - 1])
+        between = values[at - 1] + (value - values[at - 1]) * (place - places[at - 1]) / (places[at] - places[at - 1])
     if not isinstance(place, Traced):
         return between
     sources = (Traced(values, given=values.given),) if isinstance(values, GivenTable) else ()
     if is_point:
         words, numbers = f"{words} at {place.symbol}", f"{words} at {short(place.value)}"
-        return Traced(found, formula=words, numbers=numbers, parts=(place, *sources))
+        return Traced(value, formula=words, numbers=numbers, parts=(place, *sources))
     return Traced(value_of(between), operation=CHOSEN, parts=(between, *sources))
 
 
@@ -437,20 +437,20 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
 
     Examples
     --------
-    >>> pointwise(lambda one, other: one // other, 7, 2, words="the quotient")
+    >>> pointwise(lambda left, right: left // right, 7, 2, words="the quotient")
     3
     """
-    if any(isinstance(one, Traced) for one in numbers):
+    if any(isinstance(number, Traced) for number in numbers):
         value = function(*map(value_of, numbers))
         return Traced(value, formula=words, numbers=short(value), parts=numbers)
-    if all(isinstance(one, _PLAIN) for one in numbers):
+    if all(isinstance(number, _PLAIN) for number in numbers):
         return function(*numbers)
     import numpy as np
 
     # Plain numbers are repeated, and arrays read as they are asked for: neither their number nor their size is bounded.
     given: tuple[Any, ...] = numbers
     shape = np.broadcast_shapes(*map(np.shape, given))
-    points = zip(*(_points(one, shape) for one in given), strict=False)
+    points = zip(*(_points(number, shape) for number in given), strict=False)
     return np.array([function(*point) for point in points], dtype=float).reshape(shape)
 
 
@@ -460,7 +460,7 @@ def _points(number: "float | NDArray[Any]", shape: tuple[int, ...]) -> Iterator[
         return repeat(number)
     import numpy as np
 
-    return (one.item() for one in np.broadcast_to(number, shape).flat)
+    return (point.item() for point in np.broadcast_to(number, shape).flat)
 
 
 def named(number: Number, key: str, symbol: str) -> Number:
@@ -490,7 +490,7 @@ def total(parts: Iterable[Number]) -> Number:
     >>> total([1.5, 2]), total([])
     (3.5, 0.0)
     """
-    found: Number | None = None
-    for one in parts:
-        found = one if found is None else found + one
-    return 0.0 if found is None else found
+    sum_: Number | None = None
+    for part in parts:
+        sum_ = part if sum_ is None else sum_ + part
+    return 0.0 if sum_ is None else sum_

@@ -62,7 +62,7 @@ class PlacedError(BusplanError):
         hidden += len(problems[_MOST_SHOWN:])
         problems = problems[:_MOST_SHOWN]
         more = [f"{name}: and {hidden} more problems"] if hidden else []
-        super().__init__(*(f"{name}:{one.line}:{one.column}: {one.message}" for one in problems), *more)
+        super().__init__(*(f"{name}:{problem.line}:{problem.column}: {problem.message}" for problem in problems), *more)
         self.name = name
         self.placed = problems
         self.hidden = hidden

@@ -43,7 +43,11 @@ def printable(text: str, *, write: Callable[[str], str] = _escape) -> str:
     >>> print(printable("p\x1b[2J.toml"))
     p\x1b[2J.toml
     """
-    return "".join(write(one) if has_controls(one) else one for one in text) if has_controls(text) else text
+    return (
+        "".join(write(character) if has_controls(character) else character for character in text)
+        if has_controls(text)
+        else text
+    )
 
 
 def printable_lines(text: str, *, write: Callable[[str], str] = _escape) -> str:

@@ -71,15 +71,15 @@ def constants(namespace: Mapping[str, object]) -> Mapping[str, Sourced]:
     namespace
         The module's `globals()`: sourced numbers, and mappings of them.
     """
-    found: dict[str, Sourced] = {}
+    numbers: dict[str, Sourced] = {}
     for name, value in namespace.items():
         if isinstance(value, Sourced):
-            found[name] = value
+            numbers[name] = value
         elif isinstance(value, MappingProxyType):
-            found |= {f"{name}[{key}]": one for key, one in value.items() if isinstance(one, Sourced)}
-    for name, number in found.items():
+            numbers |= {f"{name}[{key}]": number for key, number in value.items() if isinstance(number, Sourced)}
+    for name, number in numbers.items():
         number.name = name
-    return MappingProxyType(found)
+    return MappingProxyType(numbers)
 
 
 class Input(NamedTuple):

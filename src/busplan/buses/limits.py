@@ -161,8 +161,8 @@ def busy_words(group: Group, network: Network) -> str:
 
 
 def _all_words(network: Network) -> str:
-    found = ((group.name, busy_words(group, network)) for group in slow_groups(network))
-    return "; ".join(f"{name}: {words}" if name else words for name, words in found)
+    busy = ((group.name, busy_words(group, network)) for group in slow_groups(network))
+    return "; ".join(f"{name}: {words}" if name else words for name, words in busy)
 
 
 def _shown_us(group: Group) -> Number:

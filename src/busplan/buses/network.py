@@ -126,5 +126,5 @@ class Network(NamedTuple):
         members = group.members or (group.said,)
         if all(alike.name != self.asked for alike in members):
             return group
-        others = [alike.nodes for alike in members if alike.name != self.asked]
-        return group._replace(nodes=total((nodes, *others)) if others else nodes)
+        unasked = [alike.nodes for alike in members if alike.name != self.asked]
+        return group._replace(nodes=total((nodes, *unasked)) if unasked else nodes)

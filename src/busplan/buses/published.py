@@ -58,7 +58,7 @@ class Spread(NamedTuple):
         """
         count = len(values)
         mean = fsum(values) / count
-        variance = fsum((one - mean) ** 2 for one in values) / (count - 1)
+        variance = fsum((value - mean) ** 2 for value in values) / (count - 1)
         return cls(mean, sqrt(variance * (1 + 1 / count)))
 
 

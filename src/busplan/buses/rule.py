@@ -96,7 +96,7 @@ def contradicts(fits: bool, figures: RuleFigures) -> bool:
 _MOST_DECIMALS: Final = 9
 
 
-def told_apart(one: float, other: float) -> tuple[str, str]:
+def told_apart(first: float, second: float) -> tuple[str, str]:
     """Write two numbers with one decimal, or with as many as tell them apart.
 
     Examples
@@ -105,10 +105,10 @@ def told_apart(one: float, other: float) -> tuple[str, str]:
     (('348.5', '250.0'), ('250.0004', '250.0000'))
     """
     for decimals in range(1, _MOST_DECIMALS + 1):
-        texts = f"{one:.{decimals}f}", f"{other:.{decimals}f}"
+        texts = f"{first:.{decimals}f}", f"{second:.{decimals}f}"
         if texts[0] != texts[1]:
             return texts
-    return f"{one:.1f}", f"{other:.1f}"
+    return f"{first:.1f}", f"{second:.1f}"
 
 
 def overrun(figures: RuleFigures) -> str:

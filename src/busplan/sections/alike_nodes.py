@@ -34,5 +34,5 @@ class AlikeNodes(NamedTuple):
 
     def bytes_of(self, kind: TransactionKind) -> Number:
         """Payload of a transaction with one of them [bytes]."""
-        found: Number = self.payload.bytes_of(kind, axes=self.node.axes)
-        return found
+        size: Number = self.payload.bytes_of(kind, axes=self.node.axes)
+        return size

@@ -104,10 +104,10 @@ def value_at(section: Section, key: str) -> Any:
     key
         Dotted key, as `with_unchecked` takes it.
     """
-    found: Any = section
+    value: Any = section
     for part in key.split("."):
-        if isinstance(found, tuple):
-            found = next((table for table in found if getattr(table, "name", None) == part), None)
+        if isinstance(value, tuple):
+            value = next((table for table in value if getattr(table, "name", None) == part), None)
         else:
-            found = getattr(found, part, None)
-    return found
+            value = getattr(value, part, None)
+    return value

@@ -105,12 +105,12 @@ class TableExecution(GradedExecution):
     def _is_a_table(self) -> Self:
         problems = [
             Problem(
-                f"payloads must ascend, and this follows {one}",
+                f"payloads must ascend, and this follows {before}",
                 key=f"payload_bytes.{index}",
                 kind="inconsistent",
             )
-            for index, (one, other) in enumerate(pairwise(self.payload_bytes), start=1)
-            if one >= other
+            for index, (before, after) in enumerate(pairwise(self.payload_bytes), start=1)
+            if before >= after
         ]
         if len(self.payload_bytes) != len(self.time_us):
             values = f"has {len(self.time_us)} values and payload_bytes has {len(self.payload_bytes)}"
@@ -122,7 +122,9 @@ class TableExecution(GradedExecution):
     @property
     def ascends_from_bytes(self) -> int:
         """The payload from which on no larger one takes less time."""
-        falls = [self.payload_bytes[at + 1] for at, (one, other) in enumerate(pairwise(self.time_us)) if other < one]
+        falls = [
+            self.payload_bytes[at + 1] for at, (before, after) in enumerate(pairwise(self.time_us)) if after < before
+        ]
         return falls[-1] if falls else 0
 
     @property

@@ -165,8 +165,8 @@ class ServoSection(AxisKeys):
         given = self.model_fields_set | self.x.model_fields_set | self.y.model_fields_set
         # A default may be graded, unless it means that there is nothing.
         given |= {key for key in self.grades.model_fields_set if getattr(self, key)}
-        found = [self.grade_of(key) for key in given & set(ServoGrades.model_fields)] or [self.grade]
-        return tuple(sorted(found, key=SERVO_GRADES.index, reverse=True))
+        grades = [self.grade_of(key) for key in given & set(ServoGrades.model_fields)] or [self.grade]
+        return tuple(sorted(grades, key=SERVO_GRADES.index, reverse=True))
 
     @property
     def grades_text(self) -> str:

@@ -50,7 +50,7 @@ class ParameterError(BusplanError):
     """
 
     def __init__(self, *refused: Refused) -> None:
-        super().__init__(*(one.message for one in refused))
+        super().__init__(*(problem.message for problem in refused))
         self.refused = refused
 
     def __reduce__(self) -> tuple[Callable[..., "ParameterError"], tuple[Refused, ...]]:
@@ -127,9 +127,9 @@ def parameters(of: Any) -> Iterator[Parameter]:
     of
         The dataclass, or an instance of it.
     """
-    for one in fields(of):
-        if _KNOWN in one.metadata:
-            yield Parameter(one.name, one.type, one.default, one.metadata[_KNOWN])
+    for key in fields(of):
+        if _KNOWN in key.metadata:
+            yield Parameter(key.name, key.type, key.default, key.metadata[_KNOWN])
 
 
 def out_of_range(values: Any) -> Iterator[Refused]:
@@ -151,7 +151,7 @@ def out_of_range(values: Any) -> Iterator[Refused]:
     >>> @dataclass
     ... class Encoder:
     ...     lines: int = parameter(1000, "Lines of the disc [1]", example=500, least=1, most=100_000)
-    >>> [one.message for one in out_of_range(Encoder(lines=0))]
+    >>> [problem.message for problem in out_of_range(Encoder(lines=0))]
     ['lines = 0: must be between 1 and 100000']
     """
     for name, type_, _, known in parameters(values):
@@ -174,7 +174,7 @@ def not_positive(**values: float) -> Iterator[Refused]:
 
     Examples
     --------
-    >>> [one.message for one in not_positive(radius_mm=0)]
+    >>> [problem.message for problem in not_positive(radius_mm=0)]
     ['radius_mm = 0: must be above 0 and at most 1e+09']
     """
     for name, value in values.items():
@@ -187,7 +187,7 @@ def negative(**values: float) -> Iterator[Refused]:
 
     Examples
     --------
-    >>> [one.message for one in negative(drive_lag_us=-1, backlash_mm=0)]
+    >>> [problem.message for problem in negative(drive_lag_us=-1, backlash_mm=0)]
     ['drive_lag_us = -1: must be between 0 and 1e+09']
     """
     for name, value in values.items():
@@ -200,7 +200,7 @@ def not_one_of(*allowed: str, **values: str) -> Iterator[Refused]:
 
     Examples
     --------
-    >>> [one.message for one in not_one_of("ccw", "cw", direction="left")]
+    >>> [problem.message for problem in not_one_of("ccw", "cw", direction="left")]
     ["direction = 'left': must be one of 'ccw', 'cw'"]
     """
     for name, value in values.items():
@@ -223,9 +223,9 @@ def no_multiple(*, period_us: float, step_us: float) -> Iterator[Refused]:
 
     Examples
     --------
-    >>> [one.message for one in no_multiple(period_us=1000, step_us=300)]
+    >>> [problem.message for problem in no_multiple(period_us=1000, step_us=300)]
     ['step_us = 300: the period of 1000 us is no multiple of it; 250 us would fit']
-    >>> [one.message for one in no_multiple(period_us=1000, step_us=2000)]
+    >>> [problem.message for problem in no_multiple(period_us=1000, step_us=2000)]
     ['step_us = 2000: longer than the period of 1000 us; the period is the longest step that fits']
     """
     steps = period_us / step_us

@@ -109,10 +109,10 @@ def measure_contour(
 
     >>> angle = np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False)
     >>> x, y = 100.002 * np.cos(angle) + 0.001, 100.002 * np.sin(angle)
-    >>> found = measure_contour(x, y_mm=y, radius_mm=100.0, part=slice(0, 1000), turn_share=1.0)
-    >>> round(found.circular_deviation_mm, 9), round(found.radius_deviation_mm, 9)
+    >>> measures = measure_contour(x, y_mm=y, radius_mm=100.0, part=slice(0, 1000), turn_share=1.0)
+    >>> round(measures.circular_deviation_mm, 9), round(measures.radius_deviation_mm, 9)
     (0.0, 0.002)
-    >>> round(found.radial_deviation_min_mm, 9), round(found.radial_deviation_max_mm, 9)
+    >>> round(measures.radial_deviation_min_mm, 9), round(measures.radial_deviation_max_mm, 9)
     (0.001, 0.003)
     """
     whole = slice(0, len(x_mm)) if turn_share is None else part
@@ -209,7 +209,7 @@ class _Fit(NamedTuple):
             np.maximum(distance, np.finfo(float).tiny, out=distance)
             directions = (np.divide(x, distance, out=x), np.divide(y, distance, out=y), np.ones_like(x))
             _add(normal, right, directions, error)
-        last = [one[-1:] for one in directions]
+        last = [direction[-1:] for direction in directions]
         _add(normal, right, last, -missing * error[-1:], weight=-missing)
         a, b, deviation = np.linalg.lstsq(normal, right, rcond=None)[0].tolist()
         return cls(centre_mm, radius_mm, missing, lowest, highest, (a, b), deviation)

@@ -33,13 +33,13 @@ def compiled_kernel(engine: Engine) -> ModuleType | None:
     >>> compiled_kernel("python") is None
     True
     """
-    found = None if engine == "python" else _compiled()
-    if engine == "compiled" and found is None:
+    kernel = None if engine == "python" else _compiled()
+    if engine == "compiled" and kernel is None:
         raise BusplanError(
             "engine 'compiled': busplan was installed without a C compiler; install one and busplan again, "
             "or use 'python'"
         )
-    return found
+    return kernel
 
 
 @cache

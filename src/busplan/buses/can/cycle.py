@@ -234,8 +234,8 @@ class CanCycle(BusCycle):
             for group in self.network.groups
             if not group.worst_extra_us
         )
-        others = () if self._messages or self.network.nonperiodic_us else (LeftOut("other messages", "message"),)
-        return (*host, *slowest, *others)
+        traffic = () if self._messages or self.network.nonperiodic_us else (LeftOut("other messages", "message"),)
+        return (*host, *slowest, *traffic)
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
@@ -342,10 +342,10 @@ class CanCycle(BusCycle):
         )
 
 
-def _numbered(parts_us: Mapping[str, Number], **others: Number) -> dict[str, Number]:
+def _numbered(parts_us: Mapping[str, Number], **figures: Number) -> dict[str, Number]:
     """The figures of a latency with the sum of its parts."""
-    deadline_us = others.pop("deadline_us")
-    return {**others, **parts_us, "worst_response_us": total(parts_us.values()), "deadline_us": deadline_us}
+    deadline_us = figures.pop("deadline_us")
+    return {**figures, **parts_us, "worst_response_us": total(parts_us.values()), "deadline_us": deadline_us}
 
 
 def _short(number: float) -> str:

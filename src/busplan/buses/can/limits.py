@@ -37,8 +37,8 @@ def _all_late(traffic: Traffic) -> str:
     endless = [stream.name for stream, share in late if share == inf]
     if endless:
         more = len(endless) - 1
-        others = f" and {more} more message{'s' * (more > 1)} have" if more else " has"
-        return f"{endless[0]}{others} no worst-case response time"
+        rest = f" and {more} more message{'s' * (more > 1)} have" if more else " has"
+        return f"{endless[0]}{rest} no worst-case response time"
     return _and_more(
         [
             f"the worst-case response time of {stream.name} is {share * stream.deadline_us:g} us, "

@@ -122,9 +122,9 @@ def worst_instance(
         # It waits at least as long as the instance before it, and for that one.
         own_us = instance * own.frames_us
         waits_us = before.settled_us(ahead_us + own_us, steps, bit_us=bit_us, from_us=waits_us, is_settled=is_over)
-        found = Response(blocking_us, instance, waits_us - blocking_us - own_us, waits_us + late_us)
-        is_worse = choose(is_over, False, found.us > worst.us if instance else True)
-        worst = Response(*(choose(is_worse, new, old) for new, old in zip(found, worst, strict=True)))
+        response = Response(blocking_us, instance, waits_us - blocking_us - own_us, waits_us + late_us)
+        is_worse = choose(is_over, False, response.us > worst.us if instance else True)
+        worst = Response(*(choose(is_worse, new, old) for new, old in zip(response, worst, strict=True)))
     raise AssertionError
 
 
@@ -206,7 +206,7 @@ class Demand:
         """Frames that arrive in a window of time, sum ceil((window + J) / T) C, added in their order [us]."""
         is_plain = isinstance(window_us + self._of_jitter_us, float)
         if len(self._senders) < _MANY and is_plain:
-            return reduce(lambda sum_us, one: sum_us + ceil((window_us + one[2]) / one[1]) * one[0], self._senders, 0.0)
+            return reduce(lambda sum_us, own: sum_us + ceil((window_us + own[2]) / own[1]) * own[0], self._senders, 0.0)
         if self._senders and getattr(window_us, "size", 1) < _FEW_POINTS:
             import numpy as np
 
@@ -225,7 +225,7 @@ class Demand:
 
             columns = []
             for column in zip(*self._senders, strict=True):
-                shape = np.broadcast_shapes((1,) * axes, *{getattr(one, "shape", ()) for one in column})
+                shape = np.broadcast_shapes((1,) * axes, *{getattr(numbers, "shape", ()) for numbers in column})
                 rows = np.empty((len(column), *shape))
                 for place, numbers in enumerate(column):
                     rows[place] = numbers

@@ -161,7 +161,7 @@ class CanProfile(Profile):
 
     @model_validator(mode="after")
     def _messages_have_names(self) -> Self:
-        names = [one.name for one in self.message]
+        names = [message.name for message in self.message]
         problems = [
             Problem("there is a message of this name", key=f"message.{place}.name", kind="inconsistent")
             for place, name in enumerate(names)
@@ -179,8 +179,8 @@ class CanProfile(Profile):
     @model_validator(mode="after")
     def _groups_have_identifiers_of_their_own(self) -> Self:
         problems = []
-        for name in (f"{one}_identifier" for one in NAMES.values()):
-            said = [getattr(one, name) for one in self.group]
+        for name in (f"{direction}_identifier" for direction in NAMES.values()):
+            said = [getattr(group, name) for group in self.group]
             problems += [
                 Problem("an earlier group has it", key=f"group.{place}.{name}", kind="inconsistent")
                 for place, identifier in enumerate(said)
@@ -204,12 +204,12 @@ class CanProfile(Profile):
 
     def _identifiers(self) -> Iterator[tuple[str, int | None]]:
         yield "bus.sync_identifier", self.bus.sync_identifier
-        sections = [("payload", self.payload), *((f"group.{place}", one) for place, one in enumerate(self.group))]
+        sections = [("payload", self.payload), *((f"group.{place}", group) for place, group in enumerate(self.group))]
         for section, payload in sections:
             if payload is not None:
                 yield f"{section}.feedback_identifier", payload.feedback_identifier
                 yield f"{section}.command_identifier", payload.command_identifier
-        yield from ((f"message.{place}.identifier", one.identifier) for place, one in enumerate(self.message))
+        yield from ((f"message.{place}.identifier", message.identifier) for place, message in enumerate(self.message))
 
 
 PROFILE: Final = CanProfile

@@ -18,14 +18,16 @@ def settings(network: Network) -> tuple[Setting, ...]:
     network
         The network, of plain numbers.
     """
-    several = any(one.node.axes > 1 for one in network.alike)
+    several = any(nodes.node.axes > 1 for nodes in network.alike)
     return (*((_pdo_per(network),) if several else ()), _bit_rate(network), _identifier_bits(network))
 
 
 def _pdo_per(network: Network) -> Setting:
     """PDOs of each axis, where a node has several: its parameters map them."""
-    keys = {one.name: f"group.{one.name}.pdo_per" if one.name else "payload.pdo_per" for one in network.alike}
-    several = {keys[one.name]: "axis" for one in network.alike if one.payload.pdo_per == "node" and one.node.axes > 1}
+    keys = {nodes.name: f"group.{nodes.name}.pdo_per" if nodes.name else "payload.pdo_per" for nodes in network.alike}
+    several = {
+        keys[nodes.name]: "axis" for nodes in network.alike if nodes.payload.pdo_per == "node" and nodes.node.axes > 1
+    }
     reason = "" if several else "each axis has one already"
     values = (several,) if several else ()
     return Setting("pdo_per", "PDOs of each axis", Cost.REGISTER, tuple(keys.values()), values, reason)
@@ -44,6 +46,6 @@ def _identifier_bits(network: Network) -> Setting:
     empty = Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), ())
     if plain(traffic.identifier_bits) == BASE_BITS:
         return empty._replace(reason=f"they have {BASE_BITS} bits")
-    if max(one.last for one in streams(traffic, is_stuffed=True)) > MAX_IDENTIFIER[BASE_BITS]:
+    if max(stream.last for stream in streams(traffic, is_stuffed=True)) > MAX_IDENTIFIER[BASE_BITS]:
         return empty._replace(reason=f"some are over {MAX_IDENTIFIER[BASE_BITS]:#x}")
     return empty._replace(values=({key: BASE_BITS},))

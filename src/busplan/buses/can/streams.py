@@ -48,9 +48,9 @@ class Stream(NamedTuple):
         """Its frames, or some of them, as a source."""
         return Sender((self.identifiers if count is None else count) * self.frame_us, self.period_us, self.jitter_us)
 
-    def goes_before(self, other: "Stream") -> bool:
+    def goes_before(self, stream: "Stream") -> bool:
         """Whether its frames win the arbitration against the last frame of another; of plain numbers."""
-        return bool((self.block if other.is_message else self.first) <= other.last)
+        return bool((self.block if stream.is_message else self.first) <= stream.last)
 
 
 def remembered(*, maxsize: int) -> "Callable[[Callable[..., Found]], Callable[..., Found]]":
@@ -59,12 +59,12 @@ def remembered(*, maxsize: int) -> "Callable[[Callable[..., Found]], Callable[..
     def of(function: Callable[..., Found]) -> Callable[..., Found]:
         known = lru_cache(maxsize=maxsize)(function)
 
-        def ask(traffic: Traffic, *others: Any, is_stuffed: bool) -> Found:
+        def ask(traffic: Traffic, *arguments: Any, is_stuffed: bool) -> Found:
             try:
-                hash((traffic, others))
+                hash((traffic, arguments))
             except TypeError:
-                return function(traffic, *others, is_stuffed=is_stuffed)
-            return known(traffic, *others, is_stuffed=is_stuffed)
+                return function(traffic, *arguments, is_stuffed=is_stuffed)
+            return known(traffic, *arguments, is_stuffed=is_stuffed)
 
         return ask
 
@@ -174,10 +174,10 @@ def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, in
     ordered = sorted(range(len(each)), key=lambda place: plain(each[place].first))
     firsts = [plain(each[place].first) for place in ordered]
     pairs = (
-        sorted((place, other))
+        sorted((place, behind))
         for number, place in enumerate(ordered)
-        for other in ordered[number + 1 : bisect_right(firsts, each[place].last)]
+        for behind in ordered[number + 1 : bisect_right(firsts, each[place].last)]
     )
-    for place, other in sorted(pairs):
-        first = max(each[place].first, each[other].first)
-        yield each[place], each[other], first, min(each[place].last, each[other].last) - first + 1
+    for early, late in sorted(pairs):
+        first = max(each[early].first, each[late].first)
+        yield each[early], each[late], first, min(each[early].last, each[late].last) - first + 1

@@ -101,27 +101,27 @@ class Sent:
         self.traffic = traffic
         self._known: Callable[[int], Traffic]
 
-    def of(self, function: Callable[..., Any], *others: Number, words: str) -> Number:
+    def of(self, function: Callable[..., Any], *arguments: Number, words: str) -> Number:
         """What a function of the traffic gives.
 
         Parameters
         ----------
         function
-            Takes traffic of plain numbers and arrays, the identifiers and the sizes of messages plain, and `others`. It
-            is asked once, or for each point alone where those vary, and where a derivation is recorded.
-        others
-            Its other arguments.
+            Takes traffic of plain numbers and arrays, with plain identifiers and sizes of messages, and `arguments`. It
+            is called once, or for each point alone where those vary or a derivation is recorded.
+        arguments
+            Arguments behind the traffic.
         words
             What a derivation says of it.
         """
         if self.is_ordered:
-            result: Number = function(self.traffic, *others)
+            result: Number = function(self.traffic, *arguments)
             return result
-        return self.of_points(function, *others, words=words)
+        return self.of_points(function, *arguments, words=words)
 
-    def of_points(self, function: Callable[..., float], *others: Number, words: str) -> Number:
+    def of_points(self, function: Callable[..., float], *arguments: Number, words: str) -> Number:
         """What a function of traffic of plain numbers gives, point by point; arguments as `of` has them."""
-        return pointwise(lambda at, *more: function(self.at(at), *more), self.place, *others, words=words)
+        return pointwise(lambda at, *more: function(self.at(at), *more), self.place, *arguments, words=words)
 
     def at(self, place: float) -> Traffic:
         """The traffic of plain numbers at a place."""

@@ -199,11 +199,11 @@ class Messages:
 
     def _worst(self, own: Stream) -> Response | None:
         try:
-            found = [*self._responses(own)]
+            responses = [*self._responses(own)]
         except TooManyStepsError:
             return None
-        each = [response for response in found if response is not None]
-        return max(each, key=lambda response: plain(response.us)) if len(each) == len(found) else None
+        known = [response for response in responses if response is not None]
+        return max(known, key=lambda response: plain(response.us)) if len(known) == len(responses) else None
 
     def _responses(self, own: Stream) -> Iterator[Response | None]:
         """The worst instance of a message from each start of a busy period."""
@@ -265,8 +265,8 @@ class Messages:
         if is_everywhere(tells):
             return bound
         if isinstance(bound, float):
-            found = self.response(own)
-            return inf if found is None else found.us / own.deadline_us
+            response = self.response(own)
+            return inf if response is None else response.us / own.deadline_us
         us = (inf if response is None else response.us for response in self._responses(own))
         return choose(tells, bound, reduce(larger, us) / own.deadline_us)
 
@@ -302,13 +302,13 @@ def response(own: Stream, traffic: Traffic, *, is_stuffed: bool) -> Response | N
     """
     if own.is_message:
         return messages(traffic, is_stuffed=is_stuffed).response(own)
-    others = [stream for stream in streams(traffic, is_stuffed=is_stuffed) if stream is not own]
+    rivals = [stream for stream in streams(traffic, is_stuffed=is_stuffed) if stream is not own]
     lower_us = (
         plain(stream.frame_us)
-        for stream in others
+        for stream in rivals
         if not stream.goes_before(own) and (own.name != SYNC or stream.is_message)
     )
-    higher = [stream.sender() for stream in others if stream.goes_before(own)]
+    higher = [stream.sender() for stream in rivals if stream.goes_before(own)]
     if own.identifiers > 1:
         higher.append(own.sender(own.identifiers - 1))
     blocking_us, bit = max(lower_us, default=0.0), plain(bit_us(traffic.bit_rate_kbit_s))

@@ -147,7 +147,7 @@ SYNC_SHIFT: Final = Sourced(
     meaning="where SYNC0 of the distributed clocks lies behind the master's task, as a share of the period",
 )
 
-CONSTANTS: Final = constants({key: one for key, one in globals().items() if not key.startswith("_")})
+CONSTANTS: Final = constants({key: value for key, value in globals().items() if not key.startswith("_")})
 
 
 _BOTH_WAYS: Final = 2

@@ -65,7 +65,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     >>> pack([Devices(1000, 4)], datagrams=1, first_bytes=0.0)
     Packing(frames=3, datagrams_bytes=4036.0, padding_bytes=0.0, last_bytes=1044.0, before_bytes=1496.0)
     """
-    devices = [_with_data(one) for one in devices if not is_everywhere(one.data_bytes <= 0)] or [Devices(0, 1)]
+    devices = [_with_data(group) for group in devices if not is_everywhere(group.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
     headers = total([alike(DATAGRAM_BYTES, devices[0].number)] * datagrams)
     free: Number = 0.0

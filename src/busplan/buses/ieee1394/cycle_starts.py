@@ -216,12 +216,12 @@ class CycleWithStarts(BusCycle):
         starts, start_us = int(plain(self.number_of_starts)), plain(self.cycle_start_us)
         start = (self._start._replace(us=start_us),)
         sent, now_us = 0, 0.0
-        for others in map(tuple, super().each_round()):
+        for events in map(tuple, super().each_round()):
             while sent < starts and now_us >= sent * CYCLE_US:
                 yield start
                 sent, now_us = sent + 1, now_us + start_us
-            yield others
-            for event in others:
+            yield events
+            for event in events:
                 now_us += plain(event.us)
         yield from repeat(start, starts - sent)
 

@@ -72,19 +72,19 @@ def of_cycle(
     hop_delays
         How often the delay of all hops stands in the cycle beside its transactions [1].
     """
-    host, split, others = network.profile.host, _split_halves(exchanges), _other_halves(exchanges, network)
+    host, split, other_halves = network.profile.host, _split_halves(exchanges), _other_halves(exchanges, network)
     spread_us = residual().uncertainty_us
     # One reading is wrong by the same share in all: signs count.
     of_split_us = total(halves * _gap_term_us(_measured_at(node), link.gap_count, "d_split") for node, halves in split)
-    gap_term_us = of_split_us + others * _gap_term_us(MAX_GAP_COUNT, link.gap_count, "d")
-    of_packets = total(one.nodes * _hop_delays(one, network) for one in exchanges)
+    gap_term_us = of_split_us + other_halves * _gap_term_us(MAX_GAP_COUNT, link.gap_count, "d")
+    of_packets = total(exchange.nodes * _hop_delays(exchange, network) for exchange in exchanges)
 
-    def swing_us(one: Exchange, execution_us: Number, host_us: Number) -> Number:
+    def swing_us(exchange: Exchange, execution_us: Number, host_us: Number) -> Number:
         """What one standard uncertainty changes, as the larger of two steps of two: up and down.
 
         The cycle never falls with either time and has kinks, at which a central difference covers too little.
         """
-        own = one.responder
+        own = exchange.responder
         if is_off(execution_us if own.answer == "split" else 0.0) and is_off(host_us):
             return 0.0
         answer, bound_us = own.answer, own.execution_us + own.worst_extra_us
@@ -105,14 +105,17 @@ def of_cycle(
         Doubt(
             "residual",
             _LABELS["residual"],
-            total(halves * choose(_is_fitted(node), 0.0, spread_us) for node, halves in split) + others * spread_us,
+            total(halves * choose(_is_fitted(node), 0.0, spread_us) for node, halves in split)
+            + other_halves * spread_us,
         ),
         Doubt("gap_term", _LABELS["gap_term"], larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
         Doubt(
             "node.execution" if network.is_uniform else "group.execution",
             "execution time",
             # Times of several groups are measured, or guessed, in one way: they are taken to err together.
-            total(one.nodes * swing_us(one, one.execution_uncertainty_us, 0.0) for one in exchanges),
+            total(
+                exchange.nodes * swing_us(exchange, exchange.execution_uncertainty_us, 0.0) for exchange in exchanges
+            ),
         ),
         Doubt(
             "bus.phy_delay_us",
@@ -122,7 +125,7 @@ def of_cycle(
         Doubt(
             "host.transaction_us",
             _LABELS["host.transaction_us"],
-            total(one.nodes * swing_us(one, 0.0, host.standard_uncertainty_us) for one in exchanges),
+            total(exchange.nodes * swing_us(exchange, 0.0, host.standard_uncertainty_us) for exchange in exchanges),
         ),
     )
 
@@ -175,12 +178,12 @@ _LABELS: Final = {
 }
 
 
-def _hop_delays(one: Exchange, network: Network) -> Number:
+def _hop_delays(exchange: Exchange, network: Network) -> Number:
     """Delays of hops in a transaction: arbitrations over the way to the root, other parts over its own [1]."""
-    packets = [part.term for part in one.parts if part.term in PACKET_PARTS]
+    packets = [part.term for part in exchange.parts if part.term in PACKET_PARTS]
     arbitrations = packets.count(ARBITRATION)
-    hops = (len(packets) - arbitrations) * one.link.hops
-    return hops + arbitrations * arbitration_hops(network, one.link)
+    hops = (len(packets) - arbitrations) * exchange.link.hops
+    return hops + arbitrations * arbitration_hops(network, exchange.link)
 
 
 def _phy_doubt_us(delays: Number, link: Link) -> Number:
@@ -192,16 +195,16 @@ def _phy_doubt_us(delays: Number, link: Link) -> Number:
 def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ...]:
     """How often half a split transaction stands in the cycle, a packet that is acknowledged: by sort of node [1]."""
     counts: dict[int, tuple[Any, list[Number]]] = {}
-    for one in exchanges:
-        if one.responder.answer == "split":
-            counts.setdefault(id(one.group.node), (one.group.node, []))[1].append(2 * one.nodes)
+    for exchange in exchanges:
+        if exchange.responder.answer == "split":
+            counts.setdefault(id(exchange.group.node), (exchange.group.node, []))[1].append(2 * exchange.nodes)
     return tuple((node, named(total(each), "split_halves", "halves")) for node, each in counts.values())
 
 
 def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
     """How often half of any other transaction stands in the cycle, and retries [1]."""
-    others = [one for one in exchanges if one.responder.answer != "split"]
-    halves = total(one.nodes * (1 if one.responder.answer == "unified" else 2) for one in others)
+    unsplit = [exchange for exchange in exchanges if exchange.responder.answer != "split"]
+    halves = total(exchange.nodes * (1 if exchange.responder.answer == "unified" else 2) for exchange in unsplit)
     return named(halves + network.profile.cycle.retries, "other_halves", "halves_other")
 
 

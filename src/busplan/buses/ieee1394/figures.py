@@ -128,7 +128,7 @@ WRITE_TRANSACTION: Final = Figure(
     "write_transaction_us", "T_write", "idle", "what a write takes of the cycle", "write T_lant + idle", better="less"
 )
 _PLAIN: Final = (SYNC, NONPERIODIC)
-_DOCUMENT_TERMS: Final = (*_PLAIN, *(one for one in TERMS if one not in _PLAIN))
+_DOCUMENT_TERMS: Final = (*_PLAIN, *(figure for figure in TERMS if figure not in _PLAIN))
 """In the order of the document, which is older than that of the wire."""
 TABLE: Final = (
     READ_LATENCY,

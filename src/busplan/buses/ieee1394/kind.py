@@ -97,8 +97,8 @@ def _gap_count(network: Network) -> Setting:
 
 def _schedule(network: Network) -> Setting:
     """The other way to read and write all nodes."""
-    other = "individual" if is_broadcast(network) else "broadcast"
-    return Setting("schedule", "schedule", Cost.SCHEDULE, ("cycle.schedule",), ({"cycle.schedule": other},))
+    schedule = "individual" if is_broadcast(network) else "broadcast"
+    return Setting("schedule", "schedule", Cost.SCHEDULE, ("cycle.schedule",), ({"cycle.schedule": schedule},))
 
 
 def _responses(network: Network) -> Setting:
@@ -248,23 +248,23 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:
         """An unsafe gap count, and cables that the table does not hold for."""
-        bus, found = network.profile.bus, []
+        bus, warnings = network.profile.bus, []
         limit = "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
         for asked in [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]:
             if not self.is_safe(asked):
                 hops, given = hops_of(asked), gap_count_of(asked)
-                found.append(
+                warnings.append(
                     f"Warning: gap count {given} is unsafe for {hops} hop{'s' * (hops != 1)} "
                     f"({asked.nodes} node{'s' * (asked.nodes != 1)}); "
                     f"the smallest safe one is {safe_gap_count(hops)}{limit}."
                 )
                 break
         if not bus.cable_is_standard:
-            found.append(
+            warnings.append(
                 f"Warning: cables of {bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m that the "
                 "gap-count table holds for."
             )
-        return found
+        return warnings
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """Those of `busplan.buses.ieee1394.evidence`."""

@@ -287,7 +287,7 @@ class Ieee1394Profile(Profile):
     @model_validator(mode="after")
     def _hops_are_known(self) -> Self:
         problems: list[Problem] = []
-        most, given = self.bus.max_hops, [(place, one.hops) for place, one in enumerate(self.group)]
+        most, given = self.bus.max_hops, [(place, group.hops) for place, group in enumerate(self.group)]
         for place, hops in given:
             key = f"group.{place}.hops"
             if most is None and hops is not None:

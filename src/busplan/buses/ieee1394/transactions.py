@@ -83,8 +83,8 @@ def arbitration_hops(network: Network, link: Link) -> Number:
 
 def is_broadcast(network: Network) -> bool:
     """Whether the nodes broadcast their data, instead of being read one by one."""
-    found: bool = network.profile.cycle.schedule == "broadcast"
-    return found
+    schedule: str = network.profile.cycle.schedule
+    return schedule == "broadcast"
 
 
 class Ways(NamedTuple):
@@ -108,15 +108,15 @@ def ways(network: Network) -> tuple[Ways, ...]:
         return (Ways(*(hops_of(network),) * 3),) * len(network.groups)
     if network.profile.bus.max_hops is not None:
         return tuple(Ways(*(group.node.hops,) * 3) for group in network.groups)
-    found: list[Ways] = []
+    chain: list[Ways] = []
     for group in network.groups:
         mean = (group.nodes + 1) / 2
-        before = found[-1].last if found else None
+        before = chain[-1].last if chain else None
         own = Ways(1, mean, group.nodes)
         if before is not None:
             own = Ways(before + 1, before + mean, before + group.nodes)
-        found.append(own._replace(mean=named(own.mean, "hops", f"H_mean{group.name and f',{group.name}'}")))
-    return tuple(found)
+        chain.append(own._replace(mean=named(own.mean, "hops", f"H_mean{group.name and f',{group.name}'}")))
+    return tuple(chain)
 
 
 def farthest_link(network: Network, name: str) -> Link:

@@ -131,19 +131,19 @@ class Sercos3Cycle(SercosCycle):
 
     def written(self) -> Iterator[BusEvent | Run]:
         """The telegrams, the wait of the devices, and what the window keeps free."""
-        other = BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "channel for other frames")
+        channel = BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "channel for other frames")
         is_last = self.method == "mdt-at-ucc"
         jitter_us = self._jitters[1] * self.jitter_us if self.is_window else 0.0
         yield self._run("write")
         if not is_last:
-            yield other
+            yield channel
         wait = "wait of the devices before the AT"
         yield BusEvent("wait", "cycle_wait_us", self._start_wait_us, wait, rests_on="bus.at_start_us")
         yield self._run("read")
         ring_us = self.ring_us if self._has_ring else 0.0
         yield BusEvent("ring", "cycle_ring_us", ring_us, "the last telegram goes round the ring")
         if is_last:
-            yield other
+            yield channel
         yield BusEvent("jitter", "cycle_jitter_us", jitter_us, "allowances for the jitter")
         master = "the master's own time before the next cycle"
         yield BusEvent("master", "cycle_master_us", self._master_us, master, rests_on="bus.master_delay_us")
@@ -177,8 +177,8 @@ class Sercos3Cycle(SercosCycle):
     def left_out(self) -> tuple[LeftOut, ...]:
         """The channel for other frames, and the devices' least time before the AT."""
         least = LeftOut("the devices' least time before the AT, S-0-1006", "bus.at_start_us")
-        other = LeftOut("the channel for other frames", "cycle.nonperiodic_us")
-        said = ((self.network.profile.bus.at_start_us is not None, least), (self.network.nonperiodic_us, other))
+        channel = LeftOut("the channel for other frames", "cycle.nonperiodic_us")
+        said = ((self.network.profile.bus.at_start_us is not None, least), (self.network.nonperiodic_us, channel))
         return tuple(left for is_said, left in said if not is_said)
 
     def figures(self) -> Mapping[str, Number | None]:

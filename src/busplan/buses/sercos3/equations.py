@@ -146,10 +146,10 @@ def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number, n
     >>> filled([Items(3, 700)], first_bytes=12, next_bytes=0)
     Filling(telegrams=2, closed_bytes=1412, open_bytes=700)
     """
-    found = Filling(1, 0, first_bytes)
-    for place, one in enumerate(items, start=1):
-        found = _with_items(found, one, next_bytes, f"{name},{place}")
-    return found
+    filling = Filling(1, 0, first_bytes)
+    for place, group in enumerate(items, start=1):
+        filling = _with_items(filling, group, next_bytes, f"{name},{place}")
+    return filling
 
 
 def _with_items(before: Filling, items: Items, next_bytes: Number, name: str) -> Filling:
