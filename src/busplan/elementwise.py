@@ -1,4 +1,4 @@
-"""Numbers of the equations: floats, arrays and traced numbers, and the few functions on them that are no operators.
+"""Numbers of the equations: floats, arrays and traced numbers, and functions that work on all of them.
 
 What a bus computes it writes with operators and with these functions. Then one equation serves all three. A traced
 number records how it was computed, so that a line of a derivation shows what was executed. numpy loads only where
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Number: TypeAlias = "float | NDArray[Any] | Traced"
 else:
     Number: TypeAlias = object  # only type checkers ask what it is, and numpy stays unloaded
-"""A plain number, an array, or a `Traced` one. Booleans count as numbers."""
+"""A plain number, an array, or a `Traced` number. Booleans count as numbers."""
 
 FIT_ROUNDING: Final = 1e-12
 """Relative allowance for the rounding of floats where a number is held against a limit: what is exactly at the limit
@@ -78,7 +78,7 @@ _Operator: TypeAlias = "Callable[[Traced, Any], Traced]"
 
 
 def _operators(name: str) -> tuple[_Operator, _Operator]:
-    """An operator of traced numbers, and the one that a number on its left asks."""
+    """An operator of traced numbers, and its form for a number on the left."""
     return lambda own, operand: _computed(name, own, operand), lambda own, operand: _computed(name, operand, own)
 
 
@@ -153,7 +153,7 @@ class Traced:
 
 
 def value_of(operand: Number) -> float:
-    """Plain number of any operand; a word, which `==` compares, too, stays one."""
+    """Plain number of any operand; a word, which `==` compares, too, stays a word."""
     value: Any = operand.value if isinstance(operand, Traced) else operand
     return float(value) if isinstance(value, Sourced) else value
 
@@ -331,7 +331,7 @@ def rounded_down(number: Number) -> Number:
 
 
 def from_table(table: Sequence[float], place: Number, *, words: str, sources: tuple[Number, ...] = ()) -> Number:
-    """The entry of a table at a place from 0; beyond its end the last one.
+    """The entry of a table at a place from 0; beyond its end the last entry.
 
     Parameters
     ----------
@@ -424,7 +424,7 @@ def interpolated(places: Sequence[float], values: Sequence[float], place: Number
 
 
 def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> Number:
-    """What a function of plain numbers gives, point by point: for what only a search can tell.
+    """Result of a function of plain numbers, point by point: for results that only a search can tell.
 
     Parameters
     ----------
@@ -455,7 +455,7 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
 
 
 def _points(number: "float | NDArray[Any]", shape: tuple[int, ...]) -> Iterator[float]:
-    """A number at each point of a shape; a plain one without end."""
+    """A number at each point of a shape; a plain number without end."""
     if isinstance(number, _PLAIN):
         return repeat(number)
     import numpy as np

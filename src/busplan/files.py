@@ -1,4 +1,4 @@
-"""Files written atomically: an old one stays whole until the new one is."""
+"""Files written atomically: an old file stays whole until the new file is."""
 
 import io
 import os

@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple, Self, TypeVar
 
 Grade = Literal["published", "derived", "recalled", "measured", "calibrated", "assumed"]
-"""How well a number is known.
+"""Grade of a number: how well it is known.
 
 published: read in a public source; derived: computed from published figures; recalled: general knowledge
 that no source opened so far confirms; measured: taken on a machine; calibrated: fitted so that the model meets

@@ -1,4 +1,4 @@
-"""Kinds of bus: what an analysis may ask of one, and a folder for each.
+"""Kinds of bus: the questions that an analysis may ask, and a folder for each kind.
 
 The register names the module of each kind; a kind loads when a profile asks for it.
 """
@@ -80,7 +80,7 @@ def _plain(name: str) -> str:
 
 @contextmanager
 def registered(bus: "Bus") -> Iterator[None]:
-    """Register one more kind for a while, as a test does.
+    """Register a further kind for a while, as a test does.
 
     Raises
     ------

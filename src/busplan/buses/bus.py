@@ -1,4 +1,4 @@
-"""What an analysis may ask of a kind of bus.
+"""Questions that an analysis may ask of a kind of bus.
 
 An analysis asks a bus, never its keys. `terms`, `figures` and limits are written with operators and the functions of
 `busplan.elementwise`, so that they serve floats, arrays and traced numbers alike. They branch on words, never on
@@ -47,7 +47,7 @@ class Bus(ABC):
     timing_models: ClassVar[tuple[TimingModel, ...]]
     """In the order reports show them."""
     deciding_model: ClassVar[str]
-    """The conservative timing model: the verdict is by this one, always."""
+    """The conservative timing model, which always gives the verdict."""
     figures: ClassVar[BusFigures]
     safety: ClassVar[Safety] = Safety()
     limits: ClassVar[tuple[Limit, ...]]
@@ -55,20 +55,20 @@ class Bus(ABC):
     periods: ClassVar[Periods] = ANY_PERIOD
     """Communication periods that it knows. One that knows some alone has a limit and a rule of `limits`."""
     starter: ClassVar[Starter]
-    """What a new profile starts from."""
+    """Defaults of a new profile."""
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
-    """What several events make together."""
+    """Stretches that several events make together."""
     constants: ClassVar[Mapping[str, Sourced]] = {}
     """Its figures with a source, by name."""
     keys: ClassVar[Mapping[str, Key]] = {}
     """Facts about keys of its profiles; a key of a group is here as `node.` or `payload.` has it."""
     calibration: ClassVar[MeasuredLatencies | None] = None
-    """How execution times are found from latencies; None where no latency could be measured."""
+    """Calibration of execution times from latencies; None where no latency could be measured."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
-    """What would take a term of its own out of the cycle, each new values by dotted key."""
+    """Changes that take a term of the kind out of the cycle, each new values by dotted key."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
     """Data files, in busplan/data, with figures of it that others have published or measured."""
 
@@ -99,7 +99,7 @@ class Bus(ABC):
         return next((name for name, key in self.keys.items() if key.role == role), "")
 
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
-        """What of the bus a plan may turn; it is asked again after each change of the network."""
+        """Settings of the bus that a plan may change; asked again after each change of the network."""
         return ()
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:  # noqa: ARG002 - a kind may have none
@@ -115,11 +115,11 @@ class Bus(ABC):
         return "every node alike"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none
-        """How the bus is set, each in a few words."""
+        """Settings in force, each in a few words."""
         return ()
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - a kind may have none
-        """What to beware of, whatever the verdict, with each of some numbers of nodes on the bus."""
+        """Warnings that hold whatever the verdict, at each of some numbers of nodes."""
         return []
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
@@ -139,5 +139,5 @@ class Bus(ABC):
         return not any(limit.is_broken(network) for limit in self.limits if limit.is_safety)
 
     def event_kind(self, key: str) -> EventKind:
-        """How an event or a stretch of events is called and drawn."""
+        """Name and colour of an event or a stretch of events."""
         return next(kind for kind in (*self.event_kinds, IDLE, *self.stretch_kinds) if kind.key == key)

@@ -1,7 +1,7 @@
 """A cycle of any bus: counted events in the order of the wire, which terms and the timeline come from.
 
 Each kind writes its cycle once, as runs of events. Terms are their sums: a run counts its events, so that a million
-nodes take no longer to add up than one. The timeline lays the same runs out, event by event.
+nodes take no longer to add up than a single node. The timeline lays the same runs out, event by event.
 """
 
 from abc import ABC, abstractmethod
@@ -27,7 +27,7 @@ class Term(NamedTuple):
     """Of its figure."""
     us: Number
     rests_on: str = ""
-    """Dotted key of the profile that it comes from, where that is one alone."""
+    """Dotted key of the profile that it comes from; empty unless it is a single key."""
 
     @property
     def name(self) -> str:
@@ -43,29 +43,29 @@ class BusEvent(NamedTuple):
     term: str
     """Key of the term that it is a part of."""
     us: Number
-    """How long it takes [us]: a plain number where it is laid out, of any sort in a run."""
+    """Duration [us]: a plain number where it is laid out, of any sort in a run."""
     label: str
     """Name, and who is at work."""
     node: int | None = None
     """Whose it is where it is laid out, from 1; None for what belongs to all."""
     transaction: str | None = None
-    """The stretch that it belongs to: the key of an `EventKind`. Where nodes take turns, an event without one is no
+    """The stretch that it belongs to: the key of an `EventKind`. Where nodes take turns, an event without it is no
     node's own."""
     packet: str | None = None
     """Which packet of the transaction it belongs to."""
     rests_on: str = ""
-    """Dotted key of the profile that it comes from, where that is one alone."""
+    """Dotted key of the profile that it comes from; empty unless it is a single key."""
     rounds: Rounds = ALL
     """Rounds of its run that have it."""
 
 
 class Run(NamedTuple):
-    """Events one behind the other, in one round or several."""
+    """Events in sequence, in one round or several."""
 
     events: tuple[BusEvent, ...]
-    """Those of a round; of the mean round where rounds differ."""
+    """Events of a round; of the mean round where rounds differ."""
     times: Number | None = None
-    """Rounds [1]; None for one alone."""
+    """Rounds [1]; None for a single round."""
     group: int | None = None
     """Place of the group of nodes that take turns, each with as many rounds; None for what belongs to all."""
     laid_out: Callable[[Number], Iterable[BusEvent]] | None = None
@@ -93,7 +93,7 @@ class Run(NamedTuple):
 
 
 def summed(runs: Iterable[Run], keys: Iterable[str]) -> dict[str, Number]:
-    """Time of each term: the sum of its events in the order of the runs, 0.0 of one without events [us].
+    """Time of each term: the sum of its events in the order of the runs, 0.0 of a term without events [us].
 
     Parameters
     ----------
@@ -129,12 +129,12 @@ class LeftOut(NamedTuple):
 
 
 class BusLatency(NamedTuple):
-    """How long one thing takes on the bus, part by part."""
+    """A latency on the bus, part by part."""
 
     name: str
     payload_bytes: Number | None
     phases: Mapping[str, Number]
-    """Figures by key, which are among the kind's `latency_figures`; an infinite one does not exist."""
+    """Figures by key, which are among the kind's `latency_figures`; infinite where the phase does not exist."""
     group: str = ""
     """Of which group of nodes; empty where all are alike."""
 
@@ -156,7 +156,7 @@ class BusCycle(ABC):
     """One for each term, in their order."""
     command_events: ClassVar[tuple[tuple[str | None, str], ...]] = ()
     """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
-    cycle. Those of no one node are the command of all."""
+    cycle. Events of no node of its own are the command of all."""
 
     @abstractmethod
     def written(self) -> Iterator[BusEvent | Run]:
@@ -174,7 +174,7 @@ class BusCycle(ABC):
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """The terms in their order: every one always, 0.0 where it is off."""
+        """All terms in their order, 0.0 where a term is off."""
         keys: dict[str, set[str]] = {}
         for event in chain.from_iterable(run.events for run in self.runs):
             keys.setdefault(event.term, set()).add(event.rests_on)
@@ -278,7 +278,7 @@ class BusCycle(ABC):
             now_us += _rounds_us(run, count)
         return now_us + self.added_before_us(now_us) if arrived_us is None else arrived_us
 
-    def added_before_us(self, sent_us: float) -> float:  # noqa: ARG002 - most runs go one behind the other
+    def added_before_us(self, sent_us: float) -> float:  # noqa: ARG002 - most runs follow each other at once
         """Time of events between the rounds, before the runs have taken some time, in plain numbers [us].
 
         Parameters
@@ -289,15 +289,15 @@ class BusCycle(ABC):
         return 0.0
 
     def figures(self) -> Mapping[str, Number | None]:
-        """The kind's own figures beside the terms, by key; None for one that these groups of nodes do not have."""
+        """The kind's own figures beside the terms, by key; None where these groups of nodes have no such figure."""
         return {}
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """What only this kind says on the card of a verdict: labels and words, of plain numbers."""
+        """Lines of this kind alone on the card of a verdict: labels and words, of plain numbers."""
         return ()
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """How long things take; a kind without transactions has its cycle."""
+        """The latencies; of a kind without transactions the cycle."""
         phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}
         return (BusLatency("cycle", None, phases),)
 
@@ -311,7 +311,7 @@ def _round(run: Run, number: int, node: int | None) -> Iterator[BusEvent]:
 
 
 def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]) -> float | None:
-    """From the start of a round to the end of the last event of a command [us]; None without one."""
+    """From the start of a round to the end of the last event of a command [us]; None without a command."""
     if not any((event.transaction, event.kind) in commands for event in run.events):
         return None
     if len(run.events) == 1:

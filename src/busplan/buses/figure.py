@@ -11,7 +11,7 @@ from busplan.buses import time_slice
 from busplan.sourced import EQUATIONS
 
 Sort = Literal["number", "count", "truth", "word", "words"]
-"""What a figure's values are."""
+"""Sort of a figure's values."""
 Better = Literal["more", "less", "neither"]
 Ink = Literal[
     "sync",
@@ -35,7 +35,7 @@ Ink = Literal[
     "unjudged",
     "refused",
 ]
-"""What a stretch of time, or a setting of a map, is to the reader of a drawing: its colour."""
+"""Colour of a stretch of time, or of a setting of a map, by its meaning to a reader."""
 
 _UNITS: Final = {
     "_mm_per_min": "mm/min",
@@ -68,7 +68,7 @@ class Figure(NamedTuple):
     meaning
         What it is, in one line.
     label
-        How a table calls it; a figure without one stands in no table of a command.
+        How a table calls it; a figure without it stands in no table of a command.
     column
         What a table's unit column says, where it is not the unit: "%" for a share.
     sort
@@ -321,7 +321,7 @@ VERDICT_FIGURES: Final = (
     Figure("sensitivity", "sensitivity", _CERTAINTY, "how small changes move the corrected margin, the largest first"),
     Figure("next_bottleneck", "next bottleneck", _CERTAINTY, "what binds once the largest term or the limit is gone"),
 )
-"""Figures of the verdict, which belong to no one timing model."""
+"""Figures of the verdict, which belong to no timing model."""
 
 TRANSACTION: Final = Figure("transaction", "kind", "profile", "what is timed", sort="word")
 PAYLOAD_BYTES: Final = Figure("payload_bytes", "P", "profile", "payload of the transaction", sort="count")
@@ -368,7 +368,7 @@ class BusFigures(NamedTuple):
     capacity: tuple[Figure, ...]
     """Of `capacity`, in the order of its document: see `capacity_figures`."""
     setup: tuple[Figure, ...] = ()
-    """Those of them that say how the bus is set."""
+    """Figures that say how the bus is set."""
     headings: tuple[str, ...] = ()
     """Keys of the set-up figures that a page's heading shows."""
     table: tuple[Figure, ...] = ()
@@ -395,7 +395,7 @@ class BusFigures(NamedTuple):
         return self.latency_document or (TIMING_MODEL, TRANSACTION, NODES, *self.latency_table)
 
     def term_label(self, name: str | None) -> str:
-        """Label of a term in tables, by its name beside the other terms; empty without one."""
+        """Label of a term in tables, by its name beside the other terms; empty without a figure."""
         return next((figure.label for figure in self.terms if term_name(figure.key) == name), "")
 
 

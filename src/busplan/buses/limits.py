@@ -50,7 +50,7 @@ class Periods(NamedTuple):
         return next_entry(self.us, least_us * (1 - FIT_ROUNDING), words="the next period that the bus knows")
 
     def neighbours(self, period_us: float) -> tuple[float, ...]:
-        """The next shorter one and the next longer one, where they exist [us].
+        """The next shorter and the next longer period that the bus knows, where they exist [us].
 
         Examples
         --------
@@ -81,7 +81,7 @@ PERIOD_LIMIT: Final = "period"
 
 
 def period_limit(periods: Periods) -> Limit:
-    """The limit that the period is one that the bus knows.
+    """The limit that the bus must know the period.
 
     Parameters
     ----------
@@ -136,12 +136,12 @@ NODE: Final = "node"
 
 
 def busy_us(group: Group) -> Number:
-    """What a node executes in a cycle: a read and a write, the slowest of each [us]."""
+    """Execution time of a node in a cycle: a read and a write, the slowest of each [us]."""
     return group.read_execution_us + group.write_execution_us + 2 * group.worst_extra_us
 
 
 def busy_doubt_us(group: Group) -> Number:
-    """Standard uncertainty of that: both times are known in one way, and are taken to err together [us]."""
+    """Standard uncertainty of that time: read and write are known in the same way, so they err together [us]."""
     return group.read_uncertainty_us + group.write_uncertainty_us
 
 
@@ -170,7 +170,7 @@ def _shown_us(group: Group) -> Number:
 
 
 def _ends_us(network: Network) -> tuple[Number, Number]:
-    """What the slowest nodes execute at least, and what they are shown to execute at most [us]."""
+    """Execution time of the slowest nodes: at least, and at most as far as it is shown [us]."""
     least_us = (busy_us(group) - COVERAGE * busy_doubt_us(group) for group in network.groups)
     return reduce(larger, least_us), reduce(larger, map(_shown_us, network.groups))
 

@@ -1,4 +1,4 @@
-"""What a cycle is computed from: groups of nodes, the period, and the kind's own keys."""
+"""Inputs of a cycle: groups of nodes, the period, and the kind's own keys."""
 
 from functools import reduce
 from typing import Any, NamedTuple
@@ -11,9 +11,9 @@ class Group(NamedTuple):
     """Nodes that are alike. The numbers may be of any sort."""
 
     said: AlikeNodes
-    """What the profile says of them."""
+    """The nodes as the profile says them."""
     nodes: Number
-    """How many [1]."""
+    """Number of nodes [1]."""
     axes: Number
     """Axes of each node [1]."""
     read_bytes: Number
@@ -25,7 +25,7 @@ class Group(NamedTuple):
     write_execution_us: Number
     """Execution time of a write in the node [us]."""
     worst_extra_us: Number = 0.0
-    """What the slowest execution takes beyond these [us]."""
+    """Extra time of the slowest execution [us]."""
     read_uncertainty_us: Number = 0.0
     """Standard uncertainty of the execution time of a read [us]."""
     write_uncertainty_us: Number = 0.0
@@ -35,7 +35,7 @@ class Group(NamedTuple):
 
     @property
     def node(self) -> Any:
-        """What the profile says of one of them, of its kind's own model: how it executes and answers."""
+        """A node of the group, of its kind's own model: how it executes and answers."""
         return self.said.node
 
     @property
@@ -83,7 +83,7 @@ class Network(NamedTuple):
         return reduce(larger, sizes)
 
     def asking(self, name: str) -> "Network":
-        """The same network, asked how many nodes one of the profile's groups may have.
+        """The same network, asked how many nodes a group of the profile may have.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class Network(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the profile's groups, in the order of the chain; one empty name for the nodes of [node]."""
+        """Names of the profile's groups, in the order of the chain; a single empty name for the nodes of [node]."""
         return tuple(alike.name for alike in self.alike)
 
     @property

@@ -1,4 +1,4 @@
-"""What a kind of bus names: timing models, events, limits, what a plan may turn, and what a new profile starts from."""
+"""Parts of a kind of bus: timing models, events, limits, settings of a plan, and the start of a new profile."""
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
@@ -19,7 +19,7 @@ class TimingModel(NamedTuple):
     name: str
     meaning: str
     error: str = "how far the bus is from this timing model is not known"
-    """How far it is off, where no bias of it is known."""
+    """Its error in words, where no bias of it is known."""
 
 
 class Safety(NamedTuple):
@@ -46,11 +46,11 @@ class Key(NamedTuple):
     default: Sourced | None = None
     """Its default, where that is a figure with a source."""
     grade: Grade | None = None
-    """How well its value can be known, where that is less than given."""
+    """Best grade of its value, where that is less than given."""
     meaning: str = ""
-    """What a change of it means on the machine, where the key does not say so."""
+    """Meaning of a change on the machine, where the key does not say it."""
     short: str = ""
-    """How a table of plans writes it: a format of the value."""
+    """Short form in a table of plans: a format of the value."""
     chooses: bool = False
     """Whether its word selects a formula, so that a derivation has it among its inputs."""
     warned_at: Sourced | None = None
@@ -60,7 +60,7 @@ class Key(NamedTuple):
 
 
 class EventKind(NamedTuple):
-    """How one kind of event, or a stretch of several, is called and drawn."""
+    """Name and colour of a kind of event, or of a stretch of several."""
 
     key: str
     label: str
@@ -72,7 +72,7 @@ class EventKind(NamedTuple):
 
 
 IDLE: Final = EventKind("idle", "idle", MARGIN.reference, "~", "idle")
-"""What is left of the slice."""
+"""The rest of the slice."""
 
 
 COVERAGE: Final = 2
@@ -82,11 +82,11 @@ KEPT, NOT_SHOWN_KEPT, BROKEN = range(3)
 
 
 class Limit(NamedTuple):
-    """What must not be exceeded. Neither its value nor the ends of its doubt fall with the number of nodes."""
+    """A value that must not be exceeded. Neither the value nor the ends of its doubt fall with the number of nodes."""
 
     key: str
     over: str
-    """What is said of one that is broken or not shown to be kept: a format of `value`, its `uncertainty`, `most` and
+    """Sentence on a limit that is broken or not shown to be kept: a format of `value`, its `uncertainty`, `most` and
     the profile's `bus`."""
     value: Callable[[Network], Number]
     most: Callable[[Network], Number]
@@ -95,23 +95,23 @@ class Limit(NamedTuple):
     perhaps: Callable[[Network], Number] | None = None
     """A part of the value that may not be there: it counts where a limit must be shown to be kept, and breaks none."""
     way_out: str = ""
-    """What makes room where this limit keeps nodes out."""
+    """Advice that makes room where this limit keeps nodes out."""
     failure: str = ""
-    """What a circle test calls a broken one, where not by its key."""
+    """Name of the broken limit in a circle test, where that is not its key."""
     has_rule: bool = False
-    """A rule of the kind reports a broken one; otherwise the rule of the verdict does."""
+    """A rule of the kind reports the broken limit; otherwise the rule of the verdict does."""
     is_safety: bool = False
     """A cycle fits without it, but nothing is advised that breaks it."""
     says: Callable[[Network], str] | None = None
-    """What is said of a broken one, where more than its value is: instead of `over`."""
+    """Sentence on the broken limit, where it says more than its value: instead of `over`."""
     breaks: Callable[[Network], Number] | None = None
-    """Whether a network breaks it, where that is sooner told than its value; of one without doubt."""
+    """Whether a network breaks it, where that is quicker to tell than its value; of a limit without doubt."""
 
     is_of_period: bool = False
     """The period alone breaks it: a plan takes no period that does."""
     kept_from_us: Callable[[Network], float] | None = None
-    """The period from which on plain numbers are shown to keep it, where a longer one is a cure [us]; without it none
-    is."""
+    """The period from which on plain numbers are shown to keep it, where a longer period is a cure [us]; None where no
+    period is."""
     is_slow: bool = False
     """Whether its value takes long to find: of a number of nodes it is asked last."""
     period: "Callable[[Limit, Network], Number] | None" = None
@@ -122,7 +122,7 @@ class Limit(NamedTuple):
         return 0.0 if self.doubt is None else COVERAGE * self.doubt(network)
 
     def least_value(self, network: Network) -> Number:
-        """What its value is at least: less U, and without what may not count."""
+        """Lower bound of its value: less U, and without what may not count."""
         least = self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
         return least if self.perhaps is None else least - self.perhaps(network)
 
@@ -133,7 +133,7 @@ class Limit(NamedTuple):
 
     @property
     def shown(self) -> "Limit":
-        """The limit that what is shown to keep this one keeps: of value + U."""
+        """The stricter limit that a network keeps where it is shown to keep this limit: of value + U."""
         if self.doubt is None:
             return self
         most = self._replace(value=lambda network: self.value(network) + self.uncertainty(network))
@@ -197,30 +197,30 @@ def share_limit(
 
 
 class Starter(NamedTuple):
-    """What of a new profile is a matter of the kind."""
+    """Parts of a new profile that the kind decides."""
 
     bus: str
     """Section [bus], as TOML without its nodes and its host."""
     hosts: Mapping[str, str] = {}
     """Hosts to choose from by name, each with its lines of [bus]; none where the host plays no part."""
     host: str = ""
-    """The one that is taken unless another is asked for."""
+    """Host of a new profile, unless another is asked for."""
     period: str = "1ms"
     """Communication period, unless another is asked for."""
     slice_ratio: str = "1            # the whole period is for communication"
     """Value of cycle.slice_ratio, with a comment."""
     measure: str = "measure it on a node"
-    """How execution times are found, a format of `file`, the profile, and `group`, an option of `calibrate`."""
+    """Advice on finding execution times, a format of `file`, the profile, and `group`, an option of `calibrate`."""
     base: str = "what a node does in each cycle"
-    """What execution.base_us is."""
+    """Meaning of execution.base_us."""
 
     def section(self, host: str | None = None) -> str:
-        """Section [bus] with the lines of a host, or of the one that is usually taken."""
+        """Section [bus] with the lines of a host, by default of `host`."""
         return "\n".join(filter(None, (self.bus, self.hosts.get(host or self.host))))
 
 
 class Cost(IntEnum):
-    """What a change of a network costs, the cheapest first: the one order of plans, of advice and of cures."""
+    """Cost of a change of a network, the cheapest first: the order of plans, of advice and of cures."""
 
     SIMULATION = 0
     """A number that the circle test alone knows."""
@@ -229,11 +229,11 @@ class Cost(IntEnum):
     HOST_TIME = 2
     """The slice ratio: the host computes in the rest of the period."""
     RESPONSES = 3
-    """How nodes answer: their firmware."""
+    """The way nodes answer: their firmware."""
     SCHEDULE = 4
-    """How the host asks them: the firmware of all."""
+    """The way the host asks them: the firmware of all."""
     PAYLOAD = 5
-    """What travels in a cycle."""
+    """Data of a cycle."""
     PERIOD = 6
     """A requirement of the machine."""
     NODES = 7
@@ -241,17 +241,17 @@ class Cost(IntEnum):
 
 
 class Setting(NamedTuple):
-    """What of the bus a plan may turn without new parts."""
+    """A setting of the bus that a plan may change without new parts."""
 
     name: str
-    """What a user calls it who lets a plan turn it: gap_count."""
+    """Name in options: gap_count."""
     label: str
-    """What it is called in a sentence: gap count."""
+    """Name in a sentence: gap count."""
     cost: Cost
     keys: tuple[str, ...]
     """Dotted keys that it turns."""
     values: tuple[Mapping[str, Value], ...]
-    """What it may be for this very network and is not yet, safe and the smallest change first: new values by key."""
+    """Values that this network could have and has not yet, safe and the smallest change first: new values by key."""
     reason: str = ""
     """Why there is none."""
 
@@ -274,13 +274,13 @@ class PayloadRange(NamedTuple):
     step_bytes: int
     most_bytes: int
     bound: str
-    """What keeps the largest from being larger."""
+    """Part of the bus that bounds the largest payload."""
     carrier: str = "a packet"
-    """What carries no more."""
+    """Carrier that holds no more."""
 
 
 class Halves(NamedTuple):
-    """What a measured latency holds beside the execution [us]."""
+    """Parts of a measured latency beside the execution [us]."""
 
     latency_us: float
     """All of it."""
@@ -296,10 +296,10 @@ class Halves(NamedTuple):
 
 
 class MeasuredLatencies(NamedTuple):
-    """How execution times are found from latencies that were measured on a kind of bus."""
+    """Calibration of execution times from latencies that were measured on a kind of bus."""
 
     halves: Callable[[Network, str, str, str, int], Halves]
-    """What the packets of a transaction take, by network, name of the group, timing model, "read" or "write", and
+    """Time of the packets of a transaction, by network, name of the group, timing model, "read" or "write", and
     payload [bytes]; a BusplanError where its latency could not be measured."""
     fit_keys: Callable[[Network, str | None], dict[str, Value]]
     """Keys of [node.execution] that say what an execution time was fitted against, by network and by timing model whose

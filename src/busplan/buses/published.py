@@ -45,7 +45,7 @@ class Spread(NamedTuple):
 
     mean: float
     uncertainty: float
-    """Standard uncertainty of the next one: sd sqrt(1 + 1/n) (JCGM 100, 4.2)."""
+    """Standard uncertainty of the next measurement: sd sqrt(1 + 1/n) (JCGM 100, 4.2)."""
 
     @classmethod
     def of(cls, values: Sequence[float]) -> "Spread":
@@ -66,9 +66,9 @@ class Tested(NamedTuple):
     """Which parts of a kind of bus figures of others set, and which they test."""
 
     set_by: Mapping[str, str]
-    """What sets constants, bias or U of each part, in a few words: it tests none of them."""
+    """Source of the constants, bias or U of each part, in a few words: it tests none of them."""
     parts: Mapping[str, str]
-    """What tests each part, and sets nothing of it."""
+    """Figures that test each part, and set nothing of it."""
     untested: tuple[str, ...]
     """Parts that no figure tests."""
 

@@ -1,4 +1,4 @@
-"""What a rule of the gate is, and what it may ask: figures, figures after changes, a cure."""
+"""Rules of the gate, and the questions they may ask: figures, figures after changes, a cure."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
@@ -10,7 +10,7 @@ Severity = Literal["error", "warning"]
 
 
 class Mending(NamedTuple):
-    """How a problem is mended."""
+    """Mending of a problem."""
 
     help: str = ""
     """In words."""
@@ -19,11 +19,11 @@ class Mending(NamedTuple):
 
 
 class RuleProblem(NamedTuple):
-    """One thing that a rule found: the dotted key that causes it, what is wrong, and how it is mended."""
+    """A problem that a rule reports: the dotted key that causes it, what is wrong, and how it is mended."""
 
     key: str
     message: str | Callable[[], str]
-    """What is wrong; or what says it, where that takes long: a comment may suppress the problem."""
+    """The problem in words; or a function for them, where that takes long: a comment may suppress the problem."""
     help: str = ""
     cure: tuple[str, ...] = ()
 
@@ -68,11 +68,11 @@ class Rule(NamedTuple):
     name: str
     severity: Severity
     summary: str
-    """What is wrong, in one line."""
+    """The problem in one line."""
     explanation: str
     """Why it matters and how to mend it."""
     check: Callable[[RuleSubject], Iterator[RuleProblem]] | None = None
-    """Looks at a profile that could be read; None for what is found in another way."""
+    """Check of a profile that could be read; None where another part of the gate reports the problem."""
 
 
 def contradicts(fits: bool, figures: RuleFigures) -> bool:

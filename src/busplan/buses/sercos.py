@@ -1,4 +1,4 @@
-"""What SERCOS I, II and III share: whole words, the master's pipeline, and how long feedback and commands take."""
+"""Parts that SERCOS I, II and III share: whole words, the master's pipeline, the age of feedback and commands."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -63,11 +63,11 @@ Sent: TypeAlias = tuple[Number, Number]
 WHOLE_PERIOD: Final = "1            # assumed: the master computes beside the telegrams, within bus.pipeline_cycles"
 MEASURE: Final = "it runs beside the telegrams; take it from the drives' data, S-0-0005 (SERCOS III: S-0-1005)"
 BASE: Final = "from a sample to the telegram that carries it, and from a command to its effect"
-"""What a new profile says of the slice and of the execution times."""
+"""Lines of a new profile on the slice and the execution times."""
 
 
 def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Number = 0.0) -> tuple[BusLatency, ...]:
-    """How old feedback is when the host has it, and how late a command takes effect.
+    """Age of feedback when the host has it, and delay of a command up to its effect.
 
     Parameters
     ----------
@@ -138,5 +138,5 @@ class SercosBus(Bus):
         return ", ".join(("feedback and commands of all nodes", *self.setup_words(network)))
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
-        """It runs beside the telegrams, and is in every latency: drives sample before their telegram."""
+        """Execution runs beside the telegrams, and is in every latency: drives sample before their telegram."""
         return of_latency

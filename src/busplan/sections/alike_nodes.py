@@ -12,11 +12,11 @@ class AlikeNodes(NamedTuple):
     name: str
     """Of the group; empty for the nodes of [node]."""
     nodes: Any
-    """How many [1]."""
+    """Number of nodes [1]."""
     node: Any
-    """How one of them executes and answers, of its kind's own model."""
+    """A node of the group, of its kind's own model: how it executes and answers."""
     payload: Any
-    """What is read from and written to one of them, of its kind's own model."""
+    """Payloads of a node, of its kind's own model."""
 
     @property
     def nodes_key(self) -> str:
@@ -24,7 +24,7 @@ class AlikeNodes(NamedTuple):
         return f"group.{self.name}.nodes" if self.name else "bus.nodes"
 
     def node_key(self, key: str) -> str:
-        """Dotted key of what the profile says of one of them, as of "execution.base_us"."""
+        """Dotted key of a node's value in the profile, as of "execution.base_us"."""
         return f"group.{self.name}.{key}" if self.name else f"node.{key}"
 
     def payload_key(self, kind: TransactionKind) -> str:
@@ -33,6 +33,6 @@ class AlikeNodes(NamedTuple):
         return f"group.{self.name}.{key}" if self.name else f"payload.{key}"
 
     def bytes_of(self, kind: TransactionKind) -> Number:
-        """Payload of a transaction with one of them [bytes]."""
+        """Payload of a transaction with a node [bytes]."""
         size: Number = self.payload.bytes_of(kind, axes=self.node.axes)
         return size

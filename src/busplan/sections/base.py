@@ -1,4 +1,4 @@
-"""What all sections of a profile share: strictness, ranges, and errors in our own words."""
+"""Base of all sections of a profile: strictness, ranges, and errors in our own words."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple, TypeVar
@@ -33,19 +33,19 @@ class Problem(NamedTuple):
 
 
 def refused(*problems: Problem) -> PydanticCustomError:
-    """Make an error whose words are ours; one validator can report several problems, each with its own key."""
+    """Make an error whose words are ours; a validator can report several problems, each with its own key."""
     return PydanticCustomError("busplan", "{text}", {"text": problems[0].message, "problems": problems})
 
 
 def _title(section: type) -> str:
-    """Title a section as its class; one of a kind of bus as the section that it extends."""
+    """Title a section as its class; a section of a kind of bus as the section that it extends."""
     titles = (base.__name__.removesuffix("Section") for base in section.__mro__ if base.__name__.endswith("Section"))
     *_, title = (section.__name__, *filter(None, titles))
     return title
 
 
 class Section(BaseModel):
-    """What all sections of a profile share."""
+    """Base of all sections of a profile."""
 
     removed: ClassVar[Mapping[str, str]] = {}
     """Keys that it had once, each with what to write instead."""
@@ -72,14 +72,14 @@ _Section = TypeVar("_Section", bound=Section)
 
 
 def with_unchecked(section: _Section, key: str, value: object) -> _Section:
-    """Return a copy with one key replaced, unvalidated.
+    """Return a copy with a key replaced, unvalidated.
 
     Parameters
     ----------
     section
         The profile, or a section of it.
     key
-        Dotted key below it; of several tables of one key, the name of one stands behind the key.
+        Dotted key below it; of several tables of a key, the name of the table stands behind the key.
     value
         Anything that computes like a number: an array, or a traced number.
     """

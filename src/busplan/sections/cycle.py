@@ -1,4 +1,4 @@
-"""What profiles of every kind of bus say of the cycle and its nodes: [bus], [cycle], [payload], [node], [[group]].
+"""Sections that every kind of bus shares, on the cycle and its nodes: [bus], [cycle], [payload], [node], [[group]].
 
 A kind of bus adds its own keys in a class of its own. The limits of its standard are not checked here: a profile that
 breaks them loads, and the analysis says why it does not fit.

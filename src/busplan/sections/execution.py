@@ -36,7 +36,7 @@ DERIVED_UNCERTAINTY_US: Final = Sourced(
 
 
 class GradedExecution(Section):
-    """What both forms of the execution time share."""
+    """Keys that both forms of the execution time share."""
 
     grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
         default=None, description="How the execution time is known; the gate warns of assumed", examples=["measured"]
@@ -81,7 +81,7 @@ class LinearExecution(GradedExecution):
 
     @property
     def ascends_from_bytes(self) -> int:
-        """The payload from which on no larger one takes less time."""
+        """The payload from which on no larger payload takes less time."""
         return 0
 
     def execution_us(self, payload_bytes: Number) -> Number:
@@ -121,7 +121,7 @@ class TableExecution(GradedExecution):
 
     @property
     def ascends_from_bytes(self) -> int:
-        """The payload from which on no larger one takes less time."""
+        """The payload from which on no larger payload takes less time."""
         falls = [
             self.payload_bytes[at + 1] for at, (before, after) in enumerate(pairwise(self.time_us)) if after < before
         ]

@@ -82,7 +82,7 @@ def _with(keys: dict[str, Any]) -> Callable[[type[_Model]], type[_Model]]:
 
 @_with(_keys(Axis))
 class AxisKeys(Extended):
-    """What can differ from one axis to the other: its controller, its drive, its encoder."""
+    """Keys that can differ between the axes: controller, drive, encoder."""
 
 
 # The same keys with the same ranges, none required and none with a default: what is not said is inherited.
@@ -93,7 +93,7 @@ class AxisKeys(Extended):
     }
 )
 class AxisOverride(Extended):
-    """What one axis has otherwise than [servo] says."""
+    """Values of an axis that differ from [servo]."""
 
 
 @_with(_keys(Mechanics))
@@ -107,7 +107,7 @@ class DeliverySection(Extended):
 
 
 _GRADED_TIMING: Final = ("interpolation", "step_us")
-"""What can be measured of the timing of the loop."""
+"""Keys of the loop's timing that can be measured."""
 
 
 @_with(
@@ -144,12 +144,12 @@ class ServoSection(AxisKeys):
     y: AxisOverride = Field(default_factory=AxisOverride, description="What the y axis has otherwise")
 
     def axis_keys(self, axis: Literal["x", "y"]) -> dict[str, Any]:
-        """Keys of one axis by name, its own before those of both."""
+        """Keys of an axis by name, its own before those of both."""
         own: AxisOverride = getattr(self, axis)
         return self.model_dump(include=set(AxisKeys.model_fields)) | own.model_dump(exclude_none=True)
 
     def grade_of(self, key: str) -> ServoGrade:
-        """How the value of a key is known.
+        """Grade of the value of a key.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class ServoSection(AxisKeys):
 
     @property
     def grades_text(self) -> str:
-        """How the values are known in words, the weakest first."""
+        """Grades of the values in words, the weakest first."""
         counts = Counter(self.grades_given)
         return ", ".join(f"{number} {grade}" if len(counts) > 1 else grade for grade, number in counts.items())
 

@@ -27,7 +27,7 @@ from busplan.sections.transactions import TRANSACTION_KINDS
 SCHEMA_VERSION: Final = 1
 
 CIRCLE_SECTIONS: Final = ("servo", "mechanics", "delivery", "circle", "tolerance")
-"""The sections that only a circle test reads; a profile that has one of them asks for it."""
+"""The sections that only a circle test reads; a profile that has any of them asks for it."""
 
 
 def _without_control_characters(allowed: str) -> Callable[[str], str]:
@@ -131,7 +131,7 @@ def _payloads(alike: AlikeNodes, place: int) -> Iterator[tuple[str, int, str]]:
 
 
 _OF_ALIKE_NODES: Final = ("bus.nodes", "payload", "node")
-"""What a profile says of its nodes where all are alike."""
+"""Keys on the nodes, where all are alike."""
 
 
 def nodes_problems(said: Collection[str]) -> Iterator[Problem]:

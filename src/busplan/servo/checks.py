@@ -17,7 +17,7 @@ _ROUNDING = 1e-12
 _NANOSECONDS = 3
 """Decimals of a time in us."""
 _MOST_STEPS_MORE = 100
-"""More steps in a period than the fewest that are tried for a round one. Chosen."""
+"""Further numbers of steps in a period that are tried for a round step. Chosen."""
 _KNOWN = "known"
 _Value = TypeVar("_Value")
 
@@ -30,7 +30,7 @@ class Refused(NamedTuple):
     value: object
     """Value as the message shows it."""
     right: str
-    """What would be right."""
+    """Value or range that would be right."""
     beside: tuple[str, ...] = ()
     """Other parameters that it is refused for, which may be the ones that a user gave."""
 
@@ -239,7 +239,7 @@ def no_multiple(*, period_us: float, step_us: float) -> Iterator[Refused]:
 
 
 def dividing_step_us(period_us: float, *, most_us: float) -> float:
-    """The longest step, up to a given one, that divides a period: one in whole nanoseconds, where one is near [us].
+    """The longest step up to a given step that divides a period, in whole nanoseconds where such a step is near [us].
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ _DEG_PER_TURN = 360.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contour:
-    """Measures of a circular test. "The part" is the one at constant speed: on a whole turn, that turn.
+    """Measures of a circular test. "The part" is the stretch at constant speed: on a whole turn, that turn.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class _Fit(NamedTuple):
 
     Its Gauss-Newton steps are for the centre and the deviation of the radius. The equations contain only small
     differences from the nominal circle, so they resolve a nanometre on a metre; fits of x^2 + y^2 do not. If the
-    solution is not unique (an axis that stands still), the one of smallest norm is taken.
+    solution is not unique (an axis that stands still), that of smallest norm is taken.
 
     References
     ----------
@@ -191,9 +191,9 @@ class _Fit(NamedTuple):
     highest_mm: float
     """Smallest and largest distance from the centre, minus the nominal radius."""
     step_mm: tuple[float, float]
-    """How far the best centre lies from this one, to first order."""
+    """Step from this centre to the best centre, to first order."""
     deviation_mm: float
-    """Radius of the best circle minus the nominal one, to first order."""
+    """Radius of the best circle minus the nominal radius, to first order."""
 
     @classmethod
     def about(
@@ -216,7 +216,7 @@ class _Fit(NamedTuple):
 
     @property
     def best_centre_mm(self) -> tuple[float, float]:
-        """The best centre as seen from this one."""
+        """The best centre as seen from this centre."""
         return self.centre_mm[0] + self.step_mm[0], self.centre_mm[1] + self.step_mm[1]
 
     def best(self, x_mm: Floats, y_mm: Floats) -> "_Fit":

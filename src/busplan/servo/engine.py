@@ -16,7 +16,7 @@ def compiled_kernel(engine: Engine) -> ModuleType | None:
     Parameters
     ----------
     engine
-        "auto" uses the compiled kernel if there is one; "python" does not.
+        "auto" uses the compiled kernel where it is installed; "python" does not.
 
     Returns
     -------

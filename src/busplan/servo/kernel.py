@@ -8,7 +8,7 @@ rounds (half to even, exact below 2^51). The order of all operations is fixed, a
 both engines give the same floats.
 """
 
-# Called as math.tanh, so that compiled code calls the one of C.
+# Called as math.tanh, so that compiled code calls that of C.
 import math
 from collections.abc import MutableSequence, Sequence
 

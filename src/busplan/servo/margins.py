@@ -104,7 +104,7 @@ def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
         G = ((h - Td) z + Td) / (z (z - 1)) - tau (b0 z + b1) / (z (z - p)),
         p = exp(-h / tau), b0 = 1 - exp(-(h - Td) / tau), b1 = exp(-(h - Td) / tau) - p.
 
-    With several crossovers, the one nearest to instability counts.
+    With several crossovers, the nearest to instability counts.
 
     References
     ----------

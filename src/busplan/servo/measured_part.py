@@ -11,7 +11,7 @@ from busplan.servo.runnable import LONGEST_SETTLING_US
 _SETTLING_SHARE = 0.2
 """Largest share of a trapezoid's constant speed that the measures leave out for settling."""
 REST_MM = 1e-4
-"""What may be left of the lag where nothing says how round the circle must be."""
+"""Remaining lag that counts as settled, where no tolerance says how round the circle must be."""
 _ROUNDING_STEPS = 1e-9
 _S_PER_MIN = 60.0
 
@@ -69,7 +69,7 @@ class MeasuredPart(NamedTuple):
 
 
 def measured_part(path: CirclePath, *, timing: LoopTiming, margins: tuple[LoopMargins, ...]) -> MeasuredPart:
-    """Steps that are measured: the whole turn of a path that has one, else its settled arc.
+    """Steps that are measured: the whole turn where the path has it, else its settled arc.
 
     Parameters
     ----------

@@ -30,9 +30,9 @@ MAX_SPEED_MM_S = 1e6
 _MIN_SPEED_MM_S = 1e-6
 _MAX_PPM = 1e5
 _ROUNDING_PERIODS = 1e-9
-"""Tolerance in periods, so that rounding does not add one to a delay."""
+"""Tolerance in periods, so that rounding does not add a period to a delay."""
 LONGEST_DELAY_PERIODS = 16
-"""Most periods from a sample to its command; a loop with more needs another controller than this one."""
+"""Most periods from a sample to its command; a loop with more needs a different controller."""
 FINEST_ENCODER_MM = 1e-9
 """A picometre: a float of 53 bits cannot count finer steps over metres of travel."""
 
@@ -120,12 +120,12 @@ class Axis:
     delay_us: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse invalid values, all in one error."""
+        """Refuse invalid values, all in a single error."""
         refuse(*out_of_range(self), *self._too_fine(), *negative(delay_us=self.delay_us))
 
     @property
     def level_mm_s(self) -> float:
-        """Step of the DAC, 0 for an ideal one [mm/s]."""
+        """Step of the DAC, 0 for an ideal DAC [mm/s]."""
         return 2 * self.max_velocity_mm_s / 2**self.dac_bits if self.dac_bits else 0.0
 
     @property
@@ -183,7 +183,7 @@ class LoopTiming:
     )
 
     def __post_init__(self) -> None:
-        """Refuse invalid values, all in one error."""
+        """Refuse invalid values, all in a single error."""
         refuse(*not_positive(period_us=self.period_us), *out_of_range(self))
         refuse(*no_multiple(period_us=self.period_us, step_us=self.step_us))
 
@@ -254,7 +254,7 @@ class Delivery:
     seed: int = parameter(0, "Seed of all that is random", example=1, least=0, most=2**63 - 1)
 
     def __post_init__(self) -> None:
-        """Refuse invalid values, all in one error."""
+        """Refuse invalid values, all in a single error."""
         refuse(*out_of_range(self))
 
 
@@ -284,5 +284,5 @@ class Mechanics:
     """Inclination of the y axis towards x."""
 
     def __post_init__(self) -> None:
-        """Refuse invalid values, all in one error."""
+        """Refuse invalid values, all in a single error."""
         refuse(*out_of_range(self))

@@ -1,4 +1,4 @@
-"""The circle that the host interpolates: one set-point each period, with speed ramps at both ends.
+"""The circle that the host interpolates: a set-point each period, with speed ramps at both ends.
 
 There are two paths. The paper's, `trapezoid`, is one circle with both ramps on it. `iso230-4` has a lead-in of whole
 turns until the loops have settled, then one whole turn at constant speed on which everything is measured, then the

@@ -211,7 +211,7 @@ def _host_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals
     edges = np.append(cycles, cycles[-1] + 1)
     times = edges * timing.steps_per_period + arrivals.offsets_us[edges] / timing.step_us
     sampled, following = times[:-1], times[1:]
-    # A command takes effect with the next SP at the latest, and so does one that waited for its turn.
+    # A command takes effect with the next SP at the latest, also where it waited for its turn.
     _, rest_us = timing.delay_parts(axis.delay_us)
     switched = np.minimum(sampled + rest_us / timing.step_us, following)
     once, nothing = np.ones_like(cycles), np.zeros_like(sampled)
@@ -270,7 +270,7 @@ def _fill(
     length_s: Floats | None = None,
 ) -> KernelRows:
     """Make rows with defaults: whole steps that control, switch and store, with a constant target."""
-    # Whole steps need only one exponential.
+    # Whole steps need a single exponential.
     lengths_s = np.array([timing.step_us / _US_PER_S]) if length_s is None else length_s
     shape = substeps.shape
     timed = (

@@ -1,4 +1,4 @@
-"""What a circle needs to be simulated at all: its move, its steps, its drives and the delivery of its set-points.
+"""Inputs of the simulation of a circle: its move, its steps, its drives and the delivery of its set-points.
 
 Nothing is simulated, and nothing needs numpy, so that every command can say why a circle cannot be run.
 """
@@ -44,7 +44,7 @@ class Move(NamedTuple):
 
     @property
     def setpoints(self) -> int:
-        """Number of set-points: of periods of the move, the last one begun [1]."""
+        """Number of set-points: of periods of the move, the last of them begun [1]."""
         return math.ceil(self.duration_s / (self.period_us / _US_PER_S) - _ROUNDING_PERIODS)
 
 

@@ -1,4 +1,4 @@
-"""The SYNC cycle: SYNC, feedback, the host, commands, and what other messages make it wait for."""
+"""The SYNC cycle: SYNC, feedback, the host, commands, and the waits for other messages."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, lru_cache, partial, reduce
@@ -41,7 +41,7 @@ STRETCHES: Final = (
     EventKind("feedback", "feedback", "", "F", "in"),
     EventKind("command", "command", "", "C", "out"),
 )
-"""What several events make together."""
+"""Stretches that several events make together."""
 
 
 class CanCycle(BusCycle):
@@ -145,7 +145,7 @@ class CanCycle(BusCycle):
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
-        """Some of the frames of lower priorities: one before SYNC, one before the feedback, the others behind it."""
+        """Some of the frames of lower priorities: before SYNC, before the feedback, or behind it."""
         waited = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
         for message in islice(waited.blocks(), first, end):
             label = f"message {message.name} of a lower priority"
@@ -153,7 +153,7 @@ class CanCycle(BusCycle):
 
     @cached_property
     def _own(self) -> dict[str, Number]:
-        """The terms that no other message is in, which these wait beside."""
+        """The terms without those of other messages."""
         keys = ("cycle_sync_us", "cycle_wait_us", "cycle_feedback_us", "cycle_host_us", "cycle_command_us")
         return summed((*self._opening, *self._feedback, *self._commands), keys)
 
@@ -165,7 +165,7 @@ class CanCycle(BusCycle):
 
     @cached_property
     def _on_bus_us(self) -> Number:
-        """From SYNC to the end of the last command, but for other messages [us]."""
+        """From SYNC to the end of the last command, without other messages [us]."""
         return total((self._own | {"cycle_wait_us": self._wait_us("read")}).values())
 
     def _waits_us(self, extra_us: Number) -> Number:
@@ -199,7 +199,7 @@ class CanCycle(BusCycle):
         return blocking_us, tuple(self._higher(lasts_us))
 
     def _higher(self, lasts_us: Number) -> Iterator[Number]:
-        """How many frames of each message go before the last PDO in a span of time [1]."""
+        """Frames of each message that go before the last PDO in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
         for message, _ in self._messages:
             count = rounded_up((window_us + message.jitter_us) / message.period_us)
@@ -307,7 +307,7 @@ class CanCycle(BusCycle):
 
     @cached_property
     def sync_spread_us(self) -> Number:
-        """How much later than without other messages SYNC may end, B + I [us]; infinite where it has no end."""
+        """Delay of SYNC by other messages, B + I [us]; infinite where it has no end."""
         phases = self._phases(0, SYNC)
         return named(phases["blocking_us"] + phases["interference_us"], "sync_spread_us", "B + I")
 

@@ -59,7 +59,7 @@ def frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bool)
 
 
 def bit_us(bit_rate_kbit_s: Number) -> Number:
-    """Time of one bit [us].
+    """Time of a bit [us].
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def full_frames(payload_bytes: Number) -> Number:
 
 
 def payload_us(payload_bytes: Number, *, identifier_bits: Number, bit_rate_kbit_s: Number, is_stuffed: bool) -> Number:
-    """Time of all frames of a payload: as many of 8 bytes as it fills, and one of the rest [us].
+    """Time of all frames of a payload: as many of 8 bytes as it fills, and a frame of the rest [us].
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What rows of evidence compute of CAN frames and messages alone, without a cycle; each takes any cycle of the kind."""
+"""Figures of CAN frames and messages for rows of evidence; each function takes any cycle of the kind."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, Literal
@@ -9,7 +9,7 @@ from busplan.buses.can.response import Sender, worst_response
 from busplan.elementwise import plain
 
 Stuffing = Literal["worst", "expected", "none"]
-"""How many stuff bits: the most, as many as measured frames have, or none."""
+"""Number of stuff bits: the most, as many as measured frames have, or none."""
 
 
 def stuffed(_cycle: object, *, least: float, most: float, stuffing: Stuffing) -> float:

@@ -122,8 +122,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         return (f"{network.profile.bus.bit_rate_kbit_s} kbit/s",)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Those of `busplan.buses.can.evidence`."""
-        from busplan.buses.can.evidence import FUNCTIONS  # one command alone asks for them
+        """Functions of `busplan.buses.can.evidence`."""
+        from busplan.buses.can.evidence import FUNCTIONS  # a single command asks for them
 
         return FUNCTIONS
 

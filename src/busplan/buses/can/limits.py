@@ -1,4 +1,4 @@
-"""What a CAN bus and the CANopen identifiers forbid, the load of the bus, and deadlines."""
+"""Limits of a CAN bus and of the CANopen identifiers, the load of the bus, and deadlines."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial, reduce
@@ -60,7 +60,7 @@ def _late(stream: Stream, share: float, traffic: Traffic) -> str:
 def _slowest(traffic: Traffic) -> float:
     """The largest response over deadline of any message of plain numbers [1]."""
     each, largest = messages(traffic, is_stuffed=True), 0.0
-    # The lowest priorities first: one of them has no response time, or none has.
+    # The lowest priorities first: where they all have a response time, every message has.
     for stream in each.by_priority():
         largest = max(largest, plain(each.deadline_share(stream)))
         if largest == inf:
@@ -80,7 +80,7 @@ def _largest(traffic: Traffic, share: Callable[[Messages, Stream], Number]) -> N
 
 
 def _is_late(network: Network) -> Number:
-    """Whether any message misses its deadline: exact response times are found only where bounds of them do not tell."""
+    """Whether any message misses its deadline: exact response times only where bounds do not tell."""
     if not network.profile.message:
         return False
     sent = Sent(traffic_of(network))
@@ -128,7 +128,7 @@ def _as_plain(number: Any) -> Any:
 
 
 _POINTS_AT_ONCE: Final = 4096
-"""Points whose response times are found together."""
+"""Points whose response times are computed together."""
 
 
 def _has_late(traffic: Traffic) -> Number:
@@ -144,7 +144,7 @@ _DEADLINE_WORDS: Final = "busy periods of all messages"
 
 
 def shared_identifiers(traffic: Traffic) -> tuple[tuple[str, str], ...]:
-    """Say which messages share identifiers, once for each key that sets those of the second one; of plain numbers."""
+    """Messages that share identifiers, in words, once for each key that sets those of the second; of plain numbers."""
     clauses: dict[str, list[str]] = {}
     for key, words in _collisions_in_words(traffic):
         clauses.setdefault(key, []).append(words)

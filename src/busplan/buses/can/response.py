@@ -16,17 +16,17 @@ from busplan.buses.can.constants import MOST_STEPS, SATURATED
 from busplan.elementwise import choose, is_everywhere, larger, rounded_up, smaller
 
 Points: TypeAlias = Any
-"""A plain number, or an array with one for each point; never a traced one."""
+"""A plain number, or an array of a number for each point; never a traced number."""
 
 
 class Sender(NamedTuple):
-    """Frames that one identifier, or several of one kind, put on the bus. The numbers may be arrays."""
+    """Frames that an identifier, or several of the same kind, put on the bus. The numbers may be arrays."""
 
     frames_us: Points
     """All frames of one instance, in the worst case [us]."""
     period_us: Points
     jitter_us: Points = 0.0
-    """How late an instance may be queued; negative where the first comes so much behind the start [us]."""
+    """Latest queueing of an instance; negative where the first comes so much behind the start [us]."""
 
     @property
     def load(self) -> Points:
@@ -35,7 +35,7 @@ class Sender(NamedTuple):
 
 
 class Response(NamedTuple):
-    """The worst case of one message: R = J + B + I + q (C - T) + C. The numbers may be arrays."""
+    """The worst case of a message: R = J + B + I + q (C - T) + C. The numbers may be arrays."""
 
     blocking_us: Points
     """B, the longest frame of a lower priority [us]."""
@@ -50,12 +50,12 @@ class Response(NamedTuple):
 def worst_response(
     own: Sender, higher: Sequence[Sender], *, blocking_us: float, bit_us: float, first_us: float = 0.0
 ) -> Response | None:
-    """Find the worst-case response time of one message.
+    """Find the worst-case response time of a message.
 
     Parameters
     ----------
     own
-        The message, one frame an instance.
+        The message, a frame for each instance.
     higher
         All messages of higher priorities.
     blocking_us
@@ -77,7 +77,7 @@ def worst_response(
 
     Examples
     --------
-    The second instance is the worst one:
+    The second instance is the worst:
 
     >>> worst_response(Sender(1000, 3500), [Sender(1000, 2500), Sender(1000, 3500)], blocking_us=0, bit_us=8)
     Response(blocking_us=0, instance=1, interference_us=5000.0, us=3500.0)
@@ -119,7 +119,7 @@ def worst_instance(
             is_over = is_over | (instance * own.period_us >= busy_us + own.jitter_us)
             if is_everywhere(is_over):
                 return worst
-        # It waits at least as long as the instance before it, and for that one.
+        # It waits at least as long as the instance before it, and for that instance.
         own_us = instance * own.frames_us
         waits_us = before.settled_us(ahead_us + own_us, steps, bit_us=bit_us, from_us=waits_us, is_settled=is_over)
         response = Response(blocking_us, instance, waits_us - blocking_us - own_us, waits_us + late_us)
@@ -146,7 +146,7 @@ def settled_us(
     -------
     float
         The smallest w = others + more(w) + sum ceil((w + J) / T) C. With a load of the senders above 0.99 a bound of it
-        in closed form, and from `SATURATED` on one that says no more than that the bus is full.
+        in closed form, and from `SATURATED` on a bound that only says that the bus is full.
 
     Examples
     --------
@@ -172,7 +172,7 @@ BELOW = 1 - 1e-9
 _MANY = 50
 """Senders from which on arrays are faster."""
 _FEW_POINTS = 2000
-"""Points up to which one array of all senders is faster than an array of each."""
+"""Points up to which a single array of all senders is faster than an array of each."""
 
 
 class TooManyStepsError(Exception):
@@ -180,7 +180,7 @@ class TooManyStepsError(Exception):
 
 
 class Demand:
-    """What several senders put on the bus.
+    """Demand of several senders on the bus.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ class Demand:
         return found_us
 
     def _rows(self, axes: int) -> Sequence[Points]:
-        """Frames, periods and jitters, each as one array of all senders over so many axes of points."""
+        """Frames, periods and jitters, each as an array of all senders over so many axes of points."""
         if axes not in self._known_rows:
             import numpy as np
 

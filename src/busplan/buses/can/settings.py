@@ -1,4 +1,4 @@
-"""What a plan may turn on a CAN bus without new parts."""
+"""Settings of a CAN bus that a plan may change without new parts."""
 
 from typing import get_args
 
@@ -34,7 +34,7 @@ def _pdo_per(network: Network) -> Setting:
 
 
 def _bit_rate(network: Network) -> Setting:
-    """Higher bit rates, the next one first: the cable must be short enough."""
+    """Higher bit rates, the next higher first: the cable must be short enough."""
     key = "bus.bit_rate_kbit_s"
     higher = tuple({key: rate} for rate in get_args(BitRate) if rate > network.profile.bus.bit_rate_kbit_s)
     return Setting("bit_rate", "bit rate", Cost.SCHEDULE, (key,), higher, "" if higher else "it is the highest")

@@ -16,7 +16,7 @@ Found = TypeVar("Found")
 
 
 class Stream(NamedTuple):
-    """Frames of one sort, with identifiers one behind the other. What orders them is plain."""
+    """Frames of the same sort, with identifiers in sequence. The identifiers that order them are plain."""
 
     name: str
     group: str
@@ -24,7 +24,7 @@ class Stream(NamedTuple):
     """Identifier from which on the first group has them: a message in a block that grows stays behind it."""
     first: Points
     identifiers: Points
-    """How many identifiers; each sends once in a period [1]."""
+    """Number of identifiers; each sends once in a period [1]."""
     data_bytes: Points
     frame_us: Points
     period_us: Points
@@ -41,7 +41,7 @@ class Stream(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What it is called."""
+        """Name beside other streams, with its group."""
         return f"{self.group} {self.name}" if self.group else self.name
 
     def sender(self, count: Points | None = None) -> Sender:
@@ -146,7 +146,7 @@ def frame_sizes(pdos: Pdos) -> Iterator[int]:
 
 
 _MOST_FRAMES: Final = int(MOST_PDOS) + 1
-"""Frames of one PDO that have streams: with one more than a bus allows, its limit is broken already."""
+"""Frames of a PDO that have streams: one more than a bus allows breaks its limit already."""
 
 
 def _whole(number: Points) -> Points:
@@ -160,7 +160,7 @@ def last_identifier(each: Iterable[Stream]) -> Points:
 
 
 def identifiers_twice(each: Sequence[Stream]) -> Points:
-    """How many identifiers stand twice, or more often [1]."""
+    """Number of identifiers that stand twice or more often [1]."""
     if all(isinstance(stream.last, int) for stream in each):
         return sum(shared for *_, shared in collisions(each))
     return total(

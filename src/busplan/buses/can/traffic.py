@@ -12,12 +12,12 @@ from busplan.elementwise import Number, Traced, choose, larger, pointwise
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 FOLLOWS: Final = -1
-"""In the place of an identifier: the one behind those of the group before."""
+"""Instead of an identifier: the next behind those of the group before."""
 SYNC: Final = "SYNC"
 LOOP: Final = "loop"
-"""What the way from SYNC to the executed commands is called."""
+"""Name of the way from SYNC to the executed commands."""
 NAMES: Final[dict[TransactionKind, str]] = {"read": "feedback", "write": "command"}
-"""What a node's read payload and its write payload are called on CAN."""
+"""Names of a node's read payload and its write payload on CAN."""
 _FIRST: Final = {"read": FEEDBACK_IDENTIFIER, "write": COMMAND_IDENTIFIER}
 
 
@@ -27,7 +27,7 @@ class Pdos(NamedTuple):
     kind: TransactionKind
     group: str
     identifier: Number
-    """Of the first frame of the first PDO; `FOLLOWS` for the one behind those of the group before."""
+    """Of the first frame of the first PDO; `FOLLOWS` for the next behind those of the group before."""
     pdos: Number
     """PDOs of all its nodes [1]."""
     payload_bytes: Number
@@ -40,7 +40,7 @@ class Pdos(NamedTuple):
 
 
 class Message(NamedTuple):
-    """One other message. The numbers may be of any sort."""
+    """A message beside SYNC and PDOs. The numbers may be of any sort."""
 
     name: str
     identifier: Number
@@ -66,7 +66,7 @@ class Traffic(NamedTuple):
     messages: tuple[Message, ...]
 
     def numbers(self) -> tuple[Number, ...]:
-        """All its numbers in one row, as `with_numbers` takes them."""
+        """All its numbers in a row, as `with_numbers` takes them."""
         pdos = (number for pdos in self.pdos for number in pdos[_PDO_WORDS:])
         own: tuple[Any, ...] = self[:_OWN_NUMBERS]
         return (*own, *pdos, *(number for message in self.messages for number in message[_MESSAGE_WORDS:]))
@@ -102,7 +102,7 @@ class Sent:
         self._known: Callable[[int], Traffic]
 
     def of(self, function: Callable[..., Any], *arguments: Number, words: str) -> Number:
-        """What a function of the traffic gives.
+        """Result of a function of the traffic.
 
         Parameters
         ----------
@@ -120,7 +120,7 @@ class Sent:
         return self.of_points(function, *arguments, words=words)
 
     def of_points(self, function: Callable[..., float], *arguments: Number, words: str) -> Number:
-        """What a function of traffic of plain numbers gives, point by point; arguments as `of` has them."""
+        """Result of a function of traffic of plain numbers, point by point; arguments as `of` has them."""
         return pointwise(lambda at, *more: function(self.at(at), *more), self.place, *arguments, words=words)
 
     def at(self, place: float) -> Traffic:
@@ -139,7 +139,7 @@ class Sent:
 
     @cached_property
     def place(self) -> Number:
-        """The place of the traffic of each point; points that are alike have one."""
+        """The place of the traffic of each point; points that are alike share it."""
         places: dict[tuple[float, ...], int] = {}
         place = pointwise(
             lambda *numbers: places.setdefault(numbers, len(places)), *self.traffic.numbers(), words="all that is sent"
@@ -155,9 +155,9 @@ class _Senders(NamedTuple):
     name: str
     payload: Any
     pdos: Number
-    """PDOs of all its nodes in one direction [1]."""
+    """PDOs of all its nodes in either direction [1]."""
     pdos_each: Number
-    """PDOs of one node in one direction [1]."""
+    """PDOs of a node in either direction [1]."""
     payloads_bytes: tuple[Number, ...]
     """Of a node, in the order of `TRANSACTION_KINDS` [bytes]."""
     read_us: Number
@@ -165,12 +165,12 @@ class _Senders(NamedTuple):
 
 
 def _pdos_each(payload: Any, axes: Number) -> Number:
-    """PDOs of one node in one direction [1]."""
+    """PDOs of a node in either direction [1]."""
     return larger(axes, 1) if payload.pdo_per == "axis" else 1
 
 
 def pdos_of(group: Group) -> Number:
-    """PDOs of all nodes of a group in one direction [1]."""
+    """PDOs of all nodes of a group in either direction [1]."""
     return group.nodes * _pdos_each(group.said.payload, group.axes)
 
 
@@ -178,7 +178,7 @@ _last: tuple[Network, Traffic] | None = None
 
 
 def traffic_of(network: Network) -> Traffic:
-    """Traffic of a network. That of the last one is remembered: all limits of a network ask for it, one by one."""
+    """Traffic of a network. The last result is remembered, for every limit of a network asks for it."""
     global _last  # noqa: PLW0603 - a network may hold arrays, and is told apart by identity alone
     if _last is None or _last[0] is not network:
         senders = [

@@ -1,4 +1,4 @@
-"""What a cycle waits for, and the worst-case response of each stream."""
+"""Waits of a cycle for other messages, and the worst-case response of each stream."""
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,7 +29,7 @@ _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 
 
 class Waits(NamedTuple):
-    """What a cycle waits for, from the queued SYNC to the end of the last command."""
+    """Waits of a cycle, from the queued SYNC to the end of the last command."""
 
     lasts_us: Points
     """All of it [us]."""
@@ -46,7 +46,7 @@ class Waits(NamedTuple):
 
 
 def is_higher(message: Points, last: Points) -> Points:
-    """Whether an identifier goes before the last one of SYNC and all PDOs; of any sort."""
+    """Whether an identifier goes before the last identifier of SYNC and all PDOs; of any sort."""
     return message <= last
 
 
@@ -70,11 +70,11 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
 
     Notes
     -----
-    SYNC, the feedback of the slowest node and the commands each meet an idle bus, or one that has just become busy. A
+    SYNC, the feedback of the slowest node and the commands each meet an idle bus, or a bus that has just become busy. A
     frame of a lower priority may have started then: three such frames, the longest that can be there. One of a message
     whose deadline D is kept ends within it, so ceil((w + D) / T) of them are there in w. Frames that go before the last
     PDO go whenever they are queued: ceil((w + J + bit) / T). That holds with what is still pending from the cycle
-    before, too: the last frame of that cycle started as long before its end as the last frame of this one does.
+    before, too: the last frame of that cycle started as long before its end as the last frame of this cycle does.
     """
     each = streams(traffic, is_stuffed=is_stuffed)
     last, bit = last_cyclic(each), bit_us(traffic.bit_rate_kbit_s)
@@ -84,7 +84,7 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
         for stream in messages
         if is_higher(stream.first, last) is not False
     ]
-    # Every frame has one bit rate and one format: the one with the most data is the longest.
+    # Every frame has the same bit rate and format: the frame with the most data is the longest.
     by_length = sorted(messages, key=lambda stream: -plain(stream.data_bytes))
     lower = tuple(stream for stream in by_length if is_higher(stream.first, last) is not True)
 
@@ -110,7 +110,7 @@ def _frames_within(stream: Stream, span_us: Points) -> Points:
 
 
 def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> dict[str, Points]:
-    """How late the last feedback and all commands may be queued behind the start of their cycle, by name [us]."""
+    """Latest queueing of the last feedback and of all commands behind the start of their cycle, by name [us]."""
     us = {name: total(stream.sender().frames_us for stream in each if stream.name == name) for name in _CYCLIC}
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
     commands_us = waits(traffic, others_us, is_stuffed=is_stuffed).lasts_us - us[_COMMAND]
@@ -243,7 +243,7 @@ class Messages:
         return choose(has_response, (own.jitter_us + own.frame_us + most_us / idle) / own.deadline_us, inf)
 
     def least_share(self, own: Stream) -> Points:
-        """What the response over the deadline is at least, of a busy period that begins with SYNC [1]."""
+        """Lower bound of the response over the deadline, of a busy period that begins with SYNC [1]."""
         behind, sender = self._behind(own), own.sender()
         load, waits_us = self._loads[behind], self._starts[0].least_us[behind] + self._longest_us[behind]
         waits_us = waits_us - sender.load * (sender.jitter_us + self._bit_us)

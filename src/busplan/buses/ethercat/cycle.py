@@ -1,4 +1,4 @@
-"""The cycle: the master, all frames one behind the other, their way through all devices and back, and the window."""
+"""The cycle: the master, all frames in sequence, their way through all devices and back, and the window."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -53,7 +53,7 @@ STRETCHES: Final = (
     EventKind("frame", "frames", "", "F", "out"),
     EventKind("way", "way through the devices", "", "W", "in"),
 )
-"""What several events make together."""
+"""Stretches that several events make together."""
 
 
 _LEFT_OUT: Final = {
@@ -103,7 +103,7 @@ class EthercatCycle(BusCycle):
 
     @property
     def most_required_us(self) -> Number:
-        """No less than with fewer devices: a short last frame takes less to receive than the full one before it."""
+        """No less than with fewer devices: a short last frame takes less to receive than the full frame before it."""
         if not self.counts_reception:
             return self.required_us
         last_us, before_us = (

@@ -109,7 +109,7 @@ _ENI: Final = "ENI files that it wrote"
 LAYOUTS: Final[Mapping[str, ProcessData]] = MappingProxyType(
     {"SOEM": SEPARATE, "IgH": SEPARATE, "ethercrab": SEPARATE, "TwinCAT": SHARED, "acontis": SHARED, UNNAMED: SEPARATE}
 )
-"""How each master lays out its process data."""
+"""Layout of the process data by master."""
 HOUSEKEEPING_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
     {
         "SOEM": _datagrams(of="none", source="SOEM, ec_main.c", grade="published"),

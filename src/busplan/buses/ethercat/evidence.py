@@ -1,4 +1,4 @@
-"""What rows of evidence compute of EtherCAT frames alone, without a cycle; each takes any cycle of the kind."""
+"""Figures of EtherCAT frames for rows of evidence; each function takes any cycle of the kind."""
 
 from typing import Final
 
@@ -8,12 +8,12 @@ from busplan.elementwise import plain
 
 
 def room_bytes(_cycle: object, *, with_clocks: bool = False) -> float:
-    """Most process data of a frame of one datagram, or of one beside the datagram of the clocks [bytes]."""
+    """Most process data of a frame of a datagram, alone or beside the datagram of the clocks [bytes]."""
     return equations.room_bytes(1) - (plain(CLOCK_BYTES["SOEM"]) if with_clocks else 0)
 
 
 def frame_bytes(_cycle: object, *, data_bytes: int) -> float:
-    """A frame of one datagram on the wire [bytes]."""
+    """A frame of a datagram on the wire [bytes]."""
     return plain(equations.frame_bytes(equations.datagram_bytes(data_bytes)))
 
 

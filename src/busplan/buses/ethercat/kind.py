@@ -143,8 +143,8 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         return (layout(network), f"{count} frame{'s' * (count != 1)}", *clocks)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Those of `busplan.buses.ethercat.evidence`."""
-        from busplan.buses.ethercat.evidence import FUNCTIONS  # one command alone asks for them
+        """Functions of `busplan.buses.ethercat.evidence`."""
+        from busplan.buses.ethercat.evidence import FUNCTIONS  # a single command asks for them
 
         return FUNCTIONS
 

@@ -1,4 +1,4 @@
-"""How long a command takes to a drive, feedback to the master, and a loop over both.
+"""Latencies of a command to a drive, of feedback to the master, and of a loop over both.
 
 The master's task starts each cycle. SYNC0 of the distributed clocks lies at a share of the period behind it: there
 drives sample, and commands that have arrived take effect. Without distributed clocks drives act when their frame has
@@ -31,7 +31,7 @@ def sync0_us(network: Network) -> Number:
 
 
 def sync0_share(network: Network) -> Number:
-    """That as a share of the period: SYNC0 at the task itself is the next one for its frames [1]."""
+    """The first SYNC0 as a share of the period: at the task itself it is the next SYNC0 that its frames meet [1]."""
     shift = network.profile.bus.sync_shift
     return choose(shift > 0, shift, 1)
 
@@ -62,7 +62,7 @@ def last_command_us(network: Network) -> Number:
 
 
 def command_doubt_us(network: Network) -> Number:
-    """Standard uncertainty of that: of the master, the devices one way, the bytes and the slowest execution [us]."""
+    """Standard uncertainty of the last command: master, devices one way, bytes and slowest execution [us]."""
     execution_us = reduce(larger, (group.write_uncertainty_us for group in network.groups))
     process_bytes = total(own.number * own.data_bytes for own in devices(network))
     parts = (

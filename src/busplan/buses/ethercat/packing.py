@@ -1,4 +1,4 @@
-"""How devices share frames: in their order, each whole, a new frame where the next device has no room."""
+"""Packing of devices into frames: in their order, each whole, a new frame where the next device has no room."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -23,7 +23,7 @@ class Devices(NamedTuple):
     """Devices that are alike, side by side. The numbers may be of any sort."""
 
     number: Number
-    """How many [1]."""
+    """Number of devices [1]."""
     data_bytes: Number
     """Bytes of each in a frame [bytes]."""
 
@@ -32,7 +32,7 @@ class Packing(NamedTuple):
     """All frames of the process data. The numbers may be of any sort."""
 
     frames: Number
-    """How many [1]."""
+    """Number of frames [1]."""
     datagrams_bytes: Number
     """All their datagrams, headers and data [bytes]."""
     padding_bytes: Number
@@ -49,7 +49,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     Parameters
     ----------
     devices
-        Groups of devices in their order, one or more.
+        Groups of devices in their order, at least one.
     datagrams
         Datagrams of process data in a frame that holds any: 1 of LRW, 2 of LRD and LWR [1].
     first_bytes
@@ -58,7 +58,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     Returns
     -------
     Packing
-        A device that no frame has room for is taken to have one of its own: a limit is broken then.
+        A device that no frame has room for counts as a frame of its own: a limit is broken then.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def _with_data(devices: Devices) -> Devices:
 
 
 class Frames(NamedTuple):
-    """Frames one behind the other that hold as many devices of one size, of plain numbers."""
+    """Frames in sequence that hold as many devices of the same size, of plain numbers."""
 
     first: int
     """First device of the first of them, from 1."""
@@ -114,7 +114,7 @@ class Frames(NamedTuple):
     datagrams_bytes: float
     """Datagrams of each [bytes]."""
     frames: int = 1
-    """How many [1]."""
+    """Number of frames [1]."""
 
     def each(self) -> Iterator[range]:
         """Devices of each frame."""

@@ -84,7 +84,7 @@ LIMITS: Final = (
 
 
 def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """A circle is to be tested, and no clock makes its axes act at one time."""
+    """A circle is to be tested, and no clock makes its axes act at the same time."""
     profile = subject.profile
     if profile.asks_for_circle and not profile.bus.distributed_clocks:
         yield RuleProblem(

@@ -35,7 +35,7 @@ class Hop(NamedTuple):
 
 
 class DevicesDoubt(NamedTuple):
-    """How well the delays of some devices are known. The number may be of any sort."""
+    """Uncertainty of the delays of some devices. The number may be of any sort."""
 
     key: str
     """Dotted key that would say them better."""
@@ -45,18 +45,18 @@ class DevicesDoubt(NamedTuple):
 
 
 def layout(network: Network) -> ProcessData:
-    """How the process data travel: as the profile says, else as its master lays them out."""
+    """Layout of the process data: as the profile says, else as its master has it."""
     bus = network.profile.bus
     return bus.process_data or LAYOUTS[bus.master or UNNAMED]
 
 
 def datagrams(network: Network) -> int:
-    """Datagrams of process data in a frame: one of LRW, or one of LRD and one of LWR."""
+    """Datagrams of process data in a frame: LRW, or LRD and LWR."""
     return 2 if layout(network) == SPLIT else 1
 
 
 def data_bytes(group: Group, network: Network) -> Number:
-    """Bytes of one device in a frame: the larger of input and output where they share bytes, else both [bytes]."""
+    """Bytes of a device in a frame: the larger of input and output where they share bytes, else both [bytes]."""
     both = group.read_bytes, group.write_bytes
     size_bytes = larger(*both) if layout(network) == SHARED else total(both)
     return named(size_bytes, "device_bytes", f"d{group.name and f',{group.name}'}")
@@ -107,7 +107,7 @@ def devices_us(network: Network) -> Number:
 
 
 def devices_doubts(network: Network) -> Iterator[DevicesDoubt]:
-    """How well the delays are known: those of a port err together, measured ones each by itself."""
+    """Uncertainties of the delays: those of a port err together, measured delays each by itself."""
     for port, uncertainty_us in DELAY_UNCERTAINTY_US.items():
         own = [group for group in network.groups if group.node.delay_us is None and group.node.port == port]
         if own:
@@ -139,7 +139,7 @@ def mailbox_us(network: Network) -> Number:
 
 
 def mailbox_frame_us(network: Network) -> Number:
-    """Frame of one mailbox poll [us]."""
+    """Frame of a mailbox poll [us]."""
     return sending_us(frame_bytes(datagram_bytes(network.profile.bus.mailbox_bytes)))
 
 

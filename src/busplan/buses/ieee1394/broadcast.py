@@ -1,7 +1,7 @@
-"""The broadcast schedule: one query, a broadcast of each node, one read of the hub that collected them, one write.
+"""The broadcast schedule: a query, a broadcast of each node, a read of the hub that collected them, a write.
 
 It is that of the da Vinci Research Kit (dVRK). A query is a quadlet write to the hub, which all nodes hear. Each
-broadcasts its data without an acknowledge, in the order of the nodes. The hub has all of them in one block, which the
+broadcasts its data without an acknowledge, in the order of the nodes. The hub has all of them in a block, which the
 host reads; the answer is concatenated. One block write, to the hub too, has the commands of all nodes. What goes on the
 bus goes to the farthest node. No execution time is on the bus.
 
@@ -73,7 +73,7 @@ class Packets(NamedTuple):
 
 
 class Idle(NamedTuple):
-    """Idle bus before a request of the host, or behind the last one [us]."""
+    """Idle bus before a request of the host, or behind the last request [us]."""
 
     gap_us: Number
     """The arbitration reset gap."""
@@ -330,7 +330,7 @@ class BroadcastCycle(CycleWithStarts):
         return _in_order({**common, **read}), _in_order({**common, **write})
 
     def figures(self) -> Mapping[str, Number | None]:
-        """How the bus is set, and the latencies; the paper has no number of nodes for this schedule."""
+        """Settings of the bus, and the latencies; the paper has no number of nodes for this schedule."""
         read, write = self._phases()
         shown = ("latency_us", "latency_with_gaps_us", "transaction_us")
         return {
@@ -375,11 +375,11 @@ class BroadcastCycle(CycleWithStarts):
 
     @property
     def with_gap(self) -> Number:
-        """Those with the gap term of equation (4) in their arbitration [1]."""
+        """Packets with the gap term of equation (4) in their arbitration [1]."""
         return 4 + self.network.profile.cycle.retries if self._is_isochronous else self.halves
 
     def _host_swing_us(self) -> Number:
-        """Change by one standard uncertainty of the host, as the larger of two steps of two: up and down [us]."""
+        """Change by a standard uncertainty of the host: half the larger of two steps, two up and two down [us]."""
         step_us: Number = self.network.profile.host.standard_uncertainty_us
         if is_off(step_us):
             return 0.0

@@ -1,4 +1,4 @@
-"""What IEEE 1394 fixes: rates, limits, packet sizes, gap counts and the constants of the equations.
+"""Constants of IEEE 1394: rates, limits, packet sizes, gap counts and the constants of the equations.
 
 Every figure that somebody published or measured is a `Sourced` float: it names its unit, its source and how well it
 is known. What is so by definition (the bits of a byte, a field of six bits) is a plain number. "Paper" is

@@ -118,7 +118,7 @@ class Ieee1394Cycle(CycleWithStarts):
         )
 
     def figures(self) -> Mapping[str, Number | None]:
-        """How the bus is set, the latencies, and the number of nodes as the paper has it."""
+        """Settings of the bus, the latencies, and the number of nodes as the paper has it."""
         network, read, write = self.network, self._longest("read"), self._longest("write")
         given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
         return {
@@ -143,7 +143,7 @@ class Ieee1394Cycle(CycleWithStarts):
         }
 
     def _longest(self, kind: TransactionKind) -> dict[str, Number]:
-        """Each of these times of the transactions of one kind with the farthest node of each group, the longest."""
+        """The longest of each phase, over the reads or writes with the farthest node of each group."""
         each = [transaction.phases for transaction in self._farthest if transaction.kind == kind]
         return {key: reduce(larger, (getattr(phases, key) for phases in each)) for key in _SHOWN}
 
@@ -159,7 +159,7 @@ class Ieee1394Cycle(CycleWithStarts):
         )
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """One read and one write of the farthest node of each group."""
+        """A read and a write of the farthest node of each group."""
         places = range(len(self.network.groups))
         farthest = (
             self._exchange(place, kind, self._ways[place].last) for place in places for kind in TRANSACTION_KINDS

@@ -54,7 +54,7 @@ STRETCHES: Final = (
     EventKind("read", "reads", "", "R", "in"),
     EventKind("write", "writes", "", "W", "out"),
 )
-"""What several events make together."""
+"""Stretches that several events make together."""
 
 
 class CycleWithStarts(BusCycle):
@@ -81,7 +81,7 @@ class CycleWithStarts(BusCycle):
     @property
     @abstractmethod
     def longest_request_us(self) -> Number:
-        """Data phase of the longest packet that the host sends to one node [us]."""
+        """Data phase of the longest packet that the host sends to a node [us]."""
 
     @cached_property
     def delays(self) -> Delays:
@@ -193,7 +193,7 @@ class CycleWithStarts(BusCycle):
         return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
 
     def setup(self) -> dict[str, Number]:
-        """How the bus is set, by key of its figures."""
+        """Settings of the bus, by key of their figures."""
         safe = safe_gap_count(self.link.hops)
         return {
             "hops": self.link.hops,
@@ -204,7 +204,7 @@ class CycleWithStarts(BusCycle):
 
     @property
     def is_known(self) -> bool:
-        """The error of a model is known of the one that decides."""
+        """Whether the model's error is known: only of the model that decides."""
         return self.model == "standard"
 
     def left_out(self) -> tuple[LeftOut, ...]:

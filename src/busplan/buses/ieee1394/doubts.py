@@ -1,6 +1,6 @@
-"""How far the bus may be from the timing model `standard`: its bias, and what is not known exactly.
+"""Distance of the bus from the timing model `standard`: the bias, and the uncertainty of each input.
 
-One input's error is the same in every transaction; different inputs are independent.
+The error of an input is the same in every transaction; different inputs are independent.
 
 References
 ----------
@@ -30,11 +30,11 @@ _RECTANGULAR = sqrt(3)
 
 
 def bias_us(exchanges: Sequence[Exchange], network: Network, *, gap_count: Number) -> Number:
-    """What a cycle takes beyond the model, on the mean [us].
+    """Mean time of a cycle beyond the model [us].
 
-    Half-count (b + d): b is the mean residual of Table I. d is the middle of two readings of it, which one gap count
-    cannot tell apart: that the difference is constant, and that it stands in the gap term of equation (4). An execution
-    time that was fitted against the model holds the error of split transactions, and of no others.
+    Half-count (b + d): b is the mean residual of Table I. d is the middle of two readings of it, which a single gap
+    count cannot tell apart: that the difference is constant, and that it stands in the gap term of equation (4). An
+    execution time that was fitted against the model holds the error of split transactions, and of no others.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def of_cycle(
     of_packets = total(exchange.nodes * _hop_delays(exchange, network) for exchange in exchanges)
 
     def swing_us(exchange: Exchange, execution_us: Number, host_us: Number) -> Number:
-        """What one standard uncertainty changes, as the larger of two steps of two: up and down.
+        """Change by a standard uncertainty: half the larger of two steps, two uncertainties up and two down.
 
         The cycle never falls with either time and has kinks, at which a central difference covers too little.
         """
@@ -112,7 +112,7 @@ def of_cycle(
         Doubt(
             "node.execution" if network.is_uniform else "group.execution",
             "execution time",
-            # Times of several groups are measured, or guessed, in one way: they are taken to err together.
+            # Times of several groups are measured, or guessed, in the same way: they are taken to err together.
             total(
                 exchange.nodes * swing_us(exchange, exchange.execution_uncertainty_us, 0.0) for exchange in exchanges
             ),
@@ -131,12 +131,12 @@ def of_cycle(
 
 
 def broadcast_bias_us(halves: Number, *, with_gap: Number, gap_count: Number) -> Number:
-    """What a cycle of the broadcast schedule takes beyond the model, on the mean [us].
+    """Mean time of a cycle of the broadcast schedule beyond the model [us].
 
     Parameters
     ----------
     halves
-        Packets of the cycle, each half a transaction; one without an acknowledge counts as one with it [1].
+        Packets of the cycle, each half a transaction; a packet without an acknowledge counts like any [1].
     with_gap
         Those of them whose arbitration has the gap term of equation (4) [1].
     gap_count
@@ -159,7 +159,7 @@ def of_broadcast(
     hop_delays
         How often the delay of all hops stands in the cycle [1].
     host_swing_us
-        What one standard uncertainty of the host's own time changes [us].
+        Change by a standard uncertainty of the host's own time [us].
     """
     gap_term_us = with_gap * _gap_term_us(MAX_GAP_COUNT, link.gap_count, "d")
     return (
@@ -187,13 +187,13 @@ def _hop_delays(exchange: Exchange, network: Network) -> Number:
 
 
 def _phy_doubt_us(delays: Number, link: Link) -> Number:
-    """What is not known of some PHY delays [us]; nothing where the profile gives them."""
+    """Standard uncertainty of some PHY delays [us]; 0 where the profile gives them."""
     half_width_us = alike(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
     return delays * half_width_us / _RECTANGULAR
 
 
 def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ...]:
-    """How often half a split transaction stands in the cycle, a packet that is acknowledged: by sort of node [1]."""
+    """Halves of split transactions in the cycle, each a packet that is acknowledged: by sort of node [1]."""
     counts: dict[int, tuple[Any, list[Number]]] = {}
     for exchange in exchanges:
         if exchange.responder.answer == "split":
@@ -202,7 +202,7 @@ def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ..
 
 
 def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
-    """How often half of any other transaction stands in the cycle, and retries [1]."""
+    """Halves of all other transactions in the cycle, and retries [1]."""
     unsplit = [exchange for exchange in exchanges if exchange.responder.answer != "split"]
     halves = total(exchange.nodes * (1 if exchange.responder.answer == "unified" else 2) for exchange in unsplit)
     return named(halves + network.profile.cycle.retries, "other_halves", "halves_other")
@@ -220,6 +220,6 @@ def _measured_at(node: Any) -> Number:
 
 
 def _gap_term_us(measured: Number, gap_count: Number, symbol: str) -> Number:
-    """Half of what the gap term changes from the gap count that was measured to the one in force: d [us]."""
+    """Half of what the gap term changes from the gap count that was measured to the gap count in force: d [us]."""
     ticks = alike(ARBITRATION_GAP_TICKS, gap_count) / 2
     return named(ticks * (measured - gap_count) / BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)

@@ -1,10 +1,10 @@
-"""Equations (3)-(15) of the paper, one function each; (1) and (2) stand in `busplan.buses.time_slice`.
+"""Equations (3)-(15) of the paper, a function each; (1) and (2) stand in `busplan.buses.time_slice`.
 
 The functions are operators only: a float in gives a float, NumPy arrays broadcast. Times are in us, rates in
 Mbit/s (which is bit/us, so that bits / rate is in us), lengths in m, sizes in bytes. Nothing is checked here:
 the profile has refused what makes no sense, and a rate of zero raises ZeroDivisionError.
 
-The paper writes one `Bandwidth` for the data rate and for the clock that gaps and PHY delays are counted in.
+The paper writes the same `Bandwidth` for the data rate and for the clock that gaps and PHY delays are counted in.
 Here they are two parameters, `data_rate_mbit_s` and `gap_clock_mbit_s`: the timing models differ in the second.
 
 References

@@ -1,4 +1,4 @@
-"""What rows of evidence compute of IEEE 1394 beside the figures of a cycle."""
+"""Figures of IEEE 1394 for rows of evidence, beside those of a cycle."""
 
 from collections.abc import Callable, Mapping
 from math import ceil

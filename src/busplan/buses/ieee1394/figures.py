@@ -167,7 +167,7 @@ _OF_BROADCAST: Final = (
     Figure("boards_us", "T_boards", "broadcast", "all nodes' broadcasts with their gaps", "broadcasts of all nodes"),
     Figure("hub_wait_us", "T_wait", "broadcast", "from the last broadcast to the read of the hub", "wait for the hub"),
 )
-"""What only a transaction of the broadcast schedule has."""
+"""Figures of the broadcast schedule alone."""
 LATENCY: Final = (
     *(TIMING_MODEL, TRANSACTION, PAYLOAD_BYTES, NODES, HOPS, GAP_COUNT),
     *_OF_BROADCAST,

@@ -1,6 +1,6 @@
-"""Idle bus around one transaction: the gaps as `paper` adds them up, and as the bus runs them.
+"""Idle bus around a transaction: the gaps as `paper` adds them up, and as the bus runs them.
 
-A gap is a threshold of one idle period: the time for which the bus has been idle. Gaps of one transaction are not
+A gap is a threshold of an idle period: the time for which the bus has been idle. Gaps of a transaction are not
 added to each other, and the time in which a node executes is idle bus, too. Fairness lets a node start one asynchronous
 packet in a fairness interval, which an idle period of the arbitration reset gap ends.
 
@@ -17,7 +17,7 @@ from typing import Literal, NamedTuple
 from busplan.elementwise import Number, choose, is_off, larger, smaller
 
 Answer = Literal["split", "concatenated", "unified"]
-"""How a node answers a request.
+"""Answer of a node to a request.
 
 split: it acknowledges, executes, and arbitrates for its response. concatenated: its response follows its acknowledge,
 and the bus stays busy. unified: its acknowledge completes the transaction.
@@ -25,7 +25,7 @@ and the bus stays busy. unified: its acknowledge completes the transaction.
 
 
 class Gaps(NamedTuple):
-    """The gaps of a bus [us], and whether one node alone answers on it."""
+    """The gaps of a bus [us], and whether a single node answers on it."""
 
     subaction_us: Number
     """T_sub."""
@@ -34,16 +34,16 @@ class Gaps(NamedTuple):
     both_us: Number
     """T_sum, equation (10)."""
     alone: Number
-    """Whether there is one node: a truth, or an array of them."""
+    """Whether there is a single node: a truth value, or an array of them."""
 
 
 class IdleTime(NamedTuple):
-    """Idle bus around one transaction, beside the execution [us]."""
+    """Idle bus around a transaction, beside the execution [us]."""
 
     idle_us: Number
-    """That of the gaps."""
+    """Idle bus of the gaps."""
     host_us: Number
-    """That of a host whose own time is longer than the gaps."""
+    """Idle bus while the host takes longer than the gaps."""
 
 
 def gaps_added_up(_answer: Answer, *, gaps: Gaps, execution_us: Number, host_us: Number) -> IdleTime:  # noqa: ARG001
@@ -84,10 +84,10 @@ def gaps_as_thresholds(answer: Answer, *, gaps: Gaps, execution_us: Number, host
 
 
 def busy_us(answer: Answer, *, gaps: Gaps, execution_us: Number, host_us: Number) -> Number:
-    """What a transaction takes beside its packets: execution, gaps and host [us].
+    """Time of a transaction beside its packets: execution, gaps and host [us].
 
     Of a split transaction both idle periods: up to its response, and behind it. A fast node ends the first before the
-    arbitration reset gap, which the second must then wait for. With one node on the bus, its response may find its
+    arbitration reset gap, which the second must then wait for. With a single node on the bus, its response may find its
     turn used in the same interval.
 
     Parameters

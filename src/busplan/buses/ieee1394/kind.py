@@ -41,11 +41,11 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 
 _HOST_STEP_US: Final = 10.0
-"""How much slower the host is made, to see what that does to the margin."""
+"""Step by which the host is made slower, for the sensitivity of the margin."""
 
 
 def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
-    """What the packets of a split transaction with the farthest node of a group take.
+    """Time of the packets of a split transaction with the farthest node of a group.
 
     Raises
     ------
@@ -200,7 +200,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         return ", ".join((farthest, *self.setup_words(network)))
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - latencies, too
-        """Whether a transaction is split: other answers keep the execution off the bus, and so do broadcasts."""
+        """Whether any transaction is split: other answers, and broadcasts, keep the execution off the bus."""
         return not is_broadcast(network) and any(
             "split" in (group.node.read_response, group.node.write_response) for group in network.groups
         )
@@ -241,7 +241,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         return f"every node at its own hops{'' if network.profile.bus.root == 'host' else ', arbitration at all'}"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """Hops, gap count, and a schedule that is not the individual one."""
+        """Hops, gap count, and a schedule other than the individual schedule."""
         hops, cycle = hops_of(network), network.profile.cycle
         schedule = (f"broadcast schedule by {cycle.broadcast_request} requests",) if is_broadcast(network) else ()
         return (f"{hops} hop{'s' * (hops != 1)}", f"gap count {gap_count_of(network)}", *schedule)
@@ -267,8 +267,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         return warnings
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Those of `busplan.buses.ieee1394.evidence`."""
-        from busplan.buses.ieee1394.evidence import FUNCTIONS  # one command alone asks for them
+        """Functions of `busplan.buses.ieee1394.evidence`."""
+        from busplan.buses.ieee1394.evidence import FUNCTIONS  # a single command asks for them
 
         return FUNCTIONS
 

@@ -21,7 +21,7 @@ _BENCH: Final = Link(float(DATA_RATE_MBIT_S["S400"]), MAX_GAP_COUNT, 1, float(RE
 
 
 class ModelResidual(NamedTuple):
-    """Measured less computed time of one half of a transaction [us]."""
+    """Measured less computed time of half a transaction [us]."""
 
     mean_us: Sourced
     uncertainty_us: Sourced

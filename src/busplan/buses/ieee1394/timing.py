@@ -1,7 +1,7 @@
-"""The timing models: the phases of one asynchronous transaction under `paper` and under `standard`.
+"""The timing models: the phases of an asynchronous transaction under `paper` and under `standard`.
 
 `paper` takes the equations as they are published: gaps and PHY delays are counted in the data rate, and both
-packets of a transaction carry the payload and one overhead. `standard` counts gaps and PHY delays in the base
+packets of a transaction carry the payload and the same overhead. `standard` counts gaps and PHY delays in the base
 rate, as the gap tables of three independent stacks show, and gives every packet its real size on the wire.
 Gaps are added up in `paper`, and are thresholds of an idle period in `standard` (`busplan.buses.ieee1394.idle`).
 Operators only, as in `equations`: floats in, floats out; arrays in, arrays out.
@@ -30,7 +30,7 @@ from busplan.sections.transactions import TransactionKind
 
 TimingModelName = Literal["paper", "standard"]
 BroadcastRequest = Literal["isochronous", "priority", "timed"]
-"""How a node asks for the bus to broadcast its data."""
+"""Way in which a node gets the bus to broadcast its data."""
 
 
 class PacketSizes(NamedTuple):
@@ -75,7 +75,7 @@ class Link(NamedTuple):
     cable_length_m
         Length of one cable [m].
     phy_delay_us
-        Repeat delay of one PHY [us]; None for the one of the equations, 14 ticks of the gap clock.
+        Repeat delay of one PHY [us]; None for that of the equations, 14 ticks of the gap clock.
     """
 
     data_rate_mbit_s: Number
@@ -86,16 +86,16 @@ class Link(NamedTuple):
 
 
 class Responder(NamedTuple):
-    """How a node answers a transaction, and how fast the host goes on.
+    """Answer of a node to a transaction, and the host's time behind it.
 
     Parameters
     ----------
     execution_us
         Execution time T_exec of a split transaction [us].
     answer
-        How the node answers.
+        Way in which the node answers.
     worst_extra_us
-        What the slowest execution takes beyond T_exec [us].
+        Time of the slowest execution beyond T_exec [us].
     hold_us
         Time from the acknowledge to a concatenated response [us]; the bus stays busy.
     host_us
@@ -110,9 +110,9 @@ class Responder(NamedTuple):
 
 
 class Phases(NamedTuple):
-    """Every phase of one transaction [us]; the equation behind each stands in `busplan.buses.ieee1394.figures`.
+    """Every phase of a transaction [us]; the equation behind each stands in `busplan.buses.ieee1394.figures`.
 
-    What an answer does not have is 0: a unified one has no response, one that is not split has no execution time.
+    Phases that the answer does not have are 0: a unified answer has no response, only a split answer an execution time.
     """
 
     request_bytes: Number
@@ -139,7 +139,7 @@ class Phases(NamedTuple):
     idle_us: Number
     host_us: Number
     transaction_us: Number
-    """What the transaction takes of the cycle."""
+    """Time of the transaction in the cycle."""
 
 
 def _paper_packets(_kind: TransactionKind, payload_bytes: Number, overhead_bytes: Number) -> PacketSizes:
@@ -173,7 +173,7 @@ TIMING_MODELS: Final[Mapping[TimingModelName, PacketTiming]] = MappingProxyType(
 
 
 class Delays(NamedTuple):
-    """What does not depend on the packet [us]."""
+    """Delays that do not depend on the packet [us]."""
 
     hop_us: Number
     arbitration_us: Number
@@ -191,9 +191,9 @@ def delays(link: Link, *, model: PacketTiming, alone: Number, shared: Delays | N
     model
         Timing model, of `TIMING_MODELS`.
     alone
-        Whether one node alone answers on the bus.
+        Whether a single node answers on the bus.
     shared
-        The delays over other hops of the bus, where they have been computed: those of a hop and the gaps are the same.
+        The delays over other hops of the bus, where they have been computed: delay of a hop and gaps are the same.
     """
     clock_mbit_s = alike(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
     hop_us = _hop_us(link, clock_mbit_s) if shared is None else shared.hop_us
@@ -230,7 +230,7 @@ def transaction(
     alone: Number = False,
     common: Delays | None = None,
 ) -> Phases:
-    """Take one asynchronous transaction apart, equations (3)-(10), (13) and (14).
+    """Take an asynchronous transaction apart, equations (3)-(10), (13) and (14).
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def transaction(
     responder
         How the node answers, and how fast the host goes on.
     alone
-        Whether one node alone answers on the bus.
+        Whether a single node answers on the bus.
     common
         The delays that all transactions of the link share, where they have been computed; then `alone` plays no part.
 

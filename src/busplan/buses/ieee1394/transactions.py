@@ -82,7 +82,7 @@ def arbitration_hops(network: Network, link: Link) -> Number:
 
 
 def is_broadcast(network: Network) -> bool:
-    """Whether the nodes broadcast their data, instead of being read one by one."""
+    """Whether the nodes broadcast their data, instead of being read in turn."""
     schedule: str = network.profile.cycle.schedule
     return schedule == "broadcast"
 
@@ -140,9 +140,9 @@ class Exchange(NamedTuple):
     """Standard uncertainty of the execution time [us]."""
     phases: Phases
     parts: tuple[BusEvent, ...]
-    """What the transaction is made of, in the order of the wire; what the answer does not have is not there.
+    """Parts of the transaction in the order of the wire, without those that the answer does not have.
 
-    The idle bus of the gaps is one part here; `events` divides it.
+    The idle bus of the gaps is a single part here; `events` divides it.
     """
 
     @property
@@ -178,7 +178,7 @@ def exchange(
     common
         The delays that all transactions share, where they have been computed.
     suffix
-        What tells its symbols from those of other transactions in a derivation.
+        Ending of its symbols in a derivation, which tells them from those of other transactions.
     """
     is_read, node = kind == "read", group.node
     size = group.read_bytes if is_read else group.write_bytes
@@ -217,7 +217,7 @@ def _with_names(phases: Phases, suffix: str) -> Phases:
 Who = Literal["host", "node"]
 ARBITRATION: Final = "cycle_arbitration_us"
 PACKET_PARTS: Final = (ARBITRATION, "cycle_data_us", "cycle_acknowledge_us")
-"""Terms whose parts are one packet's way over the hops."""
+"""Terms whose parts are the way of a packet over the hops."""
 
 
 def _parts(kind: TransactionKind, phases: Phases, answer: "Answer") -> Iterator[BusEvent]:
@@ -246,7 +246,7 @@ def _parts(kind: TransactionKind, phases: Phases, answer: "Answer") -> Iterator[
 
 
 def events(exchanged: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
-    """The parts of one transaction, of plain numbers; its idle bus is divided by idle period and gap."""
+    """The parts of a transaction, of plain numbers; its idle bus is divided by idle period and gap."""
     before, behind = _added_up(exchanged.phases) if model == "paper" else _by_idle_period(exchanged)
     for part in exchanged.parts:
         if part.kind == "idle":

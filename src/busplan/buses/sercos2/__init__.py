@@ -1,1 +1,1 @@
-"""SERCOS I and II: an optical ring whose drives answer one after the other between two telegrams of the master."""
+"""SERCOS I and II: an optical ring whose drives answer in turn between two telegrams of the master."""

@@ -1,4 +1,4 @@
-"""The cycle of SERCOS I and II: MST, the telegrams of all drives, and one telegram to all of them."""
+"""The cycle of SERCOS I and II: MST, the telegrams of all drives, and a telegram to all of them."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -34,11 +34,11 @@ STRETCHES: Final = (
     EventKind("at_stretch", "AT", "", "A", "in"),
     EventKind("mdt_stretch", "MDT", "", "M", "out"),
 )
-"""What several events make together."""
+"""Stretches that several events make together."""
 
 
 class Sercos2Cycle(SercosCycle):
-    """MST, t1, one AT of each drive with gaps between them, t_ATMT, the MDT, and the drives' recovery."""
+    """MST, t1, an AT of each drive with gaps between them, t_ATMT, the MDT, and the drives' recovery."""
 
     term_figures = TERMS
 
@@ -101,7 +101,7 @@ class Sercos2Cycle(SercosCycle):
         return 0.0
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """How old feedback is when the host has it, and how late a command takes effect."""
+        """Age of feedback when the host has it, and delay of a command up to its effect."""
         sent = self.by_term
         before_us = sent["cycle_mst_us"] + self.start_us
         ats_us = sent["cycle_at_us"] + sent["cycle_gap_us"]

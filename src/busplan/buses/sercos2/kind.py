@@ -44,7 +44,7 @@ LIMITS: Final = (
 
 
 class Sercos2(SercosBus):
-    """SERCOS I and II, whose drives answer one after the other, and are told in one telegram."""
+    """SERCOS I and II, whose drives answer in turn, and get their commands in a single telegram."""
 
     kind = "sercos2"
     title = "SERCOS I and II"

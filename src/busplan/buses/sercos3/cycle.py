@@ -51,7 +51,7 @@ EVENTS: Final = (
 )
 """Kinds of events, in the order of the cycle."""
 STRETCHES: Final = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
-"""What several events make together."""
+"""Stretches that several events make together."""
 
 
 class Sercos3Cycle(SercosCycle):
@@ -99,7 +99,7 @@ class Sercos3Cycle(SercosCycle):
 
     @property
     def _jitters(self) -> tuple[int, int]:
-        """How often the jitter is kept free: before the AT at the earliest, and in the whole cycle."""
+        """Number of jitters kept free: before the AT at the earliest, and in the whole cycle."""
         return {"mdt-at-ucc": (1, 3), "mdt-ucc-at": (2, 3), "at-last": (1, 2)}[self.method]
 
     @property
@@ -182,7 +182,7 @@ class Sercos3Cycle(SercosCycle):
         return tuple(left for is_said, left in said if not is_said)
 
     def figures(self) -> Mapping[str, Number | None]:
-        """How many telegrams there are."""
+        """Numbers of telegrams."""
         return {f"{sort}_telegrams": self.fillings[kind].telegrams for kind, sort in SORTS.items()}
 
     def _start_us(self) -> Number:
@@ -207,7 +207,7 @@ class Sercos3Cycle(SercosCycle):
         return self._start_us() + larger(start_us, self.network.profile.bus.at_start_us or 0.0)
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """How old feedback is when the host has it, and how late a command takes effect."""
+        """Age of feedback when the host has it, and delay of a command up to its effect."""
         return delays(
             self.network,
             feedback_us=(0.0, self._telegrams_us("read")),

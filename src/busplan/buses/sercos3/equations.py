@@ -95,7 +95,7 @@ class Items(NamedTuple):
     """Some pieces of data that are not split. The numbers may be of any sort."""
 
     pieces: Number
-    """How many [1]."""
+    """Number of pieces [1]."""
     size_bytes: Number
     """Of each [bytes]."""
 
@@ -104,7 +104,7 @@ class Filling(NamedTuple):
     """Telegrams of one sort that are filled, the last of them open. The numbers may be of any sort."""
 
     telegrams: Number
-    """How many, the open one among them [1]."""
+    """Number of telegrams, with the open one [1]."""
     closed_bytes: Number
     """Data of those before the open one [bytes]."""
     open_bytes: Number
