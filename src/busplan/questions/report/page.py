@@ -132,7 +132,7 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     if answer.profile.description.strip():
         yield Sentence((" ".join(answer.profile.description.split()),))
     yield _facts(subject)
-    verdicts = (card(answer.verdict, answer.profile), circle_question(answer))
+    verdicts: tuple[Block, ...] = (card(answer.verdict, answer.profile), circle_question(answer))
     if answer.no_circle:
         verdicts = verdicts[::-1]  # the cause first
     lines = (found[name].line for name in ("capacity", "circle") if name in found)
