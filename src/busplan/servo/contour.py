@@ -89,7 +89,7 @@ def measure_contour(
     radius_mm
         Nominal radius [mm].
     part
-        Points at constant speed, at least one; a slice with start and stop.
+        Points at constant speed, one or more; a slice with start and stop.
     turn_share
         None: the part is an arc, and mean and maximum are those of the whole move. A number: the part is exactly one
         turn, everything is measured on it, and its last step counts by this share [1].

@@ -20,6 +20,7 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.compare.kinds import MachineOnKind
 from busplan.questions.evidence.rows import sections_of
 from busplan.questions.fit.certainty import cycle_of, limits_with_time
 from busplan.questions.fit.loop_delays import loop_delays_us, skew_us
@@ -439,7 +440,9 @@ def test_devices_without_axes_need_no_execution_time() -> None:
     assert "assumed of inputs" in busplan.forms.render(busplan.latency(short).report(), "markdown")
     assert override(short, {"cycle.period_us": 1000.0}).group[1].execution == whole.group[1].execution
     assert "execution" not in short.group[1].model_fields_set
-    assert busplan.compare(short, buses=["ethercat", "sercos3"]).on("sercos3").figures.verdict == "fits"
+    sercos = busplan.compare(short, buses=["ethercat", "sercos3"]).on("sercos3")
+    assert isinstance(sercos, MachineOnKind)
+    assert sercos.figures.verdict == "fits"
     with pytest.raises(BusplanError, match=r"group\.inputs\.execution: missing section"):
         override(short, {"group.inputs.axes": 1})
     with pytest.raises(ValidationError, match="execution"):
