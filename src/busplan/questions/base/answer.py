@@ -71,10 +71,10 @@ class Answer(ABC):
 
     def _svg(self) -> str:
         """The picture, which not every answer has."""
-        found = self._repr_svg_()
-        if found is None:
+        picture = self._repr_svg_()
+        if picture is None:
             raise BusplanError("there is nothing to draw: this answer has no picture")
-        return found
+        return picture
 
     def _png(self) -> bytes:
         from busplan.forms.raster import png

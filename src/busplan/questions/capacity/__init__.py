@@ -108,13 +108,13 @@ def capacity(
     'idle'
     """
     network = load_profile(profile)
-    found = analysis.capacity(
+    result = analysis.capacity(
         network,
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         timing_models=checked_models(timing_model, network),
     )
     if not sensitivity:
-        return CapacityAnswer(*found, verdicts=verdicts(found))
+        return CapacityAnswer(*result, verdicts=verdicts(result))
     from busplan.questions.capacity.sensitivity import sensitivities
 
-    return CapacityAnswer(*found, verdicts=verdicts(found), sensitivities=sensitivities(found))
+    return CapacityAnswer(*result, verdicts=verdicts(result), sensitivities=sensitivities(result))

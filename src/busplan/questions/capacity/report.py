@@ -243,4 +243,4 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
 
 def certainty_record(figures: CapacityFigures) -> Record:
     """Figures of how sure the verdict is, without its word."""
-    return fields(figures, *(one.key for one in figure.CERTAINTY if one is not figure.VERDICT))
+    return fields(figures, *(key.key for key in figure.CERTAINTY if key is not figure.VERDICT))

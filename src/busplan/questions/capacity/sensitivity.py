@@ -98,7 +98,7 @@ def _relieved(network: Network) -> Iterator[Network]:
 
 
 def _largest(cycle: BusCycle, *, but: str = "") -> Term:
-    return max((term for term in cycle.terms if term.key != but), key=lambda one: plain(one.us))
+    return max((term for term in cycle.terms if term.key != but), key=lambda term: plain(term.us))
 
 
 def _of(cycle: BusCycle, key: str) -> float:
@@ -138,7 +138,7 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     yield _more_bytes(network)
     own = bus.perturbations(network)
     reset = Perturbation("a bus reset", bus.safety.after_reset, if_nothing="it is set so already")
-    yield from (_with_keys(network.profile, one) for one in (*own, *((reset,) if bus.safety.after_reset else ())))
+    yield from (_with_keys(network.profile, change) for change in (*own, *((reset,) if bus.safety.after_reset else ())))
 
 
 def _slower(network: Network, *, if_nothing: str) -> Perturbed:
@@ -157,15 +157,15 @@ def _slower(network: Network, *, if_nothing: str) -> Perturbed:
 
 def _one_node_more(network: Network, alike: AlikeNodes) -> Perturbed:
     more = alike.nodes + 1
-    found = network.asking(alike.name).with_nodes(more)
-    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, found, "")
+    changed = network.asking(alike.name).with_nodes(more)
+    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, changed, "")
 
 
 def _one_axis_more(network: Network, alike: AlikeNodes) -> Perturbed:
     key, axes = alike.node_key("axes"), alike.node.axes + 1
-    found, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
+    changed, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
     note = unknown or ("" if alike.payload.follows_axes else "no payload follows the axes")
-    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, found, note)
+    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, changed, note)
 
 
 def _more_bytes(network: Network) -> Perturbed:
@@ -194,10 +194,10 @@ def _with_keys(profile: Profile, perturbation: Perturbation) -> Perturbed:
     if perturbation.why_not:
         return Perturbed(perturbation.label, key, before, None, None, perturbation.why_not)
     try:
-        found = network_of(override(profile, dict(perturbation.changes)))
+        changed = network_of(override(profile, dict(perturbation.changes)))
     except BusplanError as error:
         return Perturbed(perturbation.label, key, before, after, None, "; ".join(error.problems))
-    return Perturbed(perturbation.label, key, before, after, found, perturbation.if_nothing)
+    return Perturbed(perturbation.label, key, before, after, changed, perturbation.if_nothing)
 
 
 def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:
@@ -281,7 +281,7 @@ def sensitivity(profile: Profile) -> Sensitivity:
     network = network_of(profile)
     now = standing(network)
     effects = [_effect(change, now) for change in perturbed(network)]
-    effects.sort(key=lambda one: (one.margin_change_us is None, -abs(one.margin_change_us or 0.0)))
+    effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
     return Sensitivity(profile, bus_of(profile).deciding_model, now, tuple(effects), next_bottleneck(profile))
 
 
@@ -295,13 +295,13 @@ def standing(network: Network) -> Standing:
     """Compute where a network stands: what `capacity` says of a profile, of any network."""
     bus = bus_of(network.profile)
     cycle = bus.cycle(network, model=bus.deciding_model)
-    found, codes = certainty(cycle), limit_codes(network)
+    sure, codes = certainty(cycle), limit_codes(network)
     broken = tuple(key for key, code in codes.items() if code == BROKEN)
-    codes[TIME] = time_code(found, network)
+    codes[TIME] = time_code(sure, network)
     late = not fits_in(cycle.required_us, available_us=available_us(network))
     return Standing(
-        margin_corrected_us=plain(found.margin_corrected_us),
-        uncertainty_us=existing(found.known_uncertainty_us),
+        margin_corrected_us=plain(sure.margin_corrected_us),
+        uncertainty_us=existing(sure.known_uncertainty_us),
         verdict=VERDICTS[int(verdict_code(codes))],
         safe=bus.is_safe(network),
         exceeded=(*broken, *((TIME,) if late else ())),

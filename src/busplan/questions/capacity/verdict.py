@@ -31,13 +31,13 @@ class Verdict(NamedTuple):
     @property
     def models_agree(self) -> bool | None:
         """Whether required <= available is the same under every model; None where there is no other."""
-        return all(other.fits == self.deciding.fits for other in self.others) if self.others else None
+        return all(figures_of_other.fits == self.deciding.fits for figures_of_other in self.others) if self.others else None
 
     @property
     def all_well(self) -> bool:
         """Whether the cycle is shown to fit, on a safe bus, within [limits], and the circle can be run."""
-        one = self.deciding
-        return one.verdict == FITS and one.safe and not one.circle_refused_by and not self.missed_limits
+        figures = self.deciding
+        return figures.verdict == FITS and figures.safe and not figures.circle_refused_by and not self.missed_limits
 
 
 def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:

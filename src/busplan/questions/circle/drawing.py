@@ -172,7 +172,7 @@ def contour_lines(profile: ContourProfile, *, width: int) -> list[Line]:
     labels = _labels(edges, per_um=unit.per_um)
     gutter = max(len(text) for text in (*labels, unit.name, "deg"))
     room = width - gutter - len(" |")
-    columns = next((one for one in _COLUMNS if one <= room), _COLUMNS[-1])
+    columns = next((number for number in _COLUMNS if number <= room), _COLUMNS[-1])
     axis = "".join(f"{angle:<{columns // 4}}" for angle in (0, 90, 180, 270)).rstrip()
     rows = zip(labels, _rows(profile.condensed(sectors=columns), edges), strict=True)
     return [

@@ -154,7 +154,7 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
     if not all(axis.stable for axis in axes):
         return None, None, None
     gains = [axis.gain_margin_db for axis in axes if axis.gain_margin_db is not None]
-    phase = min(axes, key=lambda one: inf if one.phase_margin_deg is None else one.phase_margin_deg)
+    phase = min(axes, key=lambda axis: inf if axis.phase_margin_deg is None else axis.phase_margin_deg)
     return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
 
 

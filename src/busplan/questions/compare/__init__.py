@@ -108,5 +108,5 @@ def compare(
     network = load_profile(profile)
     kinds = None
     if buses is not None:
-        kinds = analysis.checked_kinds([str(one) for one in one_or_several(buses, name="buses")], option="buses")
+        kinds = analysis.checked_kinds([str(kind) for kind in one_or_several(buses, name="buses")], option="buses")
     return CompareAnswer(*analysis.compare(network, kinds=kinds, with_circle=circle, progress=progress))

@@ -105,8 +105,8 @@ def checked_direction(
         raise BusplanError(
             f"{option} {key}: {values.size:,} values; a map shows up to {MOST_VALUES} of a key. A sweep takes more"
         )
-    found = [whole(value) for value in values.part(0, values.size).tolist()]
-    return Direction(key, tuple(found if values.has_words else sorted(found)))
+    numbers = [whole(value) for value in values.part(0, values.size).tolist()]
+    return Direction(key, tuple(numbers if values.has_words else sorted(numbers)))
 
 
 _FACTORS: Final = ((1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 2, 5), (1,))
@@ -137,7 +137,7 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
         if not each:  # nodes without axes are counted themselves
             return Direction(varied.nodes_key, nodes)
         others = own_value(AXES, profile) - steps.own_nodes * each
-        return Direction(AXES, tuple(others + one * each for one in nodes))
+        return Direction(AXES, tuple(others + count * each for count in nodes))
     own_us = own_value(PERIOD, profile)
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
     known = [known_us for known_us in bus_of(profile).periods.us if least_us <= known_us <= most_us]
@@ -153,5 +153,5 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
 def _nodes(steps: NodeSteps, to_us: float) -> tuple[int, ...]:
     """Numbers of nodes, from one to some beyond the most that fit the longest period drawn."""
     last = min(max(steps.own_nodes + 1, steps.max_nodes(to_us) + _BEYOND), MAX_COUNT)
-    step = next(one for one in (f * 10**p for p in range(7) for f in (1, 2, 5)) if last <= _MOST * one)
+    step = next(size for size in (f * 10**p for p in range(7) for f in (1, 2, 5)) if last <= _MOST * size)
     return tuple(sorted({1, steps.own_nodes, *range(step, min(last + step, MAX_COUNT + 1), step)}))

@@ -63,13 +63,13 @@ def looks_of(trade_off: TradeOff) -> Looks:
     """
     looks: dict[tuple[State, tuple[str, ...]], Look] = {}
     taken: set[str] = set()
-    for one in trade_off.regions:
-        looks[one.state, one.limited_by] = LOOKS[one.state]
-        if one.state == "does not fit" and one.limited_by != (TIME,):
-            letters = (letter for letter in "".join(one.limited_by) + ascii_lowercase if letter in ascii_lowercase)
+    for region in trade_off.regions:
+        looks[region.state, region.limited_by] = LOOKS[region.state]
+        if region.state == "does not fit" and region.limited_by != (TIME,):
+            letters = (letter for letter in "".join(region.limited_by) + ascii_lowercase if letter in ascii_lowercase)
             mark = next((letter for letter in letters if letter not in taken), _BARRED.mark)
             taken.add(mark)
-            looks[one.state, one.limited_by] = _BARRED._replace(mark=mark)
+            looks[region.state, region.limited_by] = _BARRED._replace(mark=mark)
     return looks
 
 
@@ -128,7 +128,7 @@ def value_text(direction: Direction, value: Value) -> str:
 def setting_words(trade_off: TradeOff, cell: Cell) -> str:
     """Write the setting of a cell, as "8 axes, period 4 ms"."""
     return ", ".join(
-        _along(one, value, trade_off.profile) for one, value in ((trade_off.x, cell.x), (trade_off.y, cell.y))
+        _along(direction, value, trade_off.profile) for direction, value in ((trade_off.x, cell.x), (trade_off.y, cell.y))
     )
 
 
@@ -197,7 +197,7 @@ def _cells(row: Sequence[Cell | NotDrawn], looks: Looks, *, own: int | None, cel
 
 def _tones(row: Sequence[Cell | NotDrawn], *, start: int, cell_width: int) -> Iterator[Mark]:
     """Colours of runs of cells, on a terminal that has them."""
-    for tone, run in groupby(row, key=lambda one: LOOKS[one.state].tone if isinstance(one, Cell) else "neutral"):
+    for tone, run in groupby(row, key=lambda cell: LOOKS[cell.state].tone if isinstance(cell, Cell) else "neutral"):
         end = start + cell_width * len(list(run))
         if tone != "neutral":
             yield Mark(start, end, tone)

@@ -59,10 +59,10 @@ def cure(profile: Profile, *, circle_steps: int | None = None) -> Cure:
         Most simulated steps of each axis of that circle; None for no simulation.
     """
     search, levels = Search(profile), freed(profile, None)
-    found = search.least(levels)
-    if found is None:
+    least = search.least(levels)
+    if least is None:
         return Cure(None, search.binding(levels).why)
-    changes, after = dict(found), search.profile(found)
+    changes, after = dict(least), search.profile(least)
     if not profile.asks_for_circle or rests_on(after) == rests_on(profile):
         return Cure(changes)
     failures = None if circle_steps is None else failures_within(after, most_steps=circle_steps)

@@ -35,7 +35,7 @@ class Room(NamedTuple):
 
 def payload_keys(profile: Profile) -> tuple[str, ...]:
     """Every key that a payload of a network has, or may have."""
-    sections = [f"group.{one.name}" for one in profile.group] or ["payload"]
+    sections = [f"group.{group.name}" for group in profile.group] or ["payload"]
     return tuple(f"{section}.{key}" for section in sections for key in _PAYLOADS)
 
 
@@ -85,12 +85,12 @@ def with_payload_within(profile: Profile, most_bytes: int, *, kept: Collection[s
     kept
         Keys that must stay.
     """
-    found: dict[str, Value] = {}
+    changes: dict[str, Value] = {}
     for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS):
-        over, (key, each) = int(alike.bytes_of(kind)) - most_bytes, _cut(alike, kind)
+        over, (key, bytes_cut) = int(alike.bytes_of(kind)) - most_bytes, _cut(alike, kind)
         if over > 0 and key not in kept:
-            found[key] = getattr(alike.payload, key.rpartition(".")[2]) - ceil(over / each)
-    return found if all(int(value) > 0 for value in found.values()) else None
+            changes[key] = getattr(alike.payload, key.rpartition(".")[2]) - ceil(over / bytes_cut)
+    return changes if all(int(value) > 0 for value in changes.values()) else None
 
 
 def least_cut_bytes(profile: Profile, *, kept: Collection[str] = ()) -> int:

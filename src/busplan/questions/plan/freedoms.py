@@ -151,7 +151,7 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
         Freedom(setting.name, setting.label, setting.cost, setting.keys, partial(_of_bus, setting.name))
         for setting in bus_of(profile).settings(network)
     )
-    found = (
+    freedoms_known = (
         *own,
         *(() if goes_with_step(profile, profile.cycle.period_us) else (_STEP_OF_CIRCLE,)),
         Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,), _ratios),
@@ -160,7 +160,7 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
         # Where nodes differ, nobody but the user knows which can go.
         *((Freedom("nodes", "nodes", Cost.NODES, (NODES_KEY,), _fewer_nodes),) if network.is_uniform else ()),
     )
-    return tuple(sorted(found, key=lambda one: one.cost))
+    return tuple(sorted(freedoms_known, key=lambda freedom: freedom.cost))
 
 
 def freed(
@@ -220,9 +220,9 @@ def _dividing_steps(search: "Search", changes: Changes, _cheaper: Sequence[Freed
     """The longest step, up to the own one, that divides the period, where that one does not."""
     profile = search.profile(changes)
     if not goes_with_step(profile, search.period_us(changes)):
-        one = {STEP: dividing_step_us(search.period_us(changes), most_us=profile.servo.step_us)}
-        if search.allows({**changes, **one}):
-            yield one
+        step = {STEP: dividing_step_us(search.period_us(changes), most_us=profile.servo.step_us)}
+        if search.allows({**changes, **step}):
+            yield step
 
 
 _STEP_OF_CIRCLE: Final = Freedom("step", "step of the circle", Cost.SIMULATION, (STEP,), _dividing_steps)
@@ -231,12 +231,12 @@ _STEP_OF_CIRCLE: Final = Freedom("step", "step of the circle", Cost.SIMULATION, 
 def _ratios(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
     """The smallest ratio for each combination of what is cheaper: between two of them nothing new fits."""
     period_us, own = search.period_us(changes), search.ratio(changes)
-    found = set()
-    for one in search.combinations(changes, cheaper):
-        if within(search.needed_us(one, ratio=MOST_RATIO), period_us):
-            needed_us = max(need.slice_us for need in search.needs(one))
-            found.add(RATIOS.number(place_of(RATIOS, needed_us, each_us=period_us)))
-    yield from ({RATIO: ratio} for ratio in sorted(found) if own < ratio <= MOST_RATIO)
+    ratios = set()
+    for combination in search.combinations(changes, cheaper):
+        if within(search.needed_us(combination, ratio=MOST_RATIO), period_us):
+            needed_us = max(need.slice_us for need in search.needs(combination))
+            ratios.add(RATIOS.number(place_of(RATIOS, needed_us, each_us=period_us)))
+    yield from ({RATIO: ratio} for ratio in sorted(ratios) if own < ratio <= MOST_RATIO)
 
 
 def _payloads(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
@@ -251,8 +251,8 @@ def _payloads(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) ->
     sizes = range(min(int(network.largest_payload_bytes) - 1, payloads.most_bytes) // step * step, 0, -step)
 
     def cut(size: int) -> Changes | None:
-        one = with_payload_within(profile, size, kept=search.kept)
-        return one if one is not None and search.allows({**changes, **one}) else None
+        change = with_payload_within(profile, size, kept=search.kept)
+        return change if change is not None and search.allows({**changes, **change}) else None
 
     sizes = sizes[: bisect_left(sizes, x=True, key=lambda size: cut(size) is None)]
     # Below a point after which a table of execution times falls, a smaller payload may take longer.
@@ -263,10 +263,10 @@ def _payloads(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) ->
     )
     before: Changes | None = None
     for size in search.in_strides(sizes[min(first, len(sizes) - 1) :] if sizes else sizes):
-        one = cut(size)
-        if one is not None and one != before:
-            yield one
-        before = one
+        change = cut(size)
+        if change is not None and change != before:
+            yield change
+        before = change
 
 
 def _periods(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:

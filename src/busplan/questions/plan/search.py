@@ -89,9 +89,9 @@ class Search:
         if kept is not None:
             return kept
         for change in dearest.values(self, changes, cheaper):
-            found = None if self.kept & set(change) else self._least(cheaper, {**changes, **change})
-            if found is not None:
-                return found
+            least = None if self.kept & set(change) else self._least(cheaper, {**changes, **change})
+            if least is not None:
+                return least
         return None
 
     def passes(self, changes: Changes) -> bool:
@@ -136,10 +136,10 @@ class Search:
 
     def needs(self, changes: Changes) -> list[Need]:
         """What each constraint asks; neither period nor slice ratio nor step plays a part."""
-        others = {key: value for key, value in changes.items() if key not in (PERIOD, RATIO, STEP)}
-        key = frozenset(others.items())
+        relevant = {key: value for key, value in changes.items() if key not in (PERIOD, RATIO, STEP)}
+        key = frozenset(relevant.items())
         if key not in self._needs:
-            self._needs[key] = needs(self.profile(others))
+            self._needs[key] = needs(self.profile(relevant))
         return self._needs[key]
 
     def needed_us(self, changes: Changes, *, ratio: float) -> float:
@@ -187,8 +187,8 @@ class Search:
         """The combination that needs least, with a step that divides the period and the largest ratio that is free."""
         ratio = self.most_ratio(changes, levels)
 
-        def lacks(one: Changes) -> tuple[float, bool]:
-            return self.needed_us(one, ratio=ratio), bool(refused_period(self.profile(one)))
+        def lacks(combination: Changes) -> tuple[float, bool]:
+            return self.needed_us(combination, ratio=ratio), bool(refused_period(self.profile(combination)))
 
         least = min(self.combinations(changes, levels), key=lacks)
         return {**({} if ratio == self.ratio(changes) else {RATIO: ratio}), **least}

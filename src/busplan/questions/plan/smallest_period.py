@@ -96,9 +96,9 @@ def needed_settings(profile: Profile) -> Changes:
     network = network_of(profile)
     if _is_carried(network):
         return {}
-    each = sorted(bus_of(profile).settings(network), key=lambda setting: setting.cost)
-    changes = (dict(values) for setting in each for values in setting.values)
-    return next((one for one in changes if _is_carried(network_of(override(profile, dict(one))))), {})
+    settings = sorted(bus_of(profile).settings(network), key=lambda setting: setting.cost)
+    changes = (dict(values) for setting in settings for values in setting.values)
+    return next((change for change in changes if _is_carried(network_of(override(profile, dict(change))))), {})
 
 
 def _is_carried(network: Network) -> bool:
