@@ -17,7 +17,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.terminal import block_lines
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
-"""What must be there for a file, by ending."""
+"""Check that the library for a file is installed, by ending."""
 
 
 class Answer(ABC):
@@ -65,7 +65,7 @@ class Answer(ABC):
         write_file(Path(path), document_bytes(contents[ending]()), overwrite=True)
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
-        """What makes the content of a file, by ending."""
+        """Makers of a file's content, by ending."""
         texts = {ending: partial(self._text, form) for ending, form in ENDINGS.items()}
         return {**texts, ".svg": self._svg, ".png": self._png}
 

@@ -60,8 +60,8 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     3
     """
     new = values_by_key(changes, name="changes")
-    found = profile if isinstance(profile, Profile) else load(argument(profile)).profile
-    return override(found, new)
+    loaded = profile if isinstance(profile, Profile) else load(argument(profile)).profile
+    return override(loaded, new)
 
 
 def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str, object]:
@@ -159,7 +159,7 @@ def known_model(profile: Profile, model: str, *, name: str) -> str:
     model
         The name.
     name
-        What messages call it.
+        Name of the parameter, for messages.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def known_model(profile: Profile, model: str, *, name: str) -> str:
 
 
 def finite(value: object, *, name: str) -> float:
-    """A number that is one.
+    """A finite number.
 
     Raises
     ------
@@ -260,7 +260,7 @@ def _changes_of_shipped(profile: Profile) -> KeyChanges | None:
     """Changes from the shipped profile of the same name; None if none lead to it."""
     shipped = load(profile.name).profile
     old, new = dotted_keys(shipped), dotted_keys(profile)
-    differing = {key: one.value for key, one in new.items() if key not in old or old[key].value != one.value}
+    differing = {key: place.value for key, place in new.items() if key not in old or old[key].value != place.value}
     try:
         changes = key_changes(differing)
         return changes if changes.applied(shipped) == profile else None

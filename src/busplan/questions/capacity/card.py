@@ -73,7 +73,7 @@ def _gauge(figures: CapacityFigures, profile: Profile) -> Gauge:
 
 
 def _used_us(figures: CapacityFigures) -> float:
-    """What the cycle takes of its slice, with the bias of the model [us]."""
+    """Time the cycle takes, with the bias of the model [us]."""
     return figures.available_us - (figures.margin_corrected_us or 0.0)
 
 
@@ -124,10 +124,10 @@ def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     figures = verdict.deciding
     spare = [(count.name or "nodes", (count.safe_nodes or 0) - count.nodes) for count in figures.counts]
     if verdict.all_well and any(number > 0 for _, number in spare):
-        each = (
+        rooms = (
             f"{number} more{f' of {name}' if figures.groups else f' {name}'}" for name, number in spare if number > 0
         )
-        yield "room for", Sentence((listed([*each], "or"),))
+        yield "room for", Sentence((listed([*rooms], "or"),))
         return
     if verdict.all_well:
         yield "room for", Sentence(("no more nodes",))

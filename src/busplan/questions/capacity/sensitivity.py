@@ -1,4 +1,4 @@
-"""What moves the margin: each small change of a network, and what binds once the first bottleneck is gone."""
+"""Sensitivity of the margin: the effect of each small change, and the next bottleneck behind the first."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final, NamedTuple
@@ -29,7 +29,7 @@ from busplan.sections.profile import Profile
 
 
 class NextLimit(NamedTuple):
-    """What limits the nodes of one group now, and what would next, the other groups as they are."""
+    """Limit of the nodes of one group now, and the next limit behind it; the other groups stay as they are."""
 
     group: str
     """Empty where all nodes are alike."""
@@ -44,7 +44,7 @@ class NextLimit(NamedTuple):
 
 
 class NextBottleneck(NamedTuple):
-    """What binds now, and what would bind next, by the timing model that decides."""
+    """The bottleneck now and the next one behind it, by the timing model that decides."""
 
     limits: tuple[NextLimit, ...]
     """One for each group of nodes."""
@@ -54,7 +54,7 @@ class NextBottleneck(NamedTuple):
     """Whether something would take that term out of the cycle. If so, the figures below are of the cycle without it;
     else they are of the cycle as it is."""
     next_binding_term: Term
-    """The largest other term."""
+    """The largest of the other terms."""
     next_margin_corrected_us: float | None
     """Corrected margin without the largest term; None where nothing takes it out."""
 
@@ -62,8 +62,8 @@ class NextBottleneck(NamedTuple):
 def next_bottleneck(profile: Profile) -> NextBottleneck:
     """Find what binds a network once its first bottleneck is gone.
 
-    A term is taken out at its cause, and the cycle is computed anew: without execution, for one, the bus is idle for
-    longer.
+    A term is taken out at its cause, and the cycle is computed anew: without execution, for
+    example, the bus is idle for longer.
 
     Parameters
     ----------
@@ -115,9 +115,9 @@ class Perturbed(NamedTuple):
 
     change: str
     key: str
-    """What changes: a key of the profile, or a figure of `latency`."""
+    """Key of the profile, or figure of `latency`, that changes."""
     before: Any
-    """Its value; None where it has no single one."""
+    """Value of the key before; None where groups differ."""
     after: Any
     network: Network | None
     """None where the change cannot be made."""
@@ -148,8 +148,8 @@ def _slower(network: Network, *, if_nothing: str) -> Perturbed:
         for group in network.groups
     )
     before, after = (
-        _the_one(us for group in each for us in (group.read_execution_us, group.write_execution_us))
-        for each in (network.groups, groups)
+        _common_value(us for group in state for us in (group.read_execution_us, group.write_execution_us))
+        for state in (network.groups, groups)
     )
     label = f"execution time +{_EXECUTION_SHARE:.0%}"
     return Perturbed(label, "execution_us", before, after, network._replace(groups=groups), if_nothing)
@@ -176,13 +176,13 @@ def _more_bytes(network: Network) -> Perturbed:
     def change() -> Network:
         pairs = zip(network.groups, sizes, strict=True)
         return network._replace(
-            groups=tuple(with_payloads(one, read_bytes=read, write_bytes=write) for one, (read, write) in pairs)
+            groups=tuple(with_payloads(group, read_bytes=read, write_bytes=write) for group, (read, write) in pairs)
         )
 
-    before = _the_one(size for one in network.groups for size in (one.read_bytes, one.write_bytes))
-    found, unknown = _if_known(change)
-    label = f"payload +{_PAYLOAD_STEP_BYTES} bytes"
-    return Perturbed(label, "payload_bytes", before, _the_one(size for one in sizes for size in one), found, unknown)
+    before = _common_value(size for group in network.groups for size in (group.read_bytes, group.write_bytes))
+    changed, unknown = _if_known(change)
+    after = _common_value(size for pair in sizes for size in pair)
+    return Perturbed(f"payload +{_PAYLOAD_STEP_BYTES} bytes", "payload_bytes", before, after, changed, unknown)
 
 
 def _with_keys(profile: Profile, perturbation: Perturbation) -> Perturbed:
@@ -212,10 +212,10 @@ def _in(alike: AlikeNodes) -> str:
     return f" in {alike.name}" if alike.name else ""
 
 
-def _the_one(values: Iterable[Any]) -> Any:
+def _common_value(values: Iterable[Any]) -> Any:
     """The value that all share; None where they differ."""
-    first, *others = values
-    return first if all(other == first for other in others) else None
+    first, *rest = values
+    return first if all(value == first for value in rest) else None
 
 
 class Standing(NamedTuple):
@@ -234,14 +234,14 @@ class Standing(NamedTuple):
 
 
 class Effect(NamedTuple):
-    """What one small change does to the margin."""
+    """Effect of one small change on the margin."""
 
     change: str
-    """What changes, in words."""
+    """The change, in words."""
     key: str
     """A key of the profile, or a figure of `latency`."""
     before: Any
-    """Its value, in the unit of its key; None where the change has no single one."""
+    """Value of the key before, in the key's unit; None where groups differ."""
     after: Any
     margin_change_us: float | None
     """By how much the corrected margin grows; None where the change cannot be made."""
@@ -252,7 +252,7 @@ class Effect(NamedTuple):
 
 
 class Sensitivity(NamedTuple):
-    """What moves the margin of a network at one period, by the timing model that decides."""
+    """Effects of small changes on the margin at one period, by the timing model that decides."""
 
     profile: Profile
     """At that period."""
@@ -274,8 +274,8 @@ def sensitivity(profile: Profile) -> Sensitivity:
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> found = sensitivity(load("paper-1ms").profile)
-    >>> [one.change for one in found.effects[:2]]
+    >>> result = sensitivity(load("paper-1ms").profile)
+    >>> [effect.change for effect in result.effects[:2]]
     ['one node more', 'one busy retry more']
     """
     network = network_of(profile)
@@ -286,7 +286,7 @@ def sensitivity(profile: Profile) -> Sensitivity:
 
 
 def sensitivities(capacity: Capacity) -> tuple[Sensitivity, ...]:
-    """What moves the margin at each period of a capacity result."""
+    """Sensitivity at each period of a capacity result."""
     periods_us = (results[0].period_us for results in capacity.periods)
     return tuple(sensitivity(override(capacity.profile, {"cycle.period_us": period_us})) for period_us in periods_us)
 

@@ -1,4 +1,4 @@
-"""What moves the margin, of `busplan capacity --sensitivity`: sentences, a table and a chart for each period."""
+"""Report of `busplan capacity --sensitivity`: sentences, a table and a chart for each period."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -49,8 +49,8 @@ class SensitivityDrawing(Drawing):
 
     Parameters
     ----------
-    found
-        What moves the margin.
+    sensitivity
+        Effects of small changes.
     """
 
     def __init__(self, sensitivity: Sensitivity) -> None:
@@ -96,13 +96,13 @@ class SensitivityDrawing(Drawing):
         figures = max(len(bar.words) for bar in self._bars)
         columns = max(_NARROWEST, width - names - figures - 5)
         left, right = _shared(columns, least=self._least_us, most=self._most_us)
-        for one in self._bars:
+        for bar in self._bars:
             size = _columns(
-                one.value, self._least_us if one.value < 0 else self._most_us, left if one.value < 0 else right
+                bar.value, self._least_us if bar.value < 0 else self._most_us, left if bar.value < 0 else right
             )
-            takes, adds = (_TAKES * size, "") if one.value < 0 else ("", _ADDS * size)
-            bar = f"{takes.rjust(left)}{_ZERO}{adds.ljust(right)}"
-            yield f"{one.label.ljust(names)}  {bar}  {one.words.rjust(figures)}"
+            takes, adds = (_TAKES * size, "") if bar.value < 0 else ("", _ADDS * size)
+            drawn = f"{takes.rjust(left)}{_ZERO}{adds.ljust(right)}"
+            yield f"{bar.label.ljust(names)}  {drawn}  {bar.words.rjust(figures)}"
 
 
 def _bar(change: str, us: float) -> SignedBar:
@@ -127,8 +127,8 @@ def next_bottleneck_sentence(bottlenecks: NextBottleneck, profile: Profile) -> S
 
     Parameters
     ----------
-    found
-        The bottlenecks.
+    bottlenecks
+        The bottleneck now, and the next one.
     profile
         The network.
     """
@@ -180,7 +180,7 @@ def next_bottleneck_record(bottleneck: NextBottleneck, profile: Profile) -> Reco
 
 
 def _limits(limits: Sequence[NextLimit]) -> Record:
-    """What limits the nodes; of groups a list, and nothing for the whole."""
+    """Limit of the nodes; of groups a list, and nothing for the whole."""
     records = [
         {
             "safe_limited_by": limit.limited_by,
@@ -209,14 +209,16 @@ def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], sensitivit
         The capacity.
     verdicts
         One for each period.
-    found
-        What moves the margin, one for each period.
+    sensitivities
+        Effects of small changes, one for each period.
     """
     report = capacity_report(result, verdicts)
     return report._replace(
         blocks=lambda: (*report.blocks(), *_of_periods(sensitivities)),
         document=partial(sensitivity_document, result, verdicts, sensitivities),
-        records=lambda: with_profile(result.profile.name, [row for sensitivity in sensitivities for row in _rows(sensitivity)]),
+        records=lambda: with_profile(
+            result.profile.name, [row for sensitivity in sensitivities for row in _rows(sensitivity)]
+        ),
         is_card_enough=False,
     )
 
@@ -227,7 +229,7 @@ def _of_periods(sensitivities: Sequence[Sensitivity]) -> Iterator[Block]:
 
 
 def sensitivity_blocks(sensitivity: Sensitivity) -> Iterator[Block]:
-    """What moves the margin at one period.
+    """Effects of small changes at one period.
 
     Parameters
     ----------
@@ -339,7 +341,9 @@ def _capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
-def sensitivity_document(result: Capacity, verdicts: Sequence[Verdict], sensitivities: Sequence[Sensitivity]) -> JsonDocument:
+def sensitivity_document(
+    result: Capacity, verdicts: Sequence[Verdict], sensitivities: Sequence[Sensitivity]
+) -> JsonDocument:
     """Document of `busplan capacity --sensitivity --format json`: that of `capacity`, with more in each verdict."""
     whole = capacity_document(result, verdicts)
     for verdict, sensitivity in zip(whole["verdicts"], sensitivities, strict=True):

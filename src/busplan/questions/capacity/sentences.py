@@ -149,7 +149,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
 
 
 def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
-    """What the uncertainty is made of, the largest first."""
+    """Parts of the uncertainty, the largest first."""
     whole = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     return [
         {
@@ -200,14 +200,14 @@ def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
 def _carries(figures: CapacityFigures) -> Sentence:
     safely = "" if figures.safe else " on a bus that is set safely"
     if figures.groups:
-        each = (
+        groups = (
             sentence(
                 f"{group.name} up to {{}} {nouns(group.safe_nodes or 0, 'node')} ({group.safe_limited_by})",
                 _safe(group),
             )
             for group in figures.groups
         )
-        return Sentence((f"Shown to fit{safely}, one group at a time: ", *joined(*each, by=", ").parts, "."))
+        return Sentence((f"Shown to fit{safely}, one group at a time: ", *joined(*groups, by=", ").parts, "."))
     return Sentence(
         (
             *(f"Shown to fit{safely}: ", *_nodes(figures.safe_nodes or 0, figures.safe_axes or 0).parts),

@@ -56,7 +56,7 @@ class CircleTestAnswer(Answer, CircleTest):
         Parameters
         ----------
         note
-            What the title says besides the profile's name.
+            Title, beside the profile's name.
 
         Raises
         ------

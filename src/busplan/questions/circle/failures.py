@@ -104,13 +104,13 @@ class Failure(NamedTuple):
     said: str = ""
     """Message of a broken limit of the bus; empty for other failures."""
     is_default: bool = False
-    """Whether the limit is the default of its key: the profile does not say it."""
+    """Whether the limit is the default of its key, not set in the profile."""
     more: str = ""
-    """What the message goes on to say."""
+    """End of the message."""
 
     @property
     def is_of_bus(self) -> bool:
-        """Whether the bus is what fails, and not the circle."""
+        """Whether the bus fails, and not the circle."""
         return bool(self.said) or self.name in _OF_TIME
 
     def document(self) -> dict[str, Any]:

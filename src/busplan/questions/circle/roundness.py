@@ -56,7 +56,7 @@ def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
     measure = failed_measure(result)
     if measure is None or not result.contributions:
         return None
-    first = min(result.contributions, key=lambda one: float(getattr(one, measure)))
+    first = min(result.contributions, key=lambda source: float(getattr(source, measure)))
     removed_mm = float(getattr(result, measure)) - float(getattr(first, measure))
     return (first, removed_mm) if removed_mm > 0 else None
 
@@ -109,7 +109,7 @@ def circle_test(
     ]
     simulated = [prepared for prepared in setups if isinstance(prepared, Setup)]
     ranked = [sources(prepared) if with_contributions and isinstance(prepared, Setup) else {} for prepared in setups]
-    passing = [source for each in ranked for source in each.values()]
+    passing = [source for without in ranked for source in without.values()]
     counter.expect(*simulated, *passing)
     announce(estimate(simulated, passing))
     pairs = [

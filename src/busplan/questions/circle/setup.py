@@ -196,27 +196,27 @@ _LONG_S: Final = 10.0
 
 
 class Estimate(NamedTuple):
-    """What some simulations cost, about."""
+    """Approximate cost of some simulations."""
 
     steps: int
     """Simulated steps, an axis at a time."""
     time_s: float
     memory_bytes: float
 
-    def then(self, other: "Estimate") -> "Estimate":
-        """What this costs and, when its memory is free again, another.
+    def then(self, following: "Estimate") -> "Estimate":
+        """Cost of this and, with its memory free again, of what follows.
 
         Parameters
         ----------
-        other
-            What comes behind.
+        following
+            Cost of the runs that follow.
         """
-        memory_bytes = max(self.memory_bytes, other.memory_bytes)
-        return Estimate(self.steps + other.steps, self.time_s + other.time_s, memory_bytes)
+        memory_bytes = max(self.memory_bytes, following.memory_bytes)
+        return Estimate(self.steps + following.steps, self.time_s + following.time_s, memory_bytes)
 
     @property
     def is_long(self) -> bool:
-        """Whether it is worth a word before it starts."""
+        """Whether it takes long enough to be announced."""
         return self.time_s > _LONG_S
 
     @property
@@ -228,7 +228,7 @@ class Estimate(NamedTuple):
 
 
 NOTHING: Final = Estimate(0, 0.0, 0.0)
-"""What no simulation costs."""
+"""Cost of no simulation."""
 
 
 def estimate(kept: Sequence[Setup], passing: Sequence[Setup] = ()) -> Estimate:

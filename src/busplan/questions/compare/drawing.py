@@ -54,8 +54,8 @@ def kind_lines(comparison: KindComparison) -> tuple[KindLine, ...]:
     taken: set[str] = set()
     lines = []
     for number, machine in enumerate(comparison.compared):
-        letters = [each for each in f"{machine.profile.bus.kind.upper()}{ascii_uppercase}" if each in ascii_uppercase]
-        letter = next((each for each in letters if each not in taken), "#")
+        letters = f"{machine.profile.bus.kind.upper()}{ascii_uppercase}"
+        letter = next((letter for letter in letters if letter in ascii_uppercase and letter not in taken), "#")
         taken.add(letter)
         own, points = " (this profile)" if machine.is_own else "", _points(machine)
         none = "" if points else ": none"
@@ -65,13 +65,13 @@ def kind_lines(comparison: KindComparison) -> tuple[KindLine, ...]:
 
 
 def _points(machine: MachineOnKind) -> tuple[tuple[float, int], ...]:
-    return tuple((each.period_us, each.axes) for each in machine.curve if each.axes)
+    return tuple((point.period_us, point.axes) for point in machine.curve if point.axes)
 
 
 def plane_of(comparison: KindComparison) -> Plane:
     """The scales that hold every line and the machine itself."""
-    periods_us = [each.period_us for machine in comparison.compared for each in machine.curve]
-    axes = [each.axes or 1 for machine in comparison.compared for each in machine.curve]
+    periods_us = [point.period_us for machine in comparison.compared for point in machine.curve]
+    axes = [point.axes or 1 for machine in comparison.compared for point in machine.curve]
     return Plane(min(periods_us), max(periods_us), max(_LEAST_TOP, own_axes(comparison), *axes))
 
 
@@ -91,7 +91,7 @@ def period_labels(comparison: KindComparison) -> list[tuple[float, str]]:
 
 
 def _periods_us(compared: Sequence[MachineOnKind]) -> list[float]:
-    return sorted({each.period_us for machine in compared for each in machine.curve})
+    return sorted({point.period_us for machine in compared for point in machine.curve})
 
 
 _ROWS: Final = 13
@@ -150,7 +150,7 @@ def _below(comparison: KindComparison, plane: Plane, columns: int) -> str:
     own_us = comparison.profile.cycle.period_us
     for period_us, text in sorted(period_labels(comparison), key=lambda label: label[0] != own_us):
         start = min(max(0, _column(plane, period_us, columns) - len(text) // 2), columns - len(text))
-        if all(start + len(text) < other or start > other + len(label) for other, label in taken.items()):
+        if all(start + len(text) < place or start > place + len(label) for place, label in taken.items()):
             taken[start] = text
     line = ""
     for start, text in sorted(taken.items()):

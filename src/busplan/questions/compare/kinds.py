@@ -78,7 +78,7 @@ class MachineOnKind(NamedTuple):
 
     @property
     def assumed_host(self) -> tuple[AssumedKey, ...]:
-        """What is assumed of the host's own time, by its own profile, too: then it has no rank among known hosts."""
+        """Assumptions about the host's own time, of its own profile, too; with any it has no rank."""
         key = kind_named(self.profile.bus.kind).key_of("host")
         inputs = [given(self.profile, key)] if self.is_own and key else []
         own = (
@@ -123,7 +123,7 @@ def checked_kinds(names: Sequence[str], *, option: str) -> tuple[str, ...]:
     names
         The names.
     option
-        What gives them, for messages.
+        Option or key that gives them, for messages.
 
     Raises
     ------
@@ -161,11 +161,19 @@ def compare(
     own = profile.bus.kind
     names = tuple(kinds) if kinds is not None else (own, *(kind for kind in kind_names() if kind != own))
     machines = [_on_kind(profile, name) for name in names]
-    periods_us = _curve_periods(profile, [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)])
-    machines = [machine if isinstance(machine, NotOnKind) else machine._replace(curve=_curve(machine, periods_us)) for machine in machines]
+    periods_us = _curve_periods(
+        profile, [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
+    )
+    machines = [
+        machine if isinstance(machine, NotOnKind) else machine._replace(curve=_curve(machine, periods_us))
+        for machine in machines
+    ]
     if with_circle:
         run = circle_tests(progress, of=len(machines))
-        machines = [machine if isinstance(machine, NotOnKind) else machine._replace(circle=_circle(machine, run)) for machine in machines]
+        machines = [
+            machine if isinstance(machine, NotOnKind) else machine._replace(circle=_circle(machine, run))
+            for machine in machines
+        ]
     return KindComparison(profile, tuple(machines), with_circle)
 
 
@@ -206,9 +214,11 @@ def most_safe_axes(profile: Profile) -> SafeAxes:
     """
     varied = varied_nodes(profile)
     nodes, limit = safe_nodes(profile, group=varied.name)
-    each = int(varied.node.axes)
-    others = sum(int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name)
-    axes = None if not each else others + nodes * each if nodes else 0
+    node_axes = int(varied.node.axes)
+    axes_beside = sum(
+        int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name
+    )
+    axes = None if not node_axes else axes_beside + nodes * node_axes if nodes else 0
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
 
 

@@ -106,9 +106,9 @@ def _bus_record(machine: MachineOnKind | NotOnKind) -> Record:
         "no_period": machine.smallest.why or None,
         "circle": None if machine.circle is None else _circle_record(machine.circle),
         "assumed": [fields(assumed, *assumed._fields) for assumed in machine.assumed],
-        "assumed_host": [each.key for each in machine.assumed_host],
+        "assumed_host": [assumed.key for assumed in machine.assumed_host],
         "left_out": list(machine.left_out),
-        "curve": [{"period_us": each.period_us, **_safe_record(each)} for each in machine.curve],
+        "curve": [{"period_us": point.period_us, **_safe_record(point)} for point in machine.curve],
     }
 
 
@@ -151,7 +151,11 @@ def notes(comparison: KindComparison) -> Iterator[Sentence]:
             why = "; ".join(machine.why)
             yield Sentence((f"{kind_named(machine.kind).title} cannot have this machine: {why}.",), "warns")
         else:
-            said = [*_obstacles(machine), *reset_sentence(machine.after_reset, machine.profile), *_circle_problems(machine)]
+            said = [
+                *_obstacles(machine),
+                *reset_sentence(machine.after_reset, machine.profile),
+                *_circle_problems(machine),
+            ]
             said += _execution(machine, comparison.profile)
             said += evidence_sentence(bus_of(machine.profile))
             if said:
@@ -160,7 +164,7 @@ def notes(comparison: KindComparison) -> Iterator[Sentence]:
 
 
 def _left_out(comparison: KindComparison) -> Iterator[Sentence]:
-    """What of the profile is left out, once for the kinds that leave out the same."""
+    """Keys of the profile that are left out, once for the kinds that leave out the same."""
     titles: dict[tuple[str, ...], list[str]] = {}
     for machine in comparison.compared:
         if machine.left_out:
@@ -188,7 +192,7 @@ def _circle_problems(machine: MachineOnKind) -> Iterator[Sentence]:
 
 
 def _execution(machine: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
-    """What the execution times of the profile stand for."""
+    """Meaning of the profile's execution times on other kinds."""
     bus, own = bus_of(machine.profile), bus_of(profile)
     owns_any = own.has_execution(network_of(profile))
     if machine.is_own:
@@ -301,8 +305,8 @@ def _words(assumed: Sequence[AssumedKey]) -> str:
 
 
 def _assumed(machine: MachineOnKind) -> str:
-    """What a kind has of a new profile, with the number of its defaults."""
-    new = [each for each in machine.assumed if each.source == "new profile"]
+    """Values that a kind takes from a new profile, with the number of its defaults."""
+    new = [assumed for assumed in machine.assumed if assumed.source == "new profile"]
     defaults = len(machine.assumed) - len(new)
     return ", ".join(filter(None, (_words(new), f"{defaults} {nouns(defaults, 'default')}" if defaults else ""))) or "-"
 
@@ -376,7 +380,7 @@ def compare_chart(comparison: KindComparison) -> Chart:
 
 
 def assumed_table(comparison: KindComparison) -> Table:
-    """What each kind needs and the machine does not say; defaults are details.
+    """Values that each kind needs and the machine does not give; defaults are details.
 
     Parameters
     ----------

@@ -60,13 +60,13 @@ def nodes_with(axes: Value, profile: Profile, *, nodes_key: str) -> int:
     3
     """
     alike = next(alike for alike in profile.alike_nodes if alike.nodes_key == nodes_key)
-    each = int(alike.node.axes)
-    others = int(plain(network_of(profile).axes)) - int(alike.nodes) * each
-    own = axes - others if isinstance(axes, int) else 0
-    if own < max(each, 1) or not each or own % each:
-        beside = f" beside {others} others" if others else ""
-        raise BusplanError(f"axes = {axes}: no whole number of nodes, with {each} axes each{beside}")
-    return own // each
+    node_axes = int(alike.node.axes)
+    axes_beside = int(plain(network_of(profile).axes)) - int(alike.nodes) * node_axes
+    own = axes - axes_beside if isinstance(axes, int) else 0
+    if own < max(node_axes, 1) or not node_axes or own % node_axes:
+        beside = f" beside {axes_beside} others" if axes_beside else ""
+        raise BusplanError(f"axes = {axes}: no whole number of nodes, with {node_axes} axes each{beside}")
+    return own // node_axes
 
 
 def own_value(key: str, profile: Profile) -> Any:
@@ -90,9 +90,9 @@ def checked_direction(
     values
         Its values.
     option
-        What gives them, for messages.
+        Option or key that gives them, for messages.
     circle_option
-        What requests circle tests, for messages; None where they are run.
+        Option or key that asks for circle tests, for messages; None where they are run.
 
     Raises
     ------
@@ -133,11 +133,11 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
     steps = node_steps(profile, model=bus_of(profile).deciding_model, group=varied.name)
     from_us, to_us = telling_periods(profile, [steps])
     if key == AXES:
-        nodes, each = _nodes(steps, to_us), int(varied.node.axes)
-        if not each:  # nodes without axes are counted themselves
+        nodes, node_axes = _nodes(steps, to_us), int(varied.node.axes)
+        if not node_axes:  # nodes without axes are counted themselves
             return Direction(varied.nodes_key, nodes)
-        others = own_value(AXES, profile) - steps.own_nodes * each
-        return Direction(AXES, tuple(others + count * each for count in nodes))
+        axes_beside = own_value(AXES, profile) - steps.own_nodes * node_axes
+        return Direction(AXES, tuple(axes_beside + count * node_axes for count in nodes))
     own_us = own_value(PERIOD, profile)
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
     known = [known_us for known_us in bus_of(profile).periods.us if least_us <= known_us <= most_us]

@@ -277,8 +277,8 @@ class TradeOff(NamedTuple):
     def regions(self) -> tuple[Region, ...]:
         """Cells by state and limit: the states in the order of `STATES`, of each the largest region first."""
         counts = Counter(map(_region, self.cells))
-        regions = [one._replace(cells=number) for one, number in counts.items()]
-        return tuple(sorted(regions, key=lambda one: (STATES.index(one.state), -one.cells)))
+        regions = [region._replace(cells=number) for region, number in counts.items()]
+        return tuple(sorted(regions, key=lambda region: (STATES.index(region.state), -region.cells)))
 
 
 def _region(cell: Cell) -> Region:
@@ -326,8 +326,8 @@ def trade_off(
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> found = trade_off(load("paper-4ms").profile, y=Direction("cycle.period_us", (500, 4000)))
-    >>> [[cell.state for cell in row[:3]] for row in found.rows]
+    >>> result = trade_off(load("paper-4ms").profile, y=Direction("cycle.period_us", (500, 4000)))
+    >>> [[cell.state for cell in row[:3]] for row in result.rows]
     [['fits', 'does not fit', 'does not fit'], ['fits', 'fits', 'fits']]
     """
     if x is None:
@@ -384,7 +384,9 @@ def _setting(profile: Profile, *along: tuple[str, Value]) -> MapPoint | str:
 
 def _swept(profile: Profile, settings: Mapping[Place, MapPoint]) -> Iterator[tuple[Place, Mapping[str, Any]]]:
     """Figures of each setting, from sweeps over grids without any other setting."""
-    places: dict[tuple[object, ...], Place] = {tuple(point_set.changes.values()): at for at, point_set in settings.items()}
+    places: dict[tuple[object, ...], Place] = {
+        tuple(point_set.changes.values()): at for at, point_set in settings.items()
+    }
     model = bus_of(profile).deciding_model
     for grid in _grids(settings.values()):
         for block in sweep(profile, grid, timing_models=[model], with_counts=False):

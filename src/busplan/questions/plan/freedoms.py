@@ -1,4 +1,4 @@
-"""What a plan may change, in the order of its cost; each is asked for its values again after each change."""
+"""Freedoms of a plan, in the order of their cost; each gives its values again after each change."""
 
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -125,7 +125,7 @@ PERIOD_STEP_US: Final = 1.0
 RATIO: Final = "cycle.slice_ratio"
 PERIOD: Final = "cycle.period_us"
 DEFAULT_COSTS: Final = (Cost.SIMULATION, Cost.REGISTER, Cost.HOST_TIME, Cost.PERIOD)
-"""What a plan may change where nobody says otherwise."""
+"""Freedoms of a plan by default."""
 
 
 class Freedom(NamedTuple):
@@ -136,11 +136,11 @@ class Freedom(NamedTuple):
     cost: Cost
     keys: tuple[str, ...]
     values: "Callable[[Search, Changes, Sequence[Freedom]], Iterator[Changes]]"
-    """What it may be after some changes, with cheaper freedoms: the least change first, and nothing that cannot do."""
+    """Possible values after some changes, with cheaper freedoms: the least change first, nothing that cannot help."""
 
     @property
     def gives_time(self) -> bool:
-        """Whether it changes what the slice gives, and not what the cycle needs."""
+        """Whether it lengthens the slice, and leaves the cycle as it is."""
         return self.cost in (Cost.HOST_TIME, Cost.PERIOD)
 
 
@@ -166,7 +166,7 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
 def freed(
     profile: "Profile", names: Sequence[str] | None, *, asked: Collection[str] = (), option: str = "free"
 ) -> tuple[Freedom, ...]:
-    """What a plan may change, the cheapest first.
+    """Freedoms of a plan, the cheapest first.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def freed(
     asked
         Keys with a value that was asked for, which stays.
     option
-        What messages call the names.
+        Option or parameter that gives the names, for messages.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def _of_bus(name: str, search: "Search", changes: Changes, _cheaper: Sequence[Fr
     """Values of a setting of the bus, safe for all nodes that [limits] asks for."""
     profile = search.profile(changes)
     networks = (network_of(profile), *(room.network for room in rooms(profile)))
-    network = max(networks, key=lambda one: float(plain(one.nodes)))
+    network = max(networks, key=lambda network: float(plain(network.nodes)))
     for setting in bus_of(profile).settings(network):
         if setting.name == name:
             yield from setting.values
@@ -337,9 +337,9 @@ def place_of(grid: NumberGrid, needed_us: float, *, each_us: float) -> int:
     grid
         Periods [us], or slice ratios [1].
     needed_us
-        What the slice must give [us].
+        Length that the slice must have [us].
     each_us
-        What it gives for each unit of the grid: the slice ratio, or the period.
+        Length of the slice for each unit of the grid: the slice ratio, or the period.
     """
     place = grid.place(needed_us / each_us)
     while not fits_in(needed_us, available_us=each_us * grid.number(place)):

@@ -1,4 +1,4 @@
-"""What a plan offers: one way to set a network, what the machine could reach, and what would make a plan possible."""
+"""Offers of a plan: one way to set a network, what the machine could reach, and what would make a plan possible."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
@@ -61,7 +61,7 @@ class Impossible(NamedTuple):
     title: str
     reason: str
     proven: bool = True
-    """Whether no value exists; False if the search was cut short."""
+    """Whether it is proven that no value exists; False if the search was cut short."""
 
 
 def option(search: Search, title: str, changes: Changes, *, held_by: str | None = None) -> Option:
@@ -72,7 +72,7 @@ def option(search: Search, title: str, changes: Changes, *, held_by: str | None 
     search
         The search.
     title
-        What the option is called.
+        Name of the option.
     changes
         New values by dotted key.
     held_by
@@ -105,7 +105,7 @@ def frontier(goal: Profile, search: Search, levels: Sequence[Freedom]) -> Iterat
     search
         A search for it.
     levels
-        What may be changed, of which what is cheaper than a payload is.
+        Freedoms, of which those cheaper than a payload are used.
     """
     cheap = [level for level in levels if level.cost < Cost.PAYLOAD]
     yield _shortest_period(goal, search, cheap)
@@ -193,7 +193,7 @@ class Relaxation(NamedTuple):
     value: Value | None
     """Value of the key of [limits] that is enough; None for others."""
     changes: dict[str, Value]
-    """What to set then; keys of the goal with new values."""
+    """Changes to make then: keys of the goal with new values."""
 
 
 def relaxations(
@@ -211,7 +211,7 @@ def relaxations(
     goal
         The profile with the wanted values, for which there is no plan.
     levels
-        What may be changed.
+        Freedoms.
     kept
         Keys that were asked for: each is relaxed by itself.
     circle
@@ -227,11 +227,11 @@ def relaxations(
     names = {level.name for level in levels}
     for freedom in freedoms(goal):
         if freedom.name not in names:
-            more = [each for each in freedoms(goal) if each.name in {*names, freedom.name}]
+            more = [level for level in freedoms(goal) if level.name in {*names, freedom.name}]
             search = Search(goal, circle=circle, kept=set(kept) - set(freedom.keys), max_circles=max_circles)
-            found = search.least(more)
-            if found is not None:
-                yield Relaxation(freedom.name, None, dict(found))
+            least = search.least(more)
+            if least is not None:
+                yield Relaxation(freedom.name, None, dict(least))
     for key, values in _weaker_limits(goal):
         relaxed = _least_relaxed(goal, key, values, levels, kept=kept)
         if relaxed is not None:

@@ -25,13 +25,13 @@ class Plan(NamedTuple):
     wanted: dict[str, Value]
     """Wanted values that differ from the profile, by dotted key."""
     free: tuple[str, ...]
-    """Names of what may be changed, the cheapest first."""
+    """Names of the freedoms, the cheapest first."""
     options: tuple[Option, ...]
     impossible: tuple[Impossible, ...]
     binding: Need | None
     """The constraint that stands in the way; None if there is a plan."""
     relaxations: tuple[Relaxation, ...]
-    """What alone would make a plan possible, with what to set then; empty if there is a plan."""
+    """Relaxations that would each make a plan possible, with their changes; empty if there is a plan."""
     with_circle: bool
     """Whether the circle test was run."""
 
@@ -95,8 +95,8 @@ def plan(
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> found = plan(load("paper-1ms").profile, wanted={"bus.nodes": 4})
-    >>> found.recommended.changes, round(found.recommended.deciding.margin_us, 1)
+    >>> answer = plan(load("paper-1ms").profile, wanted={"bus.nodes": 4})
+    >>> answer.recommended.changes, round(answer.recommended.deciding.margin_us, 1)
     ({'bus.gap_count': 10}, 106.1)
     """
     asked = dict(wanted or {})

@@ -62,7 +62,7 @@ def _known_us(bus: Bus, least_us: float) -> float:
 
 
 def _need(profile: Profile, period_us: float) -> Need | None:
-    """What a profile lacks at a period; None where it is shown to fit."""
+    """Need that a profile does not meet at a period; None where it is shown to fit."""
     network = network_of(override(profile, {PERIOD: period_us}))
     need = most_asking(shown(network), ratio=profile.cycle.slice_ratio)
     is_given = within(need.period_us(profile.cycle.slice_ratio), period_us)

@@ -45,7 +45,7 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes
 
 
 def change_meanings(bus: "Bus") -> dict[str, str]:
-    """What a change of a key means on the machine, for keys that do not say so."""
+    """Meaning of a change on the machine, by key, for keys that do not say so."""
     return {name: key.meaning for name, key in bus.keys.items() if key.meaning}
 
 
