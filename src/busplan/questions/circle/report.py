@@ -66,8 +66,10 @@ def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Senten
         yield Sentence((*subject, ": ", verdict, ", ", *failure_words(result).parts, "."), verdict.state)
         yield from _attack(result)
         return
-    said = "the circle holds every tolerance" if result.passed else f"{verdict.text}: no contour tolerance is asked for"
-    yield Sentence((*subject, ": ", Words(said, verdict.state), "."), verdict.state)
+    if result.passed:
+        yield Sentence((*subject, ": ", Words("the circle holds every tolerance", verdict.state), "."), verdict.state)
+    else:
+        yield Sentence((*subject, ": ", *_unjudged(result), "."), verdict.state)
     yield sentence(
         "The loop is stable, with a phase margin of {}{} or more and a gain margin of {}{} or more.",
         *(
@@ -79,6 +81,14 @@ def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Senten
             )
         ),
     )
+
+
+def _unjudged(result: CircleFigures) -> tuple[Part, ...]:
+    """The measure to set a tolerance of, and its key: G of a whole turn, else the largest contour error."""
+    key = "max_contour_error_mm" if result.circular_deviation_mm is None else "circular_deviation_mm"
+    measure = CIRCLE_BY_KEY[key]
+    value = attribute_value(measure, result)
+    return f"{measure.label} ", value, "; ", Words("no tolerance set", "warns"), ": ", Code(f"tolerance.{key}")
 
 
 def _attack(result: CircleFigures) -> Iterator[Sentence]:
