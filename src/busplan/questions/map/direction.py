@@ -151,7 +151,15 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
 
 
 def _nodes(steps: NodeSteps, to_us: float) -> tuple[int, ...]:
-    """Numbers of nodes, from one to some beyond the most that fit the longest period drawn."""
-    last = min(max(steps.own_nodes + 1, steps.max_nodes(to_us) + _BEYOND), MAX_COUNT)
-    step = next(size for size in (f * 10**p for p in range(7) for f in (1, 2, 5)) if last <= _MOST * size)
-    return tuple(sorted({1, steps.own_nodes, *range(step, min(last + step, MAX_COUNT + 1), step)}))
+    """Numbers of nodes, from one to some beyond the most that fit the longest period drawn.
+
+    Steps of one size about this design, to twice its nodes; beyond, steps that grow.
+    """
+    own = steps.own_nodes
+    last = min(max(own + 1, steps.max_nodes(to_us) + _BEYOND), MAX_COUNT)
+    near = last if last <= _MOST else min(2 * own, last)
+    most = _MOST if near == last else _MOST // 2
+    step = next(size for size in (f * 10**p for p in range(7) for f in (1, 2, 5)) if near <= most * size)
+    about = range(own % step or step, near + 1, step)
+    beyond = round_numbers(near, last, most=_MOST - len(about), decades=_FACTORS) if near < last else []
+    return tuple(sorted({1, *about, *(ceil(nodes) for nodes in beyond), last}))
