@@ -17,7 +17,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.terminal import block_lines
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
-"""What must be there for a file, by ending."""
+"""Check that the library for a file is installed, by ending."""
 
 
 class Answer(ABC):
@@ -65,16 +65,16 @@ class Answer(ABC):
         write_file(Path(path), document_bytes(contents[ending]()), overwrite=True)
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
-        """What makes the content of a file, by ending."""
+        """Makers of a file's content, by ending."""
         texts = {ending: partial(self._text, form) for ending, form in ENDINGS.items()}
         return {**texts, ".svg": self._svg, ".png": self._png}
 
     def _svg(self) -> str:
         """The picture, which not every answer has."""
-        found = self._repr_svg_()
-        if found is None:
+        picture = self._repr_svg_()
+        if picture is None:
             raise BusplanError("there is nothing to draw: this answer has no picture")
-        return found
+        return picture
 
     def _png(self) -> bytes:
         from busplan.forms.raster import png

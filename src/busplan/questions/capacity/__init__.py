@@ -28,7 +28,7 @@ class CapacityAnswer(Answer):
     verdicts
         One verdict for each period.
     sensitivities
-        What moves the margin, one for each period; empty if it was not asked for.
+        Effects of small changes on the margin, one for each period; empty if it was not asked for.
     """
 
     profile: Profile
@@ -97,24 +97,24 @@ def capacity(
     --------
     >>> import busplan
     >>> answer = busplan.capacity("paper-1ms", period_us=500)
-    >>> [(one.timing_model, one.fits, one.max_axes) for one in answer.results]
+    >>> [(figures.timing_model, figures.fits, figures.max_axes) for figures in answer.results]
     [('paper', True, 8), ('standard', False, 4)]
     >>> answer.verdicts[0].models_agree, answer.verdicts[0].deciding.verdict
     (False, 'does not fit')
-    >>> (found,) = busplan.capacity("paper-1ms", sensitivity=True).sensitivities
-    >>> [(one.change, round(one.margin_change_us, 1)) for one in found.effects[:2]]
+    >>> (sensitivity,) = busplan.capacity("paper-1ms", sensitivity=True).sensitivities
+    >>> [(effect.change, round(effect.margin_change_us, 1)) for effect in sensitivity.effects[:2]]
     [('one node more', -128.1), ('one busy retry more', -28.0)]
-    >>> found.next_bottleneck.next_binding_term.name
+    >>> sensitivity.next_bottleneck.next_binding_term.name
     'idle'
     """
     network = load_profile(profile)
-    found = analysis.capacity(
+    result = analysis.capacity(
         network,
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         timing_models=checked_models(timing_model, network),
     )
     if not sensitivity:
-        return CapacityAnswer(*found, verdicts=verdicts(found))
+        return CapacityAnswer(*result, verdicts=verdicts(result))
     from busplan.questions.capacity.sensitivity import sensitivities
 
-    return CapacityAnswer(*found, verdicts=verdicts(found), sensitivities=sensitivities(found))
+    return CapacityAnswer(*result, verdicts=verdicts(result), sensitivities=sensitivities(result))
