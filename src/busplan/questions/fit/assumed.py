@@ -39,7 +39,7 @@ class HeavyAssumption(NamedTuple):
 
     def covers(self, key: str) -> bool:
         """Whether a key is one of these, or stands in one of these sections."""
-        return any(key == one or key.startswith(f"{one}.") for one in self.keys)
+        return any(key == covered or key.startswith(f"{covered}.") for covered in self.keys)
 
 
 def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssumption, ...]:
@@ -79,8 +79,8 @@ def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> li
     if not assumed:
         return []
     without = network._replace(groups=tuple(_at_once(group) if group in assumed else group for group in network.groups))
-    cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(one.key(_EXECUTION) for one in assumed)
-    whole_us, rest_us = (_doubt_us(each) for each in (figures.doubts, cycle.doubts()))
+    cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(group.key(_EXECUTION) for group in assumed)
+    whole_us, rest_us = (_doubt_us(doubts) for doubts in (figures.doubts, cycle.doubts()))
     rest = {term.key: plain(term.us) for term in cycle.terms}
     # A term that grows, as the wait for a gap does, is none of theirs.
     carried_us = sum(max(0.0, plain(term.us) - rest[term.key]) for term in figures.terms)

@@ -53,7 +53,7 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
     """The limits of closed forms: those of a network's kind of bus, without safety and doubts, and time the last."""
     bus = bus_of(network.profile)
-    time = time_limit(lambda one: bus.cycle(one, model=model).most_required_us)
+    time = time_limit(lambda tried: bus.cycle(tried, model=model).most_required_us)
     return (*(limit.nominal for limit in bus.limits if not limit.is_safety), time)
 
 

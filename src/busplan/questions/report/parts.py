@@ -154,7 +154,7 @@ def _terms(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 def _largest_term(answer: AllAnswers) -> Sentence:
     """Say which term takes most, by the model that decides."""
     deciding = answer.verdict.deciding
-    term = max(bus_of(answer.profile).figures.terms, key=lambda one: getattr(deciding, one.key))
+    term = max(bus_of(answer.profile).figures.terms, key=lambda figure: getattr(deciding, figure.key))
     return sentence(
         f"Of the {{}} that the cycle needs by the {deciding.timing_model} model, {term.label} takes the most, {{}}",
         attribute_value(REQUIRED, deciding),

@@ -97,8 +97,12 @@ def _curves(body: Element, plotted: Plotted, *, y: int) -> int:
 
 def _ends(plotted: Plotted) -> tuple[float, float]:
     """Smallest and largest value."""
-    known = [one.values[np.isfinite(one.values)] for one in plotted.panels]
-    return (float(min(one.min() for one in known)), float(max(one.max() for one in known))) if known else (0.0, 0.0)
+    known = [values.values[np.isfinite(values.values)] for values in plotted.panels]
+    return (
+        (float(min(values.min() for values in known)), float(max(values.max() for values in known)))
+        if known
+        else (0.0, 0.0)
+    )
 
 
 def _curve(plot: PlotArea, scale: PlotScale, panel: Panel) -> None:
@@ -124,8 +128,8 @@ def _css(panel: Panel) -> str:
 
 
 def _cross(place: Element, *css: str) -> None:
-    for one in css:
-        SubElement(place, "path", {"d": _CROSS, "class": one})
+    for name in css:
+        SubElement(place, "path", {"d": _CROSS, "class": name})
 
 
 def _legend_of_curves(body: Element, plotted: Plotted, *, y: int) -> int:
@@ -181,7 +185,7 @@ def _maps(body: Element, plotted: Plotted, *, y: int) -> int:
     for panel in plotted.panels:
         y = paragraph(body, f"{panel.model} model", y=y, css="head")
         height = min(_MOST_MAP, max(_LEAST_MAP, _CELL * up.places.size))
-        rulers = (_ruler(one, as_cells=True) for one in (across, up))
+        rulers = (_ruler(scale, as_cells=True) for scale in (across, up))
         plot = draw_plot_area(body, *rulers, y=y, height=height)
         _cells(plot, plotted, panel, colours)
         y = plot.bottom + _GAP
@@ -262,10 +266,10 @@ def _legend_of_maps(body: Element, plotted: Plotted, *, y: int) -> int:
         _sample(body, y, "zero")
         y = _entry(body, _zero(plotted), y)
     y = _unsafe_entry(body, plotted, y)
-    if all(one.own is not None for one in plotted.scales):
+    if all(panel.own is not None for panel in plotted.scales):
         SubElement(body, "circle", {"cx": "14", "cy": str(y + 10), "r": "6", "class": "cross"})
         y = _entry(body, "this design", y)
-    if any(np.isnan(one.values).any() for one in plotted.panels):
+    if any(np.isnan(panel.values).any() for panel in plotted.panels):
         SubElement(body, "rect", {"x": "7", "y": str(y + 4), "width": "14", "height": "12", "class": "blank"})
         y = _entry(body, "blank: no value", y)
     return y

@@ -68,7 +68,7 @@ def _field(name: str, figure: Figure) -> pa.Field:
 def _axis_type(axis: Values) -> pa.DataType:
     values = axis.part(0, axis.size if axis.has_words else 1)
     if values.dtype == object:
-        return pa.bool_() if all(isinstance(one, bool) for one in values) else _WORDS
+        return pa.bool_() if all(isinstance(value, bool) for value in values) else _WORDS
     return pa.from_numpy_dtype(values.dtype)
 
 
@@ -87,11 +87,11 @@ def _words(block: SweepBlock, name: str) -> pa.Array:
     texts = [[str(spelled(word)) for word in column.words or ()] for column in columns]
     known = dict.fromkeys(text for own in texts for text in own if text)
     codes = {text: code for code, text in enumerate(known)}
-    found = [
-        np.array([codes.get(text, -1) for text in own], dtype=np.int32)[one.values]
-        for own, one in zip(texts, columns, strict=True)
+    own_codes = [
+        np.array([codes.get(text, -1) for text in own], dtype=np.int32)[column.values]
+        for own, column in zip(texts, columns, strict=True)
     ]
-    values = block.interleaved(found)
+    values = block.interleaved(own_codes)
     indices = pa.array(values, mask=values < 0)
     return pa.DictionaryArray.from_arrays(indices, pa.array(list(known), type=pa.string()))
 

@@ -95,7 +95,7 @@ class FigureData:
         as_cells = len(keys) == _MAX_KEYS
         scales = tuple(plot_scale(self._profile, key, self._grid.axes[key], as_cells=as_cells) for key in keys)
         if not self._is_own():
-            scales = tuple(one._replace(own=None) for one in scales)
+            scales = tuple(scale._replace(own=None) for scale in scales)
         bus = bus_of(self._profile)
         return Plotted(figure, scales, panels, bus.deciding_model, bus.safety.setting)
 

@@ -64,7 +64,7 @@ def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> P
     if not are_choices:
         inside = isinstance(own, int | float) and values.min() <= own <= values.max()
         return PlotScale(label, values, (), whole, float(own) if inside else None)
-    names = tuple(_name(one) for one in values.tolist())
+    names = tuple(_name(value) for value in values.tolist())
     place = names.index(_name(own)) if _name(own) in names else None
     return PlotScale(label, np.arange(values.size), names, whole, place)
 
@@ -89,7 +89,7 @@ def key_label(profile: Profile, key: str) -> str:
     >>> [key_label(profile, key) for key in ("cycle.period_us", "bus.gap_count", "payload.read_bytes")]
     ['period T_s, us', 'gap count', 'payload read, bytes']
     """
-    setup = {f"bus.{one.key}": one for one in bus_of(profile).figures.setup}
+    setup = {f"bus.{setting.key}": setting for setting in bus_of(profile).figures.setup}
     figure = {"cycle.period_us": PERIOD, "bus.nodes": NODES, **setup}.get(key)
     if figure is not None:
         return figure_label(figure)
@@ -157,21 +157,21 @@ class Plotted(NamedTuple):
     @property
     def any_unsafe(self) -> bool:
         """Whether a point is not set safely."""
-        return any(bool(one.unsafe.any()) for one in self.panels)
+        return any(bool(panel.unsafe.any()) for panel in self.panels)
 
     @property
     def told(self) -> Panel | None:
         """The panel that the caption tells of: that of the model that decides, where it has one."""
-        return next((one for one in self.panels if one.model == self.deciding), next(iter(self.panels), None))
+        return next((panel for panel in self.panels if panel.model == self.deciding), next(iter(self.panels), None))
 
     def value_at_own(self, panel: Panel) -> float | None:
         """The figure at this design; None if it is no point of the grid."""
         places = []
-        for one in self.scales:
-            found = np.flatnonzero(one.places == one.own) if one.own is not None else np.array([], dtype=int)
-            if not found.size:
+        for scale in self.scales:
+            at_own = np.flatnonzero(scale.places == scale.own) if scale.own is not None else np.array([], dtype=int)
+            if not at_own.size:
                 return None
-            places.append(int(found[0]))
+            places.append(int(at_own[0]))
         value = float(panel.values[tuple(places)])
         return None if np.isnan(value) else value
 
