@@ -6,8 +6,8 @@ attributes, the report as text, the document of `--format json` by `to_dict()`. 
 Examples
 --------
 >>> import busplan
->>> busplan.capacity("paper-4ms")  # doctest: +ELLIPSIS
-<CapacityAnswer: paper-4ms at 4 ms: fits. Margin 1730.064 us +/- 6.311 us of 2000.000 us, less a bias of 6.616 us...>
+>>> busplan.capacity("paper-4ms")
+<CapacityAnswer: paper-4ms IEEE 1394, 2 nodes, 8 axes, 4 ms FITS>
 """
 
 from importlib import import_module
@@ -25,6 +25,7 @@ __all__ = [
     "DiffAnswer",
     "EvidenceAnswer",
     "ExplainAnswer",
+    "ImportAnswer",
     "LatencyAnswer",
     "MapAnswer",
     "PlanAnswer",
@@ -41,6 +42,7 @@ __all__ = [
     "diff",
     "evidence",
     "explain",
+    "import_profile",
     "latency",
     "load_profile",
     "map_",
@@ -61,6 +63,7 @@ if TYPE_CHECKING:
     from busplan.questions.diff import DiffAnswer, diff
     from busplan.questions.evidence import EvidenceAnswer, evidence
     from busplan.questions.explain import ExplainAnswer, explain
+    from busplan.questions.import_ import ImportAnswer, import_profile
     from busplan.questions.latency import LatencyAnswer, latency
     from busplan.questions.map import MapAnswer, map_
     from busplan.questions.plan import PlanAnswer, plan
@@ -77,6 +80,8 @@ else:
         "load_profile": "busplan.questions.base.inputs",
         "check": "busplan.gate.check",
         "CheckAnswer": "busplan.gate.check",
+        "import_profile": "busplan.questions.import_",
+        "ImportAnswer": "busplan.questions.import_",
     }
     """Where a name is that is no question and no answer of one."""
 
