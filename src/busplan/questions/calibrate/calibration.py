@@ -218,7 +218,7 @@ def calibrate(
         unchecked_bytes=screening.unchecked_bytes,
         uncertainty_us=_uncertainty_us(residuals_us, fit),
         fit_keys=_latencies(profile).fit_keys(network_of(profile), model if way == "timing-model" else None),
-        at_most_us=max(measurement.shortest_us for measurement in halves.values()),
+        at_most_us=max(half.shortest_us for half in halves.values()),
     )
 
 
@@ -324,14 +324,15 @@ def _require_possible(
         "its T1 + T2 and T4 + T5 are" if way == "measured-halves" else f"the packets alone take in the {model} model"
     )
     problems = [
-        f"{source}:{measurement.line}: payload {measurement.payload_bytes} bytes is over the {limit} bytes of {payloads.carrier}"
+        f"{source}:{measurement.line}: payload {measurement.payload_bytes} bytes is over the {limit} bytes of "
+        f"{payloads.carrier}"
         for measurement, _ in raw
         if measurement.payload_bytes > limit
     ]
     short = [(measurement, packets_us) for measurement, packets_us in raw if measurement.latency_us < packets_us]
     problems += [
-        f"{source}:{measurement.line}: latency {measurement.latency_us:g} us at {measurement.payload_bytes} bytes is below the "
-        f"{packets_us:.3f} us that {needed}"
+        f"{source}:{measurement.line}: latency {measurement.latency_us:g} us at {measurement.payload_bytes} bytes is "
+        f"below the {packets_us:.3f} us that {needed}"
         for measurement, packets_us in short
     ]
     if len(short) == len(raw) and way == "timing-model":

@@ -184,7 +184,7 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         at_most_us=result.at_most_us,
         rms_residual_us=result.rms_residual_us,
         largest_residual={key: value for key, value in result.largest._asdict().items() if key not in _OF_OUTLIERS},
-        outliers=[one._asdict() for one in result.outliers],
+        outliers=[outlier._asdict() for outlier in result.outliers],
         worst_extra_us=result.worst_extra_us,
         unchecked_bytes=list(result.unchecked_bytes),
         payloads=calibration_records(result),

@@ -132,10 +132,10 @@ def diff(
     --------
     >>> import busplan
     >>> answer = busplan.diff("paper-1ms", "paper-optimal-gap", timing_model="standard", circle=False)
-    >>> [(profile_a.key, profile_a.a.value, profile_a.b.value) for profile_a in answer.keys if profile_a.key == "bus.gap_count"]
-    [('bus.gap_count', 63, 'optimal')]
-    >>> [(profile_a.part, round(profile_a.difference, 3)) for profile_a in answer.figures if profile_a.figure.key == "margin_us"]
-    [('standard', 75.195)]
+    >>> [(change.a.value, change.b.value) for change in answer.keys if change.key == "bus.gap_count"]
+    [(63, 'optimal')]
+    >>> [round(row.difference, 3) for row in answer.figures if row.figure.key == "margin_us"]
+    [75.195]
     >>> answer.regressions()
     ()
     """

@@ -190,7 +190,7 @@ def difference(
     --------
     >>> from busplan.profile.shipped import load
     >>> changed = difference(load("paper-1ms").profile, load("paper-optimal-gap").profile, timing_models=["standard"])
-    >>> "bus.timing_model" in [difference_.key for difference_ in changed.keys]
+    >>> "bus.timing_model" in [change.key for change in changed.keys]
     True
     >>> changed.judged("worse")
     []

@@ -295,7 +295,7 @@ def diff_document(difference: Difference, *, arguments: Arguments) -> JsonDocume
 
     Parameters
     ----------
-    found
+    difference
         The difference.
     arguments
         A and B as they were typed.
@@ -311,7 +311,7 @@ def diff_document(difference: Difference, *, arguments: Arguments) -> JsonDocume
         b=b,
         verdict=sentence_text(headline(difference)),
         same=not difference.keys,
-        changes=[change_document(difference) for difference in difference.keys],
+        changes=[change_document(change) for change in difference.keys],
         figures=diff_records(difference),
     )
 

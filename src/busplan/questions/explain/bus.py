@@ -10,8 +10,7 @@ from busplan.buses.network import Network
 from busplan.elementwise import Number, Traced, value_of
 from busplan.forms.numbers import listed
 from busplan.questions.capacity.verdict import verdicts
-from busplan.questions.explain.formulas import against, found
-from busplan.questions.explain.formulas import found as result_of
+from busplan.questions.explain.formulas import against, result_of
 from busplan.questions.fit.certainty import available_us, certainty
 from busplan.questions.fit.circle_refusal import STEP
 from busplan.questions.fit.figures import CapacityFigures, capacity, certainty_numbers, figures, numeric_figures

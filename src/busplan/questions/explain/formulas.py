@@ -168,7 +168,7 @@ def formula_of(equation: Equation) -> str:
     return result.symbol or formula_text(result, in_numbers=False)
 
 
-def found(value: object, words: str, parts: Iterable[Number]) -> Traced:
+def result_of(value: object, words: str, parts: Iterable[Number]) -> Traced:
     """A result without an equation, as of a search or a simulation: it has no steps, but all inputs of its parts.
 
     Parameters

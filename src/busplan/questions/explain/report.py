@@ -267,8 +267,8 @@ def _result_parts(derivation: Derivation) -> tuple[Part, ...]:
             Sentence((Code(key), " = ", ShownValue(new, key))) for key, new in derivation.value["changes"].items()
         )
         return joined(*settings, by=", ").parts
-    found = _result(derivation.value, derivation.figure.key, derivation.figure.unit)
-    return (found if isinstance(found, ShownValue) else found.text,)
+    result = _result(derivation.value, derivation.figure.key, derivation.figure.unit)
+    return (result if isinstance(result, ShownValue) else result.text,)
 
 
 def _result(value: object, key: str, unit: str) -> ShownValue | Words:

@@ -177,5 +177,5 @@ def limits_behind(judged: Judged) -> tuple[str, ...]:
 def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
     """Every limit that a network must keep to be shown to fit on a bus that is set safely; time is the last."""
     bus = bus_of(network.profile)
-    time = time_limit(lambda one: certainty(bus.cycle(one, model=bus.deciding_model)).safe_required_us)
+    time = time_limit(lambda tried: certainty(bus.cycle(tried, model=bus.deciding_model)).safe_required_us)
     return (*(limit.shown for limit in bus.limits), time)

@@ -62,7 +62,7 @@ def latency(
     --------
     >>> import busplan
     >>> answer = busplan.latency("paper-two-node", payload_bytes=[4, 1024], timing_model="paper")
-    >>> [(transaction.transaction, transaction.payload_bytes, round(transaction.phases.latency_us, 2)) for transaction in answer.transactions]
+    >>> [(row.transaction, row.payload_bytes, round(row.phases.latency_us, 2)) for row in answer.transactions]
     [('read', 4, 43.17), ('write', 4, 43.17), ('read', 1024, 474.57), ('write', 1024, 474.57)]
     """
     network = load_profile(profile)

@@ -97,12 +97,10 @@ def _curves(body: Element, plotted: Plotted, *, y: int) -> int:
 
 def _ends(plotted: Plotted) -> tuple[float, float]:
     """Smallest and largest value."""
-    known = [values.values[np.isfinite(values.values)] for values in plotted.panels]
-    return (
-        (float(min(values.min() for values in known)), float(max(values.max() for values in known)))
-        if known
-        else (0.0, 0.0)
-    )
+    known = [panel.values[np.isfinite(panel.values)] for panel in plotted.panels]
+    if not known:
+        return 0.0, 0.0
+    return float(min(values.min() for values in known)), float(max(values.max() for values in known))
 
 
 def _curve(plot: PlotArea, scale: PlotScale, panel: Panel) -> None:
@@ -266,7 +264,7 @@ def _legend_of_maps(body: Element, plotted: Plotted, *, y: int) -> int:
         _sample(body, y, "zero")
         y = _entry(body, _zero(plotted), y)
     y = _unsafe_entry(body, plotted, y)
-    if all(panel.own is not None for panel in plotted.scales):
+    if all(scale.own is not None for scale in plotted.scales):
         SubElement(body, "circle", {"cx": "14", "cy": str(y + 10), "r": "6", "class": "cross"})
         y = _entry(body, "this design", y)
     if any(np.isnan(panel.values).any() for panel in plotted.panels):
