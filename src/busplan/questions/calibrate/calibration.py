@@ -87,7 +87,7 @@ class Calibration(NamedTuple):
     profile: Profile
     """The network that was measured."""
     nodes: AlikeNodes
-    """Those of its nodes that were measured."""
+    """The nodes that were measured."""
     timing_model: str
     way: Way
     method: Method
@@ -103,7 +103,7 @@ class Calibration(NamedTuple):
     outliers: tuple[ComparedMeasurement, ...]
     """Measurements far from the others, slow or fast."""
     worst_extra_us: float | None
-    """What the slowest execution takes beyond the fit; None where no measurement outside the fit is slow."""
+    """Time of the slowest execution beyond the fit; None where no measurement outside the fit is slow."""
     unchecked_bytes: tuple[int, ...]
     """Payloads with too few measurements to tell an outlier."""
     uncertainty_us: float | None

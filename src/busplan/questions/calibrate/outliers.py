@@ -27,7 +27,7 @@ PAYLOADS_TO_COMPARE: Final = 4
 
 
 class Sample(NamedTuple):
-    """What one measurement says of the execution time."""
+    """Execution time derived from one measurement."""
 
     transaction: str
     payload_bytes: int
@@ -37,7 +37,7 @@ class Sample(NamedTuple):
 
 
 class Screening(NamedTuple):
-    """What can be told of outliers; measurements by their place."""
+    """Outliers among the samples, by their index; and payloads that cannot be screened."""
 
     expected_us: Mapping[int, float]
     """The outliers, with the T_exec that the others say: above it they are slow executions."""
@@ -87,7 +87,7 @@ def _distances_us(samples: Sequence[Sample], group: Sequence[int]) -> list[float
 
 
 def _off_their_repetitions(samples: Sequence[Sample], groups: Sequence[Sequence[int]]) -> Iterator[tuple[int, float]]:
-    """Those that are far from the median of three or more repetitions, with the median of the others."""
+    """Samples far from the median of three or more repetitions, by index, with the median of the others [us]."""
     repeated = [_distances_us(samples, group) for group in groups if len(group) > 1]
     all_us = median_low(chain(*repeated)) if repeated else 0.0
     for group in groups:
@@ -104,7 +104,7 @@ def _off_their_repetitions(samples: Sequence[Sample], groups: Sequence[Sequence[
 def _off_the_line(
     samples: Sequence[Sample], few: Sequence[int], left_out: Mapping[int, float]
 ) -> Iterator[tuple[int, float]]:
-    """Those measured once or twice that are far from the line through all payloads, with the T_exec of the line."""
+    """Samples of payloads measured once or twice that are off the line through all, by index, with its T_exec [us]."""
     groups: defaultdict[int, list[float]] = defaultdict(list)
     for place, sample in enumerate(samples):
         if place not in left_out:

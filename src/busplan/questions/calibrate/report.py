@@ -155,7 +155,7 @@ def _cell(value: float | None, key: str) -> Cell:
 
 
 def calibration_warnings(result: Calibration) -> list[str]:
-    """What to check before using these figures."""
+    """Warnings: things to check before these figures are used."""
     return list(map(sentence_text, warning_sentences(result)))
 
 

@@ -30,7 +30,7 @@ class DiffAnswer(Answer):
     circles
         Circle tests of A and B; None if neither asks for one, or none was to be run.
     arguments
-        What the report calls A and B: as they were given, and the name of a `Profile`.
+        Names of A and B in the report: as they were given, and the name of a `Profile`.
     """
 
     a: Profile
@@ -116,7 +116,7 @@ def diff(
     progress
         Called from time to time with the steps simulated and the steps known to be needed.
     arguments
-        What the report calls A and B; by default as they are given, and the name of a `Profile`.
+        Names of A and B in the report; by default as they are given, and the name of a `Profile`.
 
     Returns
     -------

@@ -17,13 +17,13 @@ _PAPER = ("ieee1394", "paper")
 
 
 class KindEvidence(NamedTuple):
-    """What is known of one kind of bus; no section where nothing is."""
+    """Published figures about one kind of bus; no section where there are none."""
 
     kind: str
     title: str
-    """What the kind is called."""
+    """Name of the kind."""
     tested: Tested
-    """Which parts of it figures of others test."""
+    """Parts of the model that published figures test."""
     sections: tuple[EvidenceSection, ...]
 
 
@@ -37,7 +37,7 @@ class EvidenceAnswer(Answer):
         Each kind of bus with its `sections`, whose `comparisons` have a published figure, its grade, and the computed
         one.
     paper
-        Whether it is what the paper publishes, and nothing else.
+        Whether these are the figures of the paper alone.
     """
 
     kinds: tuple[KindEvidence, ...]

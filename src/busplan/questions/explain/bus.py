@@ -101,7 +101,7 @@ _SENTENCES: Final = "sentences on what the command computes"
 OF_DOCUMENT: Final = ("missed_limits", "verdict_after_reset", "uncertainty_parts", "not_in_it", "not_applicable")
 """Figures whose values the document of `capacity` has."""
 OF_SENSITIVITY: Final = ("sensitivity", "next_bottleneck")
-"""Those that it has with --sensitivity."""
+"""Figures that it has with --sensitivity."""
 VERDICT_KEYS: Final = (
     *("models_agree", "reserve", *OF_DOCUMENT, "cheapest_change", "warnings", "text"),
     *OF_SENSITIVITY,

@@ -253,7 +253,7 @@ def explained_figures(profile: Profile) -> Iterator[tuple[CommandName, Figure]]:
 
 
 def assumptions(profile: Profile) -> tuple[Input, ...]:
-    """What the figures of a profile rest on, each with its grade, the least well known first.
+    """Inputs that the figures of a profile rest on, each with its grade, the least well known first.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What stands behind a traced number: its steps and inputs, and its formula in symbols and in numbers."""
+"""Steps, inputs and formula of a traced number, in symbols and in numbers."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from inspect import signature

@@ -1,4 +1,4 @@
-"""What a cycle needs, what its slice gives it, and how sure it is that it fits."""
+"""Time that a cycle needs, time that its slice gives it, and how sure it is that it fits."""
 
 from collections.abc import Callable, Mapping
 from functools import reduce
@@ -79,13 +79,13 @@ class Certainty(NamedTuple):
     """A cycle with its bias and its uncertainty [us]. The numbers may be of any sort."""
 
     bias_us: Number | None
-    """What the bus takes beyond the timing model; None where nobody has measured it."""
+    """Time that the bus takes beyond the timing model; None where nobody has measured it."""
     margin_corrected_us: Number
-    """What is left of the slice, less the bias."""
+    """Rest of the slice after the cycle, less the bias."""
     uncertainty_us: Number
     """U, two standard uncertainties."""
     safe_required_us: Number
-    """What the slice must give for the cycle to be shown to fit, with the reserve."""
+    """Slice with which the cycle is shown to fit, with the reserve."""
     doubts: tuple[Doubt, ...]
 
     @property

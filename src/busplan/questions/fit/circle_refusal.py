@@ -170,7 +170,7 @@ def _move(profile: Profile, axes: Sequence[Axis]) -> list[Refused]:
 
 
 def _unfit(profile: Profile, axes: Sequence[Axis], settling_us: float | None) -> Iterator[Refused]:
-    """What is wrong with the move of a lead-in."""
+    """Reasons why the move of a lead-in cannot be made."""
     move, radius_mm = move_of(profile, settling_us), profile.circle.radius_mm
     timing = LoopTiming(period_us=profile.cycle.period_us, step_us=profile.servo.step_us)
     yield from (_at_key(cause, profile) for cause in unfit_move(move, radius_mm=radius_mm))
@@ -238,7 +238,7 @@ def parameters_in(section: Section, of: type) -> dict[str, Any]:
 
 
 _REST_SHARE: Final = 1e-3
-"""What settling may leave of the smallest contour tolerance."""
+"""Rest after settling, as a share of the smallest contour tolerance."""
 
 
 def loop_timing(profile: Profile) -> LoopTiming:

@@ -146,7 +146,7 @@ class CapacityFigures(NamedTuple):
     """Keys of the limits that are neither broken nor shown to be kept, time among them."""
     verdict: VerdictWord | None
     doubts: tuple[Doubt, ...]
-    """What the uncertainty is made of."""
+    """Parts of the uncertainty."""
     counts: tuple[GroupCapacity, ...]
     """How many nodes fit: of each [[group]], or of all where they are alike."""
     safe: bool
@@ -380,7 +380,7 @@ def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) 
     network
         The network; its own period plays no part. Its numbers may be of any sort.
     needed_us
-        What the cycle needs [us].
+        Time that the cycle needs [us].
     is_shown
         Whether limits must be shown to be kept; otherwise doubts of their values play no part.
     """

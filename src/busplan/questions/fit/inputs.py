@@ -125,7 +125,7 @@ def traced_profile(profile: Profile) -> Profile:
 
 
 def _chooses(profile: Profile, key: str) -> bool:
-    """Whether the word of a key chooses between numbers."""
+    """Whether a key is text-valued and selects a formula."""
     own = choosing_keys(bus_of(profile))
     return any(key == alike.node_key(name) for alike in profile.alike_nodes for name in own)
 

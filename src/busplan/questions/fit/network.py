@@ -72,7 +72,7 @@ _OF_ONE_GROUP: Final = ("name", "nodes")
 
 
 def _is_alike(left: object, right: object) -> bool:
-    """Whether two groups, sections or values are equal; arrays only where they are one."""
+    """Whether two groups, sections or values are equal; an array equals only itself."""
     if isinstance(left, Section) and type(left) is type(right):
         keys = (key for key in type(left).model_fields if key not in _OF_ONE_GROUP)
         return all(_is_alike(getattr(left, key), getattr(right, key)) for key in keys)

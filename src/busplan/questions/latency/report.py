@@ -91,7 +91,7 @@ def _column(transaction: Transaction) -> TableColumn:
 
 
 def _name(transaction: Transaction) -> str:
-    """What it is called: whose it is, what it is, and its payload."""
+    """Name of a transaction: its group, its kind and its payload."""
     payload = "" if transaction.payload_bytes is None else f"{transaction.payload_bytes} B"
     return " ".join(filter(None, (transaction.group, transaction.transaction, payload)))
 

@@ -94,7 +94,7 @@ def part(kind: str, title: str, blocks: Iterable[Block]) -> Chapter:
 
 
 def parts(answer: AllAnswers, sources: Sources) -> Iterator[Chapter]:
-    """What a page says of a profile, below its verdict."""
+    """Parts of a page about a profile, below its verdict."""
     several = len(bus_of(answer.profile).timing_models) > 1
     by_groups = bool(answer.profile.group)
     yield part("models", f"The timing model{'s, side by side' if several else ''}", _models(answer, sources))
@@ -227,7 +227,7 @@ def _over_period(
 
 
 def _shown_of(is_safe: bool) -> tuple[Figure, ...]:
-    """What is shown over the period: what is shown to fit, or the closed form of a model that decides nothing."""
+    """Figures over the period: nodes shown to fit, or the closed form of a model that does not affect the verdict."""
     return _OVER_PERIOD if is_safe else _CLOSED
 
 

@@ -60,7 +60,7 @@ class SweepAnswer(Answer):
     Parameters
     ----------
     sweep
-        What was asked.
+        The sweep as asked for.
     blocks
         The figures, block by block.
     """
@@ -192,7 +192,7 @@ def sweep(
     BusplanError
         Not a profile, an invalid key or value, a point whose circle test cannot be run, or too many points.
     Exception
-        What `executor` raises.
+        Any error that `executor` raises.
 
     References
     ----------

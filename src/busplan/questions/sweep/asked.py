@@ -1,4 +1,4 @@
-"""What is asked of a sweep, checked."""
+"""A sweep as asked for: its keys, values and columns, checked."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple

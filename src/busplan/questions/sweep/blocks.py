@@ -41,8 +41,7 @@ _CAUSES_KEPT: Final = 1 << 16
 """Most values of which the causes that refuse a circle are kept: about ten megabytes."""
 
 Word: TypeAlias = str | float | list[str] | None
-"""What stands in a column that is no array of numbers: a word, a value of a key that also takes words, a list, or
-nothing."""
+"""Cell of a column that is no array of numbers: a word, a value of a key that also takes words, a list, or nothing."""
 
 _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
 

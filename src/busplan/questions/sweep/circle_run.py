@@ -57,7 +57,7 @@ def sweep_blocks(asked: Sweep, work: Work, *, chunk_points: int = CHUNK_POINTS) 
     BusplanError
         The first point whose circle test cannot be run, before any is run.
     Exception
-        What `work` raises.
+        Any error that `work` raises.
     """
     if asked.circle:
         cost = require_circles(asked, work)

@@ -223,9 +223,9 @@ def require_keys(profile: Profile, keys: Iterable[str], *, option: str, circle_o
     keys
         Dotted keys.
     option
-        What gives them, for messages.
+        Option that gives them, for messages.
     circle_option
-        What requests circle tests, for messages; None where they are run.
+        Option that requests circle tests, for messages; None where they are run.
 
     Raises
     ------
@@ -249,7 +249,7 @@ def grid_models(profile: Profile, grid: Grid, asked: Sequence[str] | None, *, na
     asked
         Names of timing models; by default all that can.
     name
-        What messages call them.
+        Name of the timing models in messages.
 
     Raises
     ------

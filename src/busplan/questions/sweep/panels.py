@@ -51,7 +51,7 @@ def sweep_svg(plotted: Plotted, *, title: str) -> str:
     Parameters
     ----------
     plotted
-        What is drawn.
+        The figure, its scales and its values.
     title
         Title of the picture.
     """

@@ -109,7 +109,7 @@ class ParquetWriter:
     Parameters
     ----------
     sweep
-        What the rows are of.
+        The sweep that gives the rows.
     write
         Writes bytes to the destination, which need not be seekable.
     """

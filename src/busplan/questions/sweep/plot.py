@@ -45,7 +45,7 @@ class FigureData:
     figure
         Name of the column; by default the safe axes, or of groups the margin.
     option
-        What asks for the picture, for messages.
+        Name of the option that asks for the picture, for messages.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class FigureData:
         return sweep_svg(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
 
     def plotted(self) -> Plotted:
-        """What is drawn, in words and in its unit."""
+        """The picture's content, in words and in the unit of the figure."""
         keys = self._varied()
         figure, factor = plotted_figure(self._profile, self._name)
         shape = tuple(self._grid.axes[key].size for key in keys)

@@ -23,7 +23,7 @@ class PlotScale(NamedTuple):
     """One varied key along an axis."""
 
     label: str
-    """What it is, with its unit."""
+    """Quantity along the axis, with its unit."""
     places: Array
     """Where its values stand: the values themselves, or 0, 1, 2 and so on for choices."""
     labels: tuple[str, ...]
@@ -142,11 +142,11 @@ class Plotted(NamedTuple):
     deciding: str
     """The timing model that decides."""
     safety: str
-    """What must be set safely on this kind of bus."""
+    """The setting of this kind of bus that must be safe."""
 
     @property
     def label(self) -> str:
-        """What is drawn, with its unit."""
+        """The figure drawn, with its unit."""
         return figure_label(self.figure)
 
     @property
@@ -156,7 +156,7 @@ class Plotted(NamedTuple):
 
     @property
     def any_unsafe(self) -> bool:
-        """Whether a point is not set safely."""
+        """Whether any point is set unsafely."""
         return any(bool(panel.unsafe.any()) for panel in self.panels)
 
     @property

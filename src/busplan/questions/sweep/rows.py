@@ -21,7 +21,7 @@ TEXT_POINTS: Final = 4096
 
 
 def sweep_facts(sweep: Sweep) -> JsonDocument:
-    """What a reader must know besides the rows, and how many there are."""
+    """Description of the sweep that comes with its rows: profile, keys, timing models and counts."""
     facts = document(
         "sweep",
         profile=sweep.profile.name,
@@ -65,7 +65,7 @@ class TextWriter:
     form
         "csv"; "jsonl", whose first line describes the sweep; or "json", one document.
     sweep
-        What the rows are of.
+        The sweep that gives the rows.
     write
         Writes bytes to the destination.
     """
@@ -162,7 +162,7 @@ def rows_writer(form: RowsForm, sweep: Sweep, write: Callable[[bytes], object]) 
     form
         The form.
     sweep
-        What the rows are of.
+        The sweep that gives the rows.
     write
         Writes bytes to the destination.
     """
