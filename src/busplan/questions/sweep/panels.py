@@ -7,6 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from busplan.forms.blocks import Drawing
 from busplan.forms.picture import styled
 from busplan.forms.plot_area import MARGIN_PERCENT, PlotArea, Ruler, choices, draw_across, draw_plot_area, numbers
 from busplan.forms.svg import LINE, PHONE, drawing, inside, markup, paragraph, text_at
@@ -58,9 +59,33 @@ def sweep_svg(plotted: Plotted, *, title: str) -> str:
     root = drawing(caption(plotted), css="chart sweep")
     body = inside(root, x_percent=MARGIN_PERCENT, width_percent=100 - 2 * MARGIN_PERCENT, y=0)
     y = paragraph(body, caption(plotted), y=paragraph(body, title, y=8, css="head"), css="small") + _GAP
+    return styled(_drawn(root, body, plotted, y=y), css=_STYLE)
+
+
+class SweepDrawing(Drawing):
+    """The picture of a sweep for a page, which has its title, caption and style sheet.
+
+    Parameters
+    ----------
+    plotted
+        The figure, its scales and its values.
+    """
+
+    stylesheet = _STYLE
+
+    def __init__(self, plotted: Plotted) -> None:
+        self._plotted = plotted
+
+    def svg(self) -> str:
+        """Draw it for a page."""
+        root = drawing(caption(self._plotted), css="chart sweep")
+        return _drawn(root, root, self._plotted, y=0)
+
+
+def _drawn(root: Element, body: Element, plotted: Plotted, *, y: int) -> str:
     y = (_curves if len(plotted.scales) == 1 else _maps)(body, plotted, y=y)
     root.set("height", str(y + _GAP))
-    return styled(markup(root), css=_STYLE)
+    return markup(root)
 
 
 def _ruler(scale: PlotScale, *, as_cells: bool) -> Ruler:

@@ -5,7 +5,7 @@ meaning as metadata, the schema has the profile.
 """
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from types import MappingProxyType
@@ -55,6 +55,16 @@ def table_schema(sweep: Sweep) -> pa.Schema:
         "busplan.sweep": json_text(sweep_facts(sweep)),
     }
     return pa.schema(fields, metadata=metadata)
+
+
+def arrow_table(sweep: Sweep, blocks: Iterable[SweepBlock]) -> pa.Table:
+    """Table of some blocks; each text is once in the dictionary of its column."""
+    schema = table_schema(sweep)
+    return pa.concat_tables([_table(schema, block) for block in blocks]).unify_dictionaries()
+
+
+def _table(schema: pa.Schema, block: SweepBlock) -> pa.Table:
+    return pa.table([_array(block, field.name, field.type) for field in schema], schema=schema)
 
 
 def _axis_field(key: str, axis: Values) -> pa.Field:
@@ -123,8 +133,7 @@ class ParquetWriter:
 
     def add(self, block: SweepBlock) -> None:
         """Add a block."""
-        arrays = [_array(block, field.name, field.type) for field in self._schema]
-        self._pending.append(pa.table(arrays, schema=self._schema))
+        self._pending.append(_table(self._schema, block))
         if sum(part.num_rows for part in self._pending) >= GROUP_ROWS:
             self._write_group()
 

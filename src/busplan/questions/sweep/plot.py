@@ -5,12 +5,13 @@ from typing import Final
 import numpy as np
 
 from busplan.errors import BusplanError
+from busplan.forms.blocks import Chart, Sentence
 from busplan.questions.fit.network import bus_of
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import SweepBlock
 from busplan.questions.sweep.grid import Grid
-from busplan.questions.sweep.panels import sweep_svg
-from busplan.questions.sweep.plotted import Panel, Plotted, key_label, plot_scale, plotted_figure
+from busplan.questions.sweep.panels import SweepDrawing, sweep_svg
+from busplan.questions.sweep.plotted import Panel, Plotted, caption, key_label, plot_scale, plotted_figure
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
@@ -24,15 +25,19 @@ def _default_figure(profile: Profile) -> str:
     return "margin_corrected_us" if profile.group else "safe_axes"
 
 
-def _require_drawable(grid: Grid, *, option: str) -> None:
-    """Refuse a grid that cannot be drawn."""
+def is_drawable(grid: Grid) -> bool:
+    """Whether a figure over a grid can be drawn."""
+    return not _not_drawable(grid)
+
+
+def _not_drawable(grid: Grid) -> str:
+    """The reason why a figure over a grid cannot be drawn; empty if it can."""
     varied = [key for key, axis in grid.axes.items() if axis.size > 1]
     if not grid.axes:
-        raise BusplanError(f"{option}: draws figures over one or two keys, and none varies but the seed; vary another")
+        return "draws figures over one or two keys, and none varies but the seed; vary another"
     if len(varied) > _MAX_KEYS:
-        raise BusplanError(f"{option}: draws one or two keys, and {', '.join(varied)} vary; give the others one value")
-    if grid.points > MAX_DRAWN:
-        raise BusplanError(f"{option}: {grid.points:,} points; a figure shows at most {MAX_DRAWN:,}")
+        return f"draws one or two keys, and {', '.join(varied)} vary; give the others one value"
+    return f"{grid.points:,} points; a figure shows at most {MAX_DRAWN:,}" if grid.points > MAX_DRAWN else ""
 
 
 class FigureData:
@@ -54,7 +59,8 @@ class FigureData:
     """
 
     def __init__(self, sweep: Sweep, *, figure: str | None = None, option: str = "the picture of a sweep") -> None:
-        _require_drawable(sweep.grid, option=option)
+        if reason := _not_drawable(sweep.grid):
+            raise BusplanError(f"{option}: {reason}")
         self._profile, self._grid, self._models = sweep.profile, sweep.grid, sweep.timing_models
         self._name = figure or _default_figure(sweep.profile)
         points = self._grid.points, len(self._models)
@@ -79,6 +85,11 @@ class FigureData:
         """
         plotted = self.plotted()
         return sweep_svg(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
+
+    def chart(self) -> Chart:
+        """The picture as a block of a page."""
+        plotted = self.plotted()
+        return Chart(SweepDrawing(plotted), Sentence((caption(plotted),)))
 
     def plotted(self) -> Plotted:
         """The picture's content, in words and in the unit of the figure."""
