@@ -130,6 +130,19 @@ class Panel(NamedTuple):
     """In the unit of the label, shaped as the scales; NaN for a missing value."""
     unsafe: Array
     """Where the network is not set safely."""
+    fits: Array | None
+    """Where the cycle is shown to fit; None under a model that does not decide."""
+
+    @property
+    def frontier(self) -> Array | None:
+        """`fits`, if it is not the same at all points."""
+        return self.fits if self.fits is not None and self.fits.any() and not self.fits.all() else None
+
+
+def is_constant(values: Array) -> bool:
+    """Whether all values are the same number, or missing."""
+    known = values[np.isfinite(values)]
+    return bool((known == known[:1]).all()) and known.size in (0, values.size)
 
 
 class Plotted(NamedTuple):
@@ -177,24 +190,40 @@ class Plotted(NamedTuple):
 
 
 def caption(plotted: Plotted) -> str:
-    """Say in one sentence what the figure shows."""
+    """Say what the figure shows, and where the cycle is shown to fit."""
     panel = plotted.told
     if panel is None:
         return f"No timing model gives {plotted.figure.label or plotted.figure.key} here."
     known = panel.values[np.isfinite(panel.values)]
     own = plotted.value_at_own(panel)
     by = f"by the {panel.model} model"
-    design = "" if own is None else f"; this design has {_text(plotted, own)}"
+    design = "" if own is None else f"; this design has {value_text(plotted, own)}"
     name = plotted.figure.label or plotted.figure.key
-    if plotted.has_zero and known.min() < 0 <= known.max():
+    if plotted.has_zero and panel.fits is None and known.min() < 0 <= known.max():
         fitting, line = int((known >= 0).sum()), "line" if len(plotted.scales) > 1 else "dashed line"
         settings = f"{fitting:,} of {known.size:,} settings"
         return f"A {name} of 0 or more in {settings} {by}, on one side of the {line}{design}."
-    least, most = _text(plotted, float(known.min())), _text(plotted, float(known.max()))
-    spread = least if least == most else f"{least} to {most}"
-    return f"{name[:1].upper()}{name[1:]} {by}: {spread}{design}."
+    least, most = value_text(plotted, float(known.min())), value_text(plotted, float(known.max()))
+    spread = f"{least} to {most}"
+    if least == most:
+        spread = f"{least} at every setting" if known.size > 1 else least
+    return f"{name[:1].upper()}{name[1:]} {by}: {spread}{design}.{_fitting(plotted, panel)}"
 
 
-def _text(plotted: Plotted, value: float) -> str:
+def _fitting(plotted: Plotted, panel: Panel) -> str:
+    """Say at how many settings the cycle is shown to fit, and how they are drawn."""
+    if panel.fits is None:
+        return ""
+    fitting, settings = int(panel.fits.sum()), panel.fits.size
+    if panel.frontier is None:
+        return " Every setting is shown to fit." if fitting else " No setting is shown to fit."
+    drawn = ", outside the grey"
+    if len(plotted.scales) > 1:
+        drawn = "" if is_constant(panel.values) else ", on one side of the line"
+    return f" Shown to fit: {fitting:,} of {settings:,} settings{drawn}."
+
+
+def value_text(plotted: Plotted, value: float) -> str:
+    """Write a value of the figure with its unit."""
     unit = plotted.figure.column or plotted.figure.unit
     return with_unit(ShownValue(value, unit=unit, digits=_DIGITS))
