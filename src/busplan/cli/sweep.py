@@ -90,7 +90,8 @@ def sweep_command(
         str | None,
         option(
             "--figure COLUMN",
-            "What --plot draws, by its name in --columns.  [default: safe_axes; of groups margin_corrected_us]",
+            "What --plot draws, by its name in --columns.  [default: safe_axes; margin_corrected_us of groups "
+            "and where safe_axes does not vary]",
         ),
     ] = None,
     all_: AllOption = False,

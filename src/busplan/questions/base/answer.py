@@ -89,12 +89,16 @@ class Answer(ABC):
     def report(self) -> Report:
         """The answer in blocks, which every form but JSON and CSV is made of."""
 
+    def _shown(self) -> Report:
+        """The report for a reader in Python."""
+        return self.report()._replace(whole_by="to_dict() has all figures.")
+
     def _headline(self) -> str:
         """The answer in one line."""
         return " ".join(next(block_lines(self.report().blocks())).text.split())
 
     def __str__(self) -> str:
-        return render(self.report(), "table").removesuffix("\n")
+        return render(self._shown(), "table").removesuffix("\n")
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self._headline()}>"
@@ -102,7 +106,7 @@ class Answer(ABC):
     def _repr_html_(self) -> str:
         from busplan.forms.html import fragment
 
-        return fragment(self.report())
+        return fragment(self._shown())
 
     def _repr_svg_(self) -> str | None:
         from busplan.forms.picture import first_picture

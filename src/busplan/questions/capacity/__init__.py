@@ -1,13 +1,15 @@
 """`busplan.capacity`."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
 from busplan.questions.capacity.verdict import Verdict, verdicts
 from busplan.questions.fit import figures as analysis
+from busplan.questions.fit.certainty import FITS, VerdictWord
 from busplan.questions.fit.figures import Capacity, CapacityFigures
 from busplan.sections.profile import Profile
 
@@ -35,6 +37,30 @@ class CapacityAnswer(Answer):
     periods: tuple[tuple[CapacityFigures, ...], ...]
     verdicts: tuple[Verdict, ...]
     sensitivities: "tuple[Sensitivity, ...]" = ()
+
+    @property
+    def verdict(self) -> VerdictWord:
+        """The verdict on a single period, by the timing model that decides."""
+        return cast("VerdictWord", self._deciding.verdict)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the cycle is shown to fit a single period: `verdict` is "fits"."""
+        return self.verdict == FITS
+
+    @property
+    def margin_us(self) -> float:
+        """Free time of a single period's slice, less the bias: `margin_corrected_us` of that model [us]."""
+        return cast("float", self._deciding.margin_corrected_us)
+
+    @property
+    def _deciding(self) -> CapacityFigures:
+        if len(self.verdicts) > 1:
+            raise BusplanError(
+                f"{len(self.verdicts)} periods have no single verdict: each has its own, "
+                "as verdicts[0].deciding.verdict"
+            )
+        return self.verdicts[0].deciding
 
     @property
     def results(self) -> tuple[CapacityFigures, ...]:
@@ -96,6 +122,8 @@ def capacity(
     Examples
     --------
     >>> import busplan
+    >>> busplan.capacity("paper-4ms").verdict
+    'fits'
     >>> answer = busplan.capacity("paper-1ms", period_us=500)
     >>> [(figures.timing_model, figures.fits, figures.max_axes) for figures in answer.results]
     [('paper', True, 8), ('standard', False, 4)]
