@@ -25,6 +25,7 @@ __all__ = [
     "DiffAnswer",
     "EvidenceAnswer",
     "ExplainAnswer",
+    "ImportAnswer",
     "LatencyAnswer",
     "MapAnswer",
     "PlanAnswer",
@@ -41,6 +42,7 @@ __all__ = [
     "diff",
     "evidence",
     "explain",
+    "import_profile",
     "latency",
     "load_profile",
     "map_",
@@ -61,6 +63,7 @@ if TYPE_CHECKING:
     from busplan.questions.diff import DiffAnswer, diff
     from busplan.questions.evidence import EvidenceAnswer, evidence
     from busplan.questions.explain import ExplainAnswer, explain
+    from busplan.questions.import_ import ImportAnswer, import_profile
     from busplan.questions.latency import LatencyAnswer, latency
     from busplan.questions.map import MapAnswer, map_
     from busplan.questions.plan import PlanAnswer, plan
@@ -77,6 +80,8 @@ else:
         "load_profile": "busplan.questions.base.inputs",
         "check": "busplan.gate.check",
         "CheckAnswer": "busplan.gate.check",
+        "import_profile": "busplan.questions.import_",
+        "ImportAnswer": "busplan.questions.import_",
     }
     """Where a name is that is no question and no answer of one."""
 

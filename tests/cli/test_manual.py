@@ -13,8 +13,8 @@ Run = Callable[..., CompletedProcess[str]]
 Refused = Callable[..., str]
 
 TOPICS = [
-    *("can", "circle", "commands", "ethercat", "gate", "json"),
-    *("limits", "models", "plan", "profile", "python", "sercos"),
+    *("can", "circle", "commands", "ethercat", "gate", "import"),
+    *("json", "limits", "models", "plan", "profile", "python", "sercos"),
 ]
 
 

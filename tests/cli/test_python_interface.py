@@ -10,6 +10,7 @@ import busplan
 from busplan.cli.lazy import COMMANDS, LazyCommands
 
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+    "import": busplan.import_profile,
     "plan": busplan.plan,
     "calibrate": busplan.calibrate,
     "map": busplan.map_,
@@ -53,6 +54,7 @@ TERMINAL_OR_FILES: Reasons = {
     "all": "rows and columns on a terminal",
     "format": "save(path) goes by the ending",
     "output": "save(path)",
+    ("import", "force"): "replaces an old file",
     ("plan", "force"): "replaces an old file",
     "plot": "save(path)",
     "figure": "which figure --plot draws",
@@ -85,6 +87,7 @@ PYTHON_ALONE: Reasons = {
     ("check", "record"): "--update-baseline",
     ("diff", "arguments"): "the profiles as typed",
     ("evidence", "paper"): "a command of its own",
+    ("import", "name"): "that of --output",
     ("paper", "paper"): "the command is its value",
     ("paper", "kind"): "the paper is of one kind",
     ("plan", "gap_count"): "--set bus.gap_count",

@@ -75,7 +75,7 @@ def init_command(
     What is not known yet is assumed, graded so, and has a comment that says how to find it. In a terminal the command
     asks for what is missing; otherwise it takes the defaults and says them. With --from it copies a shipped profile
     under a name of its own. Exits 0 when the file is written, whatever the verdict is; a file that is already there
-    stays as it is, unless --force is given.
+    stays as it is, unless --force is given. From a machine's own files, as an ENI, `busplan import` writes a profile.
 
     Example: busplan init gantry --nodes 6 --axes 24 --period 1ms
     """

@@ -104,13 +104,15 @@ def _of_kind(params: list[Any], kind: str) -> list[Any]:
 SETTINGS: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 GROUPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
-        "Design": ("init", "plan", "calibrate", "map", "sweep", "compare"),
+        "Design": ("init", "import", "plan", "calibrate", "map", "sweep", "compare"),
         "Analyse": ("capacity", "latency", "circle-test", "timeline", "explain", "report"),
         "Gate": ("check", "diff", "rule", "schema"),
         "Learn": ("manual", "profiles", "evidence", "paper"),
     }
 )
-"""In the order of the help. `circle-test` is in module `circle`: `circle_test` would look like a test module."""
+"""In the order of the help."""
+_MODULES: Final = {"circle-test": "circle", "import": "import_"}
+"""Where a command is whose name no module has: `circle_test` would look like a test, `import` is a keyword."""
 COMMANDS: Final = tuple(name for names in GROUPS.values() for name in names)
 
 
@@ -125,7 +127,7 @@ class LazyCommands(Mapping[str, Any]):
             raise KeyError(name)
         if name not in self._made:
             stem = name.replace("-", "_")
-            module = import_module(f"busplan.cli.{stem.removesuffix('_test')}")
+            module = import_module(f"busplan.cli.{_MODULES.get(name, stem)}")
             single = typer.Typer(
                 add_completion=False,
                 rich_markup_mode=None,

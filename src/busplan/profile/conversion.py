@@ -19,6 +19,7 @@ from busplan.profile.toml import profile_of
 from busplan.sections.profile import Profile
 
 _KIND, _NODES, _SHOWN_FIRST = "kind", "nodes", "timing_model"
+_SIZES = ("read_bytes", "write_bytes")
 
 
 class AssumedKey(NamedTuple):
@@ -84,9 +85,25 @@ def converted(profile: Profile, kind: str) -> Conversion:
         if nodes and "execution" in nodes:
             # Whoever measured it did so on the other bus.
             nodes["execution"]["grade"] = "assumed"
+    raised, empty = _with_payloads(machine)
     found = profile_of(_merged(machine, new))
-    given = [AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}"]
-    return Conversion(found, (*given, *_defaults(found)), left_out)
+    given = [*raised, *(AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}")]
+    return Conversion(found, (*given, *_defaults(found)), (*left_out, *empty))
+
+
+def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:
+    """Give each node data in both directions, and leave out groups that have none, as couplers; gives both."""
+    groups: Sequence[TomlTable] = machine.get("group", ())
+    empty = [group["name"] for group in groups if not any(group.get(key, 1) for key in _SIZES)]
+    raised = []
+    for group in groups:
+        for key in _SIZES:
+            if group.get(key) == 0 and group["name"] not in empty:
+                group[key] = 1
+                raised.append(AssumedKey(f"group.{group['name']}.{key}", 1, "setting"))
+    if empty and len(empty) < len(groups):
+        machine["group"] = [group for group in groups if group["name"] not in empty]
+    return raised, [f"group.{name}" for name in empty]
 
 
 def _cables_m(profile: Profile) -> dict[str, float]:

@@ -99,6 +99,25 @@ def test_frames_are_those_of_a_writer(groups: list[tuple[int, int, int]], is_sha
     assert one_by_one(own, datagrams=datagrams, first_bytes=first) == [(len(one.bytes), one.devices) for one in whole]
 
 
+@given(GROUPS, st.booleans(), st.integers(0, 4))
+@example([(1, 1466, 1)], True, 0)
+@example([(2, 1467, 1)], True, 0)
+def test_devices_without_data_are_in_no_frame(groups: list[tuple[int, int, int]], clocks: bool, place: int) -> None:
+    own = [Devices(nodes, max(read, write)) for nodes, read, write in groups]
+    couplers = [*own[:place], Devices(2000, 0), *own[place:]]
+    first = 20.0 if clocks else 0.0
+    found = pack(own, datagrams=1, first_bytes=first)
+    assert pack(couplers, datagrams=1, first_bytes=first) == found
+    frames = list(frames_of(couplers, datagrams=1, first_bytes=first))
+    alone = list(frames_of(own, datagrams=1, first_bytes=first))
+    assert [one.datagrams_bytes for one in frames] == [one.datagrams_bytes for one in alone]
+    sizes = np.array([0, 5])
+    together = pack([*own, Devices(3, sizes)], datagrams=1, first_bytes=first)
+    with_five = pack([*own, Devices(3, 5)], datagrams=1, first_bytes=first)
+    for one, without, five in zip(together, found, with_five, strict=True):
+        assert np.broadcast_to(np.asarray(one), sizes.shape).tolist() == [without, five]
+
+
 @given(st.integers(1, 1486), st.booleans(), st.integers(1, 200))
 def test_an_array_and_a_traced_number_pack_as_each_number(size: int, clocks: bool, other: int) -> None:
     first, nodes = 20.0 if clocks else 0.0, np.arange(1, 60)

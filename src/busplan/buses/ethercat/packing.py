@@ -4,7 +4,19 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from busplan.buses.ethercat.equations import DATAGRAM_BYTES, padding_bytes, room_bytes
-from busplan.elementwise import Number, alike, choose, is_off, larger, plain, rounded_down, rounded_up, smaller, total
+from busplan.elementwise import (
+    Number,
+    alike,
+    choose,
+    is_everywhere,
+    is_off,
+    larger,
+    plain,
+    rounded_down,
+    rounded_up,
+    smaller,
+    total,
+)
 
 
 class Devices(NamedTuple):
@@ -53,6 +65,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     >>> pack([Devices(1000, 4)], datagrams=1, first_bytes=0.0)
     Packing(frames=3, datagrams_bytes=4036.0, padding_bytes=0.0, last_bytes=1044.0, before_bytes=1496.0)
     """
+    devices = [_with_data(one) for one in devices if not is_everywhere(one.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
     headers = total([alike(DATAGRAM_BYTES, devices[0].number)] * datagrams)
     free: Number = 0.0
@@ -81,6 +94,14 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
         present, free = choose(opens, headers + in_last, present), choose(opens, larger(room - in_last, 0.0), free)
         frames, whole = frames + new, whole + new * headers + group.number * group.data_bytes
     return Packing(frames, whole, padding + padding_bytes(present), present, before)
+
+
+def _with_data(devices: Devices) -> Devices:
+    """The same devices; where an array has couplers, which have no data and are in no frame, as none of a byte."""
+    if is_everywhere(devices.data_bytes > 0):
+        return devices
+    number = choose(devices.data_bytes > 0, devices.number, 0)
+    return Devices(number, larger(devices.data_bytes, 1))
 
 
 class Frames(NamedTuple):
@@ -114,15 +135,16 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
     first, held, opened, filled = 1, 0, first_bytes, 0.0
     for group in devices:
         size, left = plain(group.data_bytes), int(plain(group.number))
-        fitting = max(int((room - opened - filled) // size), 0 if held or opened else 1)
+        # Couplers have no data, and room in any frame.
+        fitting = max(int((room - opened - filled) // size), 0 if held or opened else 1) if size else left
         beside = min(left, fitting)
         held, filled, left = held + beside, filled + beside * size, left - beside
         if left:
-            yield Frames(first, held, opened + bool(held) * headers + filled)
+            yield Frames(first, held, opened + bool(filled) * headers + filled)
             first, each = first + held, max(int(room // size), 1)
             full = (left - 1) // each
             if full:
                 yield Frames(first, each, headers + each * size, full)
             first, held, opened = first + full * each, left - full * each, 0.0
             filled = held * size
-    yield Frames(first, held, opened + headers + filled)
+    yield Frames(first, held, opened + bool(filled) * headers + filled)

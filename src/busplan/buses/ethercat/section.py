@@ -1,9 +1,9 @@
 """The keys that only profiles of an EtherCAT bus have, in [bus], [node] and [[group]]."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
 from busplan.buses.ethercat.equations import (
@@ -18,7 +18,7 @@ from busplan.buses.ethercat.equations import (
     room_bytes,
 )
 from busplan.elementwise import Number
-from busplan.sections.base import MAX_COUNT, Count, TimeUs
+from busplan.sections.base import MAX_COUNT, Bytes, Count, TimeUs
 from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
 from busplan.sections.execution import UNKNOWN_SHARE
 from busplan.sections.profile import Profile
@@ -137,6 +137,17 @@ class EthercatGroup(EthercatNode, GroupSection):
     """One of the sections [[group]]: devices that are alike, in the order of the segment."""
 
     axes: GroupAxes = Field(examples=[4])
+    read_bytes: Bytes | None = Field(
+        default=None, description="Inputs of each device, or their fixed part; 0 of a coupler [bytes]", examples=[12]
+    )
+    write_bytes: Bytes | None = Field(
+        default=None, description="Outputs of each device, or their fixed part; 0 of a coupler [bytes]", examples=[12]
+    )
+
+    @model_validator(mode="after")
+    def _has_payloads(self) -> Self:
+        """Couplers have no data, and most terminals have inputs or outputs alone."""
+        return self
 
 
 class EthercatProfile(Profile):

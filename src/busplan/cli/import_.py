@@ -1,0 +1,99 @@
+"""`busplan import`."""
+
+import shlex
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from busplan.cli.destinations import require_apart
+from busplan.cli.options import STANDARD_OUTPUT
+from busplan.cli.output import emit_document, say
+from busplan.cli.rewrite import changing, require_changeable, rewrite
+from busplan.errors import BusplanError
+from busplan.files import new_file
+
+
+def import_command(
+    paths: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE...",
+            help="Files of one machine, each recognised by its content; - is standard input.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="NEW.toml",
+            help="Write the profile to a new file.  [default: standard output]",
+            show_default=False,
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
+    update: Annotated[
+        Path | None,
+        typer.Option(
+            "--update",
+            metavar="PROFILE",
+            help="Bring the values of the files into a profile, whose comments and other keys stay.  [default: a new "
+            "profile]",
+            show_default=False,
+        ),
+    ] = None,
+    take: Annotated[
+        Literal["file", "profile"] | None,
+        typer.Option(
+            "--take",
+            help="Whose value to take where a file and the profile of --update differ.  [default: none is changed]",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS and others.
+
+    Several files of one machine are merged: an ENI has the frames, the text of `ethercat slaves -v` the measured delays
+    of devices, `ethercat pdos` their bytes. Each value has its grade, file and line in a comment; what no file says is
+    assumed, and named at the end, beside the verdict. What each format cannot say is in `busplan manual import`.
+
+    The profile goes to standard output or to -o; a file that is already there stays, unless --force is given. Exits 0
+    when it is written, whatever the verdict is.
+
+    Example: busplan import machine.xml slaves.txt -o machine.toml
+    """
+    if update is None and take is not None:
+        raise BusplanError("--take: goes with --update PROFILE")
+    if update is not None and (output is not None or force):
+        raise BusplanError("--update and -o: give one of them; --update writes into PROFILE")
+    if paths.count("-") > 1:
+        raise BusplanError("-: only one FILE can be standard input")
+    new = None if output == STANDARD_OUTPUT else output
+    if new is not None and new.suffix.lower() != ".toml":
+        raise BusplanError(f"--output {new}: expected a name ending in .toml, for it is a profile")
+    inputs = [Path(path) for path in paths]
+    require_apart({"--output": new, "--update": update}, inputs=inputs, of_profiles=True)
+    with ExitStack() as files:
+        # Opened before the work, so that a path that cannot be written fails at once.
+        file = None if new is None else files.enter_context(new_file(new, overwrite=force))
+        if update is not None:
+            require_changeable(update)
+            files.enter_context(changing(update))
+        from busplan.questions.import_ import import_profile
+
+        answer = import_profile(paths, update=update, take=take, name=None if new is None else new.stem)
+        sentences = answer.sentences()
+        if update is not None:
+            rewrite(update, answer.text.encode())
+        elif file is None:
+            emit_document(answer.text)
+        else:
+            file.write(answer.text.encode())
+    written = new or update
+    say(*([f"wrote {written}"] if written else []), *sentences)
+    if written:
+        shown = shlex.quote(f"./{written}" if str(written).startswith("-") else str(written))
+        say(f"next: busplan capacity {shown}")

@@ -1,0 +1,200 @@
+"""The profile of a CAN bus: CANopen nodes in groups, and all other messages."""
+
+from collections.abc import Iterator
+from itertools import groupby
+from typing import Any, Final, NamedTuple
+
+from busplan.buses import kind_named
+from busplan.errors import BusplanError
+from busplan.questions.import_.can_database import EXTENDED
+from busplan.questions.import_.canopen import Pdo
+from busplan.questions.import_.record import Fact, Facts, Reading
+from busplan.questions.import_.text import ProfileLine, group_name, time_us
+
+_DIRECTIONS: Final = {"feedback": "read_bytes", "command": "write_bytes"}
+_FRAME_BYTES: Final = 8
+_PDO_STEP: Final = 0x100
+_HEARTBEAT_ID: Final = 0x700
+_BIT_RATE: Final = "bit_rate_kbit_s"
+_LISTED: Final = 8
+
+
+class _Node(NamedTuple):
+    """A CANopen node in the cycle."""
+
+    number: int
+    facts: Facts
+    sent: dict[str, list[Pdo]]
+    """PDOs of each direction that go in one payload."""
+
+
+def rows(machine: Reading) -> Iterator[ProfileLine]:
+    """Lines of the profile, without its head.
+
+    Raises
+    ------
+    BusplanError
+        No node has PDOs with every SYNC in both directions: a profile has no cycle then.
+    """
+    bus = machine.bus
+    period = _period(machine)
+    nodes = list(_nodes(machine))
+    messages = list(message_rows(machine))
+    if not nodes:
+        raise BusplanError(*_lacking(machine, messages))
+    yield ProfileLine("bus", "kind", Fact("can", machine.place(1)))
+    yield ProfileLine(
+        "bus", _BIT_RATE, bus.get(_BIT_RATE) or Fact(1000, "", "assumed", "no file says it; the cable decides")
+    )
+    for key in ("sync_identifier", "sync_counter"):
+        if key in bus:
+            yield ProfileLine("bus", key, bus[key])
+    yield ProfileLine("bus", "pipeline_cycles", Fact(1, "", "assumed", "the host computes in the next cycle"))
+    yield ProfileLine("cycle", "period_us", period)
+    taken: set[str] = set()
+    for _, alike in groupby(enumerate(nodes), lambda item: _alike(item[0], item[1])):
+        yield from _group([node for _, node in alike], taken)
+    yield from messages
+
+
+def _lacking(machine: Reading, messages: list[ProfileLine]) -> Iterator[str]:
+    """What is missing to a profile, for messages alone."""
+    count = sum(row.key == "identifier" for row in messages)
+    what = f"{count} message{'s' * (count != 1)} with a period"
+    yield f"{machine.file}: {what}, and no profile yet: a profile of CAN has a cycle of SYNC and PDOs; what is missing:"
+    yield (
+        "the nodes of the cycle and their PDOs: give the EDS or DCF of each node beside it, or --update PROFILE to "
+        "bring the messages into a profile that has nodes, as busplan init --bus can writes one"
+    )
+    if _BIT_RATE not in machine.bus:
+        yield f"bus.{_BIT_RATE}: the bit rate"
+    if "period_us" not in machine.bus:
+        yield "cycle.period_us: the period of SYNC"
+    yield from machine.remarks
+
+
+def _nodes(machine: Reading) -> Iterator[_Node]:
+    """Nodes whose PDOs go with every SYNC in both directions; all other PDOs become messages."""
+    for number in sorted(machine.nodes):
+        facts = machine.nodes[number]
+        sent = {key: _together([pdo for pdo in facts[key].value if pdo.every == 1]) for key in _DIRECTIONS}
+        if all(sent.values()):
+            yield _Node(number, facts, sent)
+
+
+def _together(pdos: list[Pdo]) -> list[Pdo]:
+    """The first PDOs that a profile's payload makes again: full frames but the last, identifiers 256 apart."""
+    found = pdos[:1]
+    for pdo in pdos[1:]:
+        if found[-1].payload_bytes != _FRAME_BYTES or pdo.identifier != found[-1].identifier + _PDO_STEP:
+            break
+        found.append(pdo)
+    return found
+
+
+def _alike(place: int, node: _Node) -> tuple[Any, ...]:
+    """What neighbours of one group share: sizes, axes, and identifiers that go up by one."""
+    sizes = (sum(pdo.payload_bytes for pdo in node.sent[key]) for key in _DIRECTIONS)
+    starts = (node.sent[key][0].identifier - place for key in _DIRECTIONS)
+    return (*sizes, *starts, node.facts["axes"].value)
+
+
+def _group(nodes: list[_Node], taken: set[str]) -> Iterator[ProfileLine]:
+    first = nodes[0]
+    section = f"group.{group_name(str(first.facts['name'].value), taken)}"
+    numbers = f"{first.number} to {nodes[-1].number}" if len(nodes) > 1 else f"{first.number}"
+    identity = first.facts["node_id"]
+    note = ", ".join(filter(None, (f"node-ID {numbers}", identity.note)))
+    yield ProfileLine(section, "nodes", Fact(len(nodes), identity.place, identity.grade, note))
+    axes = first.facts["axes"]
+    yield ProfileLine(section, "axes", axes)
+    for key, size in _DIRECTIONS.items():
+        pdos = first.sent[key]
+        names = ", ".join(pdo.name for pdo in pdos)
+        yield ProfileLine(section, size, Fact(sum(pdo.payload_bytes for pdo in pdos), pdos[0].place, note=names))
+        yield ProfileLine(
+            section, f"{key}_identifier", Fact(pdos[0].identifier, pdos[0].place, note=f"0x{pdos[0].identifier:x}")
+        )
+    yield ProfileLine(f"{section}.execution", "kind", Fact("linear", "", "assumed"))
+    yield ProfileLine(f"{section}.execution", "grade", Fact("assumed", "", "assumed"))
+    base = "from SYNC to a queued feedback PDO, and from a command PDO to its effect"
+    yield ProfileLine(f"{section}.execution", "base_us", Fact(20, "", "assumed", base))
+    yield ProfileLine(f"{section}.execution", "per_byte_us", Fact(0.1, "", "assumed", "what each byte adds"))
+
+
+def _period(machine: Reading) -> Fact:
+    """The period of SYNC."""
+    usual = Fact(time_us(kind_named("can").starter.period), "", "assumed", "no file says it; usual on this bus")
+    return machine.bus.get("period_us", usual)
+
+
+def part_rows(machine: Reading) -> Iterator[ProfileLine]:
+    """What databases alone say: the bit rate and messages."""
+    if _BIT_RATE in machine.bus:
+        yield ProfileLine("bus", _BIT_RATE, machine.bus[_BIT_RATE])
+    yield from message_rows(machine)
+
+
+def message_rows(machine: Reading) -> Iterator[ProfileLine]:
+    """Every message that is in no cycle: of databases, PDOs that the cycle has not, heartbeats."""
+    taken: set[str] = set()
+    used = {machine.bus["sync_identifier"].value if "sync_identifier" in machine.bus else 0x80}
+    nodes = {node.number: node for node in _nodes(machine)}
+    for node in nodes.values():
+        used |= {pdo.identifier for pdos in node.sent.values() for pdo in pdos}
+    left_out: dict[str, list[str]] = {}
+    for number in sorted(machine.nodes):
+        for found in _of_node(number, machine.nodes[number], nodes.get(number), _period(machine)):
+            yield from _message(found, used, taken, left_out)
+    for identifier, facts in sorted(machine.messages.items()):
+        yield from _message({"identifier": Fact(identifier, facts["name"].place), **facts}, used, taken, left_out)
+    for reason, names in left_out.items():
+        more = f" and {len(names) - _LISTED} more" if names[_LISTED:] else ""
+        machine.remarks.append(f"left out, {reason}: {', '.join(names[:_LISTED])}{more}")
+
+
+def _of_node(number: int, facts: Facts, node: _Node | None, period: Fact) -> Iterator[Facts]:
+    """Messages of a CANopen node beside its cycle."""
+    for key in _DIRECTIONS:
+        for pdo in facts[key].value:
+            if node and pdo in node.sent[key]:
+                continue
+            us = pdo.every * period.value if pdo.every else pdo.period_us
+            grade = period.grade if pdo.every else "published"
+            note = f"with every {pdo.every}. SYNC" if pdo.every else pdo.timer
+            found = {
+                "name": Fact(f"{facts['name'].value}-{number}-{pdo.name}", pdo.place),
+                "identifier": Fact(pdo.identifier, pdo.place),
+                "payload_bytes": Fact(pdo.payload_bytes, pdo.place),
+            }
+            yield found | ({"period_us": Fact(us, pdo.place, grade, note)} if us else {})
+    if "heartbeat_us" in facts:
+        beat = facts["heartbeat_us"]
+        yield {
+            "name": Fact(f"{facts['name'].value}-{number}-heartbeat", beat.place),
+            "identifier": Fact(_HEARTBEAT_ID + number, beat.place, note="0x700 and the node-ID"),
+            "payload_bytes": Fact(1, beat.place, note="the state of the node (CiA 301)"),
+            "period_us": beat,
+        }
+
+
+def _message(found: Facts, used: set[int], taken: set[str], left_out: dict[str, list[str]]) -> Iterator[ProfileLine]:
+    identifier, name = found["identifier"], str(found["name"].value)
+    reason = ""
+    if identifier.value in used:
+        return
+    if identifier.value >= EXTENDED:
+        reason = "an identifier of 29 bits beside those of 11, which a profile cannot say yet"
+    elif ("is_fd" in found and found["is_fd"].value) or found["payload_bytes"].value > _FRAME_BYTES:
+        reason = "CAN FD, which a profile cannot say yet"
+    elif "period_us" not in found:
+        reason = "no file says its period; give one that does, or add it by hand"
+    if reason:
+        left_out.setdefault(reason, []).append(name)
+        return
+    used.add(identifier.value)
+    section = f"message.{group_name(name, taken)}"
+    note = ", ".join(filter(None, (f"0x{identifier.value:x}", identifier.note)))
+    yield ProfileLine(section, "identifier", identifier._replace(note=note))
+    yield ProfileLine(section, "payload_bytes", found["payload_bytes"])
+    yield ProfileLine(section, "period_us", found["period_us"])

@@ -1,0 +1,107 @@
+"""Text of SOEM's `slaveinfo`: bits, delays since the first clock, ports and clocks."""
+
+import re
+from math import ceil
+from typing import Final
+
+from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact
+from busplan.questions.import_.record import Fact, Reading
+
+TITLE: Final = "slaveinfo"
+_SLAVE: Final = re.compile(r"Slave:(\d{1,5})\s*$")
+_KEYS: Final = re.compile(r" (Name|Output size|Input size|Delay|Has DC|Activeports|MBX length wr): *(.*?)\s*$")
+_READ_LENGTH: Final = re.compile(r"rd: *(\d{1,5})")
+_MAPPED: Final = re.compile(r"\s+\[0x[0-9A-Fa-f]{4}\.\d\] 0x([0-9A-Fa-f]{4}):0x[0-9A-Fa-f]{2} 0x[0-9A-Fa-f]{2}")
+_DELAY: Final = re.compile(r"(\d{1,9})\[ns\]")
+_SIZES: Final = {"Output size": "write_bytes", "Input size": "read_bytes"}
+_BRANCH, _END = 3, 1
+
+
+def read(text: str, name: str) -> Reading:
+    """Read the text of slaveinfo.
+
+    Raises
+    ------
+    BusplanError
+            A device is left out, or has no size; with its line.
+    """
+    machine = Reading("ethercat", TITLE, name, rank=3)
+    totals_ns: dict[int, tuple[int, int]] = {}
+    ports: dict[int, int] = {}
+    for number, lines in enumerate(_slaves(text, machine)):
+        facts = machine.nodes[number] = {}
+        words: dict[int, int] = {}
+        mapped = None
+        for line, content in lines:
+            if match := _MAPPED.match(content):
+                mapped = mapped or line
+                if int(match[1], 16) in CONTROL_WORDS:
+                    words.setdefault(int(match[1], 16), line)
+            elif match := _KEYS.match(content):
+                _described(match[1], match[2], line, facts, machine)
+                if match[1] == "Delay" and (delay := _DELAY.match(match[2])):
+                    totals_ns[number] = int(delay[1]), line
+                elif match[1] == "Activeports":
+                    ports[number] = match[2].count("1")
+        for title, key in _SIZES.items():
+            if key not in facts:
+                raise machine.refusal(lines[0][0], f"slave {number + 1} has no {title}: cut off?")
+        facts["axes"] = axes_fact(words, machine, line=mapped)
+    _hops(totals_ns, ports, machine)
+    machine.bus["master"] = Fact("SOEM", machine.place(1), "derived", "slaveinfo is of its tools")
+    return machine
+
+
+def _slaves(text: str, machine: Reading) -> list[list[tuple[int, str]]]:
+    """The numbered lines of each device."""
+    found: list[list[tuple[int, str]]] = []
+    for line, content in enumerate(text.split("\n"), start=1):
+        if match := _SLAVE.match(content):
+            found.append([])
+            if int(match[1]) != len(found):
+                raise machine.refusal(line, f"slave {match[1]} where slave {len(found)} is due: give all of the text")
+        if found:
+            found[-1].append((line, content))
+    return found
+
+
+def _described(key: str, value: str, line: int, facts: dict[str, Fact], machine: Reading) -> None:
+    place = machine.place(line)
+    if key in _SIZES and (bits := re.match(r"(\d{1,6})bits", value)):
+        facts[_SIZES[key]] = Fact(ceil(int(bits[1]) / 8), place, note=f"{bits[1]} bits")
+    elif key == "Name" and value:
+        facts["name"] = Fact(value, place)
+    elif key == "Has DC" and value == "1":
+        facts["has_clock"] = Fact(True, place, "measured")
+    elif key == "MBX length wr" and (length := _READ_LENGTH.search(value)) and int(length[1]):
+        facts["mailbox_bytes"] = Fact(int(length[1]), place)
+
+
+def _hops(totals_ns: dict[int, tuple[int, int]], ports: dict[int, int], machine: Reading) -> None:
+    """The delay of each device but the first, from the time of a frame on its way from the first clock to it.
+
+    That way leads through earlier branches there and back: all devices between a device and its parent.
+    """
+    hops_ns: dict[int, int] = {}
+    for number in range(1, len(machine.nodes)):
+        before = _parent(number, ports)
+        between = [hops_ns.get(other) for other in range(before + 1, number)]
+        known = all("has_clock" in machine.nodes[other] and other in totals_ns for other in (before, number))
+        if not known or None in between:
+            continue
+        hop_ns = totals_ns[number][0] - totals_ns[before][0] - 2 * sum(ns for ns in between if ns)
+        if hop_ns > 0:
+            hops_ns[number] = hop_ns
+            place = machine.place(totals_ns[number][1])
+            machine.nodes[number]["delay_us"] = Fact(hop_ns / 1000, place, "measured", "cable included")
+
+
+def _parent(number: int, ports: dict[int, int]) -> int:
+    """The device that a device is connected to: devices at an end close the branch that they are on."""
+    ends = 0
+    for before in range(number - 1, 0, -1):
+        count = ports.get(before, 2)
+        ends += -1 if count == _END else max(count - 2, 0)
+        if ends >= 0 and count > _END:
+            return before
+    return 0

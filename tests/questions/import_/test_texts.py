@@ -1,0 +1,196 @@
+"""Scans of a bus, LinuxCNC's file, databases of messages, CANopen files: one of each dialect, of our own making."""
+
+import pickle
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+import busplan
+
+FILES: Final = Path(__file__).parent / "files"
+MACHINE: Final = [("CP10", 1, 0, 0, 0), ("DI04", 1, 1, 0, 0), ("AX20", 2, 8, 6, 1)]
+"""Name, devices, inputs, outputs and axes of the groups of the EtherCAT machine."""
+
+
+def imported(*names: str, **options: Any) -> busplan.ImportAnswer:
+    return busplan.import_profile([FILES / name for name in names], **options)
+
+
+def groups(answer: busplan.ImportAnswer) -> list[tuple[Any, ...]]:
+    return [(each.name, each.nodes, each.read_bytes, each.write_bytes, each.axes) for each in answer.profile.group]
+
+
+@pytest.mark.parametrize("names", [("slaves.txt", "pdos.txt"), ("pdos.txt", "slaves.txt"), ("slaveinfo.txt",)])
+def test_a_scan_has_bytes_and_measured_delays(names: tuple[str, ...]) -> None:
+    answer = imported(*names)
+    assert groups(answer) == MACHINE
+    profile: Any = answer.profile
+    # The drives behind the block: 0.67 us to the first, 0.70 to the second; the terminal 0.15.
+    assert [group.delay_us for group in profile.group] == [None, 0.15, 0.685]
+    assert profile.bus.master == {"slaves": "IgH", "pdos": "IgH", "slaveinfo": "SOEM"}[names[0].partition(".")[0]]
+    assert profile.bus.mailbox_bytes == 128
+    assert {row.fact.grade for row in answer.rows if row.key == "delay_us"} == {"measured"}
+    assert "cycle.period_us = 1000" in answer.sentences()[-1]
+
+
+def test_an_eni_has_the_frames_and_a_scan_beside_it_the_delays() -> None:
+    answer = imported("slaves.txt", "machine.xml")
+    profile: Any = answer.profile
+    assert groups(answer) == MACHINE
+    assert [group.delay_us for group in profile.group] == [None, 0.15, 0.685]
+    assert (profile.cycle.period_us, profile.bus.sync_shift, profile.bus.mailbox_bytes) == (500, 0.25, 128)
+    # Of the ENI, though the scan is of another master's tool.
+    assert (profile.bus.master, profile.bus.process_data) == (None, "LRW-shared")
+    assert profile.bus.housekeeping_bytes == (4, 4, 1, 2)
+    # 40 bytes of a frame, 12 of each of five datagrams, and their data.
+    assert any("its frame takes 10.24 us on the wire, as those of the profile" in remark for remark in answer.remarks)
+    assert "delay_us = 0.15            # measured: cable included, slaves.txt:39" in answer.text
+
+
+def test_the_ports_of_a_scan_are_known() -> None:
+    assert [group.port for group in imported("slaves.txt", "pdos.txt").profile.group] == [
+        "100BASE-TX",
+        "E-bus",
+        "100BASE-TX",
+    ]
+
+
+def test_a_hop_over_devices_without_clock_is_shared_out(tmp_path: Path) -> None:
+    text = (FILES / "slaves.txt").read_text(encoding="utf-8")
+    head, _, last = text.partition("=== Master 0, Slave 2 ===")
+    drive, _, end = last.partition("=== Master 0, Slave 3 ===")
+    drive = drive.replace("clocks: yes, 64 bit", "clocks: no")
+    slaves = tmp_path / "slaves.txt"
+    slaves.write_text(f"{head}=== Master 0, Slave 2 ==={drive}=== Master 0, Slave 3 ==={end}", encoding="utf-8")
+    answer = busplan.import_profile([slaves, FILES / "pdos.txt"])
+    assert answer.profile.group[-1].delay_us == 0.35
+    assert "shared with 1 without a clock" in answer.text
+
+
+def test_linuxcnc_has_the_period_and_asks_for_the_bytes_of_typed_devices() -> None:
+    answer = imported("ethercat-conf.xml", "pdos.txt")
+    profile: Any = answer.profile
+    assert [group[1:] for group in groups(answer)] == [group[1:] for group in MACHINE]
+    assert (profile.cycle.period_us, profile.bus.sync_shift, profile.bus.distributed_clocks) == (500, 0.25, True)
+    # BRD and FRMW of the master, and the headers of two further domains.
+    assert profile.bus.housekeeping_bytes == (2, 4, 0, 0)
+    with pytest.raises(busplan.BusplanError, match=r"device 0 \(CP10\), 1 \(DI04\) has .* `ethercat pdos`"):
+        imported("ethercat-conf.xml")
+
+
+def test_linuxcnc_may_leave_devices_out_that_a_scan_lists(tmp_path: Path) -> None:
+    text = (FILES / "ethercat-conf.xml").read_text(encoding="utf-8")
+    conf = tmp_path / "ethercat-conf.xml"
+    conf.write_text(text.replace('    <slave idx="1" type="DI04" name="inputs"/>\n', ""), encoding="utf-8")
+    assert len(busplan.import_profile([conf, FILES / "pdos.txt", FILES / "slaves.txt"]).profile.group) == 3
+    with pytest.raises(busplan.BusplanError, match="no device 1, though there is device 3"):
+        busplan.import_profile([conf])
+
+
+def test_files_that_differ_say_so(tmp_path: Path) -> None:
+    text = (
+        (FILES / "ethercat-conf.xml")
+        .read_text(encoding="utf-8")
+        .replace('idx="603f" subIdx="00" bitLen="16"', 'idx="603f" subIdx="00" bitLen="8"')
+    )
+    (tmp_path / "conf.xml").write_text(text, encoding="utf-8")
+    answer = busplan.import_profile([FILES / "pdos.txt", tmp_path / "conf.xml"])
+    (said,) = (remark for remark in answer.remarks if "read_bytes" in remark)
+    assert said.startswith("node 2: read_bytes is 7 at conf.xml:9 and 8 at pdos.txt:14; the first is taken, in 1 more")
+    assert answer.profile.group[-1].read_bytes == 7
+
+
+def test_files_of_two_machines_are_refused(tmp_path: Path) -> None:
+    shorter = (FILES / "pdos.txt").read_text(encoding="utf-8").partition("=== Master 0, Slave 3")[0]
+    (tmp_path / "pdos.txt").write_text(shorter, encoding="utf-8")
+    with pytest.raises(busplan.BusplanError, match=r"has 4 devices and .*pdos.txt 3: these are two machines"):
+        busplan.import_profile([FILES / "slaves.txt", tmp_path / "pdos.txt"])
+    with pytest.raises(busplan.BusplanError, match=r"is of can and .* of ethercat: a profile is one bus"):
+        imported("axis-5.dcf", "slaves.txt")
+    with pytest.raises(busplan.BusplanError, match="are both node 5"):
+        imported("axis-5.dcf", str(_copy(FILES / "axis-5.dcf", tmp_path / "other.dcf")))
+
+
+def _copy(old: Path, new: Path) -> Path:
+    new.write_bytes(old.read_bytes())
+    return new
+
+
+# --- CAN ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "message"), [("dbc", "Pressure"), ("kcd", "Pressure"), ("sym", "Pressure"), ("arxml", "PressureFrame")]
+)
+def test_messages_of_a_database_go_beside_the_nodes_of_a_dcf(name: str, message: str) -> None:
+    answer = imported("axis-5.dcf", f"machine.{name}")
+    profile: Any = answer.profile
+    assert (profile.bus.bit_rate_kbit_s, profile.cycle.period_us) == (500, 4000)
+    (group,) = profile.group
+    assert (group.name, group.axes, group.read_bytes, group.write_bytes) == ("axis-five", 1, 6, 6)
+    assert (group.feedback_identifier, group.command_identifier) == (0x185, 0x205)
+    assert [(each.name, each.identifier, each.payload_bytes, each.period_us) for each in profile.message] == [
+        ("axis-five-5-TPDO2", 0x285, 2, 10_000),
+        ("axis-five-5-heartbeat", 0x705, 1, 250_000),
+        (message, 0x100, 8, 20_000),
+    ]
+    if name in ("dbc", "kcd"):
+        assert any("no file says its period" in remark and remark.endswith(": Door") for remark in answer.remarks)
+    lines = (FILES / f"machine.{name}").read_text(encoding="utf-8").splitlines()
+    place = next(row.fact.place for row in answer.rows if row.dotted == f"message.{message}.payload_bytes")
+    assert message in lines[int(place.rpartition(":")[2]) - 1]
+
+
+def test_a_database_alone_says_what_is_missing() -> None:
+    with pytest.raises(busplan.BusplanError) as refused:
+        imported("machine.dbc")
+    first, nodes, period, *left_out = refused.value.problems
+    assert "1 message with a period, and no profile yet" in first
+    assert nodes.startswith("the nodes of the cycle and their PDOs: give the EDS or DCF")
+    assert period == "cycle.period_us: the period of SYNC"
+    assert [each.rpartition(": ")[2] for each in left_out] == ["Door", "Foreign"]
+
+
+def test_an_eds_has_defaults_and_says_so() -> None:
+    answer = imported("node.eds")
+    assert any("an EDS has the defaults of a device" in remark for remark in answer.remarks)
+    assert {"bus.bit_rate_kbit_s", "group.AX30.nodes", "cycle.period_us"} <= {
+        row.dotted for row in answer.rows if row.fact.grade == "assumed"
+    }
+
+
+PDOS = {
+    # Bytes of both PDOs and type of the second -> bytes of the group, and the message that the second is.
+    "behind a full one": ((8, 4, 1), 12, []),
+    "behind one that is not full": ((6, 4, 1), 6, [(0x285, 4, 4000)]),
+    "with every fourth SYNC": ((8, 4, 4), 8, [(0x285, 4, 16_000)]),
+}
+
+
+@pytest.mark.parametrize("case", PDOS)
+def test_a_second_pdo_goes_where_the_profile_can_say_it(case: str, tmp_path: Path) -> None:
+    (first, second, kind), size, messages = PDOS[case]
+    text = (FILES / "axis-5.dcf").read_text(encoding="utf-8")
+    for old, new in (
+        ("0x60640020", f"0x6064{8 * first - 16:04x}"),
+        ("[1801sub2]\nDefaultValue=255", f"[1801sub2]\nDefaultValue={kind}"),
+        ("0x60770010", f"0x6077{8 * second:04x}"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "axis.dcf"
+    path.write_text(text, encoding="utf-8")
+    profile: Any = busplan.import_profile(path).profile
+    assert profile.group[0].read_bytes == size
+    found = [(each.identifier, each.payload_bytes, each.period_us) for each in profile.message]
+    assert [each for each in found if each[0] != 0x705] == messages
+
+
+def test_the_answer_has_every_form_and_can_be_pickled(tmp_path: Path) -> None:
+    answer = imported("machine.xml", "slaves.txt")
+    assert pickle.loads(pickle.dumps(answer)).to_dict() == answer.to_dict()
+    for ending in ("json", "csv", "md", "html", "txt"):
+        answer.save(tmp_path / f"answer.{ending}")
+        assert "delay_us" in (tmp_path / f"answer.{ending}").read_text(encoding="utf-8")
+    assert repr(answer) == "<ImportAnswer: machine EtherCAT, 4 nodes, 2 axes, 500 us FITS>"
