@@ -6,8 +6,8 @@ attributes, the report as text, the document of `--format json` by `to_dict()`. 
 Examples
 --------
 >>> import busplan
->>> busplan.capacity("paper-4ms")  # doctest: +ELLIPSIS
-<CapacityAnswer: paper-4ms at 4 ms: fits. Margin 1730.064 us +/- 6.311 us of 2000.000 us, less a bias of 6.616 us...>
+>>> busplan.capacity("paper-4ms")
+<CapacityAnswer: paper-4ms IEEE 1394, 2 nodes, 8 axes, 4 ms FITS>
 """
 
 from importlib import import_module

@@ -512,8 +512,8 @@ def otherwise_in_forms(profile: Profile, own: Data) -> Iterator[str]:
         if row[key] != (own[key] if isinstance(own[key], str) else " ".join(own[key] or ())):
             yield f"{key} {row[key]} as CSV, and {own[key]} as JSON"
     text = call("capacity", FILE, "--format", "table").out.decode()
-    is_refused = "cannot be run at" in text.partition("\n")[0]
-    if f": {own['verdict']}" not in text or is_refused != bool(own["circle_refused_by"]):
+    is_refused = "\n  circle          cannot be run: " in text
+    if own["verdict"].upper() not in text.partition("[")[0] or is_refused != bool(own["circle_refused_by"]):
         yield f"{text[:300]} as text, and {own['verdict']}, {own['circle_refused_by']} as JSON"
     figures = busplan.capacity(profile).verdicts[0].deciding
     for key in TOLD:

@@ -210,6 +210,6 @@ def test_constants_have_sources(kind: str) -> None:
 def test_a_margin_without_doubts_says_that_no_uncertainty_is_known(
     run: Run, name: str, nodes: int, has_doubts: bool
 ) -> None:
-    said = run("capacity", name, "--set", f"bus.nodes={nodes}").stdout.splitlines()[1]
+    said = run("capacity", name, "--set", f"bus.nodes={nodes}", "--all").stdout
     assert ("so no bias and no uncertainty are in it" in said) == (not has_doubts)
     assert ("+/-" in said) == has_doubts

@@ -486,12 +486,13 @@ def test_its_rule_and_its_limit_are_found_and_listed(run: Run, ring: Path) -> No
 
 def test_its_verdict_says_that_no_figure_of_others_tests_it(run: Run, ring: Path) -> None:
     words = "No figure that others have published or measured tests the model of Token ring (kind ring)."
-    for command in ("capacity", "report"):
-        assert words in run(command, ring.name, cwd=ring.parent).stdout
+    for command in (("capacity", "--all"), ("report",)):
+        assert words in run(command[0], ring.name, *command[1:], cwd=ring.parent).stdout
     assert run("evidence", "ring", cwd=ring.parent).stdout == f"{words}\n"
     found = json.loads(run("evidence", "ring", "--format", "json", cwd=ring.parent).stdout)
     assert (found["without"], found["figures"]) == (["ring"], [])
-    assert "No figure that others" not in run("capacity", "paper-4ms", cwd=ring.parent).stdout
+    assert "\n  tested          not against figures of others\n" in run("capacity", ring.name, cwd=ring.parent).stdout
+    assert "No figure that others" not in run("capacity", "paper-4ms", "--all", cwd=ring.parent).stdout
 
 
 def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> None:
@@ -501,11 +502,12 @@ def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> Non
     # Without a bias and without doubts, what is needed is all that there is to show.
     assert (one.safe_required_us, one.margin_corrected_us) == (NEEDED_US, one.margin_us)
     assert (one.safe_nodes, one.safe_limited_by, one.safe_min_period_us) == (one.max_nodes, "time", one.min_period_us)
-    said = run("capacity", ring.name, cwd=ring.parent).stdout
-    assert said.splitlines()[0] == (
-        "ring at 1.5 ms: fits. Margin 100.000 us of 750.000 us; how far the bus is from this timing model is not "
-        "known, so no bias and no uncertainty are in it."
-    )
+    said = run("capacity", ring.name, "--all", cwd=ring.parent).stdout
+    assert (
+        "\nring at 1.5 ms: fits. Margin 100.000 us of 750.000 us; how far the bus is from this timing model is not "
+        "known, so no bias and no uncertainty are in it.\n"
+    ) in said
+    assert "\n  free            100 us\n" in said
     assert "Not in it" not in said
     ring.write_text(TEXT.replace("period_us = 1500", "period_us = 1200"), encoding="utf-8")
     assert "no bias or uncertainty known; cheapest cure" in run("check", ring.name, cwd=ring.parent).stdout
@@ -563,9 +565,9 @@ def test_doubts_without_a_bias_make_three_verdicts(
     assert (one.verdict, one.bias_us) == (verdict, None)
     assert one.uncertainty_us == pytest.approx(DOUBT_US)
     assert one.fits == (slice_us >= NEEDED_US)
-    said = run("capacity", doubted.name, cwd=doubted.parent).stdout
+    said = run("capacity", doubted.name, "--all", cwd=doubted.parent).stdout
     margin = f"Margin {slice_us - NEEDED_US:.3f} us +/- {DOUBT_US:.3f} us of {slice_us:.3f} us; how far the bus is from"
-    assert said.startswith(f"ring at {2 * slice_us / 1000:.12g} ms: {verdict}. {margin}".replace("-0.000", "0.000"))
+    assert f"\nring at {2 * slice_us / 1000:.12g} ms: {verdict}. {margin}".replace("-0.000", "0.000") in said
     assert "Largest doubt: rate, 98% of U squared." in said  # 6.4 squared of 41.96
     assert "Not in it: guard time (guard.guard_us)." in said
     done = run("check", doubted.name, "--no-circle", cwd=doubted.parent)
@@ -652,8 +654,8 @@ def test_one_of_its_timing_models_decides_whatever_leads_and_whatever_is_asked_f
         ]
         assert (hasty.safe_nodes, hasty.bias_us, hasty.uncertainty_us) == (None, None, None)
         for asked in ((), ("--timing", "hasty"), ("--timing", "plain")):
-            done = run("capacity", ring_file.name, *asked, cwd=ring_file.parent)
-            assert done.stdout.startswith("ring at 1.29 ms: not shown to fit. Margin -5.000 us +/- 12.955 us of")
+            done = run("capacity", ring_file.name, *asked, "--all", cwd=ring_file.parent)
+            assert "\nring at 1.29 ms: not shown to fit. Margin -5.000 us +/- 12.955 us of" in done.stdout
             says_otherwise = "The hasty model says otherwise: 640.000 us needed of 645.000 us. It decides nothing."
             assert (says_otherwise in done.stdout) == (asked != ("--timing", "plain"))
         assert run("check", ring_file.name, "--no-circle", cwd=ring_file.parent).returncode == 1

@@ -45,7 +45,7 @@ def own(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("key", BEYOND)
 def test_such_a_key_leaves_the_standard_alone_and_a_sentence_says_why(busplan: Run, own: Path, key: str) -> None:
     own.write_text(text_with(key), encoding="utf-8")
-    done = busplan("capacity", "own.toml", cwd=own.parent)
+    done = busplan("capacity", "own.toml", "--all", cwd=own.parent)
     assert done.returncode == 0, done.stderr
     assert f"The paper model is not applicable: it has no {key}.\n" in done.stdout
     (header,) = [line for line in done.stdout.splitlines() if line.startswith("figure ")]
@@ -69,7 +69,7 @@ def test_the_paper_is_refused_where_it_is_asked_for(busplan: Run, own: Path, com
 
 def test_every_such_key_at_once_has_one_sentence_and_one_verdict(busplan: Run, own: Path) -> None:
     own.write_text(text_with(*BEYOND), encoding="utf-8")
-    done = busplan("capacity", "own.toml", cwd=own.parent)
+    done = busplan("capacity", "own.toml", "--all", cwd=own.parent)
     assert done.stdout.count("not applicable") == 1
     assert all(key in done.stdout for key in BEYOND)
     assert busplan("check", "own.toml", "--no-circle", cwd=own.parent).returncode == 0

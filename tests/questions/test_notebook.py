@@ -17,9 +17,9 @@ def test_a_notebook_shows_tables_and_charts_and_no_name_is_markup() -> None:
     found = busplan.capacity(busplan.load_profile("paper-4ms", changes={"name": "<b>&x"}), sensitivity=True)
     shown = found._repr_html_()
     assert "<b>" not in shown
-    assert "&lt;b&gt;&amp;x</bdi> at " in shown
+    assert "&lt;b&gt;&amp;x</bdi>  IEEE 1394, " in shown
     assert shown.count("<table") == 2
-    assert shown.count("<svg ") == 1
+    assert shown.count("<svg ") == 2  # the bar of the card, and what moves the margin
     assert f'<data value="{found.results[1].margin_us!r}"' in shown
 
 

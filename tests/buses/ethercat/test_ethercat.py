@@ -1,6 +1,7 @@
 """An EtherCAT segment: its cycle by hand, latencies, clocks, limits and rules, and every question in some form."""
 
 import json
+import re
 from collections.abc import Callable
 from math import sqrt
 from pathlib import Path
@@ -460,7 +461,7 @@ def test_init_knows_the_hosts_of_a_kind(run: Run, tmp_path: Path, kind: str, wor
 def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None:
     done = run("init", "press", "--bus", "ethercat", "--nodes", "4", "--axes", "10", cwd=tmp_path)
     assert done.returncode == 0
-    assert "press at 1 ms: fits" in done.stderr
+    assert re.search(r"\npress  EtherCAT, 4 nodes, 10 axes, 1 ms +FITS\n", done.stderr)
     found = busplan.load_profile(tmp_path / "press.toml")
     assert (found.bus.kind, len(found.group), found.bus.distributed_clocks) == ("ethercat", 2, True)
     assert run("check", "press.toml", "--no-circle", cwd=tmp_path).returncode == 0
