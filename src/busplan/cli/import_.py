@@ -19,7 +19,7 @@ def import_command(
     paths: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE...",
+            metavar="FILE",
             help="Files of one machine, each recognised by its content; - is standard input.",
             show_default=False,
         ),
