@@ -34,7 +34,7 @@ def circle_test_command(
     period: PeriodsOption = None,
     changes: KeyChanges = NO_CHANGES,
     contributions: Annotated[
-        bool, typer.Option("--contributions", help="Rank the error sources: test again without each in turn.")
+        bool, typer.Option("--contributions", help="Rank the error sources: run the test again without each of them.")
     ] = False,
     trace: Annotated[
         Path | None,
@@ -62,11 +62,11 @@ def circle_test_command(
 ) -> None:
     """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
 
-    First the bus: a cycle that does not fit its period fails the test before any simulation. Then stability: a loop
-    without its phase and gain margin fails, however round its circle. Then the tolerances of the profile; without any,
+    The test has three parts. The bus: a cycle that does not fit its period fails before any simulation. Stability: a
+    loop without its phase and gain margin fails, however round its circle. The tolerances of the profile: without any,
     the circle is not judged. Errors are in um in the table, in mm in JSON and CSV; F_min, F_max and G are the terms of
-    ISO 230-4, and circle.path = "iso230-4" measures them on a whole turn. Exits 0 when every tolerance holds or none is
-    asked for, and 1 when one does not hold.
+    ISO 230-4, and circle.path = "iso230-4" measures them on a whole turn. Exits 0 when the test passes or the circle is
+    not judged, and 1 when it fails.
 
     Example: busplan circle-test paper-4ms --contributions
     """

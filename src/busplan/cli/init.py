@@ -44,7 +44,7 @@ def init_command(
         int | None, option("--nodes N", "Nodes of the machine, the host not counted.  [default: 4]", min=1)
     ] = None,
     axes: Annotated[
-        int | None, option("--axes N", "Axes of the whole machine, alike on each node.  [default: 4 a node]", min=1)
+        int | None, option("--axes N", "Axes of the whole machine.  [default: 4 for each node]", min=1)
     ] = None,
     group: Annotated[
         list[str] | None,
@@ -57,7 +57,7 @@ def init_command(
     period: Annotated[
         str | None,
         option(
-            "--period TIME", "Communication period with its unit, as 1ms or 500us.  [default: what is usual on the bus]"
+            "--period TIME", "Communication period with its unit, as 1ms or 500us.  [default: a usual one of the bus]"
         ),
     ] = None,
     bytes_per_axis: Annotated[
@@ -68,8 +68,8 @@ def init_command(
         str | None,
         option(
             "--host HOST",
-            "Host of the master, whose own time is assumed by it; of EtherCAT hardware, tuned, real-time or stock."
-            "  [default: tuned]",
+            "Kind of host, from which its own time is assumed; for EtherCAT hardware, tuned, real-time or stock.  "
+            "[default: tuned]",
         ),
     ] = None,
     source: Annotated[
@@ -84,10 +84,10 @@ def init_command(
 ) -> None:
     """Write a commented profile of your machine, and say whether it fits.
 
-    What is not known yet is assumed, graded so, and has a comment that says how to find it. In a terminal the command
-    asks for what is missing; otherwise it takes the defaults and says them. With --from it copies a shipped profile
-    under a name of its own. Exits 0 when the file is written, whatever the verdict is; a file that is already there
-    stays as it is, unless --force is given. From a machine's own files, as an ENI, `busplan import` writes a profile.
+    Values that are not known yet are assumed, graded so, and have a comment on how to find them. In a terminal the
+    command asks for missing values; otherwise it takes the defaults and names them. With --from it copies a shipped
+    profile under the new name. Exits 0 when the file is written, whatever the verdict is; a file that is already there
+    stays as it is, unless --force is given. To start from a machine's own files, such as an ENI, use `busplan import`.
 
     Nodes that differ are groups: --group dual:4x2 --group io:3x0:32/8 are four nodes of two axes each and three without
     axes, which send 32 bytes and receive 8.
