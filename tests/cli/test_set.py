@@ -65,7 +65,7 @@ EVERY = {
     "calibrate": ("mine.toml", "table-1.csv"),
     "check": ("mine.toml", "--no-circle"),
 }
-WITHOUT_PROFILE = {"rule", "schema", "manual", "evidence", "paper", "profiles", "init"}
+WITHOUT_PROFILE = {"rule", "schema", "manual", "evidence", "paper", "profiles", "init", "import"}
 
 
 @pytest.fixture
