@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
+from busplan.buses.parts import Cost
 from busplan.elementwise import FIT_ROUNDING
 from busplan.errors import BusplanError
 from busplan.gate.gate import check_document
@@ -23,7 +24,7 @@ from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import cure
 from busplan.questions.plan.constraints import needs, with_payload_within
-from busplan.questions.plan.freedoms import PERIOD, Cost, Freedom, ShortNumbers, freed
+from busplan.questions.plan.freedoms import PERIOD, Freedom, ShortNumbers, freed
 from busplan.questions.plan.planning import plan
 from busplan.questions.plan.search import Search
 from busplan.sections.profile import Profile
