@@ -60,27 +60,27 @@ class KeyChanges:
     each: tuple[KeyChange, ...] = ()
 
     def __post_init__(self) -> None:
-        for one, other in combinations(self.each, 2):
-            require_separate(one, other.key, typed=other.typed)
+        for first, second in combinations(self.each, 2):
+            require_separate(first, second.key, typed=second.typed)
 
     @property
     def values(self) -> dict[str, object]:
         """New value by dotted key."""
-        return {one.key: one.value for one in self.each}
+        return {change.key: change.value for change in self.each}
 
     @property
     def by_set(self) -> tuple[KeyChange, ...]:
         """Changes by --set; those by another option show in every answer."""
-        return tuple(one for one in self.each if one.option == SET)
+        return tuple(change for change in self.each if change.option == SET)
 
     @property
     def words(self) -> str:
         """The --set options as typed; empty without them."""
-        return " and ".join(one.typed for one in self.by_set)
+        return " and ".join(change.typed for change in self.by_set)
 
     def without(self, *, key: str) -> "KeyChanges":
         """Leave out the change of a key."""
-        return KeyChanges(tuple(one for one in self.each if one.key != key))
+        return KeyChanges(tuple(change for change in self.each if change.key != key))
 
     def applied(self, profile: "Profile") -> "Profile":
         """Return the profile with all changes, validated once.
@@ -92,7 +92,9 @@ class KeyChanges:
         """
         from busplan.profile.toml import override  # noqa: PLC0415 - loads pydantic, which --help does not need
 
-        return override(profile, self.values, origin={one.key: f"{one.typed}{one.note}" for one in self.each})
+        return override(
+            profile, self.values, origin={change.key: f"{change.typed}{change.note}" for change in self.each}
+        )
 
 
 NO_CHANGES: Final = KeyChanges()
@@ -115,12 +117,12 @@ def require_separate(change: KeyChange, key: str, *, typed: str) -> None:
     BusplanError
         The keys are the same, or one is a section of the other.
     """
-    one, other = change.sections, tuple(key.split("."))
-    shared = min(len(one), len(other))
-    if one[:shared] != other[:shared]:
+    parts, other_parts = change.sections, tuple(key.split("."))
+    shared = min(len(parts), len(other_parts))
+    if parts[:shared] != other_parts[:shared]:
         return
-    inner, outer = (change.key, key) if len(one) > len(other) else (key, change.key)
-    why = f"both set {key}" if one == other else f"{inner} is inside {outer}"
+    inner, outer = (change.key, key) if len(parts) > len(other_parts) else (key, change.key)
+    why = f"both set {key}" if parts == other_parts else f"{inner} is inside {outer}"
     raise BusplanError(f"{change.typed} and {typed}: {why}; give one of them")
 
 
@@ -134,7 +136,7 @@ def parse_set(texts: Sequence[str]) -> tuple[KeyChange, ...]:
 
     Examples
     --------
-    >>> [(one.key, one.value) for one in parse_set(["bus.speed=S200", "node.execution.time_us=[30, 40.5]"])]
+    >>> [(change.key, change.value) for change in parse_set(["bus.speed=S200", "node.execution.time_us=[30, 40.5]"])]
     [('bus.speed', 'S200'), ('node.execution.time_us', [30, 40.5])]
     """
     return tuple(map(_parsed, texts))
@@ -148,7 +150,7 @@ def _parsed(text: str) -> KeyChange:
 
 
 def _value(written: str, *, name: str) -> object:
-    """Read a TOML value; a word that TOML has not is text."""
+    """Read a TOML value; a bare word counts as text."""
     from busplan.profile.document import Document  # noqa: PLC0415 - as above
 
     try:

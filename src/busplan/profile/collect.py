@@ -101,7 +101,7 @@ def _name(path: Path) -> str:
 def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
     """Every profile below a folder, sorted by name, and every folder that cannot be read."""
     unreadable: list[OSError] = []
-    found = False
+    has_profile = False
     for root, folders, files in os.walk(folder, onerror=unreadable.append):
         folders[:] = sorted(name for name in folders if not name.startswith(".") and name not in _SKIPPED_FOLDERS)
         for name in sorted(files):
@@ -109,14 +109,14 @@ def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
                 continue
             path = Path(root) / name
             if _claims(path):
-                found = True
+                has_profile = True
                 yield ProfileSource(path, _name(path))
             else:
                 skipped.append(_name(path))
     for error in unreadable:
         name = _name(Path(error.filename))
         yield ProfileSource(Path(error.filename), name, f"{name}: cannot be read: {error.strerror}")
-    if not found and not unreadable:
+    if not has_profile and not unreadable:
         name = _name(folder)
         yield ProfileSource(folder, name, f"{name}: no profile below this folder (a *.toml with a schema_version)")
 

@@ -1,4 +1,4 @@
-"""A profile as one of another kind of bus: the same machine, on a bus as a new profile of that kind has it.
+"""The machine of a profile on another kind of bus: its bus section is that of a new profile of that kind.
 
 The machine is what profiles of every kind say: nodes, axes, payloads, execution times, the period, the share of it that
 is for communication, the servo and the circle; and its cables, by whatever key. What only its own kind has is left out,
@@ -23,7 +23,7 @@ _SIZES = ("read_bytes", "write_bytes")
 
 
 class AssumedKey(NamedTuple):
-    """A key that the machine says nothing of."""
+    """A key whose value does not come from the machine."""
 
     key: str
     value: Any
@@ -62,8 +62,8 @@ def converted(profile: Profile, kind: str) -> Conversion:
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> found = converted(load("paper-4ms").profile, "can")
-    >>> found.profile.bus.kind, found.profile.bus.nodes, found.profile.node.axes
+    >>> conversion = converted(load("paper-4ms").profile, "can")
+    >>> conversion.profile.bus.kind, conversion.profile.bus.nodes, conversion.profile.node.axes
     ('can', 2, 4)
     """
     if kind == profile.bus.kind:
@@ -79,7 +79,7 @@ def converted(profile: Profile, kind: str) -> Conversion:
     cable_key, new = bus.key_of("cable"), tomllib.loads(bus.starter.section())
     cables_m = _cables_m(profile)
     if cables_m and cable_key:
-        left_out = tuple(one for one in left_out if one not in cables_m)
+        left_out = tuple(key for key in left_out if key not in cables_m)
         section, _, name = cable_key.partition(".")
         for table in [machine["bus"]] if section == "bus" else [machine.get("node"), *machine.get("group", ())]:
             if table is not None:
@@ -89,9 +89,9 @@ def converted(profile: Profile, kind: str) -> Conversion:
             # Whoever measured it did so on the other bus.
             nodes["execution"]["grade"] = "assumed"
     raised, empty = _with_payloads(machine)
-    found = profile_of(_merged(machine, new))
+    new_profile = profile_of(_merged(machine, new))
     given = [*raised, *(AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}")]
-    return Conversion(found, (*given, *_defaults(found)), (*left_out, *empty))
+    return Conversion(new_profile, (*given, *_defaults(new_profile)), (*left_out, *empty))
 
 
 def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:
@@ -110,11 +110,11 @@ def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:
 
 
 def _cables_m(profile: Profile) -> dict[str, float]:
-    """Lengths of cables that a profile says, by key [m]; a cable of no length says nothing."""
+    """Cable lengths that a profile sets, by key [m]; lengths of zero are left out."""
     section, _, name = kind_named(profile.bus.kind).key_of("cable").partition(".")
     tables = [(f"bus.{name}", profile.bus)] if section == "bus" else []
     if section == "node":
-        tables = [(one.node_key(name), one.node) for one in profile.alike_nodes]
+        tables = [(nodes.node_key(name), nodes.node) for nodes in profile.alike_nodes]
     return {
         key: float(getattr(table, name))
         for key, table in tables
@@ -123,31 +123,33 @@ def _cables_m(profile: Profile) -> dict[str, float]:
 
 
 def _common(data: TomlTable) -> tuple[TomlTable, tuple[str, ...]]:
-    """What profiles of every kind say; and the keys of the rest, a section by its name."""
+    """Keys that profiles of every kind have; and names of the others, a section as a whole."""
     rest: list[str] = []
-    found = _part(data, [Profile], "", rest)
+    common = _part(data, [Profile], "", rest)
     nodes = data["bus"].get(_NODES)
-    found["bus"] = {} if nodes is None else {_NODES: nodes}
-    said = {f"bus.{one}" for one in (_NODES, _SHOWN_FIRST)}
-    return found, tuple(one for one in rest if one not in said)
+    common["bus"] = {} if nodes is None else {_NODES: nodes}
+    said = {f"bus.{key}" for key in (_NODES, _SHOWN_FIRST)}
+    return common, tuple(key for key in rest if key not in said)
 
 
 def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: str, rest: list[str]) -> TomlTable:
-    """The keys of a table that one of some models has; those of the others are added to the rest."""
-    found: TomlTable = {}
+    """The keys of a table that any of the models has; the others are added to the rest."""
+    known: TomlTable = {}
     for name, value in table.items():
-        fields = [one.model_fields[name] for one in models if name in one.model_fields]
+        fields = [model.model_fields[name] for model in models if name in model.model_fields]
         inner = [model for field in fields for model in models_of(field.annotation)]
         tables = named_tables(value)
         if not fields:
             rest.append(f"{prefix}{name}")
         elif isinstance(value, Mapping):
-            found[name] = _part(value, inner, f"{prefix}{name}.", rest)
+            known[name] = _part(value, inner, f"{prefix}{name}.", rest)
         elif tables is not None:
-            found[name] = [_part(one, inner, f"{prefix}{name}.{own}.", rest) for own, one in tables.items()]
+            known[name] = [
+                _part(named_table, inner, f"{prefix}{name}.{own}.", rest) for own, named_table in tables.items()
+            ]
         else:
-            found[name] = value
-    return found
+            known[name] = value
+    return known
 
 
 def _merged(machine: TomlTable, new: TomlTable) -> TomlTable:
@@ -158,8 +160,8 @@ def _merged(machine: TomlTable, new: TomlTable) -> TomlTable:
 def _defaults(profile: Profile) -> Iterator[AssumedKey]:
     """Keys that only the kind of a profile has, and that the profile leaves to their defaults."""
     _, own = _common(profile.model_dump())
-    for key, one in dotted_keys(profile).items():
+    for key, entry in dotted_keys(profile).items():
         is_own = any(key == name or key.startswith(f"{name}.") for name in own)
-        # A key without a value, or an array without an element, is none.
-        if is_own and one.source == "default" and one.value is not None and one.value != ():
-            yield AssumedKey(key, one.value, "default")
+        # Keys without a value and empty arrays are left out.
+        if is_own and entry.source == "default" and entry.value is not None and entry.value != ():
+            yield AssumedKey(key, entry.value, "default")

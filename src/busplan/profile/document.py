@@ -141,11 +141,11 @@ class Document:
         marks_key
             If True, mark the key instead of its value.
         """
-        found = self.nearest(path)
-        if not found:
+        marked_path = self.nearest(path)
+        if not marked_path:
             return Spot(1, 1, 1, 2)
-        place = self.places[found]
-        marks_key = marks_key or found != path
+        place = self.places[marked_path]
+        marks_key = marks_key or marked_path != path
         start, end = (place.key_start, place.key_end) if marks_key else (place.value_start, place.value_end)
         line, column = self.lines.line_and_column(place.key_start)
         # A value starts on the line of its key; one of several lines is marked on the first.

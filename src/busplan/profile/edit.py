@@ -112,7 +112,7 @@ def _require_profile(name: str, data: dict[str, Any]) -> None:
     try:
         validate(Document(name, tomli_w.dumps(data)))
     except PlacedError as error:
-        raise BusplanError(*(f"{name}: with the changes, {one.message}" for one in error.placed)) from None
+        raise BusplanError(*(f"{name}: with the changes, {problem.message}" for problem in error.placed)) from None
 
 
 def _encoded(text: str, *, like: bytes) -> bytes:
@@ -197,7 +197,7 @@ def _without(document: Document, path: KeyPath) -> str:
     if text[start : place.key_start].strip():
         raise _LayoutError(f"{path[-1]} does not begin a line")
     comments = (text[at : _line_end(text, at)].rstrip() for at in document.comments if start <= at < end)
-    return text[:start] + "".join(f"{_indent(text, start)}{one}\n" for one in comments) + text[end:]
+    return text[:start] + "".join(f"{_indent(text, start)}{comment}\n" for comment in comments) + text[end:]
 
 
 def _with_old_grades(document: Document, paths: set[KeyPath]) -> Document:

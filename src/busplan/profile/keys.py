@@ -61,7 +61,7 @@ def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
 def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
     """Yield dotted key and value of everything but tables.
 
-    Of several tables of one key, the key of each is its name, and the names are the value of their key:
+    In an array of tables, each table's name is a part of its keys, and the value of the array is the list of names:
 
     Examples
     --------
@@ -73,26 +73,26 @@ def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, o
             yield from flat(value, f"{prefix}{name}.")
         elif (tables := named_tables(value)) is not None:
             yield f"{prefix}{name}", list(tables)
-            for own, one in tables.items():
-                yield from flat({key: each for key, each in one.items() if key != NAME}, f"{prefix}{name}.{own}.")
+            for own, inner in tables.items():
+                yield from flat({key: inner[key] for key in inner if key != NAME}, f"{prefix}{name}.{own}.")
         else:
             yield f"{prefix}{name}", value
 
 
 NAME: Final = "name"
-"""The key that tells several tables of one key apart."""
+"""Key that names a table of an array of tables."""
 
 
 def named_tables(value: object) -> dict[str, dict[str, Any]] | None:
-    """Tables of one key by their names; None if a value is no such list."""
+    """Tables of an array by name; None if the value is no array of named tables."""
     if not isinstance(value, Sequence) or isinstance(value, str) or not value:
         return None
-    tables = {str(one[NAME]): one for one in value if isinstance(one, dict) and NAME in one}
+    tables = {str(inner[NAME]): inner for inner in value if isinstance(inner, dict) and NAME in inner}
     return tables if len(tables) == len(value) else None
 
 
 def path_of(data: Mapping[str, object], key: str) -> tuple[str | int, ...]:
-    """Path of a dotted key, with the place of a table among several of one key instead of its name.
+    """Path of a dotted key, with the index of a table in its array instead of its name.
 
     Examples
     --------
@@ -103,12 +103,12 @@ def path_of(data: Mapping[str, object], key: str) -> tuple[str | int, ...]:
 
 
 def named_path(data: object, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
-    """The path with the name of a table among several of one key instead of its place, where it has one."""
+    """The path with the names of tables in arrays instead of their indexes, where they have names."""
     return tuple(name for _, name in _steps(data, path))
 
 
 def _steps(data: object, path: Iterable[str | int]) -> Iterator[tuple[str | int, str | int]]:
-    """Each part of a path; a table among several of one key as its place and as its name, whichever the path has."""
+    """Each part of a path; that of a table in an array as its index and as its name, whichever the path has."""
     for part in path:
         tables = named_tables(data) or {}
         names = list(tables)
@@ -139,22 +139,22 @@ def holder(data: dict[str, Any], key: str, *, name: str | None = None) -> tuple[
         A part of the key is a value, or there is no table of that name.
     """
     *sections, last = key.split(".")
-    found: object = data
+    table: object = data
     for number, section in enumerate(sections):
-        tables = named_tables(found)
+        tables = named_tables(table)
         if tables is not None:
             if section not in tables:
                 raise BusplanError(
                     f"{name or key}: no {sections[number - 1]} is called {section}; there are {', '.join(tables)}"
                 )
-            found = tables[section]
-        elif isinstance(found, dict):
-            found = found.setdefault(section, {})
+            table = tables[section]
+        elif isinstance(table, dict):
+            table = table.setdefault(section, {})
         else:
             raise BusplanError(f"{name or key}: no such key; {sections[number - 1]} is a value, not a section")
-    if not isinstance(found, dict):
-        tables = named_tables(found)
+    if not isinstance(table, dict):
+        tables = named_tables(table)
         why = f"{sections[-1]} is a value, not a section"
         known = f"give the name of one, as {sections[-1]}.{next(iter(tables))}.{last}" if tables else why
         raise BusplanError(f"{name or key}: no such key; {known}")
-    return found, last
+    return table, last

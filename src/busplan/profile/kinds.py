@@ -46,8 +46,8 @@ def _fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Iterator[Fie
     rest = path[2:] if len(path) > 1 and isinstance(path[1], int) else path[1:]
     if field is not None and not (rest and inner):
         yield field
-    for one in inner if rest else []:
-        yield from _fields(one, rest)
+    for section in inner if rest else []:
+        yield from _fields(section, rest)
 
 
 def models_of(annotation: Any) -> list[type[BaseModel]]:
@@ -60,7 +60,7 @@ def models_of(annotation: Any) -> list[type[BaseModel]]:
 
 
 def value_keys(model: type[BaseModel], names: Mapping[str, Sequence[str]], prefix: str = "") -> Iterator[str]:
-    """Dotted keys of a model whose value is one number, word or truth, in the order of the schema.
+    """Dotted keys of a model whose value is a number, a word or a boolean, in the order of the schema.
 
     Parameters
     ----------
@@ -73,9 +73,9 @@ def value_keys(model: type[BaseModel], names: Mapping[str, Sequence[str]], prefi
     """
     for name, field in model.model_fields.items():
         inner = models_of(field.annotation)
-        sections = [f"{name}.{one}" for one in names.get(name, ())] if _are_several(field.annotation) else [name]
-        for section, one in product(sections, inner):
-            yield from value_keys(one, {}, f"{prefix}{section}.")
+        sections = [f"{name}.{table}" for table in names.get(name, ())] if _are_several(field.annotation) else [name]
+        for section, section_model in product(sections, inner):
+            yield from value_keys(section_model, {}, f"{prefix}{section}.")
         if not inner and (_is_number(field.annotation) or _words(field.annotation)):
             yield f"{prefix}{name}"
 
@@ -84,7 +84,7 @@ def cycle_keys(profile: Profile) -> tuple[str, ...]:
     """Keys of a profile that its cycle, or its verdict, may depend on."""
     model = profile_model(profile.bus.kind)
     several = [name for name, field in model.model_fields.items() if _are_several(field.annotation)]
-    return _cycle_keys(model, tuple((name, tuple(one.name for one in getattr(profile, name))) for name in several))
+    return _cycle_keys(model, tuple((name, tuple(table.name for table in getattr(profile, name))) for name in several))
 
 
 @cache
@@ -92,7 +92,7 @@ def _cycle_keys(model: type[Profile], several: tuple[tuple[str, tuple[str, ...]]
     names = dict(several)
     groups = names["group"]
     others = {key for key in value_keys(Profile, {}) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
-    without = {*others, *_CHANGE_NO_FIGURE, *(f"group.{one}.{key}" for one in groups for key in _OF_GROUP)}
+    without = {*others, *_CHANGE_NO_FIGURE, *(f"group.{group}.{key}" for group in groups for key in _OF_GROUP)}
     unused = ("node.", "payload.", "bus.nodes") if groups else ()
     keys = dict.fromkeys(value_keys(model, names))
     read = (key for key in keys if "." in key and key not in without and not key.startswith(unused))
@@ -100,10 +100,10 @@ def _cycle_keys(model: type[Profile], several: tuple[tuple[str, tuple[str, ...]]
 
 
 def words_of(profile: Profile, key: str) -> tuple[str, ...]:
-    """Words allowed for a key of a profile, instead of a number or alone; those of a truth are true and false."""
+    """Words that a key of a profile may have as its value; for a boolean, true and false."""
     path = tuple(part for place, part in enumerate(key.split(".")) if not (place == 1 and key.startswith("group.")))
     fields = _fields(profile_model(profile.bus.kind), path)
-    return tuple(dict.fromkeys(text for one in fields for text in _words(one.annotation)))
+    return tuple(dict.fromkeys(text for field in fields for text in _words(field.annotation)))
 
 
 def _are_several(annotation: Any) -> bool:
@@ -117,7 +117,7 @@ def _is_number(annotation: Any) -> bool:
     if annotation in (int, float):
         return True
     if get_origin(annotation) is Literal:
-        return any(type(one) is int for one in get_args(annotation))
+        return any(type(word) is int for word in get_args(annotation))
     # A tuple's arguments are elements.
     return get_origin(annotation) in (Union, UnionType, Annotated) and any(map(_is_number, get_args(annotation)))
 
@@ -128,7 +128,7 @@ def _words(annotation: Any) -> tuple[str, ...]:
         return ("true", "false")
     arguments = get_args(annotation)
     if get_origin(annotation) is Literal:
-        return tuple(one for one in arguments if isinstance(one, str))
+        return tuple(word for word in arguments if isinstance(word, str))
     if get_origin(annotation) in (Union, UnionType, Annotated):
         return tuple(word for part in arguments for word in _words(part))
     return ()

@@ -114,11 +114,11 @@ def measurements_below(
     if problems:
         raise PlacedError(name, tuple(problems))
     columns = [cell.text for cell in header]
-    found = [_measurement(line, dict(zip(columns, cells, strict=False)), cells, columns) for line, cells in rows]
-    problems = sorted(one for each in found if isinstance(each, list) for one in each)
+    results = [_measurement(line, dict(zip(columns, cells, strict=False)), cells, columns) for line, cells in rows]
+    problems = sorted(problem for result in results if isinstance(result, list) for problem in result)
     if problems:
         raise PlacedError(name, tuple(problems))
-    measurements = tuple(each for each in found if isinstance(each, Measurement))
+    measurements = tuple(result for result in results if isinstance(result, Measurement))
     if not measurements:
         raise PlacedError(name, (PlacedProblem(line, 1, "missing-key", "no measurement below the header"),))
     return measurements
@@ -154,9 +154,9 @@ def _header_problems(line: int, header: Sequence[MeasuredCell]) -> Iterator[Plac
         return PlacedProblem(line, cell.column, kind, message)
 
     names = [cell.text for cell in header]
-    other = _OTHER_DELIMITER.search(names[0])
-    if other and len(names) == 1:
-        delimiter = _DELIMITER_NAMES.get(other.group(), "spaces")
+    delimiter_match = _OTHER_DELIMITER.search(names[0])
+    if delimiter_match and len(names) == 1:
+        delimiter = _DELIMITER_NAMES.get(delimiter_match.group(), "spaces")
         message = f"{delimiter} between the columns; expected commas, and a point in numbers: 4,48.7"
         yield problem(header[0], message, "syntax")
         return
@@ -170,7 +170,7 @@ def _header_problems(line: int, header: Sequence[MeasuredCell]) -> Iterator[Plac
             yield problem(cell, f"column {_shown(cell.text)}: {_meant(cell.text)}")
     for name in REQUIRED_COLUMNS:
         # A column with another name or unit has its own message already.
-        if name not in names and not any(_is_about(other, name) for other in names if other not in _COLUMNS):
+        if name not in names and not any(_is_about(column, name) for column in names if column not in _COLUMNS):
             yield problem(header[0], f"column {name} is missing; {_EXPECTED}", "missing-key")
 
 
@@ -183,7 +183,7 @@ def _meant(written: str) -> str:
     match = _QUANTITY.fullmatch(written.strip().lower())
     if match:
         quantity = match["quantity"]
-        name = next(one for one in _COLUMNS if one.startswith(quantity))
+        name = next(column for column in _COLUMNS if column.startswith(quantity))
         unit = match["unit"].strip(" _-.,()[]/")
         units = _SIZES if quantity == "payload" else _TIMES
         own = name.rpartition("_")[2]
@@ -225,7 +225,7 @@ def _measurement(
     half_name = "request_and_acknowledge_us"
     half_us = number(half_name, most=MAX_TIME_US) if half_name in values else None
     kind = values["transaction"].text.lower() if "transaction" in values else "write"
-    transaction = next((one for one in TRANSACTION_KINDS if one == kind), None)
+    transaction = next((known_kind for known_kind in TRANSACTION_KINDS if known_kind == kind), None)
     if transaction is None:
         refuse("transaction", "out-of-range", "expected read or write")
         return problems
@@ -281,12 +281,12 @@ def measurements_from(given: object, *, name: str) -> tuple[Measurement, ...]:
 
 def _given_columns(given: Any, name: str) -> tuple[list[Any], list[tuple[Any, ...]]]:
     names = list(given.keys())
-    columns = [_plain(given[one]) for one in names]
-    if not names or not all(isinstance(one, Iterable) and not isinstance(one, str) for one in columns):
+    columns = [_plain(given[column_name]) for column_name in names]
+    if not names or not all(isinstance(column, Iterable) and not isinstance(column, str) for column in columns):
         raise BusplanError(f"{name}: {_EXPECTED_TABLE}")
-    columns = [list(one) for one in columns]
-    if len({len(one) for one in columns}) > 1:
-        sizes = ", ".join(f"{key} has {len(one)} values" for key, one in zip(names, columns, strict=True))
+    columns = [list(column) for column in columns]
+    if len({len(column) for column in columns}) > 1:
+        sizes = ", ".join(f"{key} has {len(column)} values" for key, column in zip(names, columns, strict=True))
         raise BusplanError(f"{name}: {sizes}; expected one of each for a measurement")
     return names, list(zip(*columns, strict=True))
 

@@ -84,9 +84,9 @@ def findings(error: ValidationError | None, data: dict[str, Any]) -> Iterator[Ke
     KeyFinding
         One for each problem, in pydantic's order.
     """
-    found = () if error is None else (*_validated(error, data), *_of_nodes(data))
-    for one in dict.fromkeys((*found, *_unknown_kind(data))):
-        yield one._replace(named=named_path(data, one.path))
+    of_keys = () if error is None else (*_validated(error, data), *_of_nodes(data))
+    for finding in dict.fromkeys((*of_keys, *_unknown_kind(data))):
+        yield finding._replace(named=named_path(data, finding.path))
 
 
 def _of_nodes(data: dict[str, Any]) -> Iterator[KeyFinding]:
@@ -95,9 +95,9 @@ def _of_nodes(data: dict[str, Any]) -> Iterator[KeyFinding]:
     said = {"node", "payload", "group"}.intersection(data)
     if not isinstance(bus, dict) or "nodes" in bus or kind_of(data) is None:
         said.add("bus.nodes")  # or nobody can tell
-    for one in nodes_problems(said):
-        if one.key != "bus.nodes" or (isinstance(bus, dict) and kind_of(data) is not None):
-            yield _of_problem(one, (), model)
+    for problem in nodes_problems(said):
+        if problem.key != "bus.nodes" or (isinstance(bus, dict) and kind_of(data) is not None):
+            yield _of_problem(problem, (), model)
 
 
 def _of_problem(problem: Problem, path: KeyPath, model: type[BaseModel]) -> KeyFinding:
@@ -144,8 +144,8 @@ def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> tuple[KeyP
     path: list[int | str] = []
     members, section = [model], model
     for part in location:
-        if len(members) > 1 and any(part in _tag(one) for one in members):
-            members = [one for one in members if part in _tag(one)]
+        if len(members) > 1 and any(part in _tag(member) for member in members):
+            members = [member for member in members if part in _tag(member)]
             continue
         path.append(part)
         if isinstance(part, int):
@@ -164,7 +164,9 @@ def _tag(model: type[BaseModel]) -> tuple[Any, ...]:
 
 def _tags(path: KeyPath, section: type[BaseModel]) -> list[str]:
     """All values of the key `kind` of a union, as TOML."""
-    return [value_text(tag) for one in models_of(section.model_fields[str(path[-1])].annotation) for tag in _tag(one)]
+    return [
+        value_text(tag) for member in models_of(section.model_fields[str(path[-1])].annotation) for tag in _tag(member)
+    ]
 
 
 def _parsed(key: str) -> KeyPath:
@@ -231,23 +233,25 @@ def refusal(error: ValidationError | None, data: dict[str, Any], document: Docum
     document
         The document of the data.
     """
-    found = (_problem(document, one) for one in findings(error, data))
-    placed = sorted(found, key=lambda problem: (problem.line, problem.column))
+    problems = (_problem(document, finding) for finding in findings(error, data))
+    placed = sorted(problems, key=lambda problem: (problem.line, problem.column))
     return PlacedError(document.name, tuple(placed))
 
 
-def _problem(document: Document, found: KeyFinding) -> PlacedProblem:
-    key = _shortened(found.key, limit=100)
-    written = _shortened(_written(document, found)) if found.shows_value else ""
+def _problem(document: Document, finding: KeyFinding) -> PlacedProblem:
+    key = _shortened(finding.key, limit=100)
+    written = _shortened(_written(document, finding)) if finding.shows_value else ""
     subject = f"{key} = {written}" if written else key
-    line, column, *marked = document.spot(found.path, marks_key=found.kind == "unknown-key")
-    return PlacedProblem(line, column, found.kind, f"{subject}: {found.message}", found.key, (marked[0], marked[1]))
+    line, column, *marked = document.spot(finding.path, marks_key=finding.kind == "unknown-key")
+    return PlacedProblem(
+        line, column, finding.kind, f"{subject}: {finding.message}", finding.key, (marked[0], marked[1])
+    )
 
 
-def _written(document: Document, found: KeyFinding) -> str:
+def _written(document: Document, finding: KeyFinding) -> str:
     """Source text of the value; empty for a table without a text of its own."""
-    place = document.places.get(found.path)
-    if place is None or (place.value_start == place.key_start and isinstance(found.path[-1], str)):
+    place = document.places.get(finding.path)
+    if place is None or (place.value_start == place.key_start and isinstance(finding.path[-1], str)):
         return ""
     return document.text[place.value_start : place.value_end]
 
@@ -265,7 +269,7 @@ def refused_data(error: ValidationError | None, data: dict[str, Any]) -> Busplan
     error, data
         As for `findings`.
     """
-    return BusplanError(*(f"{one.key}: {one.message}" for one in findings(error, data)))
+    return BusplanError(*(f"{finding.key}: {finding.message}" for finding in findings(error, data)))
 
 
 def refused_changes(
@@ -275,18 +279,18 @@ def refused_changes(
     sources: dict[KeyPath, str] = {
         path_of(data, key): origin.get(key, f"{key} {value}") for key, value in changes.items()
     }
-    return BusplanError(*(_of_changes(one, sources, kind=kind_of(data)) for one in findings(error, data)))
+    return BusplanError(*(_of_changes(finding, sources, kind=kind_of(data)) for finding in findings(error, data)))
 
 
-def _of_changes(found: KeyFinding, sources: dict[KeyPath, str], *, kind: str | None) -> str:
-    """Message for a problem of a changed key, of one around or inside it, or of one that the changes do not suit."""
-    if found.path in sources:
-        if found.kind == "unknown-key" and found.key not in sources[found.path]:
+def _of_changes(finding: KeyFinding, sources: dict[KeyPath, str], *, kind: str | None) -> str:
+    """Message for a problem after changes: of a changed key, of a key around or inside it, or of any other key."""
+    if finding.path in sources:
+        if finding.kind == "unknown-key" and finding.key not in sources[finding.path]:
             # The option stands for a key that its user did not write.
-            what = str(found.path[-1]).replace("_", " ")
-            return f"{sources[found.path]}: a bus of kind {kind} has no {what}"
-        return f"{sources[found.path]}: {found.message}"
-    near = [source for path, source in sources.items() if all(map(eq, path, found.path))]
+            what = str(finding.path[-1]).replace("_", " ")
+            return f"{sources[finding.path]}: a bus of kind {kind} has no {what}"
+        return f"{sources[finding.path]}: {finding.message}"
+    near = [source for path, source in sources.items() if all(map(eq, path, finding.path))]
     if near:
-        return f"{' and '.join(near)}: {found.key}: {found.message}"
-    return f"with {' and '.join(sources.values())}, {found.key}: {found.message}"
+        return f"{' and '.join(near)}: {finding.key}: {finding.message}"
+    return f"with {' and '.join(sources.values())}, {finding.key}: {finding.message}"

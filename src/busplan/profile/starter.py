@@ -1,4 +1,4 @@
-"""A new profile: of a machine of one's own, or from a shipped one with its comments and layout."""
+"""Text of a new profile: of a new machine, or a copy of a shipped profile with its comments and layout."""
 
 import re
 from typing import Final, NamedTuple
@@ -128,7 +128,7 @@ def shared_out(axes: int, *, nodes: int) -> tuple[NodeGroup, ...]:
 
 
 def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
-    """Text of a profile of a machine that nobody has measured; every value that rests on nothing says so.
+    """Text of a profile of an unmeasured machine; every assumed value says so.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ _OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
 """Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
 PERIOD_KEY: Final = "cycle.period_us"
 _SOURCE: Final = "_source"
-"""Where a profile keeps its document and the keys that are no longer as there: no field, so no part of its value."""
+"""Attribute of a profile that holds its document and the keys changed since; no field, so no part of its value."""
 
 
 class LoadedProfile(NamedTuple):
@@ -107,13 +107,13 @@ def validate(document: Document) -> Profile:
         Not TOML or not a profile; one message for each problem, in the order of their places.
     """
     data = document.data()
-    found = _checked(data)
-    if isinstance(found, Profile):
-        found.__dict__[_SOURCE] = document, frozenset()
-        return found
+    result = _checked(data)
+    if isinstance(result, Profile):
+        result.__dict__[_SOURCE] = document, frozenset()
+        return result
     from busplan.profile.problems import refusal  # loaded only for an invalid profile
 
-    raise refusal(found, data, document)
+    raise refusal(result, data, document)
 
 
 def profile_of(data: TomlTable) -> Profile:
@@ -129,22 +129,22 @@ def profile_of(data: TomlTable) -> Profile:
     BusplanError
         No profile of its kind; each problem names its key.
     """
-    found = _checked(data)
-    if isinstance(found, Profile):
-        return found
+    result = _checked(data)
+    if isinstance(result, Profile):
+        return result
     from busplan.profile.problems import refused_data  # as above
 
-    raise refused_data(found, data)
+    raise refused_data(result, data)
 
 
 def _checked(data: TomlTable) -> Profile | ValidationError | None:
-    """The profile of some data, or what is wrong with it: an error of pydantic, or None for an unknown kind alone."""
+    """The profile of some data, or its error from pydantic; None if only the kind of bus is unknown."""
     kind = kind_of(data)
     try:
-        found = profile_model(kind).model_validate(data)
+        valid = profile_model(kind).model_validate(data)
     except ValidationError as error:
         return error
-    return None if kind is None else found
+    return None if kind is None else valid
 
 
 def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, str] | None = None) -> Profile:
@@ -171,15 +171,15 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     for key, value in changes.items():
         table, last = holder(data, key, name=origin.get(key))
         table[last] = value
-    found = _checked(data)
-    if isinstance(found, Profile):
+    result = _checked(data)
+    if isinstance(result, Profile):
         if _SOURCE in profile.__dict__:
             document, before = profile.__dict__[_SOURCE]
-            found.__dict__[_SOURCE] = document, before | set(changes)
-        return found
+            result.__dict__[_SOURCE] = document, before | set(changes)
+        return result
     from busplan.profile.problems import refused_changes  # as above
 
-    raise refused_changes(found, data, changes, origin)
+    raise refused_changes(result, data, changes, origin)
 
 
 def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Profile]:
@@ -192,7 +192,10 @@ def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Pro
     """
     if periods_us is None:
         return [profile]
-    return [override(profile, {PERIOD_KEY: one}, origin={PERIOD_KEY: f"period {one}"}) for one in periods_us]
+    return [
+        override(profile, {PERIOD_KEY: period_us}, origin={PERIOD_KEY: f"period {period_us}"})
+        for period_us in periods_us
+    ]
 
 
 def comment_grade(profile: Profile, key: str) -> Grade | None:
@@ -206,7 +209,7 @@ def comment_grade(profile: Profile, key: str) -> Grade | None:
         Dotted key.
     """
     document, changed = profile.__dict__.get(_SOURCE, (None, ()))
-    if document is None or any(key == one or key.startswith(f"{one}.") for one in changed):
+    if document is None or any(key == changed_key or key.startswith(f"{changed_key}.") for changed_key in changed):
         return None
     grades: dict[str, Grade] = document.grades
     return grades.get(key)

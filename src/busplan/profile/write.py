@@ -34,9 +34,9 @@ def value_text(value: object) -> str:
         return repr(float(value))
     if isinstance(value, str):
         # TOML has JSON's escapes; for other characters that are not printable, it needs \U.
-        return printable(json.dumps(value, ensure_ascii=False), write=lambda one: f"\\U{ord(one):08x}")
+        return printable(json.dumps(value, ensure_ascii=False), write=lambda character: f"\\U{ord(character):08x}")
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{key} = {value_text(one)}' for key, one in value.items())}}}"
+        return f"{{{', '.join(f'{key} = {value_text(inner)}' for key, inner in value.items())}}}"
     if isinstance(value, Sequence):
         return f"[{', '.join(map(value_text, value))}]"
     raise TypeError(f"{value!r} is no value of a profile")
