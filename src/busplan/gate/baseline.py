@@ -30,7 +30,7 @@ _WORDS: Final = ("schema_version", "name", "description")
 
 
 class Record(NamedTuple):
-    """What a baseline holds of one profile."""
+    """A baseline's entry for one profile."""
 
     figures: Mapping[str, float]
     """By name: "paper.max_axes"."""
@@ -40,14 +40,14 @@ class Record(NamedTuple):
 
 def figures_of(subject: Subject) -> dict[str, float]:
     """Figures of a profile to record, by name."""
-    found: dict[str, float | None] = {}
-    for one in sorted((subject.deciding, *subject.others), key=lambda one: one.timing_model):
+    figures: dict[str, float | None] = {}
+    for capacity in sorted((subject.deciding, *subject.others), key=lambda capacity: capacity.timing_model):
         for name in ("max_axes", "margin_us", "safe_axes", "margin_corrected_us"):
-            found[f"{one.timing_model}.{name}"] = getattr(one, name)
-        for group in one.groups:
+            figures[f"{capacity.timing_model}.{name}"] = getattr(capacity, name)
+        for group in capacity.groups:
             for name in ("max_nodes", "safe_nodes"):
-                found[f"{one.timing_model}.group.{group.name}.{name}"] = getattr(group, name)
-    return {name: value for name, value in found.items() if value is not None}
+                figures[f"{capacity.timing_model}.group.{group.name}.{name}"] = getattr(group, name)
+    return {name: value for name, value in figures.items() if value is not None}
 
 
 def keys_of(profile: Profile) -> dict[str, object]:
@@ -127,27 +127,27 @@ def _are_keys(value: object) -> bool:
 def _is_value(value: object) -> bool:
     """Whether a value may be that of a key: a scalar or an array of scalars."""
     return all(
-        isinstance(one, bool | str | int) or (isinstance(one, float) and isfinite(one))
-        for one in (value if isinstance(value, list) else [value])
+        isinstance(scalar, bool | str | int) or (isinstance(scalar, float) and isfinite(scalar))
+        for scalar in (value if isinstance(value, list) else [value])
     )
 
 
 def _are_figures(value: object) -> bool:
     return isinstance(value, dict) and all(
-        isinstance(one, int | float) and not isinstance(one, bool) and abs(one) <= float_info.max
-        for one in value.values()
+        isinstance(figure, int | float) and not isinstance(figure, bool) and abs(figure) <= float_info.max
+        for figure in value.values()
     )
 
 
 def write_baseline(recorded: Mapping[str, Record]) -> str:
     """Write a baseline, sorted by path so that diffs are small."""
-    each = {path: recorded[path] for path in sorted(recorded)}
+    by_path = {path: recorded[path] for path in sorted(recorded)}
     document = {
         "schema": _SCHEMA,
         "command": "baseline",
         "models": MODELS,
-        "profiles": {path: dict(one.figures) for path, one in each.items()},
-        "keys": {path: dict(one.keys) for path, one in each.items() if one.keys is not None},
+        "profiles": {path: dict(record.figures) for path, record in by_path.items()},
+        "keys": {path: dict(record.keys) for path, record in by_path.items() if record.keys is not None},
     }
     return to_json(document)
 
@@ -207,20 +207,20 @@ def _is_less(value: float, before: float) -> bool:
 def _causes(subject: Subject, before: Mapping[str, object], lost: Mapping[str, object]) -> dict[str, ChangedValue]:
     """Changed keys whose recorded value alone would win back some of what was lost; all of them if none would."""
     changed = _changed(subject, before)
-    found = {key: one for key, one in changed.items() if _wins_back(subject, key, one.before, lost)}
-    return found or changed
+    causes = {key: change for key, change in changed.items() if _wins_back(subject, key, change.before, lost)}
+    return causes or changed
 
 
 def _changed(subject: Subject, before: Mapping[str, object]) -> dict[str, ChangedValue]:
-    """Keys with another value than recorded; one that a file does not say has its default."""
+    """Keys whose value differs from the recorded one; a key that a file leaves out has its default."""
     profile = subject.profile
     values, said = dict(flat(profile.model_dump(mode="json"))), keys_of(profile)
-    found: dict[str, ChangedValue] = {}
+    changed: dict[str, ChangedValue] = {}
     for key in dict.fromkeys((*said, *before)):
-        one = ChangedValue(before[key] if key in before else default_of(profile, key), values.get(key))
-        if one.before != one.now:
-            found[key] = one
-    return found
+        change = ChangedValue(before[key] if key in before else default_of(profile, key), values.get(key))
+        if change.before != change.now:
+            changed[key] = change
+    return changed
 
 
 def _wins_back(subject: Subject, key: str, value: object, lost: Mapping[str, object]) -> bool:
@@ -267,9 +267,9 @@ def _order(name: str) -> int:
 
 def _fell(figure: str, before: float, now: float) -> str:
     section, _, last = figure.rpartition(".")
-    one = _NAMES[last]
+    described = _NAMES[last]
     of_group = f" of {section.partition('.')[2]}" if section else ""
-    if not one.unit:
-        return f"{one.label}{of_group} from {before:g} to {now:g}"
+    if not described.unit:
+        return f"{described.label}{of_group} from {before:g} to {now:g}"
     was, is_ = told_apart(before, now)
-    return f"{one.label}{of_group} from {was} to {is_} {one.unit}"
+    return f"{described.label}{of_group} from {was} to {is_} {described.unit}"

@@ -13,37 +13,37 @@ from busplan.sections.execution import TableExecution
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle does not fit, whatever is not known of it."""
-    one, bus = subject.deciding, bus_of(subject.profile)
-    if one.verdict != DOES_NOT_FIT:
+    deciding, bus = subject.deciding, bus_of(subject.profile)
+    if deciding.verdict != DOES_NOT_FIT:
         return
-    broken = [limit for limit in map(bus.limit, one.exceeded) if limit is not None]
+    broken = [limit for limit in map(bus.limit, deciding.exceeded) if limit is not None]
     alone = [limit for limit in broken if not limit.has_rule]
     for limit in alone:
         yield RuleProblem("cycle.period_us", limit.words(network_of(subject.profile)), limit.way_out)
-    if not alone and (TIME in one.exceeded or not broken):
-        yield RuleProblem("cycle.period_us", f"the cycle {overrun(one)}", *subject.cure())
+    if not alone and (TIME in deciding.exceeded or not broken):
+        yield RuleProblem("cycle.period_us", f"the cycle {overrun(deciding)}", *subject.cure())
 
 
 def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle may fit, but what is known of it does not show so."""
-    one, reserve, bus = subject.deciding, subject.profile.limits.reserve, bus_of(subject.profile)
-    if one.verdict != NOT_SHOWN:
+    deciding, reserve, bus = subject.deciding, subject.profile.limits.reserve, bus_of(subject.profile)
+    if deciding.verdict != NOT_SHOWN:
         return
-    for limit in map(bus.limit, limits_behind(one)):
+    for limit in map(bus.limit, limits_behind(deciding)):
         if limit is not None and not limit.has_rule:
             words = limit.words(network_of(subject.profile))
             yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", limit.way_out)
-    if TIME in (one.not_shown or ()):
-        asked = f"{margin(one)}, limits.reserve asks for {reserve * one.available_us:.1f} us"
-        words = asked if reserve else overrun(one)
+    if TIME in (deciding.not_shown or ()):
+        asked = f"{margin(deciding)}, limits.reserve asks for {reserve * deciding.available_us:.1f} us"
+        words = asked if reserve else overrun(deciding)
         yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", *subject.cure())
 
 
 def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The slice is fuller than [limits] allows."""
-    limit, one = subject.profile.limits.max_utilisation, subject.deciding
-    if limit is not None and not (limit and fits_in(one.required_us / limit, available_us=one.available_us)):
-        used, allowed = told_apart(100 * one.utilisation, 100 * limit)
+    limit, deciding = subject.profile.limits.max_utilisation, subject.deciding
+    if limit is not None and not (limit and fits_in(deciding.required_us / limit, available_us=deciding.available_us)):
+        used, allowed = told_apart(100 * deciding.utilisation, 100 * limit)
         words = f"{used}% of the slice is used, {allowed}% allowed"
         yield RuleProblem("limits.max_utilisation", words, *subject.cure())
 
@@ -91,9 +91,9 @@ def _room(subject: RuleSubject, counts: Any) -> Mending:
 
 def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A node is not done once a cycle, where the bus does not wait for it."""
-    one, network = subject.deciding, network_of(subject.profile)
-    is_broken = NODE in one.exceeded
-    if is_broken or NODE in (one.not_shown or ()):
+    deciding, network = subject.deciding, network_of(subject.profile)
+    is_broken = NODE in deciding.exceeded
+    if is_broken or NODE in (deciding.not_shown or ()):
         for group in slow_groups(network):
             words = busy_words(group, network)
             name = "time_us" if isinstance(group.node.execution, TableExecution) else "base_us"
@@ -103,11 +103,11 @@ def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
     """Much of the required time, or of what is not known of it, is an assumption."""
-    for one in heavy_assumptions(subject.deciding, subject.profile):
-        what = "an assumption" if len(one.keys) == 1 else "an assumption of several"
-        for key in one.keys:
-            at = f"{key}.grade" if one.is_execution else key
-            yield RuleProblem(at, f"{what}, which {one.carries}", "measure it")
+    for assumption in heavy_assumptions(subject.deciding, subject.profile):
+        what = "an assumption" if len(assumption.keys) == 1 else "an assumption of several"
+        for key in assumption.keys:
+            at = f"{key}.grade" if assumption.is_execution else key
+            yield RuleProblem(at, f"{what}, which {assumption.carries}", "measure it")
 
 
 CHECKS: Final[Mapping[str, Callable[[RuleSubject], Iterator[RuleProblem]]]] = {

@@ -69,7 +69,7 @@ def check(
     paths
         One or several files, folders (every *.toml below with a `schema_version`), shipped names or a `Profile` each. A
         `Profile` is checked as the file that `busplan` would write of it, NAME.toml. Or what
-        `busplan.profile.collect.collect` found.
+        `busplan.profile.collect.collect` returns.
     circle
         Run the circle test of profiles that ask for one.
     circle_steps
@@ -118,25 +118,25 @@ def check(
     }
     check_file = partial(check_source, recorded=recorded, options=options)
     if executor is None:
-        found = list(map(check_file, collection.sources))
+        results = list(map(check_file, collection.sources))
     else:
         # Only this process has standard input.
         own = {source: check_file(source) for source in collection.sources if str(source.path) == "-"}
         others = [source for source in collection.sources if source not in own]
-        results = own | dict(zip(others, executor.map(check_file, others), strict=True))
-        found = [results[source] for source in collection.sources]
+        by_source = own | dict(zip(others, executor.map(check_file, others), strict=True))
+        results = [by_source[source] for source in collection.sources]
     for profile in profiles:
         document = Document(f"{profile.name}.toml", profile_text(profile))
-        found.append(check_document(document, baseline=record_of(document.name, recorded), **options))
-    return CheckAnswer(tuple(found), changed, len(collection.skipped) if skip_others else 0)
+        results.append(check_document(document, baseline=record_of(document.name, recorded), **options))
+    return CheckAnswer(tuple(results), changed, len(collection.skipped) if skip_others else 0)
 
 
 def _collected(paths: ProfileLike | Iterable[ProfileLike], *, skip_others: bool) -> tuple[Collection, list[Profile]]:
     """Files of the arguments, and the profiles that are in memory."""
     # A profile is iterable, too: over its sections.
     several = [paths] if isinstance(paths, str | os.PathLike | Profile) else items(paths, name="paths")
-    profiles = [one for one in several if isinstance(one, Profile)]
-    files = [argument(one) for one in several if not isinstance(one, Profile)]
+    profiles = [profile for profile in several if isinstance(profile, Profile)]
+    files = [argument(profile) for profile in several if not isinstance(profile, Profile)]
     return collect(files, skip_others=skip_others), profiles
 
 

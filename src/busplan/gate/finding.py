@@ -26,7 +26,7 @@ class Finding(NamedTuple):
     rule: str
     severity: Severity
     message: str
-    """What is wrong and how it is mended, in one line."""
+    """Problem and remedy, in one line."""
     key: str
     line: int
     column: int
@@ -118,7 +118,7 @@ class Subject:
 
     @property
     def others_fit(self) -> tuple[tuple[str, bool], ...]:
-        """The other timing models, each with whether the cycle fits, which takes no figures to tell."""
+        """The other timing models, each with whether the cycle fits; no figures are computed for that."""
         given_us = available_us(network_of(self.profile))
         return tuple(
             (model, bool(fits_in(cycle_of(self.profile, model=model).required_us, available_us=given_us)))
@@ -145,14 +145,14 @@ class Subject:
 
     @cached_property
     def _cure(self) -> Mending:
-        found = cure(self.profile, circle_steps=self.circle_steps)
-        if found.changes is None:
-            return Mending(f"no change of {listed(changeable(self.profile), 'and')} is a cure: {found.why}")
-        lines = tuple(f"{key} = {short_text(value)}" for key, value in found.changes.items())
-        if found.circle_failures:
-            return Mending(f"with {', '.join(lines)} it fits, and then {found.circle_failures[0]}; `plan` tries more")
+        mending = cure(self.profile, circle_steps=self.circle_steps)
+        if mending.changes is None:
+            return Mending(f"no change of {listed(changeable(self.profile), 'and')} is a cure: {mending.why}")
+        lines = tuple(f"{key} = {short_text(value)}" for key, value in mending.changes.items())
+        if mending.circle_failures:
+            return Mending(f"with {', '.join(lines)} it fits, and then {mending.circle_failures[0]}; `plan` tries more")
         words = (
-            "the period must change" if PERIOD in found.changes else "",
-            UNTESTED_CIRCLE if found.circle_failures is None else "",
+            "the period must change" if PERIOD in mending.changes else "",
+            UNTESTED_CIRCLE if mending.circle_failures is None else "",
         )
         return Mending("; ".join(filter(None, words)), lines)

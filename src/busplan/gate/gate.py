@@ -59,37 +59,45 @@ def suppressions(document: Document) -> Iterator[Suppression]:
         yield Suppression(codes, match["reason"].strip(), spot, line + 1 if alone else line)
 
 
-def suppress(found: Iterable[Violation], document: Document, *, ran: set[str]) -> tuple[list[Violation], list[Finding]]:
+def suppress(
+    violations: Iterable[Violation], document: Document, *, ran: set[str]
+) -> tuple[list[Violation], list[Finding]]:
     """Remove suppressed problems, and find what is wrong with the suppressions themselves.
 
     Parameters
     ----------
-    found
+    violations
         All problems of the document.
     document
         The document.
     ran
         Codes of the rules that have run: a suppression of others may have an effect.
     """
-    left = list(found)
+    left = list(violations)
     own: list[Finding] = []
-    for one in suppressions(document):
-        if not one.codes:
+    for comment in suppressions(document):
+        if not comment.codes:
             way_out = "write # busplan: ignore[CODE] reason"
-            own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, "the comment suppresses nothing", way_out))
-        elif not one.reason:
+            own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, "the comment suppresses nothing", way_out))
+        elif not comment.reason:
             way_out = "add why behind the bracket"
-            own.append(_finding(SUPPRESSION_WITHOUT_REASON, one, "the suppression says no reason", way_out))
-        for code in one.codes:
-            hit = [each for each in left if each.rule.code == code and each.spot.line == one.of_line]
-            left = [each for each in left if each not in hit]
+            own.append(_finding(SUPPRESSION_WITHOUT_REASON, comment, "the suppression says no reason", way_out))
+        for code in comment.codes:
+            hit = [
+                violation
+                for violation in left
+                if violation.rule.code == code and violation.spot.line == comment.of_line
+            ]
+            left = [violation for violation in left if violation not in hit]
             if code not in all_rules():
-                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code or 'nothing'} is no code of a rule"))
+                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, f"{code or 'nothing'} is no code of a rule"))
             elif code in NEVER_SUPPRESSED:
-                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code} cannot be suppressed, it must be mended"))
+                own.append(
+                    _finding(SUPPRESSION_WITHOUT_EFFECT, comment, f"{code} cannot be suppressed, it must be mended")
+                )
             elif not hit and code in ran:
-                message = f"{code} has nothing to suppress on line {one.of_line}"
-                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, message))
+                message = f"{code} has nothing to suppress on line {comment.of_line}"
+                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, message))
     return left, own
 
 
@@ -208,22 +216,22 @@ def check_document(
         return FileResult(document.name, profile.name, (), {}, failure=failure)
     subject = Subject(LoadedProfile(profile, document), changes, circle_steps=circle_steps if with_circle else None)
     own = cycle_rules(profile.bus.kind)
-    found = [_placed(document, rule, problem) for rule in own if rule.check for problem in rule.check(subject)]
+    violations = [_placed(document, rule, problem) for rule in own if rule.check for problem in rule.check(subject)]
     ran = {rule.code for rule in own}
     problems = list(circle.circle_problems(subject))
-    found += [_placed(document, all_rules()[code], problem) for code, problem in problems]
+    violations += [_placed(document, all_rules()[code], problem) for code, problem in problems]
     ran |= circle.answered(subject, problems)
     if baseline is not None:
         lost = regression(subject, baseline)
-        found += [_placed(document, BASELINE, problem) for problem in lost]
+        violations += [_placed(document, BASELINE, problem) for problem in lost]
         ran.add(BASELINE.code)
     if changes.each:
         # What a comment suppresses is of the file as it is.
         ran = set()
-    left, of_comments = suppress(found, document, ran=ran)
+    left, of_comments = suppress(violations, document, ran=ran)
     findings = [*(_said(placed, subject) for placed in left), *of_comments]
-    one = subject.deciding
-    fit = Fit(one.verdict, one.margin_corrected_us, one.uncertainty_us)
+    deciding = subject.deciding
+    fit = Fit(deciding.verdict, deciding.margin_corrected_us, deciding.uncertainty_us)
     result = _result(document, profile.name, findings)._replace(fit=fit)
     return result._replace(figures=figures_of(subject), keys=keys_of(profile)) if record else result
 
@@ -231,18 +239,18 @@ def check_document(
 def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
     """Make the result for a file that is not text."""
     lines = content.decode("utf-8-sig", errors="replace").split("\n")
-    found = tuple(_of_file(error))
-    return FileResult(name, None, found, {}, tuple(lines[finding.line - 1] for finding in found))
+    findings = tuple(_of_file(error))
+    return FileResult(name, None, findings, {}, tuple(lines[finding.line - 1] for finding in findings))
 
 
 def _of_file(error: PlacedError) -> Iterator[Finding]:
     last = len(error.placed) - 1
-    for number, one in enumerate(error.placed):
-        rule = BY_KIND[one.kind]
+    for number, problem in enumerate(error.placed):
+        rule = BY_KIND[problem.kind]
         more = f"; {error.hidden} more problems of this file are not listed" if error.hidden and number == last else ""
-        spot = Spot(one.line, one.column, *(one.marked or (one.column, one.column + 1)))
-        words = one.message + more
-        yield finding_of(rule, RuleProblem(one.key, words), spot, words=words)
+        spot = Spot(problem.line, problem.column, *(problem.marked or (problem.column, problem.column + 1)))
+        words = problem.message + more
+        yield finding_of(rule, RuleProblem(problem.key, words), spot, words=words)
 
 
 def _placed(document: Document, rule: Rule, problem: RuleProblem) -> Violation:
@@ -257,7 +265,7 @@ def _said(placed: Violation, subject: Subject) -> Finding:
     return finding_of(rule, problem, spot, words=f"{problem.key}: {message}{subject.origin}")
 
 
-def _result(document: Document, name: str | None, found: list[Finding]) -> FileResult:
-    ordered = tuple(sorted(found, key=lambda one: (one.line, one.column, one.code, one.message)))
+def _result(document: Document, name: str | None, findings: list[Finding]) -> FileResult:
+    ordered = tuple(sorted(findings, key=lambda finding: (finding.line, finding.column, finding.code, finding.message)))
     lines = document.text.split("\n") if ordered else []
     return FileResult(document.name, name, ordered, {}, tuple(lines[finding.line - 1] for finding in ordered))

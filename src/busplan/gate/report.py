@@ -59,17 +59,17 @@ class CheckReport(NamedTuple):
     @property
     def located(self) -> tuple[Located, ...]:
         """All findings by file and place."""
-        found = []
+        located = []
         for file in self.files:
             seen: dict[tuple[str, str], int] = {}
             for finding, source in zip(file.findings, file.source, strict=True):
                 same = (finding.code, finding.key)
                 number = seen[same] = seen.get(same, -1) + 1
                 mark = "\0".join((file.path, *same, str(number)))
-                found.append(
+                located.append(
                     Located(file.path, finding, source, sha256(mark.encode("utf-8", "surrogatepass")).hexdigest())
                 )
-        return tuple(found)
+        return tuple(located)
 
 
 def check_report(report: CheckReport) -> Report:

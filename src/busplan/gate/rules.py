@@ -61,8 +61,8 @@ def all_rules() -> Mapping[str, Rule]:
 
 @cache
 def _by_code(kinds: tuple[Bus, ...]) -> Mapping[str, Rule]:
-    found = (*OWN.values(), *(rule for kind in kinds for rule in kind.rules))
-    return MappingProxyType({rule.code: rule for rule in sorted(found, key=lambda rule: rule.code)})
+    rules = (*OWN.values(), *(rule for kind in kinds for rule in kind.rules))
+    return MappingProxyType({rule.code: rule for rule in sorted(rules, key=lambda rule: rule.code)})
 
 
 def cycle_rules(kind: str) -> tuple[Rule, ...]:

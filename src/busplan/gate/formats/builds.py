@@ -59,11 +59,11 @@ def _case(suite: Element, file: FileResult) -> None:
     if file.failure is not None:
         SubElement(case, "error", message=_clean(file.failure))
     for severity, tag in (("error", "failure"), ("warning", "system-out")):
-        found = [finding for finding in file.findings if finding.severity == severity]
-        if not found:
+        findings = [finding for finding in file.findings if finding.severity == severity]
+        if not findings:
             continue
-        said = {"message": _clean(found[0].message), "type": found[0].code} if tag == "failure" else {}
-        SubElement(case, tag, said).text = _clean("\n".join(finding_line(file.path, finding) for finding in found))
+        said = {"message": _clean(findings[0].message), "type": findings[0].code} if tag == "failure" else {}
+        SubElement(case, tag, said).text = _clean("\n".join(finding_line(file.path, finding) for finding in findings))
 
 
 def _clean(text: str) -> str:

@@ -110,7 +110,9 @@ class _Shown(NamedTuple):
 def _shown(source: str, start: int, end: int, width: int) -> _Shown:
     """Cut a source line around what is marked; tabs become spaces, so that the carets stand below it."""
     parts = source[:start], source[start:end], source[end:]
-    before, marked, after = (printable(part, write=lambda one: _INDENT if one == "\t" else " ") for part in parts)
+    before, marked, after = (
+        printable(part, write=lambda character: _INDENT if character == "\t" else " ") for part in parts
+    )
     if _columns(before + marked + after) <= width:
         return _Shown(before, marked, after)
     room = width - 2 * len(_CUT)
