@@ -77,7 +77,7 @@ def signed_bar(value: float, *, least: float, most: float, title: str) -> str:
     """
     root = drawing(title, css="chart bars")
     root.set("height", str(_HEIGHT))
-    zero, end = (100 * (one - least) / (most - least) for one in (0.0, value))
+    zero, end = (100 * (mark - least) / (most - least) for mark in (0.0, value))
     box = {"x": f"{min(zero, end):.5g}%", "width": f"{abs(end - zero):.5g}%", "y": "2", "height": str(_HEIGHT - 4)}
     SubElement(root, "rect", {**box, "class": "takes" if value >= 0 else "hides"})
     x = f"{zero:.5g}%"

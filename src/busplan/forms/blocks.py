@@ -355,10 +355,10 @@ def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
     words = [piece[0] for piece in pieces]
     # The template may end in a part.
     words += [""] * (pieces[-1][1] is not None)
-    found: list[Part] = [words[0]]
+    woven: list[Part] = [words[0]]
     for part, behind in zip(parts, words[1:], strict=True):
-        found += [part, behind]
-    return Sentence(tuple(one for one in found if one != ""), state)
+        woven += [part, behind]
+    return Sentence(tuple(part for part in woven if part != ""), state)
 
 
 def joined(*sentences: Sentence, by: str = " ") -> Sentence:

@@ -35,12 +35,12 @@ def page(report: Report) -> str:
     str
         The whole document. The same answer always gives the same document.
     """
-    found = shown_blocks(report)
+    blocks = shown_blocks(report)
     return _template("page.html.j2").render(
         title=report.title,
-        blocks=found,
+        blocks=blocks,
         program=f"busplan {__version__}",
-        colours=Markup(_colours(found)),  # noqa: S704 - our own constants
+        colours=Markup(_colours(blocks)),  # noqa: S704 - our own constants
     )
 
 
@@ -52,12 +52,12 @@ def fragment(report: Report) -> str:
     report
         The answer.
     """
-    found = shown_blocks(report)
+    blocks = shown_blocks(report)
     page = files("busplan.forms") / "templates"
     chart, style = ((page / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
     # The rules are nested in one of the piece; what the page's root has, it has itself.
-    own = f"{chart}{_colours(found)}{style}".replace(":root", "&")
-    return _template("fragment.html.j2").render(blocks=found, style=Markup(own))  # noqa: S704 - as above
+    own = f"{chart}{_colours(blocks)}{style}".replace(":root", "&")
+    return _template("fragment.html.j2").render(blocks=blocks, style=Markup(own))  # noqa: S704 - as above
 
 
 def _template(name: str) -> Template:
@@ -66,7 +66,7 @@ def _template(name: str) -> Template:
 
 @cache
 def _environment() -> Environment:
-    """What all templates share, and each of them once it is compiled."""
+    """Jinja's environment of all templates, which keeps each one compiled."""
     environment = Environment(
         loader=PackageLoader("busplan.forms"),
         autoescape=True,
@@ -76,22 +76,22 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    for each in (*_TYPES, *_BLOCKS):
-        kind = getattr(made_of, each)
-        environment.tests[each.lower()] = lambda one, kind=kind: isinstance(one, kind)
+    for name in (*_TYPES, *_BLOCKS):
+        kind = getattr(made_of, name)
+        environment.tests[name.lower()] = lambda block, kind=kind: isinstance(block, kind)
     environment.filters |= {
         "exact": lambda value: json_text(value.value),
         "exact_unit": lambda value: unit_of(value.key),
         "figure_text": figure_text,
         "unit": unit_text,
         "plain": sentence_text,
-        "runs": lambda found: list(_runs(found)),
+        "runs": lambda blocks: list(_runs(blocks)),
         "groups": _groups,
         "words": cell_text,
         "bar": _bar,
         # SVG from `forms.svg` is escaped already.
         "svg": Markup,
-        "holds_sections": lambda section: any(isinstance(one, Chapter) for one in section.blocks),
+        "holds_sections": lambda section: any(isinstance(block, Chapter) for block in section.blocks),
     }
     return environment
 
@@ -135,8 +135,8 @@ def _role(block: Block) -> str:
 
 def _groups(table: Table) -> list[tuple[str, int]]:
     """Group headings with the number of columns that each spans; empty if no column has a group."""
-    found = [(name, len(list(run))) for name, run in groupby(column.group for column in table.columns)]
-    return found if any(name for name, _ in found) else []
+    groups = [(name, len(list(run))) for name, run in groupby(column.group for column in table.columns)]
+    return groups if any(name for name, _ in groups) else []
 
 
 def _bar(bar: Bar) -> Markup:

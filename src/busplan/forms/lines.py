@@ -78,21 +78,21 @@ def wrapped(line: Line, width: int | None, *, hang: int = 0) -> list[Line]:
 
     Examples
     --------
-    >>> [one.text for one in wrapped(Line("Margin 230.064 us +/- 6.311 us of 500 us."), 20)]
+    >>> [line.text for line in wrapped(Line("Margin 230.064 us +/- 6.311 us of 500 us."), 20)]
     ['Margin 230.064 us', '+/- 6.311 us of', '500 us.']
     """
     if width is None or len(line.text) <= width:
         return [line]
-    found: list[Line] = []
+    lines: list[Line] = []
     for start, end in _spans(line.text, width, hang):
-        indent = hang if found else 0
+        indent = hang if lines else 0
         marks = (
             Mark(max(mark.start, start) - start + indent, min(mark.end, end) - start + indent, mark.tone)
             for mark in line.marks
             if mark.start < end and mark.end > start
         )
-        found.append(Line(" " * indent + line.text[start:end], line.tone, tuple(marks)))
-    return found
+        lines.append(Line(" " * indent + line.text[start:end], line.tone, tuple(marks)))
+    return lines
 
 
 def _spans(text: str, width: int, hang: int) -> Iterator[tuple[int, int]]:

@@ -122,7 +122,7 @@ def _blocks(blocks: Sequence[Block], *, level: int) -> Iterator[str]:
     """Lines of blocks, with a blank line before each; neighbouring commands are one listing."""
     for are_commands, run in groupby(blocks, key=lambda block: isinstance(block, Command)):
         if are_commands:
-            yield from ("", "```sh", *(one.line for one in run if isinstance(one, Command)), "```")
+            yield from ("", "```sh", *(command.line for command in run if isinstance(command, Command)), "```")
             continue
         for block in run:
             lines = list(_lines(block, level=level))
@@ -199,15 +199,15 @@ def _part(part: Part) -> str:
     return escaped(part_text(part))
 
 
-def _table(one: Table) -> list[str]:
+def _table(block: Table) -> list[str]:
     # Columns of drawings are left out: the figure is in another column.
-    shown = [number for number, column in enumerate(one.columns) if column.kind != "drawing"]
-    columns = [one.columns[number] for number in shown]
+    shown = [number for number, column in enumerate(block.columns) if column.kind != "drawing"]
+    columns = [block.columns[number] for number in shown]
     headings = [
         escaped(", ".join(filter(None, (" ".join(filter(None, (column.group, column.heading))), column.unit)))) or " "
         for column in columns
     ]
-    rows = ([_in_row(_cell(row.cells[number]), highlighted=row.highlighted) for number in shown] for row in one.rows)
+    rows = ([_in_row(_cell(row.cells[number]), highlighted=row.highlighted) for number in shown] for row in block.rows)
     return table(headings, rows, left=[column.kind == "words" for column in columns])
 
 

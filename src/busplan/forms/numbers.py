@@ -42,7 +42,7 @@ def figure_text(value: ShownValue) -> str:
     --------
     >>> figure_text(ShownValue(0.0036, "max_contour_error_mm", "um", 3))
     '3.600'
-    >>> [figure_text(ShownValue(one)) for one in (None, True, 16.0, ("time", "nodes"))]
+    >>> [figure_text(ShownValue(value)) for value in (None, True, 16.0, ("time", "nodes"))]
     ['-', 'yes', '16', 'time, nodes']
     >>> figure_text(ShownValue([2.38808777, 4000.0], digits=4)), figure_text(ShownValue(-4e-16, decimals=3, fixed=True))
     ('2.388, 4000', '0.000')
@@ -57,7 +57,7 @@ def figure_text(value: ShownValue) -> str:
         case int() | float():
             return _number(value)
         case list() | tuple():
-            return ", ".join(figure_text(value._replace(value=one)) for one in value.value) or MISSING
+            return ", ".join(figure_text(value._replace(value=element)) for element in value.value) or MISSING
     return str(value.value)
 
 
@@ -98,7 +98,7 @@ def period_value(period_us: float) -> ShownValue:
 
     Examples
     --------
-    >>> [with_unit(period_value(one)) for one in (4000.0, 250.0, 1234.5, 2e6)]
+    >>> [with_unit(period_value(period_us)) for period_us in (4000.0, 250.0, 1234.5, 2e6)]
     ['4 ms', '250 us', '1.2345 ms', '2 s']
     """
     unit = "s" if period_us >= _SECOND_US else "ms" if period_us >= _MILLISECOND_US else "us"

@@ -83,13 +83,13 @@ def first_picture(blocks: Sequence[Block]) -> str | None:
         None if no chart can be drawn.
     """
     for block in blocks:
-        found = None
+        picture = None
         if isinstance(block, Chapter):
-            found = first_picture(block.blocks)
+            picture = first_picture(block.blocks)
         elif isinstance(block, Chart) and (svg := block.drawing.svg()) is not None:
-            found = styled(svg, css=block.drawing.stylesheet)
-        if found is not None:
-            return found
+            picture = styled(svg, css=block.drawing.stylesheet)
+        if picture is not None:
+            return picture
     return None
 
 

@@ -73,8 +73,8 @@ def round_numbers(
     """
     powers = range(floor(log10(low)), ceil(log10(high)) + 1)
     for factors in decades:
-        found = [float(f"{factor}e{power}") for power in powers for factor in factors]
-        inside = [one for one in found if low <= one <= high]
+        numbers = [float(f"{factor}e{power}") for power in powers for factor in factors]
+        inside = [number for number in numbers if low <= number <= high]
         if len(inside) <= most:
             return inside
     return inside[:: ceil(len(inside) / most)]
@@ -99,7 +99,7 @@ def ticks(low: float, high: float, *, most: int) -> tuple[Tick, ...]:
     """
     # A step longer than this gives at most `most` marks, wherever the window begins.
     smallest = (high - low) / most * (1 + 1e-6)
-    step = next(one for one in round_steps(smallest) if one.size > smallest)
+    step = next(size for size in round_steps(smallest) if size.size > smallest)
     first, last = ceil(low / step.size - 1e-9), floor(high / step.size + 1e-9)
     decimals = max(0, -step.power)
     return tuple(Tick(number * step.size, f"{number * step.size:.{decimals}f}") for number in range(first, last + 1))
@@ -130,10 +130,10 @@ def placed_labels(texts: Sequence[str], *, own: int | None, pitch: float, letter
     {0: 1.0, 1: 3.5, 3: 9.5}
     """
     placed: dict[int, float] = {}
-    for column in sorted(range(len(texts)), key=lambda one: one != own):
+    for column in sorted(range(len(texts)), key=lambda index: index != own):
         start = max(0.0, (column + 0.5) * pitch - letter * len(texts[column]) / 2)
         end = start + letter * (len(texts[column]) + 1)
-        others = ((begin, begin + letter * (len(texts[one]) + 1)) for one, begin in placed.items())
+        others = ((begin, begin + letter * (len(texts[index]) + 1)) for index, begin in placed.items())
         if all(start >= behind or end <= begin for begin, behind in others):
             placed[column] = start
     return dict(sorted(placed.items()))

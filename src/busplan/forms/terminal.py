@@ -51,8 +51,8 @@ def text(report: Report, *, width: int | None = None, height: int | None = None,
         names = ("next", *("" for _ in report.next_commands))
         commands = zip(names, (Sentence((command.line,)) for command in report.next_commands), strict=False)
         blocks[last] = card._replace(lines=(*card.lines, *commands))
-    found = [Chapter(report.title, tuple(blocks))] if report.is_page else blocks
-    lines = [*block_lines(found, width=width, is_whole=report.is_whole, whole_by=report.whole_by)]
+    shown = [Chapter(report.title, tuple(blocks))] if report.is_page else blocks
+    lines = [*block_lines(shown, width=width, is_whole=report.is_whole, whole_by=report.whole_by)]
     # The shell's prompt takes a line.
     folds = report.is_card_enough and not report.is_whole
     if folds and height is not None and last is not None and len(lines) >= height:
@@ -87,9 +87,9 @@ def block_lines(
         before = block
 
 
-def _belong(one: Block, other: Block) -> bool:
+def _belong(block: Block, following: Block) -> bool:
     """Whether no blank line separates two blocks."""
-    return any(isinstance(one, kind) and isinstance(other, kind) for kind in (Sentence | Facts, Command))
+    return any(isinstance(block, kind) and isinstance(following, kind) for kind in (Sentence | Facts, Command))
 
 
 def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) -> Sequence[Line]:

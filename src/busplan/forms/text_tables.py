@@ -103,14 +103,14 @@ def _panels(table: Table, side: Sequence[int], extents: dict[int, Extent], width
     if sum(extents[number].broken for number in side) + GAP * (len(side) - 1) <= width:
         return [tuple(side)]
     heads = [number for number in side if number < table.heads]
-    while len(heads) > 1 and any(_width([*heads, one], extents) > width for one in side[len(heads) :]):
+    while len(heads) > 1 and any(_width([*heads, number], extents) > width for number in side[len(heads) :]):
         heads.pop()
     others = side[len(heads) :]
-    runs = [list(run) for _, run in groupby(others, key=lambda one: table.columns[one].group or one)]
+    runs = [list(run) for _, run in groupby(others, key=lambda number: table.columns[number].group or number)]
     pieces = [
         piece
         for run in runs
-        for piece in ([run] if _width([*heads, *run], extents) <= width else [[one] for one in run])
+        for piece in ([run] if _width([*heads, *run], extents) <= width else [[number] for number in run])
     ]
     panels = [[*heads]]
     for piece in pieces:
@@ -134,20 +134,20 @@ def shared_widths(columns: Sequence[int], extents: dict[int, Extent], *, width: 
     """
     if width is None:
         return [extents[number].natural for number in columns]
-    found = {number: extents[number].least for number in columns}
+    widths = {number: extents[number].least for number in columns}
     spare = width - _width(columns, extents)
     # The columns that need least come first: what they leave is for the others.
     wanting = sorted(columns, key=lambda number: extents[number].natural - extents[number].least)
     for place, number in enumerate(wanting):
         more = min(extents[number].natural - extents[number].least, max(spare, 0) // (len(wanting) - place))
-        found[number] += more
+        widths[number] += more
         spare -= more
     # What names a row is broken last.
     for number in reversed(columns):
-        less = min(found[number] - extents[number].broken, max(-spare, 0))
-        found[number] -= less
+        less = min(widths[number] - extents[number].broken, max(-spare, 0))
+        widths[number] -= less
         spare += less
-    return [found[number] for number in columns]
+    return [widths[number] for number in columns]
 
 
 _FAILS: Final = " !"
@@ -197,7 +197,9 @@ def table_lines(
         for number, column in enumerate(table.columns)
         if column.kind != "drawing" and (is_whole or not column.is_detail)
     }
-    extents = {number: Extent.of(table.columns[number], one.heads, one.cells) for number, one in columns.items()}
+    extents = {
+        number: Extent.of(table.columns[number], column.heads, column.cells) for number, column in columns.items()
+    }
     chosen = arrangement(table, extents, width=width, is_whole=is_whole)
     lines: list[Line] = []
     for panel in chosen.panels:
@@ -213,7 +215,7 @@ def table_lines(
         [table.columns[number].name for number in chosen.left_out],
         whole_by=whole_by,
     )
-    fails = any(cell.endswith(_FAILS) for one in columns.values() for cell in one.cells)
+    fails = any(cell.endswith(_FAILS) for column in columns.values() for cell in column.cells)
     notes = " ".join(filter(None, ("! fails." * fails, left_out)))
     return [*lines, *(wrapped(Line(notes), width) if notes else [])]
 
@@ -259,10 +261,10 @@ def _heading(placed: Sequence[_Placed]) -> list[Line]:
 
 
 def _laid(cells: Sequence[str], placed: Sequence[_Placed]) -> str:
-    each = zip(cells, placed, strict=True)
+    pairs = zip(cells, placed, strict=True)
     return (
         (" " * GAP)
-        .join(cell.ljust(one.width) if one.column.is_left else cell.rjust(one.width) for cell, one in each)
+        .join(cell.ljust(place.width) if place.column.is_left else cell.rjust(place.width) for cell, place in pairs)
         .rstrip()
     )
 
@@ -272,10 +274,10 @@ def _row_lines(row: TableRow, at: int, placed: Sequence[_Placed]) -> Iterator[Li
     pieces = [[line.text for line in _cell_lines(place.column.cells[at], place.width)] for place in placed]
     for cells in zip_longest(*pieces, fillvalue=""):
         marks = [
-            Mark(begin, begin + len(cell), one.column.tones[at])
-            for cell, one in zip(cells, placed, strict=True)
-            for begin in [one.start if one.column.is_left else one.start + one.width - len(cell)]
-            if one.column.tones[at] != "neutral" and cell
+            Mark(begin, begin + len(cell), place.column.tones[at])
+            for cell, place in zip(cells, placed, strict=True)
+            for begin in [place.start if place.column.is_left else place.start + place.width - len(cell)]
+            if place.column.tones[at] != "neutral" and cell
         ]
         if row.highlighted:
             marks.append(Mark(0, placed[-1].start + placed[-1].width + GAP, "heading"))
@@ -288,5 +290,5 @@ def _cell_lines(cell: str, width: int) -> list[Line]:
 
 def _below(at: int, columns: Mapping[str, _Column], width: int | None) -> list[Line]:
     """Cells that stand below their row, with their headings."""
-    lines = (Line(f"{' ' * _INDENT}{name}: {one.cells[at]}") for name, one in columns.items() if one.cells[at])
+    lines = (Line(f"{' ' * _INDENT}{name}: {column.cells[at]}") for name, column in columns.items() if column.cells[at])
     return [piece for line in lines for piece in wrapped(line, width, hang=_INDENT + 2)]
