@@ -163,7 +163,7 @@ def terminal_height() -> int | None:
 
 
 def columns() -> int:
-    """Width to lay out lines for that are always of a width: the terminal's, or a fixed one."""
+    """Width of documents that always have one: the terminal's, or the default."""
     from busplan.forms.terminal import WIDTH
 
     return terminal_width() or WIDTH

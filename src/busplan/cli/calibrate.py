@@ -94,7 +94,7 @@ def calibrate_command(
         loaded = load(profile)
         bench = changes.applied(loaded.profile)
         path, name, shipped = locate_measurements(measurements)
-        found = calibrate(
+        calibration = calibrate(
             bench,
             # Read here: Python reads no standard input, and takes a name of several lines for CSV text.
             measurements if shipped else read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES),
@@ -105,12 +105,12 @@ def calibrate_command(
         )
         if apply:
             for change in changes.by_set:
-                for key in found.edits:
+                for key in calibration.edits:
                     require_separate(change, key, typed="--apply")
-            apply_changes(loaded.document, found.edits, notes=found.notes)
+            apply_changes(loaded.document, calibration.edits, notes=calibration.notes)
             kept = "your comments are kept: see whether they hold of the new values"
-            say(f"wrote [{' '.join(found.notes)}] of {profile}; {kept}")
-        give(found.report(applied_to=profile if apply else None))
+            say(f"wrote [{' '.join(calibration.notes)}] of {profile}; {kept}")
+        give(calibration.report(applied_to=profile if apply else None))
 
 
 def _measurements_file(argument: str) -> Iterator[Path]:

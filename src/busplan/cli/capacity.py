@@ -53,22 +53,24 @@ def capacity_command(
         from busplan.questions.capacity import capacity
 
         plan = load_changed(profile, changes)
-        found = capacity(
+        capacity_answer = capacity(
             plan,
             period_us=periods_us(period, plan),
             timing_model=timing_models(timing, plan),
             sensitivity=sensitivity,
         )
-        give(found.report()._replace(next_commands=_next(str(profile), found, changes)))
+        give(capacity_answer.report()._replace(next_commands=_next(str(profile), capacity_answer, changes)))
 
 
-def _next(argument: str, found: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
+def _next(argument: str, capacity_answer: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
     """What to ask next of the same profile."""
     from busplan.forms.blocks import Command
     from busplan.questions.base.shell import change_options, shell_word
 
-    changed = " ".join((shell_word(argument), *change_options(changes, period_us=found.profile.cycle.period_us)))
-    all_well = all(verdict.all_well for verdict in found.verdicts)
+    changed = " ".join(
+        (shell_word(argument), *change_options(changes, period_us=capacity_answer.profile.cycle.period_us))
+    )
+    all_well = all(verdict.all_well for verdict in capacity_answer.verdicts)
     second = "circle-test" if all_well else "plan"
     asked = (f"capacity {changed} --sensitivity", f"{second} {changed}", f"report {changed}")
     return tuple(Command(f"busplan {words}") for words in asked)

@@ -84,7 +84,7 @@ def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..
 
         # Typer reads the options of a command from its signature; without it every command would list these two.
         with_changes.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-        kept = {name: one for name, one in command.__annotations__.items() if name != "changes"}
+        kept = {name: annotation for name, annotation in command.__annotations__.items() if name != "changes"}
         with_changes.__annotations__ = {**kept, **options}
         return with_changes
 
@@ -93,9 +93,9 @@ def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..
 
 def _require_no_period(changes: KeyChanges, text: str) -> None:
     """Refuse periods to compute, such as 4ms, beside a change of the period."""
-    for one in changes.each:
-        if one.key == _PERIOD:
-            require_separate(one, _PERIOD, typed=f"--period {text}")
+    for change in changes.each:
+        if change.key == _PERIOD:
+            require_separate(change, _PERIOD, typed=f"--period {text}")
 
 
 def load_changed(argument: str, changes: KeyChanges) -> "Profile":

@@ -29,7 +29,7 @@ else:
     # The choices for typer.
     FormatName = Literal[tuple(FORMATS)]
 
-_BUILD_FORMATS: Final = [name for name, one in FORMATS.items() if one.reader == "builds"]
+_BUILD_FORMATS: Final = [name for name, report_format in FORMATS.items() if report_format.reader == "builds"]
 
 
 @takes_changes(
@@ -152,7 +152,7 @@ def check_command(
 
 
 def _require_baseline(baseline: Path | None, *, update: bool) -> None:
-    """Refuse to update what is not named or cannot be written."""
+    """Refuse to update a baseline that is not named or cannot be written."""
     if update and baseline is None:
         raise BusplanError("--update-baseline: needs --baseline FILE")
     if update and baseline is not None:
@@ -181,7 +181,7 @@ def _executor(number: int) -> "Iterator[Executor | None]":
 
 
 def _read_baseline(path: Path, *, needed: bool) -> "Baseline | None":
-    """What is recorded; None if there is no file yet and none is needed."""
+    """The recorded baseline; None if there is no file yet and none is needed."""
     from busplan.gate.baseline import load_baseline
 
     return load_baseline(path) if needed or path.exists() else None

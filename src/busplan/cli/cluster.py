@@ -166,7 +166,7 @@ class _Cluster(Executor):
 
 
 class _Crew:
-    """The workers, as they were when they were last looked at."""
+    """The workers, as of the last look."""
 
     def __init__(self, client: "Client", address: str) -> None:
         self._client, self._address = client, address

@@ -78,21 +78,21 @@ def diff_command(
         from busplan.profile.revision import load_revision
         from busplan.questions.diff import diff
 
-        one, other = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
-        if timing != ALL_MODELS and one.bus.kind == other.bus.kind:
-            for side in (other, one):
+        first, second = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
+        if timing != ALL_MODELS and first.bus.kind == second.bus.kind:
+            for side in (second, first):
                 timing_model(timing, side)  # refuses it in the words of the option
         with progress_bar("circle tests") as progress, naming_option("timing_model"):
-            found = diff(
-                one,
-                other,
+            difference = diff(
+                first,
+                second,
                 timing_model=None if timing == ALL_MODELS else timing,
                 circle=circle,
                 progress=progress,
                 arguments=(a, b),
             )
-        give(found.report())
-    regressions = found.regression_words(tolerance_percent=allowed)
+        give(difference.report())
+    regressions = difference.regression_words(tolerance_percent=allowed)
     if fail_on_regression and regressions:
         say(regressions)
         raise PlanFailsError

@@ -77,7 +77,7 @@ def explain_command(
 
         plan = load_changed(profile, changes)
         with progress_bar("circle test") as progress, naming_option("transaction"):
-            found = explain(
+            explanation = explain(
                 plan,
                 figure,
                 period_us=periods_us(period, plan),
@@ -85,7 +85,7 @@ def explain_command(
                 transaction=None if transaction == ALL_MODELS else transaction,
                 progress=progress,
             )
-        give(found.report())
+        give(explanation.report())
 
 
 def _refuse_without_figure(options: "dict[str, object]") -> None:

@@ -221,7 +221,7 @@ def _machine(
     bytes_per_axis: int | None,
     host: str | None,
 ) -> "Machine":
-    """The machine of the options, with all that they do not say."""
+    """The machine of the options; values that they leave open are asked for, or defaults."""
     from busplan.profile.starter import Machine, shared_out
 
     starter = kind_named(kind).starter

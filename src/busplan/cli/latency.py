@@ -48,9 +48,9 @@ def latency_command(
         from busplan.questions.latency import latency
 
         plan = load_changed(profile, changes)
-        found = latency(
+        latencies = latency(
             plan,
             payload_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
             timing_model=timing_models(timing, plan),
         )
-        give(found.report())
+        give(latencies.report())

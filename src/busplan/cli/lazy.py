@@ -43,7 +43,7 @@ def _usage_in_our_form(command: str, *, takes_set: bool = False) -> Iterator[Non
 
 
 def _key_named(name: str) -> str | None:
-    """The key of a profile that has a name, but for its unit; the first one, or none."""
+    """The first key of a profile that has a name apart from its unit; None without such a key."""
     from busplan.buses import kind_names
     from busplan.profile.kinds import profile_model, value_keys
 
@@ -192,7 +192,7 @@ class LazyGroup(TyperGroup):
         for title, names in GROUPS.items():
             commands: list[Any] = [self.get_command(ctx, name) for name in names]
             with formatter.section(title):
-                formatter.write_dl([(one.name, one.help.partition("\n\n")[0]) for one in commands])
+                formatter.write_dl([(command.name, command.help.partition("\n\n")[0]) for command in commands])
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write commands and options."""

@@ -114,7 +114,7 @@ def show_drawn(
 
 
 def _changes_words(changes: KeyChanges) -> str:
-    """What was set, in the title of a picture that is a file of its own."""
+    """The --set options, for the title of a picture in a file of its own."""
     from busplan.forms.numbers import sentence_text
     from busplan.questions.words.documents import changes_sentences
 

@@ -63,11 +63,11 @@ def report_command(
 
         plans = load_each(profiles, partial(load_changed, changes=changes))
         with progress_bar("circle tests") as progress:
-            found = report(
+            page = report(
                 plans,
                 title=title,
                 circle=circle,
                 progress=progress,
                 origins=[(argument, changes) for argument in profiles],
             )
-        give(found.report())
+        give(page.report())

@@ -50,7 +50,7 @@ def kept_parts(job: "SweepJob", output: Path) -> "Iterator[Parts]":
 
 @contextmanager
 def _locked(folder: Path, output: Path) -> "Iterator[None]":
-    """Keep other runs out of a folder, which is made for it; what stays empty is removed."""
+    """Keep other runs out of a folder; it is made for that, and removed if it stays empty."""
     with naming_errors(output, folder):
         if not folder.exists():
             folder.mkdir(exist_ok=True)
@@ -73,7 +73,7 @@ def _is_ours(descriptor: int, folder: Path) -> bool:
     except OSError as error:  # some network file systems have no locks
         say(f"{folder}: cannot be locked ({error.strerror}); let no other run write it meanwhile")
         return True
-    # A run that has just ended removed what was locked here.
+    # A run that has just ended may have removed the locked folder.
     return is_locked and folder.exists() and os.path.samestat(os.fstat(descriptor), folder.stat())
 
 
@@ -134,7 +134,7 @@ class Parts:
             self.flush()
 
     def flush(self) -> None:
-        """Write what is not in the folder yet.
+        """Write the results that are not in the folder yet.
 
         Raises
         ------
@@ -158,13 +158,13 @@ class Parts:
         self._written_s = monotonic()
 
     def remove(self) -> None:
-        """Remove what is in the folder: its file is complete."""
+        """Remove the parts: their file is complete."""
         with suppress(OSError):
             for path in (*self.folder.glob("*.npy"), self.folder / _MANIFEST):
                 path.unlink(missing_ok=True)
 
     def _checked(self, *, resume: bool) -> list[Path]:
-        """Files to go on with."""
+        """Parts of an earlier run to go on with."""
         try:
             inside = list(self.folder.iterdir())
         except FileNotFoundError:
@@ -186,8 +186,8 @@ class Parts:
             theirs = json.loads(manifest.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise BusplanError(f"{manifest}: cannot be read: {error}; delete the folder") from None
-        found = theirs if isinstance(theirs, dict) else {}
-        differing = [_difference(name, found.get(name), own) for name, own in self._facts.items()]
+        their_facts = theirs if isinstance(theirs, dict) else {}
+        differing = [_difference(name, their_facts.get(name), own) for name, own in self._facts.items()]
         if any(differing):
             raise BusplanError(
                 f"--resume: {self.folder} is of a sweep with {', '.join(filter(None, differing))}; repeat the "
@@ -206,7 +206,7 @@ def _opened(path: Path) -> "Array":
 
 
 def _facts(job: "SweepJob") -> dict[str, Any]:
-    """What must be the same, under its name for people."""
+    """Facts that a resumed sweep must share, by their names in messages."""
     return {
         "version of busplan": __version__,
         "profile": sha256(profile_text(job.sweep.profile).encode()).hexdigest(),
@@ -219,7 +219,7 @@ def _facts(job: "SweepJob") -> dict[str, Any]:
 
 
 def _axis(axis: "Values") -> list[object]:
-    return [type(axis).__name__, *(list(one) if isinstance(one, tuple) else one for one in axis)]
+    return [type(axis).__name__, *(list(part) if isinstance(part, tuple) else part for part in axis)]
 
 
 def _difference(name: str, theirs: object, ours: object) -> str | None:

@@ -50,14 +50,14 @@ class SweepJob(NamedTuple):
 
 
 class _Taker(Protocol):
-    """What takes the blocks of a sweep, in order."""
+    """Consumer of the blocks of a sweep, in order."""
 
     def add(self, block: "SweepBlock") -> None:
         """Take one more block."""
 
 
 class _StoppedBetweenError(Exception):
-    """A signal came: what is in the middle of a block is left out."""
+    """A signal came in the middle of a block, which is left out."""
 
 
 def run_sweep(job: SweepJob) -> None:

@@ -245,13 +245,13 @@ class Gauge(NamedTuple):
     """How a period is used: shares of it, 0..1."""
 
     used: float
-    """More than 1 if it does not suffice."""
+    """Used share; more than 1 if the period does not suffice."""
     doubt: float
-    """The uncertainty of what is used."""
+    """Uncertainty of the used share."""
     free_until: float
-    """Where the reserve begins."""
+    """Share at which the reserve begins."""
     most: float
-    """The share that may be used, with the reserve."""
+    """Share that may be used, with the reserve."""
     state: State
 
     def parts(self) -> "list[GaugePart]":

@@ -55,7 +55,7 @@ def fragment(report: Report) -> str:
     blocks = shown_blocks(report)
     page = files("busplan.forms") / "templates"
     chart, style = ((page / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
-    # The rules are nested in one of the piece; what the page's root has, it has itself.
+    # The rules are nested in the fragment's own rule, where & stands for its outer element: that is its root.
     own = f"{chart}{_colours(blocks)}{style}".replace(":root", "&")
     return _template("fragment.html.j2").render(blocks=blocks, style=Markup(own))  # noqa: S704 - as above
 

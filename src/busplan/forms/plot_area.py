@@ -78,11 +78,11 @@ class PlotArea(NamedTuple):
     """The y below the labels, in px."""
 
     def x(self, value: float) -> str:
-        """Position of a value across."""
+        """The x of a value, in percent."""
         return f"{100 * self.across.share(value):.5g}%"
 
     def y(self, value: float) -> float:
-        """Position of a value up, in px."""
+        """The y of a value, in px."""
         return self.top + self.height * (1 - self.up.share(value))
 
     def point(self, x: float, y: float) -> str:

@@ -12,7 +12,7 @@ WIDTH: Final = 640
 _ZOOM: Final = 2.0
 """Pixels of the PNG for a px of the SVG."""
 _MOST_HEIGHT: Final = 16_000
-"""Most pixels down: of a higher drawing, a px is less than `_ZOOM` pixels."""
+"""Largest height in pixels: a drawing that would be higher is enlarged by less than `_ZOOM`."""
 _FONT: Final = '* {font-family:"DejaVu Sans Subset" !important}'
 
 

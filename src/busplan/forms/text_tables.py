@@ -27,7 +27,7 @@ class Extent(NamedTuple):
     least: int
     """Width below which a word, a figure or a heading would be broken."""
     broken: int
-    """Width that is left to it where nothing else helps: words are broken, figures are not."""
+    """Least width as a last resort: words are broken, figures are not."""
 
     @classmethod
     def of(cls, column: TableColumn, heads: Sequence[str], cells: Sequence[str]) -> "Extent":

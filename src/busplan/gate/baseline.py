@@ -35,7 +35,7 @@ class Record(NamedTuple):
     figures: Mapping[str, float]
     """By name: "paper.max_axes"."""
     keys: Mapping[str, object] | None = None
-    """What the file said, by dotted key; None in a baseline that does not record it."""
+    """Values in the file, by dotted key; None in a baseline that does not record them."""
 
 
 def figures_of(subject: Subject) -> dict[str, float]:
@@ -51,7 +51,7 @@ def figures_of(subject: Subject) -> dict[str, float]:
 
 
 def keys_of(profile: Profile) -> dict[str, object]:
-    """Keys of a profile to record: those that its file says."""
+    """Keys of a profile to record: those that its file sets."""
     said = flat(profile.model_dump(mode="json", exclude_unset=True))
     return {key: value for key, value in said if key not in _WORDS}
 
@@ -165,7 +165,7 @@ _MOST_FIGURES: Final = 3
 
 
 class ChangedValue(NamedTuple):
-    """A value that was recorded, and that of today."""
+    """A recorded value, and the present one."""
 
     before: object
     now: object

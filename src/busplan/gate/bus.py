@@ -12,7 +12,7 @@ from busplan.sections.execution import TableExecution
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The cycle does not fit, whatever is not known of it."""
+    """The cycle does not fit, whatever the uncertainty."""
     deciding, bus = subject.deciding, bus_of(subject.profile)
     if deciding.verdict != DOES_NOT_FIT:
         return
@@ -25,7 +25,7 @@ def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The cycle may fit, but what is known of it does not show so."""
+    """The cycle may fit, but the uncertainty leaves that open."""
     deciding, reserve, bus = subject.deciding, subject.profile.limits.reserve, bus_of(subject.profile)
     if deciding.verdict != NOT_SHOWN:
         return
@@ -71,12 +71,12 @@ def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def _counted(figures: RuleFigures) -> Sequence[Any]:
-    """What has counts of its own: the whole, or each group."""
+    """Figures with numbers of nodes: those of each group, or else of the whole bus."""
     return figures.groups or (figures,)
 
 
 def _spare(counts: Any, spare: int, limit: int) -> str:
-    """How many are to spare, and what limits them."""
+    """Number of nodes or axes to spare, and the limit that binds."""
     name = getattr(counts, "name", "")
     group = f"group {name}: " if name else ""
     words = f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
@@ -102,7 +102,7 @@ def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """Much of the required time, or of what is not known of it, is an assumption."""
+    """Much of the required time, or of its uncertainty, is an assumption."""
     for assumption in heavy_assumptions(subject.deciding, subject.profile):
         what = "an assumption" if len(assumption.keys) == 1 else "an assumption of several"
         for key in assumption.keys:

@@ -44,7 +44,7 @@ class CheckAnswer(Answer, CheckReport):
 
     @property
     def headline(self) -> str:
-        """How many profiles were checked, and how many errors and warnings they have."""
+        """Number of profiles checked, and of their errors and warnings."""
         return sentence_text(summary_sentence(self))
 
     def _headline(self) -> str:

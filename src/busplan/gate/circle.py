@@ -1,6 +1,6 @@
 """Rules of the circle test: does the loop have its margins, does the circle hold its tolerances?
 
-They share one run of the test, only for profiles with a section for it.
+They share one run of the test, for profiles with a section for it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -76,7 +76,7 @@ def _key_in_file(*keys: str, profile: Profile) -> str:
 
 
 def answered(subject: Subject, problems: Sequence[tuple[str, RuleProblem]]) -> set[str]:
-    """Codes of the rules that were checked: without a test, the one alone that says why it was not or cannot be run."""
+    """Codes of the rules that were checked; without a test, only that of the rule that says why there is none."""
     not_run = {code for code, _ in problems if code in _NOT_RUN}
     if not_run:
         return not_run

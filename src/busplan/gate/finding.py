@@ -33,13 +33,13 @@ class Finding(NamedTuple):
     marked_column: int
     """First column of the value, or of what stands for it: a name, a comment."""
     marked_end_column: int
-    """The column behind its last."""
+    """First column behind it."""
     problem: str
-    """What is wrong."""
+    """The problem."""
     help: str | None = None
-    """How it is mended, in words."""
+    """Remedy, in words."""
     cure: str | None = None
-    """How it is mended, as lines of TOML: key = value."""
+    """Remedy, as lines of TOML: key = value."""
 
 
 def finding_parts(path: str, finding: Finding) -> tuple[str, str]:
@@ -53,7 +53,7 @@ def finding_line(path: str, finding: Finding) -> str:
 
 
 class Violation(NamedTuple):
-    """A problem at its place, of which nobody knows yet whether a comment suppresses it."""
+    """A problem at its place, before comments suppress it."""
 
     rule: Rule
     problem: RuleProblem

@@ -114,7 +114,7 @@ class Fit(NamedTuple):
     verdict: str | None
     """fits, not shown to fit, or does not fit."""
     margin_corrected_us: float | None
-    """What is left of the slice, less the bias [us]."""
+    """Margin: time left in the slice, corrected for the bias [us]."""
     uncertainty_us: float | None
     """Expanded uncertainty of that [us]."""
 
@@ -226,7 +226,7 @@ def check_document(
         violations += [_placed(document, BASELINE, problem) for problem in lost]
         ran.add(BASELINE.code)
     if changes.each:
-        # What a comment suppresses is of the file as it is.
+        # Comments were written for the file as it is: with changes, none counts as without effect.
         ran = set()
     left, of_comments = suppress(violations, document, ran=ran)
     findings = [*(_said(placed, subject) for placed in left), *of_comments]

@@ -37,7 +37,7 @@ def _read() -> Iterator[Rule]:
 
 
 OWN: Final[Mapping[str, Rule]] = MappingProxyType({rule.code: rule for rule in _read()})
-"""Rules that are of no kind of bus, by code."""
+"""Rules common to all kinds of bus, by code."""
 _FILE_CODES: Final[Mapping[ProblemKind, str]] = {
     "syntax": "BP001",
     "unknown-key": "BP002",

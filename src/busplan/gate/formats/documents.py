@@ -100,7 +100,7 @@ def _result(located: Located) -> JsonDocument:
             }
         ],
         "partialFingerprints": {"busplanFinding/v1": located.fingerprint},
-        # SARIF's own fixes are edits of a file, and a cure may be a key that the file does not say.
+        # SARIF's own fixes are edits of a file, and a cure may be a key that the file does not have.
         **({"properties": {"cure": finding.cure}} if finding.cure else {}),
     }
 
