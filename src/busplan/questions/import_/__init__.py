@@ -103,15 +103,16 @@ def import_profile(
         raise BusplanError(f"paths {names!r}: expected files of one machine, each once")
     if take not in (None, "file", "profile"):
         raise BusplanError(f"take {take!r}: expected 'file' or 'profile'")
-    machine = merged(found := machines(names))
-    files = [(each.file, each.title) for each in found]
+    readings = machines(names)
+    machine = merged(readings)
+    files = [(reading.file, reading.title) for reading in readings]
     if update is None:
         return _new(machine, name=name or stem_of(names), files=files)
     return _updated(machine, update=update, take=take)
 
 
 _ROWS: Mapping[str, Callable[[Reading], Iterator[ProfileLine]]] = {"ethercat": ethercat.rows, "can": can.rows}
-"""What writes the profile of each kind of bus."""
+"""Writer of the profile, by kind of bus."""
 
 
 def _updated(machine: Reading, *, update: Path, take: Literal["file", "profile"] | None) -> ImportAnswer:
@@ -119,7 +120,7 @@ def _updated(machine: Reading, *, update: Path, take: Literal["file", "profile"]
     rows = list(can.part_rows(machine) if is_part else _ROWS[machine.kind](machine))
     name = os.fspath(update)
     profile, text = updated(machine, rows, path=pathlib.Path(update).absolute(), name=name, take=take)
-    # What is assumed of a new profile, an old one says, or leaves to its defaults.
+    # Values assumed for a new profile: an existing one sets them, or leaves them to their defaults.
     said = tuple(row for row in rows if row.fact.grade != "assumed")
     return ImportAnswer(profile, text, said, tuple(machine.remarks))
 

@@ -65,8 +65,8 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
         line = lines.get(message.name, 1)
         place, number = machine.place(line), message.frame_id + EXTENDED * bool(message.is_extended_frame)
         if number in machine.messages:
-            other = machine.messages[number]["name"].value
-            raise machine.refusal(line, f"message {message.name} has the identifier of {other}: a bus has each once")
+            owner = machine.messages[number]["name"].value
+            raise machine.refusal(line, f"message {message.name} has the identifier of {owner}: a bus has each once")
         facts = machine.messages[number] = {
             "name": Fact(message.name, place),
             "payload_bytes": Fact(message.length, place),
@@ -80,21 +80,23 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
 def _loaded(text: str, name: str, title: str, dialect: str) -> Any:
     from cantools.database import load_string
 
-    # What it warns of is refused here, or no matter.
+    # Its warnings are refused here, or do not matter.
     logging.getLogger("cantools").addHandler(logging.NullHandler())
     if dialect == "dbc":
         last = text.rstrip().rpartition("\n")[2]
         if last.lstrip().startswith("SG_ ") and not _WHOLE_SIGNAL.match(last):
             raise BusplanError(f"{name}:{text.rstrip().count(chr(10)) + 1}: ends within a signal: cut off?")
-        # Signals are no matter here, and most of the time.
+        # Signals do not matter here, and take most of the time.
         text = _SIGNALS.sub("", text)
     try:
         return load_string(text, dialect, strict=False)
     except Exception as error:  # noqa: BLE001 - the readers of formats fail in many ways
         message = " ".join(str(error).removeprefix(f"{title}: ").split())[:200]
-        found = _LINE.search(message)
-        place = f"{found[1]}:{found[2]}" if found else "1"
-        raise BusplanError(f"{name}:{place}: not a valid {title}: {'invalid syntax' if found else message}") from None
+        position = _LINE.search(message)
+        place = f"{position[1]}:{position[2]}" if position else "1"
+        raise BusplanError(
+            f"{name}:{place}: not a valid {title}: {'invalid syntax' if position else message}"
+        ) from None
 
 
 def _bit_rate(database: Any, machine: Reading) -> None:

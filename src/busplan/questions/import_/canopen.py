@@ -32,9 +32,9 @@ class Pdo(NamedTuple):
     every: int
     """Sent with every n-th SYNC; 0 where an event sends it."""
     period_us: float
-    """Shortest time from one to the next of one that an event sends; 0 where it is not known."""
+    """Shortest time between two frames that events send; 0 where it is not known."""
     timer: str
-    """What that time is."""
+    """Timer that gives that time, in words for a comment."""
     place: str
     name: str
 
@@ -103,7 +103,7 @@ class _Device:
         return int(match[1], 0) + self.node * ("$nodeid" in text.lower()), line
 
     def value(self, index: int, sub: int | None) -> tuple[int, int] | None:
-        """What an object is set to, else its default."""
+        """Value that an object is set to, else its default."""
         section = self.sections.get(f"{index:x}" if sub is None else f"{index:x}sub{sub:x}", {})
         return self.number(section, "parametervalue") or self.number(section, "defaultvalue")
 
@@ -145,11 +145,11 @@ class _Device:
 
 def _sections(text: str) -> _Sections:
     """Keys and values of each section with their lines; names without case."""
-    found: _Sections = {}
+    sections: _Sections = {}
     own: dict[str, tuple[str, int]] = {}
     for line, content in enumerate(text.split("\n"), start=1):
         if match := _SECTION.match(content):
-            own = found.setdefault(match[1].strip().lower(), {})
+            own = sections.setdefault(match[1].strip().lower(), {})
         elif match := _VALUE.match(content):
             own.setdefault(match[1].lower(), (match[2], line))
-    return found
+    return sections

@@ -49,21 +49,21 @@ def read(content: bytes, name: str) -> Reading:
 
 
 def number(element: Element, path: str, machine: Reading, *, most: int) -> tuple[int, Line] | None:
-    """A whole number of an element below another one, and its line; None where there is none.
+    """Whole number in an element below this one, and its line; None where there is none.
 
     Raises
     ------
     BusplanError
         Not a whole number from 0 to the largest.
     """
-    found = element.first(path)
-    if found is None or not found.text.strip():
+    child = element.first(path)
+    if child is None or not child.text.strip():
         return None
-    value = whole_number(found.text)
+    value = whole_number(child.text)
     if value is None or not 0 <= value <= most:
-        shown = found.text.strip()[:40]
-        raise machine.refusal(found.line, f"{found.tag} {shown!r}: expected a whole number from 0 to {most}")
-    return value, found.line
+        shown = child.text.strip()[:40]
+        raise machine.refusal(child.line, f"{child.tag} {shown!r}: expected a whole number from 0 to {most}")
+    return value, child.line
 
 
 def whole_number(text: str) -> int | None:
@@ -76,7 +76,7 @@ def whole_number(text: str) -> int | None:
 def _device(
     slave: Element, images: dict[str, set[int]], outputs: list[Element], machine: Reading
 ) -> Iterator[tuple[str, Fact]]:
-    """What the file says of one device."""
+    """Facts of a device."""
     info = slave.first("Info") or slave
     title = info.first("Name")
     text = title.text.strip() if title else ""
@@ -217,12 +217,12 @@ def _frames(config: Element, frames: list[list[tuple[int, int, int]]], line: Lin
     total = sum(length for _, length in process)
     codes = {code for code, _ in process}
     if _LRW in codes or len(process) < len((_LRD, _LWR)):
-        # Shared bytes are the fewer; more than they need can only be those of both.
+        # A total below the sum of both directions can only be of bytes that both share.
         layout = _SHARED if total < separate else _SEPARATE
     else:
         layout = _SPLIT
     needed = shared if layout == _SHARED else separate
-    # Where a frame is full, ours begins a new one, too.
+    # Where a frame is full, the profile's next datagram begins a new frame, too.
     headers = 2 if layout == _SPLIT else 1
     further = [0] * max(len(process) - headers * len(frames), 0)
     gaps = total - needed
@@ -247,7 +247,7 @@ def _mailbox_states(config: Element, machine: Reading) -> range:
 
 
 def _branches(slaves: list[Element], machine: Reading) -> None:
-    """Mark devices at whose place the segment is no line."""
+    """Mark devices that are not connected to the device before them."""
     addresses = [number(slave, "Info/PhysAddr", machine, most=65_535) for slave in slaves]
     for place, slave in enumerate(slaves[1:], start=1):
         port = slave.first("PreviousPort")

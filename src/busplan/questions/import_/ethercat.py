@@ -83,7 +83,7 @@ def _name(facts: Facts) -> str:
 
 
 def _master(bus: Facts) -> Iterator[ProfileLine]:
-    """What the master sends: as the files say, else as it is known to."""
+    """Datagrams of the master: from the files, else those that a master of this name is known to send."""
     if "process_data" in bus:
         yield ProfileLine("bus", "process_data", bus["process_data"])
         yield ProfileLine("bus", "housekeeping_bytes", bus["housekeeping_bytes"])

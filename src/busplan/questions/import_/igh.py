@@ -59,7 +59,7 @@ def read(text: str, name: str) -> Reading:
 
 def _devices(text: str, machine: Reading) -> dict[int, list[tuple[int, str]]]:
     """The numbered lines of each device."""
-    found: dict[int, list[tuple[int, str]]] = {}
+    devices: dict[int, list[tuple[int, str]]] = {}
     masters = set()
     own: list[tuple[int, str]] | None = None
     for line, content in enumerate(text.split("\n"), start=1):
@@ -68,15 +68,15 @@ def _devices(text: str, machine: Reading) -> dict[int, list[tuple[int, str]]]:
             masters.add(header[1])
             if len(masters) > 1:
                 raise machine.refusal(line, "a second master: a profile is one bus; give the text of one master")
-            own = found.setdefault(int(header[2]), [])
+            own = devices.setdefault(int(header[2]), [])
             own.append((line, content))
         elif own is not None:
             own.append((line, content))
         elif _SYNC_MANAGER.match(content):
             raise machine.refusal(line, f"no line === Master 0, Slave 0 === before it: give `{PDOS}` of the whole bus")
-    if not found:
+    if not devices:
         raise machine.refusal(1, "no line === Master 0, Slave 0 ===: cut off?")
-    return found
+    return devices
 
 
 def _described(lines: list[tuple[int, str]], facts: Facts, machine: Reading) -> Iterator[_Port]:
@@ -112,11 +112,11 @@ def _sizes(lines: list[tuple[int, str]], machine: Reading) -> Facts:
             bits[direction] += int(match[2])
             if direction == "Rx" and int(match[1], 16) in CONTROL_WORDS:
                 words.setdefault(int(match[1], 16), line)
-    found = {
+    sizes = {
         key: Fact(ceil(bits[direction] / 8), machine.place(places[direction]), note=f"{bits[direction]} bits")
         for direction, key in _DIRECTIONS.items()
     }
-    return {**found, "axes": axes_fact(words, machine, line=lines[0][0])}
+    return {**sizes, "axes": axes_fact(words, machine, line=lines[0][0])}
 
 
 def _delays(ports: Mapping[int, list[_Port]], machine: Reading) -> None:
@@ -132,9 +132,9 @@ def _delays(ports: Mapping[int, list[_Port]], machine: Reading) -> None:
         if not before.delay_ns or "has_clock" not in machine.nodes[number]:
             waiting.append(number)
             continue
-        shared = [other for other in waiting if before.next <= other < number] if before.next in waiting else []
+        shared = [device for device in waiting if before.next <= device < number] if before.next in waiting else []
         us = before.delay_ns / 1000 / (len(shared) + 1)
         note = f"cable included{f', shared with {len(shared)} without a clock' if shared else ''}"
-        for other in (*shared, number):
-            machine.nodes[other]["delay_us"] = Fact(us, machine.place(before.line), "measured", note)
-        waiting = [other for other in waiting if other not in shared]
+        for device in (*shared, number):
+            machine.nodes[device]["delay_us"] = Fact(us, machine.place(before.line), "measured", note)
+        waiting = [device for device in waiting if device not in shared]

@@ -1,4 +1,4 @@
-"""What files say of a machine: facts with their grade and place, and several files of one machine as one record."""
+"""Facts that files give of a machine, with grade and place; and several files of one machine as one record."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from busplan.profile.write import short_text
 from busplan.sourced import Grade
 
 _MAY_DIFFER: Final = ("name", "master", "clock_us")
-"""What files may say in different words."""
+"""Facts that may differ from file to file."""
 
 
 Line: TypeAlias = int | str
@@ -39,7 +39,7 @@ Facts = dict[str, Fact]
 
 @dataclass
 class Reading:
-    """What one file, or several together, say of a machine.
+    """Facts of a machine from one file, or from several together.
 
     Parameters
     ----------
@@ -115,8 +115,8 @@ def _require_one_machine(machines: Sequence[Reading]) -> None:
     """Refuse files of different devices; one that needs not list all may have fewer."""
     complete = max(machines, key=lambda machine: (machine.lists_all, len(machine.nodes)))
     for machine in machines:
-        other = machine.nodes.keys() - complete.nodes.keys()
-        if other or (machine.lists_all and machine.nodes.keys() != complete.nodes.keys()):
+        unlisted = machine.nodes.keys() - complete.nodes.keys()
+        if unlisted or (machine.lists_all and machine.nodes.keys() != complete.nodes.keys()):
             raise BusplanError(
                 f"{complete.file} has {len(complete.nodes)} devices and {machine.file} {len(machine.nodes)}: these are "
                 "two machines, or one was changed; export both anew"

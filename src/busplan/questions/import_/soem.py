@@ -54,15 +54,15 @@ def read(text: str, name: str) -> Reading:
 
 def _slaves(text: str, machine: Reading) -> list[list[tuple[int, str]]]:
     """The numbered lines of each device."""
-    found: list[list[tuple[int, str]]] = []
+    slaves: list[list[tuple[int, str]]] = []
     for line, content in enumerate(text.split("\n"), start=1):
         if match := _SLAVE.match(content):
-            found.append([])
-            if int(match[1]) != len(found):
-                raise machine.refusal(line, f"slave {match[1]} where slave {len(found)} is due: give all of the text")
-        if found:
-            found[-1].append((line, content))
-    return found
+            slaves.append([])
+            if int(match[1]) != len(slaves):
+                raise machine.refusal(line, f"slave {match[1]} where slave {len(slaves)} is due: give all of the text")
+        if slaves:
+            slaves[-1].append((line, content))
+    return slaves
 
 
 def _described(key: str, value: str, line: int, facts: dict[str, Fact], machine: Reading) -> None:
@@ -85,8 +85,8 @@ def _hops(totals_ns: dict[int, tuple[int, int]], ports: dict[int, int], machine:
     hops_ns: dict[int, int] = {}
     for number in range(1, len(machine.nodes)):
         before = _parent(number, ports)
-        between = [hops_ns.get(other) for other in range(before + 1, number)]
-        known = all("has_clock" in machine.nodes[other] and other in totals_ns for other in (before, number))
+        between = [hops_ns.get(device) for device in range(before + 1, number)]
+        known = all("has_clock" in machine.nodes[device] and device in totals_ns for device in (before, number))
         if not known or None in between:
             continue
         hop_ns = totals_ns[number][0] - totals_ns[before][0] - 2 * sum(ns for ns in between if ns)

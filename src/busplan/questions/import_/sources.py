@@ -25,14 +25,14 @@ class Format(NamedTuple):
     """A format that is read, and how it is recognised."""
 
     title: str
-    """With what a file of it holds."""
+    """Name of the format, and what its files hold."""
     module: str
     roots: tuple[str, ...] = ()
-    """Tags of its root element, of XML."""
+    """Tags of the root element, for XML."""
     pattern: str = ""
-    """Line that only its files have, of text."""
+    """Pattern of a line that only files of the format have, for text."""
     dialect: str = ""
-    """Argument of a reader of several formats."""
+    """Argument of a reader that reads several formats."""
 
 
 _IGH: Final = r"=== Master \d+, Slave \d+ ===|SM\d+: PhysAddr 0x"
@@ -102,16 +102,16 @@ def _text(content: bytes, encoding: str, name: str) -> str:
 
 
 def _of_text(text: str, name: str) -> Reading:
-    found = [known for known in FORMATS if known.pattern and re.search(f"^(?:{known.pattern})", text, re.MULTILINE)]
-    if not found:
+    matching = [known for known in FORMATS if known.pattern and re.search(f"^(?:{known.pattern})", text, re.MULTILINE)]
+    if not matching:
         raise BusplanError(_unknown(name, ""))
-    if len(found) > 1:
-        titles = " and ".join(known.title for known in found)
+    if len(matching) > 1:
+        titles = " and ".join(known.title for known in matching)
         raise BusplanError(f"{name}: has lines of {titles}; give a file for each")
-    if not found[0].dialect:
-        # No value stands further behind, and patterns take long for lines without an end.
+    if not matching[0].dialect:
+        # Values stand further to the front, and patterns take long on endless lines.
         text = "\n".join(line[:_LONGEST_LINE] for line in text.split("\n"))
-    return _reader(found[0])(text, name)
+    return _reader(matching[0])(text, name)
 
 
 def _reader(known: Format) -> Callable[..., Reading]:

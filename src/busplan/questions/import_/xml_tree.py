@@ -21,7 +21,7 @@ class Element:
     tag: str
     """Without its namespace."""
     line: int | str
-    """Its line, with the column where that is far."""
+    """Its line, with the column if the line is long."""
     attributes: dict[str, str]
     children: list["Element"] = field(default_factory=list)
     text: str = ""
