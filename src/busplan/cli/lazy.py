@@ -88,13 +88,13 @@ def _write_parameters(command: TyperCommand | TyperGroup, ctx: Any, formatter: A
                 formatter.write_dl(rows)
 
 
-def _on_one_line(items: list[Any]) -> list[Any]:
+def _on_one_line(completions: list[Any]) -> list[Any]:
     """Shorten the help of completions: typer wraps long help, and fish takes each line for a completion."""
     from textwrap import shorten
 
-    for item in items:
-        item.help = item.help and shorten(item.help, _OFFER, placeholder="...")
-    return items
+    for completion in completions:
+        completion.help = completion.help and shorten(completion.help, _OFFER, placeholder="...")
+    return completions
 
 
 def _of_kind(params: list[Any], kind: str) -> list[Any]:

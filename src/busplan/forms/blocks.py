@@ -61,7 +61,7 @@ class SectionLink(NamedTuple):
     key: str
     """Key of the section."""
     origin: str
-    """PROFILE argument, quoted for a shell; tells profiles of one name apart."""
+    """PROFILE argument, quoted for a shell; tells profiles of the same name apart."""
 
 
 class Swatch(NamedTuple):
@@ -132,7 +132,7 @@ class TableRow(NamedTuple):
     level: int = 0
     """1 if the row is a part of the row above it, which has level 0."""
     highlighted: bool = False
-    """If True, the row is bold: it is the one to look at first."""
+    """If True, the row is bold, to be read first."""
     is_detail: bool = False
     """If True, the row is shown only in a whole answer."""
 
@@ -255,7 +255,7 @@ class Gauge(NamedTuple):
     state: State
 
     def parts(self) -> "list[GaugePart]":
-        """Cut the period into parts, in this order: used, in doubt, free, to stay free, and of other use."""
+        """Cut the period into parts, in this order: used, in doubt, free, to stay free, other use."""
         ends = (self.used, self.used + self.doubt, self.free_until, self.most, 1.0)
         states: tuple[State, ...] = (self.state, "warns", "neutral", "neutral", "neutral")
         cut: list[GaugePart] = []

@@ -8,7 +8,7 @@ from busplan.forms.numbers import sentence_line
 from busplan.printable import printable
 
 _WIDTH: Final = 80
-"""Width without a terminal, and the largest one."""
+"""Width without a terminal, and the largest width."""
 _INDENT: Final = "  "
 _LABEL: Final = 18
 """Where the words of a line begin."""

@@ -66,7 +66,7 @@ def _template(name: str) -> Template:
 
 @cache
 def _environment() -> Environment:
-    """Jinja's environment of all templates, which keeps each one compiled."""
+    """Jinja's environment of all templates, which keeps each compiled."""
     environment = Environment(
         loader=PackageLoader("busplan.forms"),
         autoescape=True,

@@ -101,7 +101,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int |
 _TEXT_WIDTH: Final = 80
 """Width of a drawing in characters, in columns."""
 _COMMENT_LEVEL: Final = 3
-"""Title level of an answer that is not a page: it is read inside one, as in a comment on a change."""
+"""Title level of an answer that stands inside a page, as in a comment on a change."""
 
 
 def text(report: Report) -> str:

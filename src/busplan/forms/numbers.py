@@ -197,7 +197,7 @@ def part_text(part: Part) -> str:
 
 
 def sentence_line(sentence: Sentence) -> Line:
-    """Write a sentence as one line: its words of a state are marked, or all of it where no word has one."""
+    """Write a sentence as a line: words with a state are marked; without any, the state is that of the sentence."""
     text, marks = "", list[Mark]()
     for part in sentence.parts:
         start, text = len(text), text + printable(part_text(part))

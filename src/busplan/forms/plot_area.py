@@ -42,7 +42,7 @@ class Ruler(NamedTuple):
 
 
 def numbers(label: str, low: float, high: float, *, whole: bool = False) -> Ruler:
-    """Make a scale of numbers; a single one gets room at both sides.
+    """Make a scale of numbers; a single number gets room at both sides.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def numbers(label: str, low: float, high: float, *, whole: bool = False) -> Rule
 
 
 def choices(label: str, names: tuple[str, ...], *, own: int | None = None) -> Ruler:
-    """Make a scale of names; `own` is the place of the one that is always shown."""
+    """Make a scale of names; `own` is the index of the name that is always shown."""
     return Ruler(label, -0.5, len(names) - 0.5, names, own)
 
 

@@ -66,7 +66,7 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>", skip_other
 
 
 def _meant(argument: str, *, stdin_name: str, skipped: list[str], skip_others: bool) -> Iterator[ProfileSource]:
-    """Sources of one argument: one, or all below a folder."""
+    """Sources of an argument: a file, or every profile below a folder."""
     try:
         path, name = locate(argument)
         if argument == "-":

@@ -95,7 +95,7 @@ def converted(profile: Profile, kind: str) -> Conversion:
 
 
 def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:
-    """Give each node data in both directions, and leave out groups that have none, as couplers; gives both."""
+    """Give nodes data in both directions; returns keys set for that, and groups left out without data, as couplers."""
     groups: Sequence[TomlTable] = machine.get("group", ())
     empty = [group["name"] for group in groups if not any(group.get(key, 1) for key in _SIZES)]
     raised = []
@@ -145,7 +145,8 @@ def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: s
             known[name] = _part(value, inner, f"{prefix}{name}.", rest)
         elif tables is not None:
             known[name] = [
-                _part(named_table, inner, f"{prefix}{name}.{own}.", rest) for own, named_table in tables.items()
+                _part(named_table, inner, f"{prefix}{name}.{table_name}.", rest)
+                for table_name, named_table in tables.items()
             ]
         else:
             known[name] = value
@@ -153,7 +154,7 @@ def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: s
 
 
 def _merged(machine: TomlTable, new: TomlTable) -> TomlTable:
-    """Both, section by section; a key of both is that of the new bus."""
+    """Merge two profiles section by section; the value of a key of both is that of the new bus."""
     return {**machine, **{name: {**machine.get(name, {}), **section} for name, section in new.items()}}
 
 

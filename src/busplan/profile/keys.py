@@ -73,8 +73,8 @@ def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, o
             yield from flat(value, f"{prefix}{name}.")
         elif (tables := named_tables(value)) is not None:
             yield f"{prefix}{name}", list(tables)
-            for own, inner in tables.items():
-                yield from flat({key: inner[key] for key in inner if key != NAME}, f"{prefix}{name}.{own}.")
+            for table_name, inner in tables.items():
+                yield from flat({key: inner[key] for key in inner if key != NAME}, f"{prefix}{name}.{table_name}.")
         else:
             yield f"{prefix}{name}", value
 

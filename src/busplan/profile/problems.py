@@ -45,7 +45,7 @@ _OUT_OF_RANGE: Final = {
 
 
 class KeyFinding(NamedTuple):
-    """One problem of a key."""
+    """A problem of a key."""
 
     path: KeyPath
     message: str

@@ -48,15 +48,15 @@ def settling_time_us(
     >>> round(settling_time_us(axis, axis, timing=timing, feed_mm_per_min=6000.0) / 1e3)
     118
     """
-    each = []
+    times_us = []
     for axis in (x, y):
         lag_mm = feed_mm_per_min / _S_PER_MIN / axis.position_gain_per_s if axis.position_gain_per_s else math.inf
         margins = loop_margins(axis, timing=timing)
-        each.append(margins.time_to_us(rest_mm / lag_mm) if margins.stable and lag_mm < math.inf else math.inf)
-        if each[-1] < math.inf:
+        times_us.append(margins.time_to_us(rest_mm / lag_mm) if margins.stable and lag_mm < math.inf else math.inf)
+        if times_us[-1] < math.inf:
             friction_mm = axis.reversal_mm_s / axis.position_gain_per_s
-            each.append(axis.reversal_recovery_us * math.log(max(friction_mm / rest_mm, 1.0)))
-    settling_us = max(each) + timing.period_us
+            times_us.append(axis.reversal_recovery_us * math.log(max(friction_mm / rest_mm, 1.0)))
+    settling_us = max(times_us) + timing.period_us
     return settling_us if settling_us <= LONGEST_SETTLING_US else None
 
 

@@ -1,4 +1,4 @@
-"""Circle tests of the variants of a profile, and of a comparison; only running one loads the simulation."""
+"""Circle tests of the variants of a profile, and of a comparison; only running a test loads the simulation."""
 
 from collections.abc import Callable
 from itertools import count
@@ -99,7 +99,7 @@ ComputeCircleFigures = Callable[["Profile"], "CircleFigures"]
 
 
 def circle_tests(progress: Progress | None = None, *, of: int = 2) -> ComputeCircleFigures:
-    """Make the function that runs the circle test of each of some profiles, with one progress for all.
+    """Make a function that runs the circle tests of several profiles, with one progress for all.
 
     Parameters
     ----------

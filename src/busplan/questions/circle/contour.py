@@ -26,7 +26,7 @@ class ContourProfile(NamedTuple):
         Parameters
         ----------
         sectors
-            New number of sectors, a divisor of the present one [1].
+            New number of sectors, a divisor of the present number [1].
         """
         width = len(self.low_mm) // sectors
 

@@ -82,7 +82,7 @@ class Magnified(NamedTuple):
 
     @property
     def rings_mm(self) -> tuple[float, ...]:
-        """Errors at the rings, from the innermost one to the outermost; the nominal circle is 0."""
+        """Errors at the rings, from the innermost to the outermost; the nominal circle is 0."""
         most = floor(self.largest_mm * 1e3 / self.ring_um + 1e-9)
         return tuple(ring * self.ring_um / 1e3 for ring in range(-most, most + 1))
 
@@ -155,7 +155,7 @@ _ROWS: Final = 9
 
 
 def contour_lines(profile: ContourProfile, *, width: int) -> list[Line]:
-    """Draw the smallest and largest error of each part of the circle, of which one at least is no rounding.
+    """Draw the smallest and largest error of each part of the circle; at least one is more than rounding.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ HEIGHT: Final = 400
 _NOMINAL: Final = 140
 """Drawn radius of the nominal circle."""
 _ARROW: Final = 0.62
-"""Radius of the arrow, as a multiple of the nominal one: no error is drawn there."""
+"""Radius of the arrow, as a multiple of the nominal radius: no error is drawn there."""
 _ARROW_DEG: Final = (20, 65)
 
 

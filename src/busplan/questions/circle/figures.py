@@ -170,7 +170,7 @@ class CircleFigures(NamedTuple):
     update: str
     """When a node applies a command of a loop on the host."""
     delay_us: float
-    """Bus delay inside the loop, the longer one of both axes; 0 for a loop on the node."""
+    """Bus delay inside the loop, the longer of both axes; 0 for a loop on the node."""
     delay_x_us: float
     delay_y_us: float
     jitter_us: float
@@ -189,9 +189,9 @@ class CircleFigures(NamedTuple):
     """Whether the profile has no [servo], so that an ideal drive was simulated."""
     stable: bool | None
     phase_margin_deg: float | None
-    """The smaller one of both axes; None also if no loop gain reaches one."""
+    """The smaller of both axes; None also if no loop gain reaches one."""
     gain_margin_db: float | None
-    """The smaller one of both axes; None also if no gain makes a loop unstable."""
+    """The smaller of both axes; None also if no gain makes a loop unstable."""
     crossover_hz: float | None
     """Of the axis with the smaller phase margin."""
     settled: bool | None
@@ -224,6 +224,6 @@ class CircleTest(NamedTuple):
 
     @property
     def passed(self) -> bool | None:
-        """Whether every period holds every tolerance; None if none fails, and one is not judged."""
+        """Whether every period holds every tolerance; None if no period fails and some period is not judged."""
         verdicts = [result.passed for result in self.results]
         return False if False in verdicts else None if None in verdicts else True

@@ -181,7 +181,7 @@ def circle_svg(test: CircleTest, *, note: str = "") -> str:
     Parameters
     ----------
     test
-        The circle test, of which one period at least was simulated.
+        The circle test, with at least one simulated period.
     note
         Title, beside the profile's name.
     """
@@ -274,12 +274,12 @@ def _errors(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
 
 
 def _curve(plot: PlotArea, curve: Curve, *, per_um: float) -> None:
-    """Draw a part of the move: the measured one strong and on a shade, the rest pale."""
+    """Draw a part of the move: the measured part bold and shaded, the rest pale."""
     if curve.measured:
         start, end = (plot.across.share(float(curve.time_s[end])) for end in (0, -1))
         box = {"x": f"{100 * start:.5g}%", "width": f"{100 * (end - start):.5g}%", "y": str(plot.top)}
         SubElement(plot.area, "rect", {**box, "height": str(plot.height), "class": "during"})
-    # Far outside, the place of a point does not matter; a huge one cannot be drawn.
+    # Far outside, the place of a point does not matter; a huge coordinate cannot be drawn.
     spread = plot.up.high - plot.up.low
     errors = np.clip(curve.error_um * per_um, plot.up.low - spread, plot.up.high + spread)
     points = (plot.point(float(x), float(error)) for x, error in zip(curve.time_s, errors, strict=True))
@@ -290,7 +290,7 @@ def _curve(plot: PlotArea, curve: Curve, *, per_um: float) -> None:
 def _ranking(body: Element, row: CircleRow, rows: Sequence[CircleRow], scales: Scales, *, y: int) -> int:
     """Draw what each error source takes from the largest error, largest first, and return the y below it.
 
-    Periods whose table followed the circle share a scale, the others another one.
+    Periods whose table followed the circle share a scale; the others share a second.
     """
     if not row.result.contributions:
         return y

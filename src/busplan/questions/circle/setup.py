@@ -131,7 +131,7 @@ def contributions(
     Returns
     -------
     tuple
-        The sources, the one with the largest `removed_mm` first.
+        The sources, largest `removed_mm` first.
 
     Notes
     -----

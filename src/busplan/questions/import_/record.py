@@ -100,9 +100,12 @@ def merged(machines: Iterable[Reading]) -> Reading:
                 f"{first.file} and {machine.file} are both node {min(same)}; an EDS has no node-ID, give the DCF of "
                 "each"
             )
-        for whose, own, new in (("node", whole.nodes, machine.nodes), ("message", whole.messages, machine.messages)):
+        for whose, of_whole, new in (
+            ("node", whole.nodes, machine.nodes),
+            ("message", whole.messages, machine.messages),
+        ):
             for number, facts in new.items():
-                _add(own.setdefault(number, {}), facts, f"{whose} {number}: ", differences)
+                _add(of_whole.setdefault(number, {}), facts, f"{whose} {number}: ", differences)
         whole.remarks += machine.remarks
     if whole.kind == "ethercat":
         _require_one_machine([first, *others])
@@ -135,5 +138,5 @@ def _add(own: Facts, new: Mapping[str, Fact], whose: str, differences: dict[str,
         if known.grade == "assumed" != fact.grade:
             own[key] = fact
         elif known.value != fact.value and fact.grade != "assumed" and key not in _MAY_DIFFER:
-            values = (f"{short_text(each.value)} at {each.place}" for each in (known, fact))
+            values = (f"{short_text(stated.value)} at {stated.place}" for stated in (known, fact))
             differences.setdefault(key, []).append(f"{whose}{key} is {' and '.join(values)}")

@@ -77,7 +77,7 @@ def sections_text(rows: Sequence[ProfileLine]) -> str:
 
 
 def _sections(rows: Sequence[ProfileLine]) -> Iterator[str]:
-    for section, own in groupby(rows, lambda row: row.section):
+    for section, section_rows in groupby(rows, lambda row: row.section):
         yield ""
         first, _, rest = section.partition(".")
         name, _, inner = rest.partition(".")
@@ -88,7 +88,7 @@ def _sections(rows: Sequence[ProfileLine]) -> Iterator[str]:
             yield f"name = {value_text(name)}"
         else:
             yield f"[{first}]"
-        for row in own:
+        for row in section_rows:
             line, comment = f"{row.key} = {short_text(row.fact.value)}", row.fact.comment
             yield f"{line:{_COMMENTS_AT - 1}} # {comment}" if comment else line
 
