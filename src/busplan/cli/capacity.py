@@ -53,24 +53,22 @@ def capacity_command(
         from busplan.questions.capacity import capacity
 
         plan = load_changed(profile, changes)
-        capacity_answer = capacity(
+        result = capacity(
             plan,
             period_us=periods_us(period, plan),
             timing_model=timing_models(timing, plan),
             sensitivity=sensitivity,
         )
-        give(capacity_answer.report()._replace(next_commands=_next(str(profile), capacity_answer, changes)))
+        give(result.report()._replace(next_commands=_next(str(profile), result, changes)))
 
 
-def _next(argument: str, capacity_answer: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
+def _next(argument: str, result: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
     """What to ask next of the same profile."""
     from busplan.forms.blocks import Command
     from busplan.questions.base.shell import change_options, shell_word
 
-    changed = " ".join(
-        (shell_word(argument), *change_options(changes, period_us=capacity_answer.profile.cycle.period_us))
-    )
-    all_well = all(verdict.all_well for verdict in capacity_answer.verdicts)
+    changed = " ".join((shell_word(argument), *change_options(changes, period_us=result.profile.cycle.period_us)))
+    all_well = all(verdict.all_well for verdict in result.verdicts)
     second = "circle-test" if all_well else "plan"
     asked = (f"capacity {changed} --sensitivity", f"{second} {changed}", f"report {changed}")
     return tuple(Command(f"busplan {words}") for words in asked)

@@ -24,10 +24,8 @@ def _direction(option: str, *, default: str) -> typer.models.OptionInfo:
         "number of nodes; with groups, of the group with the most axes), and up to 64 values in its unit: "
         f"{VALUES_HELP}  [default: {default}]"
     )
-    direction_option: typer.models.OptionInfo = typer.Option(
-        option, metavar="KEY=VALUES", help=help_, show_default=False
-    )
-    return direction_option
+    direction: typer.models.OptionInfo = typer.Option(option, metavar="KEY=VALUES", help=help_, show_default=False)
+    return direction
 
 
 @takes_changes(

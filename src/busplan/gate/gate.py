@@ -83,21 +83,17 @@ def suppress(
             way_out = "add why behind the bracket"
             own.append(_finding(SUPPRESSION_WITHOUT_REASON, comment, "the suppression says no reason", way_out))
         for code in comment.codes:
-            hit = [
-                violation
-                for violation in left
-                if violation.rule.code == code and violation.spot.line == comment.of_line
-            ]
-            left = [violation for violation in left if violation not in hit]
+            hit = [placed for placed in left if placed.rule.code == code and placed.spot.line == comment.of_line]
+            left = [placed for placed in left if placed not in hit]
             if code not in all_rules():
-                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, f"{code or 'nothing'} is no code of a rule"))
+                message = f"{code or 'nothing'} is no code of a rule"
             elif code in NEVER_SUPPRESSED:
-                own.append(
-                    _finding(SUPPRESSION_WITHOUT_EFFECT, comment, f"{code} cannot be suppressed, it must be mended")
-                )
+                message = f"{code} cannot be suppressed, it must be mended"
             elif not hit and code in ran:
                 message = f"{code} has nothing to suppress on line {comment.of_line}"
-                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, message))
+            else:
+                continue
+            own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, message))
     return left, own
 
 
