@@ -513,7 +513,7 @@ def otherwise_in_forms(profile: Profile, own: Data) -> Iterator[str]:
             yield f"{key} {row[key]} as CSV, and {own[key]} as JSON"
     text = call("capacity", FILE, "--format", "table").out.decode()
     is_refused = "\n  circle          cannot be run: " in text
-    if own["verdict"].upper() not in text.partition("[")[0] or is_refused != bool(own["circle_refused_by"]):
+    if own["verdict"].upper() not in text.partition("\n  [")[0] or is_refused != bool(own["circle_refused_by"]):
         yield f"{text[:300]} as text, and {own['verdict']}, {own['circle_refused_by']} as JSON"
     figures = busplan.capacity(profile).verdicts[0].deciding
     for key in TOLD:

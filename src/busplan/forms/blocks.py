@@ -254,21 +254,21 @@ class Gauge(NamedTuple):
     """The share that may be used, with the reserve."""
     state: State
 
-    def stretches(self) -> "list[Stretch]":
-        """Cut the period into stretches, in this order: used, in doubt, free, to stay free, and of other use."""
+    def parts(self) -> "list[GaugePart]":
+        """Cut the period into parts, in this order: used, in doubt, free, to stay free, and of other use."""
         ends = (self.used, self.used + self.doubt, self.free_until, self.most, 1.0)
         states: tuple[State, ...] = (self.state, "warns", "neutral", "neutral", "neutral")
-        cut: list[Stretch] = []
-        for name, letter, end, state in zip(_STRETCHES, "#~.r ", ends, states, strict=True):
+        cut: list[GaugePart] = []
+        for name, letter, end, state in zip(_GAUGE_PARTS, "#~.r ", ends, states, strict=True):
             start = cut[-1].end if cut else 0.0
-            cut.append(Stretch(name, letter, start, min(1.0, max(start, end)), state))
+            cut.append(GaugePart(name, letter, start, min(1.0, max(start, end)), state))
         return cut
 
 
-_STRETCHES: Final = ("used", "doubt", "free", "reserve", "other")
+_GAUGE_PARTS: Final = ("used", "doubt", "free", "reserve", "other")
 
 
-class Stretch(NamedTuple):
+class GaugePart(NamedTuple):
     """A part of a period."""
 
     name: str

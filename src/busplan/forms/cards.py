@@ -55,10 +55,10 @@ def _bar(gauge: Gauge, width: int) -> Line:
     cells = width - len(_INDENT) - 2
     marks = list[Mark]()
     text = ""
-    for stretch in gauge.stretches():
+    for part in gauge.parts():
         before = len(text)
-        text += stretch.letter * (round(stretch.end * cells) - len(text))
-        marks.append(Mark(len(_INDENT) + 1 + before, len(_INDENT) + 1 + len(text), stretch.state))
+        text += part.letter * (round(part.end * cells) - len(text))
+        marks.append(Mark(len(_INDENT) + 1 + before, len(_INDENT) + 1 + len(text), part.state))
     end = round(gauge.most * cells)
     if end < cells:
         text = f"{text[:end]}|{text[end + 1 :]}"

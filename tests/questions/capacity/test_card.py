@@ -115,12 +115,12 @@ def test_what_is_used_and_free_fills_what_the_bus_may_use(name: str, period_us: 
     most=st.floats(0, 1),
     reserve=st.floats(0, 1),
 )
-def test_the_stretches_of_a_bar_fill_it(used: float, doubt: float, most: float, reserve: float) -> None:
+def test_the_parts_of_a_bar_fill_it(used: float, doubt: float, most: float, reserve: float) -> None:
     gauge = Gauge(used, doubt, most * (1 - reserve), most, "passes")
-    stretches = gauge.stretches()
-    assert [stretch.start for stretch in stretches] == [0.0, *(stretch.end for stretch in stretches[:-1])]
-    assert stretches[-1].end == 1.0
-    assert stretches[0].end == min(1.0, used)
+    parts = gauge.parts()
+    assert [part.start for part in parts] == [0.0, *(part.end for part in parts[:-1])]
+    assert parts[-1].end == 1.0
+    assert parts[0].end == min(1.0, used)
 
 
 def test_a_low_terminal_shows_the_card_alone_unless_all_was_asked_for() -> None:

@@ -159,7 +159,8 @@ def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
         Sentence((f"{bus.figures.term_label(largest.name)}, {_us(plain(largest.us), figures.uncertainty_us)} us",)),
     )
     for assumption in heavy_assumptions(figures, profile):
-        yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure it first",), "warns")
+        them = "it" if len(assumption.keys) == 1 else "them"
+        yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
     left_out = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
     if left_out:
         yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in left_out)),))

@@ -267,5 +267,7 @@ def _least_relaxed(
     def fits(value: Value) -> bool:
         return Search(override(goal, {key: value}), kept=kept).least(levels) is not None
 
-    place = bisect_left(values, x=True, key=fits)
-    return values[place] if place < len(values) else None
+    # Where not even the weakest is enough, the others need not be tried.
+    if not values or not fits(values[-1]):
+        return None
+    return values[bisect_left(values, x=True, key=fits)]

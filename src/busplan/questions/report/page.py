@@ -36,6 +36,7 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import MISSING, plural
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.questions.base.shell import shell_word
+from busplan.questions.capacity.card import card
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.circle.report import verdict_words
 from busplan.questions.explain.report import assumptions_table
@@ -44,7 +45,6 @@ from busplan.questions.fit.network import bus_of
 from busplan.questions.report.all_answers import AllAnswers
 from busplan.questions.report.commands import Sources, sources
 from busplan.questions.report.parts import (
-    bus_question,
     circle_question,
     part,
     parts,
@@ -132,18 +132,18 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     if answer.profile.description.strip():
         yield Sentence((" ".join(answer.profile.description.split()),))
     yield _facts(subject)
-    questions = (bus_question(answer), circle_question(answer))
+    verdicts: tuple[Block, ...] = (card(answer.verdict, answer.profile), circle_question(answer))
     if answer.no_circle:
-        questions = questions[::-1]  # the cause first
+        verdicts = verdicts[::-1]  # the cause first
     lines = (found[name].line for name in ("capacity", "circle") if name in found)
-    yield part("verdict", "Verdict", (*_assumed(answer), *questions, *lines))
+    yield part("verdict", "Verdict", (*_assumed(answer), *verdicts, *lines))
     yield from parts(answer, found)
     assumptions = (assumptions_table(answer.assumptions), found["explain"].line)
     yield part("assumptions", "What it rests on", assumptions)
     yield _commands(found)
 
 
-_MOST_NAMED: Final = 6
+_MOST_NAMED: Final = 3
 """Keys that are named before the verdict; the table at the end has all."""
 
 

@@ -5,9 +5,7 @@ from typing import Final
 
 from busplan.buses.figure import (
     AXES,
-    BINDING_TERM,
     LIMITED_BY,
-    MARGIN_CORRECTED,
     MAX_AXES,
     MAX_NODES,
     NODES,
@@ -16,8 +14,6 @@ from busplan.buses.figure import (
     SAFE_AXES,
     SAFE_LIMITED_BY,
     SAFE_NODES,
-    UNCERTAINTY,
-    UTILISATION,
     Figure,
 )
 from busplan.forms.blocks import (
@@ -35,7 +31,6 @@ from busplan.forms.blocks import (
     attribute_value,
     count_value,
     sentence,
-    state_of,
 )
 from busplan.forms.numbers import nouns, period_value
 from busplan.questions.capacity.report import capacity_table, groups_table
@@ -52,7 +47,6 @@ from busplan.questions.circle.report import (
     servo_sentence,
     verdict_words,
 )
-from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.latency.report import latency_tables
@@ -67,25 +61,6 @@ _OVER_PERIOD: Final = (SAFE_NODES, SAFE_AXES, SAFE_LIMITED_BY)
 """Under the timing model that decides."""
 _CLOSED: Final = (MAX_NODES, MAX_AXES, LIMITED_BY)
 """Under another timing model."""
-
-
-def bus_question(answer: AllAnswers) -> Question:
-    """The question whether the cycle fits, with its verdict."""
-    verdict = answer.verdict
-    word = str(verdict.deciding.verdict).upper()
-    if verdict.deciding.verdict == FITS and not verdict.deciding.safe:
-        word = f"UNSAFE {bus_of(answer.profile).safety.setting.upper()}"
-    facts = tuple(
-        (figure.label, attribute_value(figure, verdict.deciding))
-        for figure in (MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES, UTILISATION, BINDING_TERM)
-        if figure is not SAFE_AXES or not answer.profile.group
-    )
-    return Question(
-        "Does the cycle fit its period?",
-        Words(word, state_of(verdict.deciding.verdict == FITS and verdict.deciding.safe)),
-        tuple(verdict_sentences(verdict, answer.profile)),
-        Facts(facts),
-    )
 
 
 def part(kind: str, title: str, blocks: Iterable[Block]) -> Chapter:
@@ -114,6 +89,7 @@ def parts(answer: AllAnswers, sources: Sources) -> Iterator[Chapter]:
 
 def _models(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     """Capacity and latencies, the timing models side by side."""
+    yield from verdict_sentences(answer.verdict, answer.profile)
     yield capacity_table(answer.capacity)
     if answer.profile.group:
         yield groups_table(answer.capacity)
