@@ -83,7 +83,7 @@ else:
         "import_profile": "busplan.questions.import_",
         "ImportAnswer": "busplan.questions.import_",
     }
-    """Where a name is that is no question and no answer of one."""
+    """Module of a name that is no question and no answer."""
 
     def __getattr__(name: str) -> object:
         if name not in __all__:

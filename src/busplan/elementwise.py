@@ -1,6 +1,6 @@
 """Numbers of the equations: floats, arrays and traced numbers, and functions that work on all of them.
 
-What a bus computes it writes with operators and with these functions. Then one equation serves all three. A traced
+A bus writes its equations with operators and these functions. Then the same equation serves all three. A traced
 number records how it was computed, so that a line of a derivation shows what was executed. numpy loads only where
 arrays are.
 """
@@ -69,7 +69,7 @@ _NEUTRAL: Final = MappingProxyType({"add": 0, "sub": 0, "mul": 1, "truediv": 1})
 
 
 class GivenTable(tuple[float, ...]):  # noqa: SLOT001 - a tuple's subclass with slots holds no attribute
-    """Entries of a table in a profile, as one input of a derivation."""
+    """Entries of a table in a profile, as a single input of a derivation."""
 
     given: Input
 
@@ -184,7 +184,7 @@ def _applied(name: str, *numbers: Number) -> Number:
 
 
 def plain(number: Number) -> float:
-    """The very number, where it must be a plain one.
+    """The very number, where it must be plain.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def plain(number: Number) -> float:
 
 
 def existing(number: Number) -> float | None:
-    """A plain number; None for an infinite one, which stands for what does not exist.
+    """A plain number; None for infinity, which stands for what does not exist.
 
     Examples
     --------

@@ -33,7 +33,7 @@ _MOST_SHOWN: Final = 50
 
 
 class PlacedProblem(NamedTuple):
-    """One problem at one place of a file; lines and columns count from 1."""
+    """A problem at a place of a file; lines and columns count from 1."""
 
     line: int
     column: int
@@ -53,7 +53,7 @@ class PlacedError(BusplanError):
     name
         Name of the file.
     problems
-        At least one, in the order of their places; of very many, only the first ones are listed.
+        At least one, in the order of their places; of very many, only the first are listed.
     hidden
         Number of further problems that are not in `problems`.
     """

@@ -6,27 +6,29 @@ from importlib.util import find_spec
 from busplan.errors import BusplanError
 
 
-def require_extra(library: str, *, extra: str, option: str, module: str) -> None:
+def require_extra(library: str, *, option: str, module: str, extra: str | None = None) -> None:
     """Refuse to start without a library.
 
     Parameters
     ----------
     library
         Name of the library.
-    extra
-        The extra of busplan that it comes with.
     option
-        Option that asks for it, for messages.
+        Option or method that asks for it, for messages.
     module
         Module of the library that is needed.
+    extra
+        The extra of busplan that it comes with; None for a library of its own.
 
     Raises
     ------
     BusplanError
-        The extra is not installed, or does not load.
+        The library is not installed, or does not load.
     """
     if find_spec(library) is None:
-        raise BusplanError(f"{option} needs {library}: install it with the extra, as in pip install 'busplan[{extra}]'")
+        package = library if extra is None else f"'busplan[{extra}]'"
+        way = "it" if extra is None else "it with the extra"
+        raise BusplanError(f"{option} needs {library}: install {way}, as in pip install {package}")
     try:
         import_module(module)
     except Exception as error:  # noqa: BLE001 - a broken installation fails in many ways

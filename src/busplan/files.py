@@ -43,7 +43,7 @@ def new_file(path: Path, *, overwrite: bool, keeps_after: type[BaseException] | 
     """Open a file for atomic writing: a temporary file next to it is renamed at the end.
 
     It is opened at once, so that a path that cannot be written fails before the work. After an error, the old file is
-    unchanged; after one of `keeps_after`, too, and the output so far is under `partial_path`.
+    unchanged; after an error of `keeps_after`, too, and the output so far is under `partial_path`.
 
     Raises
     ------
@@ -101,7 +101,7 @@ class NewFile(io.BufferedWriter):
     abandoned = False
 
     def abandon(self) -> None:
-        """Discard the new file at the end and leave an old one unchanged."""
+        """Discard the new file at the end and leave an old file unchanged."""
         self.abandoned = True
 
 
@@ -137,7 +137,7 @@ def _remove(temporary: Path) -> None:
 
 
 def lock(descriptor: int) -> bool:
-    """Lock an open file or folder until it is closed, also by the end of the process; False if another one has it.
+    """Lock an open file or folder until it is closed, also by the end of the process; False if another process has it.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def naming_errors(path: Path, target: Path) -> Iterator[None]:
 
 
 def _mode_of(target: Path, *, overwrite: bool) -> int | None:
-    """Permissions of the file to be replaced, None for a new file; refuse one that may not be replaced."""
+    """Permissions of the file to be replaced, None for a new file; refuse a file that may not be replaced."""
     if not os.path.lexists(target):
         return None
     if not overwrite:
@@ -182,7 +182,7 @@ def _mode_of(target: Path, *, overwrite: bool) -> int | None:
 
 
 def _rename_new(temporary: Path, target: Path) -> None:
-    """Rename a file, but never over an existing one."""
+    """Rename a file, but never over an existing file."""
     try:
         os.link(temporary, target)
     except FileExistsError:

@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 
 def did_you_mean(typed: str, known: Iterable[str]) -> str:
-    """Ask for the known name that is nearest to a typed one; empty if none is near.
+    """Ask for the known name that is nearest to a typed name; empty if none is near.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ def printable(text: str, *, write: Callable[[str], str] = _escape) -> str:
     text
         Any text.
     write
-        How to escape one character; by default as Python does.
+        Escape of a character; by default as Python does.
 
     Examples
     --------

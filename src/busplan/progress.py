@@ -6,11 +6,11 @@ from typing import Final
 Progress = Callable[[int, int], None]
 """Called from time to time with the work done and the total work."""
 _PARTS: Final = 1000
-"""Progress steps of one piece of work."""
+"""Progress steps of a piece of work."""
 
 
 def part_of(progress: Progress, *, number: int, of: int) -> Progress:
-    """Progress of one of several equal pieces of work.
+    """Progress of a piece of work, of several that are equal.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ class Sourced(float):
     meaning
         What the number is, in one line.
     symbol
-        Symbol in formulas; without one, formulas show the value.
+        Symbol in formulas; without it, formulas show the value.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def short(value: object) -> str:
 
 
 class Equation(NamedTuple):
-    """A function that computes a published equation, or a part of one.
+    """A function that computes a published equation, or a part of it.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ from busplan.cli import run
 from busplan.cli.lazy import LazyCommands
 from busplan.errors import BusplanError
 from busplan.profile.kinds import profile_schema
-from busplan.profile.starter import Machine, machine_text
+from busplan.profile.starter import Machine, machine_text, shared_out
 from busplan.profile.toml import decode, validate
 from busplan.questions.fit.circle_refusal import path_steps
 from busplan.sections.profile import Profile
@@ -118,7 +118,7 @@ class Maker:
         rng = self.rng
         nodes = rng.choice((1, 2, 3, 5, 8, 16, 19, 40))
         axes = nodes * rng.choice((1, 2, 4)) + rng.choice((0, 0, 1))
-        machine = Machine(nodes, axes, rng.choice(PERIODS_US), rng.choice((1, 2, 4, 8, 12)))
+        machine = Machine(shared_out(axes, nodes=nodes), rng.choice(PERIODS_US), rng.choice((1, 2, 4, 8, 12)))
         return tomllib.loads(machine_text(machine, kind=self.kind, name="a machine", file=FILE))
 
     def changed(self, data: Data) -> Data:

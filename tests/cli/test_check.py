@@ -240,7 +240,7 @@ def test_a_format_is_added_by_a_function_and_a_line_of_the_register(folder: Path
     )  # fmt: skip
     assert run.stdout.startswith("BP101!\n1\n2\n")
     words = " ".join(run.stdout.split())
-    assert "github, gitlab, junit, sarif, markdown and shout are for the build service" in words
+    assert "github, gitlab, junit, sarif, markdown and shout are for build services" in words
     assert "'shout'" in run.stderr
 
 

@@ -191,8 +191,8 @@ def test_the_same_test_draws_the_same_svg(circle_test: Run, profile: Path) -> No
         (["--set", "circle.feed_mm_per_min=1e6"], "feed_mm_per_min"),
         (["--set", "circle.feed_mm_per_min=-1"], "--set circle.feed_mm_per_min=-1: must be 0.001 or more"),
         (["--set", "delivery.seed=-1"], "--set delivery.seed=-1: must be 0 or more"),
-        (["--period", "50us"], "step_us = 100"),
-        (["--period", "2050us"], "step_us = 100"),
+        (["--period", "50us"], "quick.toml: servo.step_us = 100.0: longer than the period of 50 us; "),
+        (["--period", "2050us"], "(with --period 2050us)"),
     ],
 )
 def test_bad_input_is_exit_2_with_one_message_and_no_file(

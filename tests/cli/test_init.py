@@ -35,7 +35,7 @@ def name_in(path: Path) -> object:
 # --- as a process -----------------------------------------------------------------------------------------
 
 
-GANTRY = ("--nodes", "6", "--axes", "24", "--period", "1ms", "--bytes-per-axis", "8")
+GANTRY = ("--bus", "ieee1394", "--nodes", "6", "--axes", "24", "--period", "1ms", "--bytes-per-axis", "8")
 
 
 def test_init_writes_a_profile_of_ones_own_machine_with_its_verdict(run: Run, tmp_path: Path) -> None:
@@ -78,19 +78,34 @@ def test_a_profile_of_ones_own_is_neutral_and_no_command_stumbles_over_it(run: R
     assert (checked.returncode, sorted(set(re.findall("BP[0-9]+", checked.stdout)))) == (0, ["BP112", "BP113"])
     circle = run("circle-test", "gantry.toml", cwd=tmp_path)
     assert circle.returncode == 0
-    assert "NOT JUDGED" in circle.stdout
+    assert re.search("circular deviation G [0-9.]+ um; no tolerance set", circle.stdout)
     assert "The servo values that the profile gives are assumed." in circle.stdout
 
 
 def test_init_takes_defaults_where_nobody_can_be_asked_and_says_them(run: Run, tmp_path: Path) -> None:
     done = run("init", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (0, "")
-    taken = "not given, so taken: --nodes 4 --axes 16 --period 1ms --bytes-per-axis 8"
+    taken = "not given, so taken: --bus ieee1394 --nodes 4 --axes 16 --period 1ms --bytes-per-axis 8"
     assert done.stderr.splitlines()[:2] == [taken, "wrote my-machine.toml"]
     some = run("init", "other", "--nodes", "3", "--period", "850us", cwd=tmp_path)
-    assert some.stderr.startswith("not given, so taken: --axes 12 --bytes-per-axis 8\n")
+    assert some.stderr.startswith("not given, so taken: --bus ieee1394 --axes 12 --bytes-per-axis 8\n")
     # The step of the simulation divides any period.
     assert run("circle-test", "other.toml", cwd=tmp_path).returncode == 0
+
+
+def test_init_writes_unlike_nodes_as_groups_and_knows_a_bus_by_its_other_names(run: Run, tmp_path: Path) -> None:
+    groups = ("--group", "dual:4x2", "--group", "io:3x0:32/8", "--group", "tool:1x1:40/24")
+    done = run("init", "packer", "--bus", "EtherCAT", *groups, "--period", "1ms", "--host", "stock", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stderr.startswith("not given, so taken: --bytes-per-axis 8\n")
+    data = tomllib.loads((tmp_path / "packer.toml").read_text(encoding="utf-8"))
+    assert (data["bus"]["kind"], "nodes" in data["bus"]) == ("ethercat", False)
+    dual, io, tool = ({**group, "execution": None} for group in data["group"])
+    assert (dual["name"], dual["nodes"], dual["axes"], dual["write_bytes_per_axis"]) == ("dual", 4, 2, 8)
+    assert (io["name"], io["nodes"], io["axes"], io["read_bytes"], io["write_bytes"]) == ("io", 3, 0, 32, 8)
+    # Bytes of a group are those of a node.
+    assert (tool["read_bytes"], tool["write_bytes"], "read_bytes_per_axis" in tool) == (40, 24, False)
+    assert data["description"].startswith("8 nodes, 9 axes, 1000 us, 8 bytes an axis each way")
 
 
 def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> tuple[int, str]:
@@ -133,8 +148,11 @@ def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> 
 
 def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
     # What is no number is asked for again.
-    code, said = answered(tmp_path, b"many\n", b"0\n", b"5\n", b"\n", b"12\n", arguments=("--axes", "10"))
+    code, said = answered(
+        tmp_path, b"myrinet\n", b"FireWire\n", b"many\n", b"0\n", b"5\n", b"\n", b"12\n", arguments=("--axes", "10")
+    )
     assert code == 0
+    assert said.index("myrinet: no kind of bus") < said.index("Nodes, the host")
     assert said.count("Nodes, the host not counted [4]") == 3
     assert "must be 1 or more" in said
     assert "Axes of all nodes" not in said
@@ -145,12 +163,12 @@ def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
 def test_an_input_that_ends_is_no_answer(tmp_path: Path) -> None:
     code, said = answered(tmp_path, b"\x04")
     assert code == 2
-    assert "no answer: give --nodes, --axes, --period, --bytes-per-axis and --host" in said
+    assert "no answer: give --bus, --nodes, --axes, --period, --bytes-per-axis and --host" in said
     assert files(tmp_path) == {}
 
 
 def test_ctrl_c_at_a_question_is_an_interrupt(tmp_path: Path) -> None:
-    code, _ = answered(tmp_path, b"6\n", b"\x03")
+    code, _ = answered(tmp_path, b"can\n", b"6\n", b"\x03")
     assert code == 130
     assert files(tmp_path) == {}
 
@@ -197,6 +215,14 @@ def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: P
         (("init", "x", "--period", "0us"), "--period 0us: must be between 0.001 and 1e+09 us"),
         (("init", "x", "--period", "soon"), "--period soon: expected a time with its unit"),
         (("init", "x", "--from", "paper-1ms", "--axes", "8"), "--from: goes without --axes: a copy has the values"),
+        (("init", "x", "--bus", "myrinet"), "--bus myrinet: no kind of bus; there are ieee1394, "),
+        (("init", "x", "--group", "io:3"), "--group io:3: expected NAME:NODESxAXES or "),
+        (("init", "x", "--group", "io:0x1"), "--group io:0x1: must have 1 node or more"),
+        (("init", "x", "--group", "a:1x1", "--group", "a:2x1"), "--group a:2x1: there is a group a already"),
+        (("init", "x", "--group", "a:1x1", "--axes", "2"), "--group: goes without --nodes and --axes: each group"),
+        (("init", "x", "--group", "a:1x1:4/4", "--bytes-per-axis", "2"), "--bytes-per-axis: nothing takes it"),
+        (("init", "x", "--group", "a:1x0:4/0"), "group.a.write_bytes = 0: must be 1 or more"),
+        (("init", "x", "--from", "dvrk", "--group", "a:1x1"), "--from: goes without --group"),
         (("init", "a\nb"), r"'a\nb': no name for a profile; expected 1 to 100 printable characters"),
         (("init", "\x1b[31m"), r"'\x1b[31m': no name for a profile"),
         (("init", "x" * 101), "'xxx"),

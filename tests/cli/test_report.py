@@ -44,17 +44,17 @@ class Shown(NamedTuple):
 
 
 class Page(HTMLParser):
-    """The figures of a page, its commands, its verdicts, and the numbers that stand in a table's figures unmarked."""
+    """The figures of a page, its commands, its cards, and the numbers that stand in a table's figures unmarked."""
 
     def __init__(self, html: str) -> None:
         super().__init__(convert_charrefs=True)
         self.figures: list[Shown] = []
         self.lines: list[str] = []
-        self.stories: list[list[str]] = []
+        self.cards: list[list[str]] = []
         self.unmarked: list[str] = []
         self._data: dict[str, str] | None = None
         self._text = ""
-        self._is_code = self._is_line = self._is_story = self._in_cell = self._counts = False
+        self._is_code = self._is_line = self._is_card = self._in_cell = self._counts = False
         self.feed(html)
         self.close()
 
@@ -65,11 +65,11 @@ class Page(HTMLParser):
         elif tag == "code":
             self._is_code, self._is_line = True, found.get("class") == "line"
             self.lines += [""] if self._is_line else []
-        elif tag == "div" and found.get("class") == "lines":
-            self._is_story = True
-            self.stories.append([])
-        elif tag == "p" and self._is_story:
-            self.stories[-1].append("")
+        elif tag == "dl" and found.get("class") == "card":
+            self._is_card = True
+            self.cards.append([])
+        elif tag == "dt" and self._is_card:
+            self.cards[-1].append("")
         if tag in ("td", "dd"):
             self._in_cell, self._counts = True, tag == "dd" or found.get("class") == "figures"
 
@@ -80,16 +80,16 @@ class Page(HTMLParser):
             self._data = None
         elif tag == "code":
             self._is_code = self._is_line = False
-        elif tag == "div":
-            self._is_story = False
+        elif tag == "dl":
+            self._is_card = False
         elif tag in ("td", "dd"):
             self._in_cell = self._counts = False
 
     def handle_data(self, data: str) -> None:
         if self._is_line:
             self.lines[-1] += data
-        elif self._is_story and self.stories[-1]:
-            self.stories[-1][-1] += data
+        elif self._is_card and self.cards[-1]:
+            self.cards[-1][-1] += f" {data}"
         elif self._counts and self._data is None and not self._is_code and re.search(r"\d", data):
             self.unmarked.append(data)
         if self._data is not None:
@@ -137,9 +137,12 @@ def require_the_commands_own(html: str, *, shell: Run, cwd: Path) -> Page:
         value = json.loads(shown.value)
         assert value in found, shown
         require_rounding(shown, value)
-    # The verdict of each profile is that of `capacity`, word for word.
-    told = [" ".join(map(str.strip, lines)) in found for lines in page.stories]
-    assert sum(told) == sum("--sensitivity" in line for line in page.lines)
+    # Each profile's card is that of `capacity`, word for word.
+    judging = [line.removesuffix(" --format json") for line in page.lines if "--sensitivity" in line]
+    for card, line in zip(page.cards, judging, strict=True):
+        answer = "".join(shell(line, cwd=cwd).stdout.split())
+        for words in card:
+            assert "".join(words.split()) in answer, (words, line)
     return page
 
 

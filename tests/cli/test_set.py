@@ -65,7 +65,7 @@ EVERY = {
     "calibrate": ("mine.toml", "table-1.csv"),
     "check": ("mine.toml", "--no-circle"),
 }
-WITHOUT_PROFILE = {"rule", "schema", "manual", "evidence", "paper", "profiles", "init"}
+WITHOUT_PROFILE = {"rule", "schema", "manual", "evidence", "paper", "profiles", "init", "import"}
 
 
 @pytest.fixture
@@ -203,7 +203,7 @@ def test_a_short_form_is_the_key_it_stands_for(
         ),
         (
             ("circle-test", "mine.toml", "--set", "cycle.period_us=1050"),
-            "servo.step_us = 100.0: the period of 1050 us is no multiple of it; 87.5 us would fit; it is",
+            "mine.toml: servo.step_us = 100.0: the period of 1050 us is no multiple of it; 87.5 us would fit; it is",
         ),
         (("timeline", "mine.toml", "--set", "name=x", "--transaction", "x:1"), "--transaction x:1: expected read or"),
     ],

@@ -201,24 +201,41 @@ def test_places_and_words_are_the_same_under_windows() -> None:
         assert the_problem(content) == f"f.toml:{message}"
 
 
+EXECUTION = 'execution = {kind = "linear", base_us = 30, per_byte_us = 0.35}'
+
+
 @pytest.mark.parametrize(
-    ("section", "needed"),
+    ("section", "line"),
     [
-        ("bus", "needs kind"),
-        ("cycle", "needs period_us"),
-        ("payload", "has read_bytes, write_bytes, read_bytes_per_axis, write_bytes_per_axis, overhead_bytes"),
-        ("node", "needs axes, execution"),
+        ("bus", 'bus = {kind = "ieee1394"}'),
+        ("cycle", "cycle = {period_us = 4000}"),
+        ("payload", "payload = {read_bytes = 12, write_bytes = 12}"),
+        ("node", f"node = {{axes = 4, {EXECUTION}}}"),
     ],
 )
-def test_a_missing_section_is_named_with_its_brackets_and_what_it_needs(section: str, needed: str) -> None:
+def test_a_missing_section_is_named_with_its_brackets_and_a_line_that_stands_for_it(section: str, line: str) -> None:
     text = re.sub(rf"(?s)\[{section}.*?(?=\n\[(?!{section})|\Z)\n?", "", TEXT)
-    assert the_problem(text) == f"f.toml:1:1: {section}: missing section [{section}]; it {needed}"
+    message = f"f.toml:1:1: {section}: missing section [{section}]; as one line, above all sections: {line}"
+    assert the_problem(text) == message
+    if section != "bus":  # which has further keys, by its kind
+        assert read(f"{line}\n{text}").name == "test"
 
 
 def test_a_missing_section_inside_another_stands_at_that_other() -> None:
     text = TEXT.partition("[node.execution]")[0]
-    assert the_problem(text) == (
-        "f.toml:16:2: node.execution: missing section [node.execution]; it needs kind, payload_bytes, time_us"
+    missing = f"node.execution: missing section [node.execution]; as one line, in [node]: {EXECUTION}"
+    assert the_problem(text) == f"f.toml:16:2: {missing}"
+
+
+def test_a_missing_section_of_a_group_has_the_header_that_the_file_needs() -> None:
+    group = '[[group]]\nname = "io"\nnodes = 1\naxes = 0\nread_bytes = 8\nwrite_bytes = 8\n'
+    text = re.sub(r"nodes = \d+.*\n", "", TEXT.partition("[payload]")[0]) + group
+    assert the_problem(text).endswith(
+        f"group.io.execution: missing section [group.execution]; as one line, in its [[group]]: {EXECUTION}"
+    )
+    assert read(text + EXECUTION).name == "test"
+    assert the_problem(text.replace("[[group]]", "[group]") + EXECUTION).endswith(
+        "group: expected an array of tables, each below [[group]]"
     )
 
 

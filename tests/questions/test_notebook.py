@@ -39,6 +39,7 @@ PICTURES: dict[str, Callable[[], Answer]] = {
     "map": lambda: busplan.map_("paper-4ms", x={"axes": range(4, 41, 4)}),
     "capacity": lambda: busplan.capacity("paper-4ms", sensitivity=True),
     "compare": lambda: busplan.compare("paper-4ms"),
+    "sweep": lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": "1:9", "cycle.period_us": "1000:4000:1000"}),
 }
 
 
@@ -53,6 +54,22 @@ def test_an_answer_with_a_picture_gives_it_with_its_colours(name: str, tmp_path:
     assert "prefers-color-scheme" in drawn
     answer.save(tmp_path / "x.svg")
     assert (tmp_path / "x.svg").read_text(encoding="utf-8") == drawn
+
+
+def test_a_sweep_shows_its_table_and_its_picture_where_it_can_be_drawn() -> None:
+    vary = {"bus.nodes": [1, 2], "cycle.period_us": [1000, 4000], "node.axes": [1, 2]}
+    drawn, not_drawn = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]}), busplan.sweep("paper-4ms", vary=vary)
+    for answer, charts in ((drawn, 1), (not_drawn, 0)):
+        shown = answer._repr_html_()
+        assert (shown.count("<table"), shown.count('class="chart sweep"')) == (1, charts)
+    assert not_drawn._repr_svg_() is None
+
+
+def test_what_is_left_out_is_said_without_an_option() -> None:
+    answer = busplan.capacity("paper-4ms")
+    for shown in (str(answer), answer._repr_html_()):
+        assert "--all" not in shown
+        assert "to_dict() has all figures." in shown
 
 
 def test_an_answer_without_a_picture_gives_none() -> None:

@@ -80,7 +80,7 @@ class Bus(ABC):
 
     @abstractmethod
     def cycle(self, network: Network, *, model: str) -> BusCycle:
-        """The cycle of a network under one timing model."""
+        """The cycle of a network under a timing model."""
 
     def latency_subject(self, network: Network) -> str:
         """Say whose latency it is."""

@@ -145,7 +145,7 @@ class BusLatency(NamedTuple):
 
 
 class BusCycle(ABC):
-    """One communication cycle of a network under one timing model.
+    """One communication cycle of a network under a timing model.
 
     What it needs rests on neither the period nor the slice ratio: these say what it is given. The smallest period and
     ratio are computed from that.

@@ -29,7 +29,7 @@ class RuleProblem(NamedTuple):
 
 
 RuleFigures: TypeAlias = Any
-"""Figures of `capacity` under one timing model, each an attribute by its key; those of the kind, too."""
+"""Figures of `capacity` under a timing model, each an attribute by its key; those of the kind, too."""
 
 
 class RuleSubject(Protocol):

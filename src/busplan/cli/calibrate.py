@@ -47,19 +47,19 @@ def calibrate_command(
     group: Annotated[
         str | None,
         option(
-            "--group NAME", "The group of nodes that was measured, of a profile with groups.  [default: its one group]"
+            "--group NAME", "In a profile with groups: the group of nodes that was measured.  [default: its one group]"
         ),
     ] = None,
     timing: Annotated[
         str | None,
-        option("--timing MODEL", "Timing model that says what the packets take.  [default: the one that decides]"),
+        option("--timing MODEL", "Timing model that computes the packets.  [default: the one that decides]"),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
         typer.Option(
             "--apply",
-            help="Write [node.execution], or that of the group, into PROFILE, a file, with a comment where it is from; "
+            help="Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; "
             "your own comments stay.",
         ),
     ] = False,
@@ -69,15 +69,14 @@ def calibrate_command(
 ) -> None:
     """Find the execution time T_exec of a node from latencies measured on an IEEE 1394 bus.
 
-    The CSV file has a header and the columns payload_bytes and latency_us (T_lant, from the request to its last
-    acknowledge, in us), a line for each measurement; repetitions are welcome, lines that begin with # are comments. A
-    column transaction says read or write (write without it).
+    The CSV file has a header, the columns payload_bytes and latency_us (T_lant, from the request to its last
+    acknowledge, in us) and a line for each measurement; payloads may repeat, and lines that begin with # are comments.
+    A column transaction says read or write (write without it).
 
-    T_exec is the latency less what its packets take by the timing model, equation (3). Give --set bus.nodes=2 and
-    --set bus.gap_count=63 where the bench was not as the profile. With a column request_and_acknowledge_us, the
-    measured T1+T2, both halves come from it, and the report shows how far the timing model is from it. Measurements far
-    from the others are named by their line and are not in the fit: slow ones are in worst_extra_us, and the others
-    contradict fast ones. Times are in us. A report: it exits 0 whatever the figures are.
+    T_exec is the latency less the time of its packets by the timing model, equation (3). If the bench differs from the
+    profile, say so: --set bus.nodes=2 --set bus.gap_count=63. With a column request_and_acknowledge_us, the measured
+    T1+T2, both halves come from it, and the report shows how far the timing model is from it. Outliers are named by
+    their line and are not in the fit; slow ones are in worst_extra_us. Times are in us. Exits 0 with any figures.
 
     Example: busplan calibrate paper-two-node table-1.csv --form linear
     """

@@ -33,8 +33,8 @@ def capacity_command(
         typer.Option(
             "--sensitivity",
             help="Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or "
-            "one retry more, 10 us more host time, or a bus reset, each alone; and what binds next. CSV then has these "
-            "rows.",
+            "one retry more, 10 us more host time, or a bus reset, one at a time; and what binds next. CSV has these "
+            "rows instead.",
         ),
     ] = False,
     all_: AllOption = False,
@@ -43,10 +43,9 @@ def capacity_command(
 ) -> None:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
-    A card comes first: fits, not shown to fit, or does not fit, always by the timing model that decides on this bus;
-    how much of the period is used and free, the fastest period, room for more nodes, and what to measure or change. The
-    figures behind it follow; a low terminal shows them with --all. Times are in us. A report: it exits 0 whatever the
-    verdict is.
+    It begins with a card: the verdict (fits, not shown to fit, or does not fit) by the timing model that decides on
+    this bus; how much of the period is used and free, the fastest period, room for more nodes, and what to measure or
+    change. The figures follow; on a low terminal --all shows them. Times are in us. Exits 0 with any verdict.
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """

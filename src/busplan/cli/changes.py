@@ -21,8 +21,8 @@ PeriodsOption = Annotated[
     typer.Option(
         "--period",
         metavar="TIME[,TIME...]",
-        help="Communication period with its unit, as 4ms, 250us or 0.001s, or several between commas.  "
-        "[default: the profile's cycle.period_us]",
+        help="Communication period with its unit, as 4ms, 250us or 0.001s, or several with commas.  [default: the "
+        "profile's cycle.period_us]",
         show_default=False,
     ),
 ]
@@ -41,9 +41,9 @@ def _period_change(text: str) -> KeyChange:
 def _set_option(words: str) -> Any:
     help_ = (
         "Compute with another value of a key of the profile, as cycle.nonperiodic_us=50, bus.speed=S200 or "
-        "node.execution.time_us=[30,40]. VALUE is TOML, a number without its unit, and is checked as in the file; "
-        f"a table replaces the section. May be given several times.{words and ' '}{words}  "
-        "[default: the profile as it is]"
+        "node.execution.time_us=[30,40]. VALUE is TOML, a number without its unit, and is checked like the file; a "
+        f"table replaces the whole section. May be given several times.{words and ' '}{words}  [default: the profile "
+        "as it is]"
     )
     option = typer.Option(SET, metavar="KEY=VALUE", help=help_, show_default=False)
     return Annotated[list[str] | None, option]

@@ -41,7 +41,7 @@ def check_command(
         list[str],
         typer.Argument(
             metavar="PATH",
-            help="Profile files, folders (every `*.toml` below that claims a `schema_version`), names of shipped "
+            help="Profile files, folders (every `*.toml` below that has a `schema_version`), names of shipped "
             "profiles, or - for standard input.",
             autocompletion=complete_profile,
             show_default=False,
@@ -52,9 +52,9 @@ def check_command(
         FormatName | None,
         option(
             "--format FORM",
-            "Form of the report: concise is one line a finding, full shows the line of the file with the value "
-            f"underlined, json is the document of all; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are "
-            "for the build service.  [default: full on a terminal, otherwise concise]",
+            "Form of the report: concise is one line for each finding, full shows the line of the file with the value "
+            f"underlined, json is one document; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are for "
+            "build services.  [default: full on a terminal, otherwise concise]",
             envvar="BUSPLAN_FORMAT",
         ),
     ] = None,
@@ -71,38 +71,38 @@ def check_command(
         int | None,
         option(
             "--circle-steps N",
-            "Most simulated steps of each axis of a circle; a longer one is not run, which BP204 warns of.  "
+            "Most simulated steps of each axis of a circle; a longer circle is not run, and BP204 warns of it.  "
             "[default: 10000000]",
             min=1,
         ),
     ] = None,
     baseline: Annotated[
         Path | None,
-        option("--baseline FILE", "Record that no profile may lose axes or margin against.  [default: no record]"),
+        option("--baseline FILE", "File with recorded axes and margins, which no profile may lose.  [default: none]"),
     ] = None,
     update_baseline: Annotated[
-        bool, typer.Option("--update-baseline", help="Record what the profiles carry now in the --baseline file.")
+        bool, typer.Option("--update-baseline", help="Record the present axes and margins in the --baseline file.")
     ] = False,
     skip_others: Annotated[
-        bool, typer.Option("--skip-others", help="Skip named files that claim no `schema_version`, and count them.")
+        bool, typer.Option("--skip-others", help="Skip named files without a `schema_version`, and count them.")
     ] = False,
     jobs: Annotated[
         int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Number of processes to check with.")
     ] = 1,
     stdin_filename: Annotated[
-        str, typer.Option("--stdin-filename", metavar="NAME", help="What to call standard input in the report.")
+        str, typer.Option("--stdin-filename", metavar="NAME", help="Name of standard input in the report.")
     ] = "<stdin>",
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on standard error.")] = False,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Name files that are fine and files that are skipped.")
+        bool, typer.Option("--verbose", "-v", help="Also name files without findings and skipped files.")
     ] = False,
 ) -> None:
     """Fail a build when a profile no longer fits its bus or its circle.
 
-    Each finding has a line: `path:line:column: CODE severity: message`. `busplan rule CODE` explains it. A comment
-    `# busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. A file that is
-    no TOML or no profile is a finding, too. Exits 0 when clean, 1 with findings at or above --fail-on, 2 when it could
-    not do the job, as with a file that is not there; one such file does not stop the others.
+    Each finding is a line: `path:line:column: CODE severity: message`. `busplan rule CODE` explains it. A comment `#
+    busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. A file that is not TOML or not
+    a profile is a finding, too. Exits 0 when clean, 1 with findings at or above --fail-on, 2 when it could not do the
+    job, as with a missing file; the other files are still checked.
 
     Example: busplan check paper-1ms paper-4ms --format github
     """

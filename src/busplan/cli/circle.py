@@ -1,6 +1,7 @@
 """`busplan circle-test`."""
 
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,7 +34,7 @@ def circle_test_command(
     period: PeriodsOption = None,
     changes: KeyChanges = NO_CHANGES,
     contributions: Annotated[
-        bool, typer.Option("--contributions", help="Rank the error sources: test again without each in turn.")
+        bool, typer.Option("--contributions", help="Rank the error sources: run the test again without each of them.")
     ] = False,
     trace: Annotated[
         Path | None,
@@ -61,11 +62,11 @@ def circle_test_command(
 ) -> None:
     """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
 
-    First the bus: a cycle that does not fit its period fails the test before any simulation. Then stability: a loop
-    without its phase and gain margin fails, however round its circle. Then the tolerances of the profile; without any,
+    The test has three parts. The bus: a cycle that does not fit its period fails before any simulation. Stability: a
+    loop without its phase and gain margin fails, however round its circle. The tolerances of the profile: without any,
     the circle is not judged. Errors are in um in the table, in mm in JSON and CSV; F_min, F_max and G are the terms of
-    ISO 230-4, and circle.path = "iso230-4" measures them on a whole turn. Exits 0 when every tolerance holds or none is
-    asked for, and 1 when one does not hold.
+    ISO 230-4, and circle.path = "iso230-4" measures them on a whole turn. Exits 0 when the test passes or the circle is
+    not judged, and 1 when it fails.
 
     Example: busplan circle-test paper-4ms --contributions
     """
@@ -79,17 +80,13 @@ def circle_test_command(
         from busplan.questions.circle import circle_test
 
         plan = load_changed(profile, changes)
+        periods = periods_us(period, plan)
         with ExitStack() as files:
             # Opened before the simulation, so that a path that cannot be written fails at once.
             trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
             plot_file = files.enter_context(new_file(plot, overwrite=True)) if plot else None
-            with progress_bar("circle test") as progress:
-                test = circle_test(
-                    plan,
-                    period_us=periods_us(period, plan),
-                    contributions=contributions,
-                    progress=progress,
-                )
+            with _naming(profile, period), progress_bar("circle test") as progress:
+                test = circle_test(plan, period_us=periods, contributions=contributions, progress=progress)
             if trace_file is not None:
                 trace_file.writelines(block.encode() for block in test.trace_csv(every=every or 10))
             if plot_file is not None and form is not None:
@@ -98,6 +95,19 @@ def circle_test_command(
         give(test.report())
     if test.passed is False:
         raise PlanFailsError
+
+
+@contextmanager
+def _naming(profile: str, period: list[str] | None) -> Iterator[None]:
+    """Name the file and --period in errors about a circle that cannot be run."""
+    try:
+        yield
+    except BusplanError as error:
+        from busplan.profile.shipped import locate
+
+        _, name = locate(profile)
+        typed = "".join(f" (with --period {text})" for text in period or ())
+        raise BusplanError(*(f"{name}: {problem}{typed}" for problem in error.problems)) from None
 
 
 def _draw(test: "CircleTestAnswer", file: NewFile, changes: KeyChanges, form: Picture) -> None:

@@ -34,7 +34,7 @@ def compare_command(
         str | None,
         option(
             "--buses KIND[,KIND...]",
-            "Kinds of bus, as bus.kind has them.  [default: all, the profile's own first]",
+            "Kinds of bus, by their bus.kind.  [default: all, the profile's own first]",
             autocompletion=_complete_kinds,
         ),
     ] = None,
@@ -53,10 +53,11 @@ def compare_command(
 ) -> None:
     """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
 
-    The machine is what profiles of every kind say: nodes and axes, bytes, execution times, period, servo and circle.
-    On its own kind the profile stays as it is. On another one it has the bus and the slice ratio of a new profile,
-    which are assumed; what only its own kind has is left out, and named. The smallest period [us] is the one at which
-    this machine is shown to fit; the most axes are those at the profile's period. A report: it exits 0 whatever fits.
+    The machine is the part of a profile that every kind has: nodes and axes, bytes, execution times, period, servo and
+    circle. On its own kind the profile stays as it is. On another kind it gets the bus and the slice ratio of a new
+    profile, which are assumed; keys that only its own kind has are left out, and named. The smallest period [us] is the
+    one at which this machine is shown to fit; the most axes are those at the profile's period. Exits 0 with any
+    verdict.
 
     Example: busplan compare gantry-24 --circle
     """

@@ -63,13 +63,13 @@ def diff_command(
 ) -> None:
     """Tell what changed between two profiles, and what that does to every figure.
 
-    First the keys whose values differ, defaults applied; then the figures of capacity, latency and circle-test that
-    differ, with B - A, its share of A, and whether B is better, worse or neutral: what describes the plan (period,
-    nodes, how the bus is set, time available, largest term) is neutral. JSON and CSV have those that are the same, too.
-    Times are in us, contour errors in um in the table and in mm in JSON. Markdown is for a pull request. Exits 0
-    whatever the figures are; with --fail-on-regression 1 when the report calls any figure worse, under either timing
-    model whichever decides, or of the circle; --timing and --no-circle leave some out, but never whether B is shown to
-    fit. A circle that cannot be run is not passed.
+    It lists the keys whose values differ, defaults applied, then the figures of capacity, latency and circle-test that
+    differ, with B - A, its share of A, and whether B is better, worse or neutral. Settings and what describes them
+    (period, nodes, gap count, time available, largest term) are neutral. JSON and CSV list equal figures, too. Times
+    are in us, contour errors in um in the table and in mm in JSON. Markdown is for a pull request. Exits 0 with any
+    figures; with --fail-on-regression 1 when any figure is worse, under any timing model or in the circle. --timing and
+    --no-circle leave figures out, but never whether B is shown to fit. A circle that cannot be run counts as not
+    passed.
 
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """

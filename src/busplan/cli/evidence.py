@@ -25,11 +25,11 @@ def evidence_command(
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
-    """Show every figure of a kind of bus that others have published or measured, beside the computed one.
+    """Compare published and measured figures of a kind of bus with the computed ones.
 
-    Each with its grade, the way it is computed, and the residual, computed less published; the last column is its
-    share in percent. A kind without such a figure says so, here and in its verdicts. `busplan paper` is the part of
-    the paper. A report: it exits 0 whatever the residuals are.
+    Each figure has its grade, the way it is computed, and the residual, computed less published, also in percent. A
+    kind without such a figure says so, here and in its verdicts. `busplan paper` shows the part of the paper. Exits 0
+    with any residuals.
 
     Example: busplan evidence ieee1394
     """

@@ -34,8 +34,8 @@ def explain_command(
     figure: Annotated[
         str | None,
         typer.Argument(
-            help="A key of the JSON of latency, capacity or circle-test, as required_us; circle-test.required_us where "
-            "several have it and the first is not meant.  [default: a list of all of them]",
+            help="A key in the JSON of latency, capacity or circle-test, as required_us; where several have it, the "
+            "first is meant, and circle-test.required_us names another.  [default: a list of all of them]",
             autocompletion=complete_figure,
             show_default=False,
         ),
@@ -46,28 +46,27 @@ def explain_command(
         str | None,
         option(
             "--timing MODEL|both",
-            "Timing model; a circle test and a verdict have only the one that decides.  "
-            "[default: the profile's bus.timing_model]",
+            "Timing model; a figure of the circle test or the verdict has only the one that decides.  [default: the "
+            "profile's bus.timing_model]",
         ),
     ] = None,
     transaction: Annotated[
         str | None,
         option(
             "--transaction NAME|both",
-            "Which transaction or message, for a figure of latency, by its name there: as read, SYNC or loop; a "
-            "wrong one lists them; both is all of them.  [default: both]",
+            "For a figure of latency: the name of the transaction or message, as read, SYNC or loop, or both for all "
+            "of them. A wrong name lists the right ones.  [default: both]",
         ),
     ] = None,
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
-    """Show where a figure comes from: every step in symbols and in numbers, and what it starts from.
+    """Show where a figure comes from: every step in symbols and in numbers, and its inputs.
 
-    Each step names its equation. Each constant has its source and how well it is known: published, derived, recalled,
-    measured, calibrated or assumed; "given" is what the profile sets. The lines are what the program itself computed;
-    a search or a simulation is one line. A figure of the circle test runs the test. Each figure has its unit. A
-    report: it exits 0 whatever the figures are.
+    Each step names its equation. Each input has its source and its grade: published, derived, recalled, measured,
+    calibrated or assumed, or "given" where the profile sets it. The steps are those of the computation itself; a search
+    or a simulation is one step. A figure of the circle test runs the test. Exits 0 with any figures.
 
     Example: busplan explain paper-4ms required_us
     """

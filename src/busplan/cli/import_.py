@@ -40,7 +40,7 @@ def import_command(
         typer.Option(
             "--update",
             metavar="PROFILE",
-            help="Bring the values of the files into a profile, whose comments and other keys stay.  [default: a new "
+            help="Write the values of the files into this profile; its comments and other keys stay.  [default: a new "
             "profile]",
             show_default=False,
         ),
@@ -49,7 +49,8 @@ def import_command(
         Literal["file", "profile"] | None,
         typer.Option(
             "--take",
-            help="Whose value to take where a file and the profile of --update differ.  [default: none is changed]",
+            help="Which value to take where a file and the profile of --update differ.  [default: list them and write "
+            "nothing]",
             show_default=False,
         ),
     ] = None,
@@ -57,11 +58,11 @@ def import_command(
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS and others.
 
     Several files of one machine are merged: an ENI has the frames, the text of `ethercat slaves -v` the measured delays
-    of devices, `ethercat pdos` their bytes. Each value has its grade, file and line in a comment; what no file says is
-    assumed, and named at the end, beside the verdict. What each format cannot say is in `busplan manual import`.
+    of devices, `ethercat pdos` their bytes. Each value has its grade, file and line in a comment; values in no file are
+    assumed, and named at the end with the verdict. `busplan manual import` lists what each format gives.
 
-    The profile goes to standard output or to -o; a file that is already there stays, unless --force is given. Exits 0
-    when it is written, whatever the verdict is.
+    The profile goes to standard output or to the file of -o; an existing file stays, unless --force is given. Exits 0
+    when the profile is written, with any verdict.
 
     Example: busplan import machine.xml slaves.txt -o machine.toml
     """

@@ -1,26 +1,30 @@
 """`busplan init`."""
 
+import re
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Final, TypeVar
 
 import typer
 
-from busplan.buses import kind_named, kind_names
+from busplan.buses import kind_called, kind_named, kind_names
 from busplan.cli.options import complete_profile, option, time_us
 from busplan.cli.output import say
 from busplan.errors import BusplanError
 from busplan.files import write_file
 
 if TYPE_CHECKING:
-    from busplan.profile.starter import Machine
+    from busplan.profile.starter import Machine, NodeGroup
 
 _Answer = TypeVar("_Answer")
 _KIND = "ieee1394"
 _NODES = 4
 _AXES_PER_NODE = 4
 _BYTES_PER_AXIS = 8
+_GROUP: Final = re.compile(
+    r"(?P<name>[\w-]{1,40}):(?P<nodes>\d{1,7})x(?P<axes>\d{1,7})(:(?P<read>\d{1,7})/(?P<write>\d{1,7}))?", re.ASCII
+)
 
 
 def init_command(
@@ -32,7 +36,7 @@ def init_command(
         str | None,
         option(
             "--bus KIND",
-            f"Kind of bus: {' or '.join(kind_names())}.  [default: {_KIND}]",
+            f"Kind of bus: {', '.join(kind_names())}, or another of its names, as firewire.  [default: {_KIND}]",
             autocompletion=lambda incomplete: [kind for kind in kind_names() if kind.startswith(incomplete)],
         ),
     ] = None,
@@ -40,12 +44,20 @@ def init_command(
         int | None, option("--nodes N", "Nodes of the machine, the host not counted.  [default: 4]", min=1)
     ] = None,
     axes: Annotated[
-        int | None, option("--axes N", "Axes of the whole machine, alike on each node.  [default: 4 a node]", min=1)
+        int | None, option("--axes N", "Axes of the whole machine.  [default: 4 for each node]", min=1)
+    ] = None,
+    group: Annotated[
+        list[str] | None,
+        option(
+            "--group NAME:NODESxAXES[:READ/WRITE]",
+            "Nodes alike, with the axes of one node and, if not by --bytes-per-axis, the bytes that a node sends and"
+            " receives; repeated, instead of --nodes and --axes.  [default: all nodes alike]",
+        ),
     ] = None,
     period: Annotated[
         str | None,
         option(
-            "--period TIME", "Communication period with its unit, as 1ms or 500us.  [default: what is usual on the bus]"
+            "--period TIME", "Communication period with its unit, as 1ms or 500us.  [default: a usual one of the bus]"
         ),
     ] = None,
     bytes_per_axis: Annotated[
@@ -56,8 +68,8 @@ def init_command(
         str | None,
         option(
             "--host HOST",
-            "Host of the master, whose own time is assumed by it; of EtherCAT hardware, tuned, real-time or stock."
-            "  [default: tuned]",
+            "Kind of host, from which its own time is assumed; for EtherCAT hardware, tuned, real-time or stock.  "
+            "[default: tuned]",
         ),
     ] = None,
     source: Annotated[
@@ -72,10 +84,13 @@ def init_command(
 ) -> None:
     """Write a commented profile of your machine, and say whether it fits.
 
-    What is not known yet is assumed, graded so, and has a comment that says how to find it. In a terminal the command
-    asks for what is missing; otherwise it takes the defaults and says them. With --from it copies a shipped profile
-    under a name of its own. Exits 0 when the file is written, whatever the verdict is; a file that is already there
-    stays as it is, unless --force is given. From a machine's own files, as an ENI, `busplan import` writes a profile.
+    Values that are not known yet are assumed, graded so, and have a comment on how to find them. In a terminal the
+    command asks for missing values; otherwise it takes the defaults and names them. With --from it copies a shipped
+    profile under the new name. Exits 0 when the file is written, whatever the verdict is; a file that is already there
+    stays as it is, unless --force is given. To start from a machine's own files, such as an ENI, use `busplan import`.
+
+    Nodes that differ are groups: --group dual:4x2 --group io:3x0:32/8 are four nodes of two axes each and three without
+    axes, which send 32 bytes and receive 8.
 
     Example: busplan init gantry --nodes 6 --axes 24 --period 1ms
     """
@@ -88,20 +103,25 @@ def init_command(
         "--bus": bus,
         "--nodes": nodes,
         "--axes": axes,
+        "--group": group,
         "--period": period,
         "--bytes-per-axis": bytes_per_axis,
         "--host": host,
     }
     from busplan.profile.starter import machine_text, starter_text
 
-    if bus not in (None, *kind_names()):
-        raise BusplanError(f"--bus {bus}: no kind of bus; there are {', '.join(kind_names())}")
     if source is None:
-        kind = bus or _KIND
-        machine, taken = _machine(kind, nodes=nodes, axes=axes, period=period, bytes_per_axis=bytes_per_axis, host=host)
+        groups = _groups(group or [])
+        if groups and (nodes or axes):
+            raise BusplanError("--group: goes without --nodes and --axes: each group says its own")
+        values = _Values()
+        kind, taken = values.kind(bus), values.taken
+        machine = _machine(
+            kind, values, groups=groups, nodes=nodes, axes=axes, period=period, bytes_per_axis=bytes_per_axis, host=host
+        )
         text = _with_settings(machine_text(machine, kind=kind, name=path.stem, file=shown), name=shown)
     else:
-        given = [option for option, value in asked.items() if value is not None]
+        given = [option for option, value in asked.items() if value]
         if given:
             raise BusplanError(f"--from: goes without {' and '.join(given)}: a copy has the values of its profile")
         text, taken = starter_text(source, name=path.stem), []
@@ -127,52 +147,99 @@ def _with_settings(text: str, *, name: str) -> str:
     return text
 
 
+def _groups(written: list[str]) -> "tuple[NodeGroup, ...]":
+    """Groups of nodes, as `--group` has them."""
+    from busplan.profile.starter import NodeGroup
+
+    groups = {}
+    for text in written:
+        matched = _GROUP.fullmatch(text)
+        if matched is None:
+            raise BusplanError(
+                f"--group {text}: expected NAME:NODESxAXES or NAME:NODESxAXES:READ/WRITE, as dual:4x2 or io:3x0:32/8"
+            )
+        name, nodes, axes, read, write = matched.group("name", "nodes", "axes", "read", "write")
+        if name in groups:
+            raise BusplanError(f"--group {text}: there is a group {name} already; give it another name")
+        if not int(nodes):
+            raise BusplanError(f"--group {text}: must have 1 node or more")
+        own_bytes = (int(read), int(write)) if read else (None, None)
+        groups[name] = NodeGroup(name, int(nodes), int(axes), *own_bytes)
+    return tuple(groups.values())
+
+
+class _Values:
+    """Values of options: given, asked for in a terminal, or defaults that are taken and said."""
+
+    def __init__(self) -> None:
+        self.asks = sys.stdin.isatty() and sys.stderr.isatty()
+        self.taken: list[str] = []
+        """The defaults that nobody was asked about, as options."""
+
+    def value(self, given: _Answer | None, option: str, question: str, default: _Answer) -> _Answer:
+        if given is not None:
+            return given
+        if self.asks:
+            return _asked(question, default)
+        self.taken.append(f"{option} {default}")
+        return default
+
+    def number(self, given: int | None, option: str, question: str, default: int) -> int:
+        while (number := self.value(given, option, question, default)) < 1:
+            say("must be 1 or more")
+        return number
+
+    def kind(self, given: str | None) -> str:
+        """Kind of bus; a word that is no kind is asked for again."""
+        while True:
+            word = self.value(given, "--bus", f"Kind of bus: {', '.join(kind_names())}", _KIND)
+            try:
+                return kind_called(word, option="--bus" if given else "")
+            except BusplanError as refused:
+                if given:
+                    raise
+                say(str(refused))
+
+    def period_us(self, given: str | None, default: str) -> float:
+        from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
+
+        text = self.value(given, "--period", "Communication period, with its unit", default)
+        period_us = time_us(text, option="--period")
+        if not MIN_STEP_US <= period_us <= MAX_TIME_US:
+            raise BusplanError(f"--period {text}: must be between {MIN_STEP_US:g} and {MAX_TIME_US:g} us")
+        return period_us
+
+
 def _machine(
     kind: str,
+    values: _Values,
     *,
+    groups: "tuple[NodeGroup, ...]",
     nodes: int | None,
     axes: int | None,
     period: str | None,
     bytes_per_axis: int | None,
     host: str | None,
-) -> "tuple[Machine, list[str]]":
-    """Take what is given, ask for the rest in a terminal, and take defaults elsewhere, which come second."""
-    from busplan.profile.starter import Machine
-    from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
+) -> "Machine":
+    """The machine of the options, with all that they do not say."""
+    from busplan.profile.starter import Machine, shared_out
 
     starter = kind_named(kind).starter
-    usual_period = starter.period
-    asks = sys.stdin.isatty() and sys.stderr.isatty()
-    taken: list[str] = []
-
-    def number(given: int | None, option: str, words: str, default: int) -> int:
-        if given is not None:
-            return given
-        while asks:
-            answer = _asked(words, default)
-            if answer > 0:
-                return answer
-            say("must be 1 or more")
-        taken.append(f"{option} {default}")
-        return default
-
-    count = number(nodes, "--nodes", "Nodes, the host not counted", _NODES)
-    total = number(axes, "--axes", "Axes of all nodes", _AXES_PER_NODE * count)
-    if period is None and asks:
-        period = _asked("Communication period, with its unit", usual_period)
-    if period is None:
-        taken.append(f"--period {usual_period}")
-    period_us = time_us(period or usual_period, option="--period")
-    if not MIN_STEP_US <= period_us <= MAX_TIME_US:
-        raise BusplanError(f"--period {period}: must be between {MIN_STEP_US:g} and {MAX_TIME_US:g} us")
-    size = number(bytes_per_axis, "--bytes-per-axis", "Bytes for each axis, in either direction", _BYTES_PER_AXIS)
-    if host is None and starter.hosts:
-        if asks:
-            host = _asked(f"Host of the master: {', '.join(starter.hosts)}", starter.host)
-        else:
-            taken.append(f"--host {starter.host}")
+    if not groups:
+        count = values.number(nodes, "--nodes", "Nodes, the host not counted", _NODES)
+        total = values.number(axes, "--axes", "Axes of all nodes", _AXES_PER_NODE * count)
+        groups = shared_out(total, nodes=count)
+    period_us = values.period_us(period, starter.period)
+    size = bytes_per_axis or _BYTES_PER_AXIS
+    if any(group.read_bytes is None for group in groups):
+        words = "Bytes for each axis, in either direction"
+        size = values.number(bytes_per_axis, "--bytes-per-axis", words, _BYTES_PER_AXIS)
+    elif bytes_per_axis is not None:
+        raise BusplanError("--bytes-per-axis: nothing takes it: each --group says the bytes of its nodes")
+    if starter.hosts:
+        host = values.value(host, "--host", f"Host of the master: {', '.join(starter.hosts)}", starter.host)
     _require_host(kind, host)
-    return Machine(count, total, period_us, size, host), taken
+    return Machine(groups, period_us, size, host)
 
 
 def _require_host(kind: str, host: str | None) -> None:
@@ -189,7 +256,7 @@ def _asked(words: str, default: _Answer) -> _Answer:
     except typer.Abort as stopped:
         if isinstance(stopped.__context__, KeyboardInterrupt):
             raise KeyboardInterrupt from None
-        raise BusplanError("no answer: give --nodes, --axes, --period, --bytes-per-axis and --host") from None
+        raise BusplanError("no answer: give --bus, --nodes, --axes, --period, --bytes-per-axis and --host") from None
     return answer
 
 

@@ -25,8 +25,8 @@ def latency_command(
         str | None,
         option(
             "--payload BYTES[,BYTES...]",
-            "Payload of both read and write in bytes, or several between commas, as 4,16,32.  "
-            "[default: the profile's payload.read_bytes and payload.write_bytes]",
+            "Payload of read and write alike in bytes, or several with commas, as 4,16,32.  [default: the profile's "
+            "payload.read_bytes and payload.write_bytes]",
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
@@ -37,10 +37,10 @@ def latency_command(
 ) -> None:
     """Show how long data takes to arrive, phase by phase, under each timing model.
 
-    On IEEE 1394 it is one read and one write of the farthest node, by the broadcast schedule the data of all nodes and
-    the commands to them; on CAN the worst-case response time of every message, and a loop over feedback and commands;
+    On IEEE 1394 it times one read and one write of the farthest node, or, in the broadcast schedule, the data and the
+    commands of all nodes; on CAN the worst-case response time of every message, and a loop over feedback and commands;
     on EtherCAT a command, feedback, and a loop over both; on SERCOS feedback and commands of all nodes. Times are in
-    us, sizes in bytes; each phase has its equation or source. A report: it exits 0 whatever the figures are.
+    us, sizes in bytes; each phase has its equation or source. Exits 0 with any figures.
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """

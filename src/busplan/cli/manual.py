@@ -25,12 +25,12 @@ def manual_command(
             help="Topic of a page, as profile.  [default: a list of all of them]", autocompletion=complete_topic
         ),
     ] = None,
-    output: Annotated[Path | None, output_option("Write the page to FILE, as Markdown whatever its name")] = None,
+    output: Annotated[Path | None, output_option("Write the page to FILE, always as Markdown")] = None,
 ) -> None:
     """Show a reference page: profile keys, timing models, the circle test, the plan, the gate, JSON, Python, limits.
 
-    Pages are Markdown, and come as they are. Without a topic it lists the topics. What a command and its options do is
-    in `busplan COMMAND --help`. It exits 0 when the page is written.
+    Pages are Markdown. Without a topic it lists the topics. `busplan COMMAND --help` describes a command and its
+    options. Exits 0 when the page is written.
 
     Example: busplan manual profile
     """

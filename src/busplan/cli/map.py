@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 def _direction(option: str, *, default: str) -> typer.models.OptionInfo:
     help_ = (
-        f"{'What lies across' if option == '--x' else 'What lies up'}: a key of the profile, or axes for the axes of "
-        "all nodes (by their number; of groups, by that of the group with the most axes), and up to 64 values "
-        f"in its unit: {VALUES_HELP}  [default: {default}]"
+        f"Quantity on the {option[-1]} axis: a key of the profile, or axes for the axes of all nodes (varies the "
+        "number of nodes; with groups, of the group with the most axes), and up to 64 values in its unit: "
+        f"{VALUES_HELP}  [default: {default}]"
     )
     found: typer.models.OptionInfo = typer.Option(option, metavar="KEY=VALUES", help=help_, show_default=False)
     return found
@@ -30,7 +30,7 @@ def _direction(option: str, *, default: str) -> typer.models.OptionInfo:
 
 @takes_changes(
     period=" of this design with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
-    words="Of this design; along a key that varies, it moves the mark.",
+    words="For a key on an axis of the map, it moves the mark.",
 )
 def map_command(
     profile: ProfileArgument,
@@ -38,7 +38,7 @@ def map_command(
     y: Annotated[str | None, _direction("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
     changes: KeyChanges = NO_CHANGES,
     circle: Annotated[
-        bool, typer.Option("--circle", help="Also run the circle test of every setting that fits, up to 1,000.")
+        bool, typer.Option("--circle", help="Also run the circle test of every cell that fits, up to 1,000.")
     ] = False,
     jobs: JobsOption = None,
     all_: AllOption = False,
@@ -47,10 +47,10 @@ def map_command(
 ) -> None:
     """Draw where a design fits: period against axes, or any two keys of the profile.
 
-    Each cell is the verdict of `busplan capacity` at that setting: fits, not shown to fit, does not fit, or an unsafe
-    gap count; with --circle also where the circle fails. A table says what limits each region: time with its largest
-    term, or a limit of the bus. This design is marked. A setting that cannot exist is blank. A report: it exits 0
-    whatever fits.
+    Each cell is the verdict of `busplan capacity` for its two values: fits, not shown to fit, does not fit, or an
+    unsafe gap count; with --circle also whether the circle fails. A table says what limits each region: time with its
+    largest term, or a limit of the bus. The profile's own cell is marked. Values that cannot be combined are blank.
+    Exits 0 with any verdict.
 
     Example: busplan map paper-4ms --y cycle.period_us=500:4000:500
     """

@@ -45,8 +45,8 @@ TimingOption = Annotated[
     typer.Option(
         "--timing",
         metavar="MODEL|both",
-        help="Timing model of the profile's kind of bus to report, by its name, or both. IEEE 1394 has paper, the "
-        "paper's equations as published, and standard, the standard's clock and packets.",
+        help="Timing model to report, by its name, or both. IEEE 1394 has paper, the paper's equations as published, "
+        "and standard, with the standard's clock and packets; other kinds have their own.",
     ),
 ]
 
@@ -160,7 +160,7 @@ def format_option(default: str) -> Any:
     default
         The form without --format and --output.
     """
-    help_ = f"Form of the answer; a table is lines of text.  [default: by the ending of --output, else {default}]"
+    help_ = f"Form of the answer; a table is plain text.  [default: by the ending of --output, else {default}]"
     return typer.Option("--format", help=help_, show_default=False)
 
 

@@ -6,13 +6,12 @@ from busplan.cli.progress import progress_bar
 
 
 def paper_command(all_: AllOption = False, format_: FormatOption = None, output: OutputOption = None) -> None:
-    """Show every published figure that the equations reach, beside the computed one and the residual.
+    """Compare every figure of the paper that the equations give with the computed one.
 
-    Table I and Table II, the comparison with CAN, the constant of equation (15), the gaps of equation (10), Figs. 9 and
-    10 and the comparison with SERCOS, each with its grade and the way it is computed. The residual is computed less
-    published; the last column is its share in percent. The servo values behind the circles are a calibration to these
-    very figures. This is the paper's part of `busplan evidence ieee1394`. A report: it exits 0 whatever the residuals
-    are.
+    The figures are those of Table I and Table II, the comparison with CAN, the constant of equation (15), the gaps of
+    equation (10), Figs. 9 and 10 and the comparison with SERCOS, each with its grade and the way it is computed. The
+    residual is computed less published, also in percent. The servo values of the circles were calibrated to these very
+    figures. This is the paper's part of `busplan evidence ieee1394`. Exits 0 with any residuals.
 
     Example: busplan paper --format csv
     """

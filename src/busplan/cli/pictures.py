@@ -26,7 +26,7 @@ DrawnFormatOption = Annotated[
     DrawnForm | None,
     typer.Option(
         "--format",
-        help="Form of the answer; a table is text in lines. png is for a file or a pipe, and needs the extra plot "
+        help="Form of the answer; a table is plain text. png goes to a file or a pipe, and needs the extra plot "
         "(resvg-py).  [default: by the ending of --output, else table]",
         show_default=False,
     ),

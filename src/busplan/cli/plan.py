@@ -38,7 +38,7 @@ def plan_command(
     nodes: Annotated[
         int | None,
         option(
-            "--nodes N", "Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]"
+            "--nodes N", "Goal: number of distributed nodes, the host not counted.  [default: the profile's bus.nodes]"
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
@@ -46,8 +46,8 @@ def plan_command(
         int | None,
         option(
             "--axes N",
-            "Goal: so many axes, on the nodes they need at the profile's node.axes each; instead of --nodes.  "
-            "[default: those of the nodes]",
+            "Goal: number of axes, instead of --nodes; the nodes follow from the profile's node.axes.  [default: "
+            "those of the nodes]",
             min=1,
             max=_MAX_AXES,
         ),
@@ -56,10 +56,10 @@ def plan_command(
         str | None,
         option(
             "--free NAMES",
-            "What may be changed, with commas: step (of the circle, where it does not divide the period), "
-            "gap_count, slice_ratio, responses (reads concatenated, writes "
-            "unified), schedule (where the bus has one), payload (less), period, nodes (fewer), in the order of their "
-            "cost.  [default: step,gap_count,slice_ratio,period]",
+            "Settings that may change, with commas, in the order of their cost: step (of the circle, where it does "
+            "not divide the period), gap_count, slice_ratio, responses (reads concatenated, writes unified), schedule "
+            "(where the bus has one), payload (less), period, nodes (fewer).  [default: "
+            "step,gap_count,slice_ratio,period]",
         ),
     ] = None,
     circle: Annotated[
@@ -77,8 +77,8 @@ def plan_command(
             metavar="N",
             min=1,
             max=100_000,
-            help="Periods in a row to test for the nearest that passes the circle; then the strides double, and the "
-            "answer is marked as not proven.",
+            help="Most periods to test one by one for the nearest that passes the circle; then the steps double, and "
+            "the answer is marked as not proven.",
         ),
     ] = 50,  # search.MAX_CIRCLES, which --help must not load
     apply: Annotated[
@@ -104,17 +104,17 @@ def plan_command(
     all_: AllOption = False,
     format_: FormatOption = None,
 ) -> None:
-    """Tell what to set for a number of nodes or axes: gap count, slice ratio and period, several where one is too few.
+    """Tell what to set for a number of nodes or axes: gap count, slice ratio, period, or several of them.
 
-    One plan is recommended: the least change of the dearest thing that is changed, with all cheaper ones free, after
-    which the goal is shown to fit with its reserve, at a safe gap count, within all [limits], with a circle that passes
-    and a period that servo.step_us divides. The order of cost is that of --free. The slice ratio goes up to 0.9, and a
-    period is changed only where nothing cheaper is enough. What is given by an option is kept.
+    One plan is recommended. It changes cheap settings first, costlier ones only if needed and as little as possible;
+    --free lists them by cost. With it the goal is shown to fit with its reserve, at a safe gap count, within all
+    [limits], with a circle that passes and a period that servo.step_us divides. The slice ratio goes up to 0.9; the
+    period changes only if nothing cheaper is enough. Values given by an option are kept.
 
-    The table has the steps of the search, and what could be reached: the smallest period, the largest payload (read and
-    write alike) and the most nodes, with all that is cheaper free. Margins are in us, less the model's bias. Without a
-    plan it says what stands in the way, and what would be enough. `busplan manual plan` has more. Exits 0 when there is
-    a plan, 1 when there is none.
+    The table has the steps of the search, then the smallest period, the largest payload (of read and write) and the
+    most nodes, each with all cheaper settings free. Margins are in us, less the model's bias. Without a plan the answer
+    names what prevents it and what would be enough. `busplan manual plan` has more. Exits 0 when there is a plan, 1
+    when there is none.
 
     Example: busplan plan paper-1ms --axes 16
     """

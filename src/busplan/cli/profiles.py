@@ -5,9 +5,9 @@ from busplan.cli.options import FormatOption, OutputOption
 
 
 def profiles_command(format_: FormatOption = None, output: OutputOption = None) -> None:
-    """List the shipped profiles: what every command takes by name.
+    """List the shipped profiles, which every command takes by name.
 
-    Each with its number of nodes, its period, the timing model that decides and what it is about. A report: it exits 0.
+    Each has its number of nodes, its period, its leading timing model and a description. Exits 0.
 
     Example: busplan profiles
     """

@@ -36,7 +36,8 @@ def report_command(
     format_: Annotated[Form | None, format_option("html")] = None,
     output: OutputOption = None,
     title: Annotated[
-        str | None, option("--title TEXT", "Heading of the page.  [default: the profile's name, or how many profiles]")
+        str | None,
+        option("--title TEXT", "Heading of the page.  [default: the profile's name, or the number of profiles]"),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     circle: Annotated[
@@ -45,10 +46,9 @@ def report_command(
 ) -> None:
     """Put all that busplan says of a profile on one page, for a screen, a machine's file or a repository.
 
-    Verdicts, each timing model, the cycle to scale, where the time goes, axes against period, the circle with its
-    error sources, and what it all rests on; each figure names its command. Times are in us, contour errors in um.
-    Several profiles are compared in front. The HTML needs no network and no script. A report: it exits 0 whatever the
-    verdict is.
+    The page has verdicts, each timing model, the cycle to scale, where the time goes, axes against period, the circle
+    with its error sources, and the assumptions; each figure names its command. Times are in us, contour errors in um.
+    Several profiles are compared at the top. The HTML needs no network and no script. Exits 0 with any verdict.
 
     Example: busplan report paper-4ms paper-1ms -o report.html
     """

@@ -28,7 +28,7 @@ def rule_command(
 ) -> None:
     """Explain a rule of `busplan check`: what is wrong, why it matters, and how to mend it.
 
-    Without a code it lists all rules with their severity. A report: it exits 0.
+    Without a code it lists all rules with their severity. Exits 0.
 
     Example: busplan rule BP110
     """

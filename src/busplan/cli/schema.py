@@ -6,8 +6,8 @@ from busplan.cli.output import emit_document
 def schema_command() -> None:
     """Print the JSON Schema of profiles (draft 2020-12), with every description and unit.
 
-    Editors that read `#:schema ./busplan.schema.json` at the top of a profile complete and check it.
-    It exits 0.
+    With this file beside a profile, editors that read `#:schema ./busplan.schema.json` at its top complete and check
+    it. Exits 0.
 
     Example: busplan schema > busplan.schema.json
     """

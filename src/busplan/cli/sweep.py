@@ -45,8 +45,8 @@ def sweep_command(
         list[str] | None,
         option(
             "--vary KEY=VALUES",
-            f"A key of the profile in numbers, and its values in the profile's unit: {VALUES_HELP} Given several "
-            "times, every combination is computed; the last key changes fastest.  [required]",
+            f"A numeric key of the profile, and its values in its unit: {VALUES_HELP} Given several times, every "
+            "combination is computed; the last key changes fastest.  [required]",
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
@@ -66,8 +66,8 @@ def sweep_command(
         str | None,
         option(
             "--columns NAMES",
-            "Figures to write, between commas, as margin_us,safe_axes: the names in "
-            "`busplan capacity --format json`.  [default: all of them; of the top rows the main ones]",
+            "Figures to write, with commas, as margin_us,safe_axes: the names in `busplan capacity --format json`.  "
+            "[default: all; for the top rows the main ones]",
         ),
     ] = None,
     sort: Annotated[
@@ -77,7 +77,7 @@ def sweep_command(
             "Top rows: largest first by this column, or smallest first with :asc.  [default: order of the grid]",
         ),
     ] = None,
-    top: Annotated[int | None, option("--top N", "Top rows: how many.  [default: 20]")] = None,
+    top: Annotated[int | None, option("--top N", "Number of top rows.  [default: 20]")] = None,
     plot: Annotated[
         Path | None,
         option(
@@ -90,7 +90,8 @@ def sweep_command(
         str | None,
         option(
             "--figure COLUMN",
-            "What --plot draws, by its name in --columns.  [default: safe_axes; of groups margin_corrected_us]",
+            "Figure that --plot draws, by its name in --columns.  [default: safe_axes; margin_corrected_us of groups "
+            "and where safe_axes does not vary]",
         ),
     ] = None,
     all_: AllOption = False,
@@ -104,8 +105,8 @@ def sweep_command(
         bool,
         typer.Option(
             "--summary",
-            help="With --circle and --vary delivery.seed=1:1000: one row for all seeds, with mean, standard deviation, "
-            "95 % and worst of each figure of the circle, and the share of seeds that fail.",
+            help="With --circle and --vary delivery.seed=1:1000: one row for all seeds, with mean, standard "
+            "deviation, 95th percentile and worst of each figure of the circle, and the share of seeds that fail.",
         ),
     ] = False,
     jobs: JobsOption = None,
@@ -121,21 +122,21 @@ def sweep_command(
         bool,
         typer.Option(
             "--resume",
-            help="With --circle and -o FILE: go on after what stands in FILE.parts, where a sweep that did not end, or "
-            "was killed, left the tests that were done.",
+            help="With --circle and -o FILE: continue a sweep that was interrupted or killed, after the finished "
+            "tests in FILE.parts.",
         ),
     ] = False,
     force: Annotated[
-        bool, typer.Option("--force", help="Run more than 1,000 circle tests: --circle alone refuses so many.")
+        bool, typer.Option("--force", help="Run more than 1,000 circle tests, which --circle alone refuses.")
     ] = False,
 ) -> None:
-    """Compute capacity over a grid: any keys of the profile, every combination, each timing model.
+    """Compute capacity over a grid: every combination of values of any keys, under each timing model.
 
-    Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
-    points take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in
-    FILE.partial.csv (or .json, .jsonl, .parquet) and leave FILE as it was. With --circle and -o FILE, tests that are
-    done stand in the folder FILE.parts until FILE is complete, and --resume goes on there, even after SIGKILL. A
-    report: it exits 0 whatever fits.
+    Each row has the figures of `busplan capacity` for one point. Memory does not grow with the grid; millions of points
+    take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in
+    FILE.partial.csv (or .json, .jsonl, .parquet) and leave FILE as it was. With --circle and -o FILE, finished tests
+    are kept in the folder FILE.parts until FILE is complete, and --resume continues from there, even after SIGKILL.
+    Exits 0 with any verdict.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """

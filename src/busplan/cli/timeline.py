@@ -42,9 +42,9 @@ def timeline_command(
         str | None,
         option(
             "--transaction NAME:N",
-            "Show one transaction of one node (from 1) with its gaps. NAME is what the bus calls it, as read:1, "
-            "feedback:1, frame:1 or mdt:1; a wrong one lists them. --from and --to may narrow it further.  "
-            "[default: all of them]",
+            "Show one transaction of one node (from 1) with its gaps, by its name on this bus, as read:1, feedback:1, "
+            "frame:1 or mdt:1; a wrong name lists the right ones. --from and --to may narrow it further.  [default: "
+            "all of them]",
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
@@ -52,8 +52,8 @@ def timeline_command(
         str | None,
         option(
             "--timing MODEL",
-            "Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard. A cycle has "
-            "one.  [default: the profile's bus.timing_model, where it is applicable]",
+            "Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard.  [default: the "
+            "profile's bus.timing_model, where it is applicable]",
         ),
     ] = None,
     all_: AllOption = False,
@@ -62,10 +62,10 @@ def timeline_command(
 ) -> None:
     """Show one communication cycle as events, node by node and to scale.
 
-    Everything that takes time on the wire in its order, the non-periodic window, and what is left of the slice. It is
-    the second way to the time that `busplan capacity` gives in closed form. A cycle that overruns its slice is drawn
-    whole, and said. Every node is charged the way of the farthest, unless the profile says otherwise. Times are in us.
-    A report: it exits 0 whatever the figures are.
+    The events are everything that takes time on the wire, in its order, the time for non-periodic data, and the rest of
+    the slice. Without that rest they add up to the required time of `busplan capacity`. A cycle that overruns its slice
+    is shown whole, and says so. Every node is computed with the hops of the farthest, unless the profile says
+    otherwise. Times are in us. Exits 0 with any verdict.
 
     Example: busplan timeline paper-4ms --transaction read:1
     """

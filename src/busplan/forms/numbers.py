@@ -214,7 +214,8 @@ def shown_blocks(report: Report) -> Sequence[Block]:
     report
         The answer.
     """
-    return list(_with_details(report.blocks()) if report.is_whole else _without_details(report.blocks()))
+    blocks = report.blocks()
+    return list(_with_details(blocks) if report.is_whole else _without_details(blocks, report.whole_by))
 
 
 def _with_details(blocks: Sequence[Block]) -> Iterator[Block]:
@@ -227,12 +228,12 @@ def _with_details(blocks: Sequence[Block]) -> Iterator[Block]:
             yield block
 
 
-def _without_details(blocks: Sequence[Block]) -> Iterator[Block]:
+def _without_details(blocks: Sequence[Block], whole_by: str) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, Detail):
             continue
         if isinstance(block, Chapter):
-            yield block._replace(blocks=tuple(_without_details(block.blocks)))
+            yield block._replace(blocks=tuple(_without_details(block.blocks, whole_by)))
         elif isinstance(block, Table):
             numbers = [number for number, column in enumerate(block.columns) if not column.is_detail]
             rows = tuple(
@@ -242,13 +243,13 @@ def _without_details(blocks: Sequence[Block]) -> Iterator[Block]:
             )
             heads = sum(number < block.heads for number in numbers)
             yield block._replace(columns=tuple(block.columns[number] for number in numbers), rows=rows, heads=heads)
-            left_out = left_out_sentence(len(block.rows) - len(rows))
+            left_out = left_out_sentence(len(block.rows) - len(rows), whole_by=whole_by)
             yield from [Sentence((left_out,))] if left_out else []
         else:
             yield block
 
 
-def left_out_sentence(rows: int, columns: Sequence[str] = ()) -> str:
+def left_out_sentence(rows: int, columns: Sequence[str] = (), *, whole_by: str) -> str:
     """Say what a table leaves out, and how to see it; empty if that is nothing.
 
     Parameters
@@ -257,13 +258,15 @@ def left_out_sentence(rows: int, columns: Sequence[str] = ()) -> str:
         How many rows.
     columns
         Names of the columns.
+    whole_by
+        Says how to see it.
 
     Examples
     --------
-    >>> left_out_sentence(2, ["eq", "paper"]), left_out_sentence(1), left_out_sentence(0)
-    ('Not shown: 2 rows; columns eq, paper. --all shows all.', 'Not shown: 1 row. --all shows all.', '')
+    >>> left_out_sentence(2, ["eq", "paper"], whole_by="--all shows all.")
+    'Not shown: 2 rows; columns eq, paper. --all shows all.'
     """
     names = list(dict.fromkeys(columns))
     parts = [f"{rows} {nouns(rows, 'row')}"] if rows else []
     parts += [f"{nouns(len(names), 'column')} {', '.join(names)}"] if names else []
-    return f"Not shown: {'; '.join(parts)}. --all shows all." if parts else ""
+    return f"Not shown: {'; '.join(parts)}. {whole_by}" if parts else ""

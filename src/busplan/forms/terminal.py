@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, cast
 
 from busplan.forms.blocks import (
+    ALL_SHOWS,
     Block,
     Calculation,
     CalculationStep,
@@ -51,7 +52,7 @@ def text(report: Report, *, width: int | None = None, height: int | None = None,
         commands = zip(names, (Sentence((command.line,)) for command in report.next_commands), strict=False)
         blocks[last] = card._replace(lines=(*card.lines, *commands))
     found = [Chapter(report.title, tuple(blocks))] if report.is_page else blocks
-    lines = [*block_lines(found, width=width, is_whole=report.is_whole)]
+    lines = [*block_lines(found, width=width, is_whole=report.is_whole, whole_by=report.whole_by)]
     # The shell's prompt takes a line.
     folds = report.is_card_enough and not report.is_whole
     if folds and height is not None and last is not None and len(lines) >= height:
@@ -59,7 +60,9 @@ def text(report: Report, *, width: int | None = None, height: int | None = None,
     return styled_text(lines) if styled else plain_text(lines)
 
 
-def block_lines(blocks: Iterable[Block], *, width: int | None = None, is_whole: bool = False) -> Iterator[Line]:
+def block_lines(
+    blocks: Iterable[Block], *, width: int | None = None, is_whole: bool = False, whole_by: str = ALL_SHOWS
+) -> Iterator[Line]:
     """Write blocks as lines, with blank lines around everything but sentences.
 
     Parameters
@@ -70,10 +73,12 @@ def block_lines(blocks: Iterable[Block], *, width: int | None = None, is_whole: 
         Width of the terminal, in columns; None without one.
     is_whole
         If True, tables leave nothing out.
+    whole_by
+        Says how the reader sees what a table leaves out.
     """
     before: Block | None = None
     for block in blocks:
-        lines = _lines(block, width, is_whole=is_whole)
+        lines = _lines(block, width, is_whole=is_whole, whole_by=whole_by)
         if not lines:
             continue
         if before is not None and not _belong(before, block):
@@ -87,7 +92,7 @@ def _belong(one: Block, other: Block) -> bool:
     return any(isinstance(one, kind) and isinstance(other, kind) for kind in (Sentence | Facts, Command))
 
 
-def _lines(block: Block, width: int | None, *, is_whole: bool) -> Sequence[Line]:
+def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) -> Sequence[Line]:
     match block:
         case Sentence():
             return wrapped(sentence_line(block), width)
@@ -95,11 +100,12 @@ def _lines(block: Block, width: int | None, *, is_whole: bool) -> Sequence[Line]
             facts = ", ".join(f"{name} {part_text(value)}" for name, value in block.items)
             return wrapped(Line(f"{facts}."), width) if facts else []
         case Table():
-            return [*_caption(block.caption, width), *table_lines(block, width=width, is_whole=is_whole)]
+            lines = table_lines(block, width=width, is_whole=is_whole, whole_by=whole_by)
+            return [*_caption(block.caption, width), *lines]
         case Chart():
             drawn = block.drawing.characters(width or WIDTH)
-            lines = (piece for line in drawn or () for piece in _drawn_lines(line, width))
-            return [*_caption(block.caption, width), *lines] if drawn else []
+            pieces = (piece for line in drawn or () for piece in _drawn_lines(line, width))
+            return [*_caption(block.caption, width), *pieces] if drawn else []
         case Command():
             return [Line(f"$ {block.line}", "drawn")]
         case Snippet():
@@ -109,14 +115,14 @@ def _lines(block: Block, width: int | None, *, is_whole: bool) -> Sequence[Line]
         case Question():
             head = Line(f"{block.question} {block.answer.text}", block.answer.state)
             inside: tuple[Block, ...] = (*block.sentences, block.facts)
-            return [*wrapped(head, width), *block_lines(inside, width=width, is_whole=is_whole)]
+            return [*wrapped(head, width), *block_lines(inside, width=width)]
         case Card():
             return card_lines(block, width)
         case Detail():
             return [*block_lines(block.blocks, width=width, is_whole=True)] if is_whole else []
         case Chapter():
             title = wrapped(sentence_line(block.title)._replace(tone="title"), width)
-            return [*title, *block_lines(block.blocks, width=width, is_whole=is_whole)]
+            return [*title, *block_lines(block.blocks, width=width, is_whole=is_whole, whole_by=whole_by)]
 
 
 def _drawn_lines(line: Line, width: int | None) -> list[Line]:

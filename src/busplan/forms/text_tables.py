@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, zip_longest
 from typing import Final, NamedTuple
 
-from busplan.forms.blocks import Cell, Sentence, ShownValue, Table, TableColumn, TableRow, Words
+from busplan.forms.blocks import ALL_SHOWS, Cell, Sentence, ShownValue, Table, TableColumn, TableRow, Words
 from busplan.forms.lines import BLANK, Line, Mark, Tone, least_width, wrapped
 from busplan.forms.numbers import cell_text, left_out_sentence
 from busplan.printable import printable
@@ -175,7 +175,9 @@ class _Placed(NamedTuple):
     width: int
 
 
-def table_lines(table: Table, *, width: int | None = None, is_whole: bool = False) -> list[Line]:
+def table_lines(
+    table: Table, *, width: int | None = None, is_whole: bool = False, whole_by: str = ALL_SHOWS
+) -> list[Line]:
     """Lay out a table: words left, figures right, a rule below the headings, and below it what is left out.
 
     Parameters
@@ -186,6 +188,8 @@ def table_lines(table: Table, *, width: int | None = None, is_whole: bool = Fals
         Width of the terminal; None for any width.
     is_whole
         If True, no row and no column is left out.
+    whole_by
+        Says how the reader sees what is left out.
     """
     rows = [row for row in table.rows if is_whole or not row.is_detail]
     columns = {
@@ -205,7 +209,9 @@ def table_lines(table: Table, *, width: int | None = None, is_whole: bool = Fals
             if panel is chosen.panels[0]:
                 lines += _below(at, {table.columns[number].name: columns[number] for number in chosen.below}, width)
     left_out = left_out_sentence(
-        len(table.rows) - len(rows), [table.columns[number].name for number in chosen.left_out]
+        len(table.rows) - len(rows),
+        [table.columns[number].name for number in chosen.left_out],
+        whole_by=whole_by,
     )
     fails = any(cell.endswith(_FAILS) for one in columns.values() for cell in one.cells)
     notes = " ".join(filter(None, ("! fails." * fails, left_out)))

@@ -70,6 +70,9 @@ def converted(profile: Profile, kind: str) -> Conversion:
     if kind == profile.bus.kind:
         return Conversion(profile, (), ())
     data = profile.model_dump(exclude_unset=True)
+    for table, group in zip(data.get("group", ()), profile.group, strict=True):
+        # The other kind may have no default for it.
+        table.setdefault("execution", group.execution.model_dump(exclude_none=True))
     machine, left_out = _common(data)
     _say_payloads(machine, profile)
     # The host keeps its share of the period, whatever each kind has by default.

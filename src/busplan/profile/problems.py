@@ -176,6 +176,8 @@ def _expected(details: ErrorDetails) -> str:
     kind, context = details["type"], details.get("ctx", {})
     if kind == "float_type" and type(details["input"]) is int:
         return "is a number too large for any quantity"
+    if kind == "tuple_type" and isinstance(details["input"], dict):
+        return f"expected an array of tables, each below [[{details['loc'][-1]}]]"
     if kind in _WRONG_TYPE:
         return f"expected {_WRONG_TYPE[kind]}"
     if kind == "literal_error":
@@ -187,12 +189,25 @@ def _expected(details: ErrorDetails) -> str:
 
 def _missing(path: KeyPath, section: type[BaseModel]) -> str:
     field = section.model_fields[str(path[-1])]
-    if not field.examples:
-        known = models_of(field.annotation)[-1].model_fields
-        needed = [name for name, one in known.items() if one.is_required()]
-        keys = f"it needs {', '.join(needed)}" if needed else f"it has {', '.join(known)}"
-        return f"missing section [{'.'.join(map(str, path))}]; {keys}"
-    return f"missing key. {field.description}; for example {path[-1]} = {value_text(field.examples[0])}"
+    if field.examples:
+        return f"missing key. {field.description}; for example {path[-1]} = {value_text(field.examples[0])}"
+    # Below the header of a group, [group.execution] belongs to that group.
+    *parents, key = path
+    header = ".".join(part for part in path if isinstance(part, str))
+    place = f"in its [[{parents[0]}]]" if parents[1:] else f"in [{parents[0]}]" if parents else "above all sections"
+    model = models_of(field.annotation)[0]
+    return f"missing section [{header}]; as one line, {place}: {key} = {_example(model)}"
+
+
+def _example(model: type[BaseModel]) -> str:
+    """Keys that a section needs, or its first two, as a table in a line."""
+    needed = [name for name, field in model.model_fields.items() if field.is_required()]
+    fields = {name: model.model_fields[name] for name in needed or list(model.model_fields)[:2]}
+    keys = (
+        f"{name} = {value_text(field.examples[0]) if field.examples else _example(models_of(field.annotation)[0])}"
+        for name, field in fields.items()
+    )
+    return f"{{{', '.join(keys)}}}"
 
 
 def _unknown(path: KeyPath, section: type[BaseModel]) -> str:

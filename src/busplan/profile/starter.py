@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
 from busplan.buses.parts import Starter
-from busplan.errors import BusplanError
+from busplan.errors import BusplanError, PlacedError
 from busplan.nearest import did_you_mean
 from busplan.profile.shipped import locate, shipped_names
 from busplan.profile.toml import decode, read_bytes, validate
@@ -26,7 +26,7 @@ _COMMENTS_AT: Final = 27
 _MACHINE: Final = """\
 schema_version = 1
 name = {name}
-description = "{nodes} nodes, {axes} axes, {period} us, {bytes} bytes an axis each way: assumed until somebody measures"
+description = "{nodes} nodes, {axes} axes, {period} us{bytes}: assumed until somebody measures"
 
 {bus}
 {count}
@@ -34,7 +34,7 @@ description = "{nodes} nodes, {axes} axes, {period} us, {bytes} bytes an axis ea
 period_us = {period}
 slice_ratio = {ratio}
 
-{each}
+{parts}
 [limits]
 reserve = 0.15             # share of the slice that must stay free for a plan to fit
 
@@ -63,10 +63,6 @@ _PAYLOAD: Final = """\
 read_bytes_per_axis = {bytes}    # as position and status of an axis
 write_bytes_per_axis = {bytes}   # as set-point and control word of an axis
 """
-_PAYLOAD_WITHOUT_AXES: Final = """\
-read_bytes = {bytes}             # as inputs
-write_bytes = {bytes}            # as outputs
-"""
 _EXECUTION: Final = """\
 kind = "linear"
 grade = "assumed"
@@ -75,7 +71,7 @@ per_byte_us = 0.1          # assumed: what each byte adds
 """
 _ALIKE: Final = f"""\
 [payload]                  # assumed: see the register map of the nodes; a fixed part is read_bytes, write_bytes
-{_PAYLOAD}
+{{payload}}
 [node]
 axes = {{axes}}
 
@@ -83,7 +79,7 @@ axes = {{axes}}
 {_EXECUTION}"""
 _GROUP: Final = f"""\
 [[group]]                  # the groups stand in their order on the bus; the payload is assumed: see the register map
-name = "axes-{{axes}}"
+name = "{{name}}"
 nodes = {{nodes}}
 axes = {{axes}}
 {{payload}}
@@ -91,23 +87,48 @@ axes = {{axes}}
 {_EXECUTION}"""
 
 
-class Machine(NamedTuple):
-    """What a new profile starts from."""
+class NodeGroup(NamedTuple):
+    """Like nodes of a new machine."""
 
+    name: str
+    """Empty for the nodes of a machine whose nodes are all alike."""
     nodes: int
     axes: int
-    """Of all nodes."""
+    """Axes of one node."""
+    read_bytes: int | None = None
+    """Payload that a node sends; None for that of its axes."""
+    write_bytes: int | None = None
+    """Payload that a node receives; None for that of its axes."""
+
+
+class Machine(NamedTuple):
+    """A machine that a new profile describes."""
+
+    groups: tuple[NodeGroup, ...]
     period_us: float
     bytes_per_axis: int
-    """Payload of each axis, in either direction."""
+    """Payload of each axis, in either direction; that of a node without axes and bytes of its own."""
     host: str | None = None
     """Name among the hosts of the kind; None for its usual one."""
 
 
+def shared_out(axes: int, *, nodes: int) -> tuple[NodeGroup, ...]:
+    """Share axes out over nodes as evenly as possible: alike nodes, or two groups.
+
+    Examples
+    --------
+    >>> [(group.name, group.nodes, group.axes) for group in shared_out(7, nodes=3)]
+    [('axes-3', 1, 3), ('axes-2', 2, 2)]
+    """
+    per_node, rest = divmod(axes, nodes)
+    if not rest:
+        return (NodeGroup("", nodes, per_node),)
+    shares = ((rest, per_node + 1), (nodes - rest, per_node))
+    return tuple(NodeGroup(f"axes-{share}", count, share) for count, share in shares)
+
+
 def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     """Text of a profile of a machine that nobody has measured; every value that rests on nothing says so.
-
-    Axes that cannot be shared out evenly make two groups of nodes.
 
     Parameters
     ----------
@@ -123,50 +144,66 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     Raises
     ------
     BusplanError
-        An invalid name.
+        An invalid name, or groups that the kind of bus cannot have.
     """
     starter = kind_named(kind).starter
-    per_node, rest = divmod(machine.axes, machine.nodes)
-    if rest:
-        count = ""
-        shares = ((rest, per_node + 1), (machine.nodes - rest, per_node))
-        each = "\n".join(_group(nodes, axes, machine=machine, starter=starter, file=file) for nodes, axes in shares)
-    else:
-        count = _COUNT.format(nodes=machine.nodes)
-        each = _ALIKE.format(
-            bytes=machine.bytes_per_axis,
-            axes=per_node,
-            measure=starter.measure.format(file=file, group=""),
-            base=starter.base,
-        )
+    first = machine.groups[0]
     step_us = dividing_step_us(machine.period_us, most_us=_LONGEST_STEP_US)
+    by_axis = any(group.read_bytes is None for group in machine.groups)
     text = _MACHINE.format(
         name=value_text(name),
         bus=starter.section(machine.host),
         ratio=starter.slice_ratio,
-        nodes=machine.nodes,
-        axes=machine.axes,
-        count=count,
-        each=each,
+        nodes=sum(group.nodes for group in machine.groups),
+        axes=sum(group.nodes * group.axes for group in machine.groups),
+        count="" if first.name else _COUNT.format(nodes=first.nodes),
+        parts="\n".join(_part(group, machine=machine, starter=starter, file=file) for group in machine.groups),
         period=short_text(machine.period_us),
-        bytes=machine.bytes_per_axis,
+        bytes=f", {machine.bytes_per_axis} bytes an axis each way" if by_axis else "",
         step=f"step_us = {short_text(step_us)} ".ljust(_COMMENTS_AT),
     )
     return _checked(text, name=name)
 
 
-def _group(nodes: int, axes: int, *, machine: Machine, starter: Starter, file: str) -> str:
-    payload = (_PAYLOAD if axes else _PAYLOAD_WITHOUT_AXES).format(bytes=machine.bytes_per_axis)
-    measure = starter.measure.format(file=file, group=f" --group axes-{axes}")
-    return _GROUP.format(nodes=nodes, axes=axes, payload=payload, measure=measure, base=starter.base)
+def _part(group: NodeGroup, *, machine: Machine, starter: Starter, file: str) -> str:
+    """Sections of a group of nodes."""
+    of_group = f" --group {group.name}" if group.name else ""
+    return (_GROUP if group.name else _ALIKE).format(
+        name=group.name,
+        nodes=group.nodes,
+        axes=group.axes,
+        payload=_payload(group, bytes_per_axis=machine.bytes_per_axis),
+        measure=starter.measure.format(file=file, group=of_group),
+        base=starter.base,
+    )
+
+
+def _payload(group: NodeGroup, *, bytes_per_axis: int) -> str:
+    if group.read_bytes is None and group.axes:
+        return _PAYLOAD.format(bytes=bytes_per_axis)
+    sizes = (("read_bytes", group.read_bytes, "inputs"), ("write_bytes", group.write_bytes, "outputs"))
+    lines = (
+        (f"{key} = {bytes_per_axis if size is None else size}", "of a node" if group.axes else f"as {words}")
+        for key, size, words in sizes
+    )
+    return "".join(f"{line.ljust(_COMMENTS_AT)}# {comment}\n" for line, comment in lines)
 
 
 def _checked(text: str, *, name: str) -> str:
     try:
         validate(decode(text.encode(), name=name))
-    except (BusplanError, UnicodeEncodeError):  # UnicodeEncodeError: a file name that is not UTF-8
-        raise BusplanError(f"{name!r}: no name for a profile; expected 1 to 100 printable characters") from None
+    except PlacedError as refused:
+        problems = [problem for problem in refused.placed if problem.key.startswith("group.")]
+        if problems:
+            raise BusplanError(*(problem.message for problem in problems)) from None
+        raise _nameless(name) from None
+    except UnicodeEncodeError:  # a file name that is not UTF-8
+        raise _nameless(name) from None
     return text
+
+
+def _nameless(name: str) -> BusplanError:
+    return BusplanError(f"{name!r}: no name for a profile; expected 1 to 100 printable characters")
 
 
 def starter_text(source: str, *, name: str) -> str:

@@ -118,7 +118,7 @@ class PayloadSection(Extended):
 
 
 class NodeSection(Section):
-    """Section [node]: one distributed node."""
+    """Section [node]: a distributed node."""
 
     axes: Count = Field(description="Axes that one node controls", examples=[4])
     execution: Execution = Field(description="Execution time T_exec in the node, measured")

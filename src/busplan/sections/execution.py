@@ -63,7 +63,7 @@ class GradedExecution(Section):
     def standard_uncertainty_us(self, execution_us: Number) -> Number:
         """Standard uncertainty u(T_exec) of an execution time [us].
 
-        The key `uncertainty_us`, or by grade: of a measured time 0.1 / sqrt(12), of a derived one 1 / sqrt(3), else
+        The key `uncertainty_us`, or by grade: of a measured time 0.1 / sqrt(12), of a derived time 1 / sqrt(3), else
         10 % of it.
         """
         if self.uncertainty_us is not None:
@@ -85,7 +85,7 @@ class LinearExecution(GradedExecution):
         return 0
 
     def execution_us(self, payload_bytes: Number) -> Number:
-        """Execution time T_exec of one transaction with that payload [us]."""
+        """Execution time T_exec of a transaction with that payload [us]."""
         return self.base_us + self.per_byte_us * payload_bytes
 
 
@@ -138,7 +138,7 @@ class TableExecution(GradedExecution):
         return f"{self.payload_bytes[0]} to {self.payload_bytes[-1]} bytes"
 
     def execution_us(self, payload_bytes: Number) -> Number:
-        """Execution time T_exec of one transaction with that payload [us].
+        """Execution time T_exec of a transaction with that payload [us].
 
         Raises
         ------

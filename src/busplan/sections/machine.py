@@ -30,7 +30,7 @@ LengthMm = Annotated[float, Field(ge=0, le=MAX_LENGTH_MM, allow_inf_nan=False)]
 
 
 def _without(never: tuple[int, str]) -> AfterValidator:
-    """Refuse one value of a range."""
+    """Refuse a value of a range."""
     unwanted, right = never
 
     def check(value: int) -> int:

@@ -1,4 +1,4 @@
-"""Simulate one axis, from set-points to position, with a fixed step."""
+"""Simulate an axis, from set-points to position, with a fixed step."""
 
 from typing import TYPE_CHECKING, cast
 
@@ -34,7 +34,7 @@ def simulate_axis(
     progress: Progress | None = None,
     engine: Engine = "auto",
 ) -> Floats:
-    """Simulate one axis over all cycles of a move.
+    """Simulate an axis over all cycles of a move.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def simulate_axis(
         Timing of the loop.
     arrivals
         When and whether the packets arrive (`busplan.servo.delivery.arrivals`); by default all on time. A loop on the
-        host loses a velocity command instead of a set-point and keeps the last one, whatever `on_loss`: holding a
+        host loses a velocity command instead of a set-point and keeps the last command, whatever `on_loss`: holding a
         velocity extrapolates the position.
     progress
         Called from time to time with the steps done and the total.
@@ -87,7 +87,7 @@ def simulate_axis(
 
     Examples
     --------
-    An ideal drive with velocity feed-forward follows the set-points one period late:
+    An ideal drive with velocity feed-forward follows the set-points a period late:
 
     >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0, velocity_feedforward=1.0)
     >>> timing = LoopTiming(period_us=1000.0, step_us=500.0)
@@ -122,7 +122,7 @@ def axis_targets(
     setpoints_mm, axis, timing, arrivals
         As for `simulate_axis`.
     every
-        Steps from one value to the next [1].
+        Steps between values [1].
 
     Returns
     -------

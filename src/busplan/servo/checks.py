@@ -59,7 +59,7 @@ class ParameterError(BusplanError):
 
 
 def refuse(*refused: Refused) -> None:
-    """Raise one error for all refused values; without any, do nothing.
+    """Raise a single error for all refused values; without any, do nothing.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ class CircleRun:
         Parameters
         ----------
         every
-            Steps from one entry to the next; the first entry is at the end of step number `every` [1].
+            Steps between entries; the first entry is at the end of step number `every` [1].
 
         Returns
         -------
@@ -178,7 +178,7 @@ def simulate_circle(
     Notes
     -----
     On a path with a whole turn, everything is measured on that turn. On a trapezoid, mean and largest contour error are
-    those of the whole move. The other measures begin one period after the set-points have reached the feed, when the
+    those of the whole move. The other measures begin a period after the set-points have reached the feed, when the
     loops have settled to a thousandth, at the latest after a fifth of the constant speed, and end when the set-points
     slow down; there is no circular deviation G.
 

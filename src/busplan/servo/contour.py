@@ -89,7 +89,7 @@ def measure_contour(
     radius_mm
         Nominal radius [mm].
     part
-        Points at constant speed, at least one; a slice with start and stop.
+        Points at constant speed, one or more; a slice with start and stop.
     turn_share
         None: the part is an arc, and mean and maximum are those of the whole move. A number: the part is exactly one
         turn, everything is measured on it, and its last step counts by this share [1].
@@ -162,12 +162,17 @@ def covered_deg(x_mm: Floats, *, y_mm: Floats, part: slice | None = None) -> flo
     >>> round(covered_deg(np.cos(angle), y_mm=np.sin(angle)), 6)
     -540.0
     """
-    total = 0.0
-    for block in blocks(slice(0, len(x_mm)) if part is None else part):
-        # Start with the last point of the block before.
-        joined = slice(max(block.start - 1, 0 if part is None else part.start), block.stop)
-        turned = np.diff(np.arctan2(y_mm[joined], x_mm[joined])) / (2 * np.pi)
-        total += float((turned - np.rint(turned)).sum())
+    if part is not None:
+        x_mm, y_mm = x_mm[part], y_mm[part]
+
+    def turns(points: Sequence[int] | NDArray[np.intp]) -> Floats:
+        return np.asarray(np.arctan2(y_mm[points], x_mm[points]) / (2 * np.pi))
+
+    # Angles jump by a turn at half the circle, and only between points on both sides of the x axis.
+    before = np.flatnonzero(np.diff(np.signbit(y_mm)))
+    jumps = np.rint(turns(before + 1) - turns(before))
+    first, last = turns([0, -1])
+    total = float(last - first - jumps.sum())
     return total * _DEG_PER_TURN
 
 

@@ -25,7 +25,7 @@ _LOSS_STREAM = {"x": 1, "y": 2}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Arrivals:
-    """When and whether the packets of each cycle reach one node; the first and last entry are the axis at rest.
+    """When and whether the packets of each cycle reach a node; the first and last entry are the axis at rest.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Arrivals:
 
 
 def arrivals(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Arrivals:
-    """Draw the arrivals at one node for a whole move.
+    """Draw the arrivals at a node for a whole move.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, perio
 
 
 def lost_cycles(delivery: Delivery, *, name: AxisName, cycles: int) -> Flags:
-    """Draw the cycles in which the packet to one node is lost.
+    """Draw the cycles in which the packet to a node is lost.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def received_mm(setpoints_mm: Floats, *, lost: Flags, on_loss: OnLoss) -> Floats
     lost
         True if a set-point is lost, same shape.
     on_loss
-        "hold": keep the last one. "extrapolate": continue the line through the last two.
+        "hold": keep the last set-point. "extrapolate": continue the line through the last two.
 
     Returns
     -------

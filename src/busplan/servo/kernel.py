@@ -47,7 +47,7 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     friction_keep: Sequence[float],
     friction_shift: Sequence[float],
 ) -> int:
-    """Run one axis over a chunk of rows.
+    """Run an axis over a chunk of rows.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ _DOUBLE_POLE_STEPS = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopMargins:
-    """Stability of one position loop.
+    """Stability of a position loop.
 
     Parameters
     ----------

@@ -149,7 +149,7 @@ class LoopTiming:
     Parameters
     ----------
     period_us
-        Communication period T_s, with one set-point each [us].
+        Communication period T_s, with a set-point each [us].
 
     Raises
     ------
@@ -189,12 +189,12 @@ class LoopTiming:
 
     @property
     def steps_per_period(self) -> int:
-        """Whole number of simulation steps in one period [1]."""
+        """Whole number of simulation steps in a period [1]."""
         return round(self.period_us / self.step_us)
 
     @property
     def control_period_us(self) -> float:
-        """Time from one run of the position loop to the next [us]."""
+        """Time between runs of the position loop [us]."""
         return self.step_us if self.loop == "node" else self.period_us
 
     def delay_parts(self, delay_us: float) -> tuple[int, float]:
@@ -250,7 +250,7 @@ class Delivery:
     )
     """Drawn for each cycle and node separately."""
     on_loss: OnLoss = parameter("hold", "What a node does without its set-point", example="hold")
-    """Hold the last one, or extrapolate the last two."""
+    """Hold the last set-point, or extrapolate the last two."""
     seed: int = parameter(0, "Seed of all that is random", example=1, least=0, most=2**63 - 1)
 
     def __post_init__(self) -> None:

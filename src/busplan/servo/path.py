@@ -33,7 +33,7 @@ class CirclePath:
     feed_mm_per_min
         Speed along the path between the ramps [mm/min].
     period_us
-        Time from one set-point to the next [us].
+        Time between set-points [us].
     x_mm, y_mm
         Set-points after the start at time 0, shape (setpoints + 1,) [mm].
     constant_from_us, constant_until_us
@@ -96,7 +96,7 @@ def circle_path(
     feed_mm_per_min
         Speed F along the path between the ramps [mm/min].
     period_us
-        Time T from one set-point to the next [us].
+        Time T between set-points [us].
     ramp_periods
         Length of the speed ramp at each end, in periods; 0 starts and stops at full feed [1].
     direction

@@ -22,14 +22,14 @@ _US_PER_S = 1e6
 
 
 class KernelRows(NamedTuple):
-    """Columns of the kernel's rows, all of one length.
+    """Columns of the kernel's rows, all of the same length.
 
     Parameters
     ----------
     substeps
         Number of sub-steps in the row [1].
     target_mm, increment_mm
-        Target at the first control of the row, and its increment at each further one [mm].
+        Target at the first control of the row, and its increment at each further control [mm].
     forward_mm_s
         Feed-forward velocity [mm/s].
     action
@@ -120,7 +120,7 @@ def stored_steps(rows: KernelRows) -> int:
     Parameters
     ----------
     rows
-        Rows of one axis.
+        Rows of an axis.
 
     Examples
     --------
@@ -139,7 +139,7 @@ def stored_targets_mm(rows: KernelRows) -> Floats:
     Parameters
     ----------
     rows
-        Rows of one axis.
+        Rows of an axis.
 
     Returns
     -------

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 import busplan
 from busplan.buses import kind_named
@@ -19,6 +20,7 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.compare.kinds import MachineOnKind
 from busplan.questions.evidence.rows import sections_of
 from busplan.questions.fit.certainty import cycle_of, limits_with_time
 from busplan.questions.fit.loop_delays import loop_delays_us, skew_us
@@ -420,6 +422,31 @@ def test_every_figure_is_derived(run: Run, tmp_path: Path, figure: str) -> None:
     done = run("explain", "ethercat-servo-8", figure, cwd=tmp_path)
     assert done.returncode == 0, done
     assert "Traceback" not in done.stderr
+
+
+def test_devices_without_axes_need_no_execution_time() -> None:
+    group = {"name": "inputs", "nodes": 4, "axes": 0, "read_bytes": 4, "write_bytes": 0}
+    at_once = {"kind": "linear", "grade": "assumed", "base_us": 0.0, "per_byte_us": 0.0}
+    drives = {"name": "drives", "nodes": 2, "axes": 2, "read_bytes": 8, "write_bytes": 8}
+    data = {key: value for key, value in DATA.items() if key not in ("payload", "node")}
+    data["bus"] = {key: value for key, value in DATA["bus"].items() if key != "nodes"}
+    execution = DATA["node"]["execution"]
+    short = EthercatProfile.model_validate({**data, "group": [{**drives, "execution": execution}, group]})
+    whole = EthercatProfile.model_validate(
+        {**data, "group": [{**drives, "execution": execution}, {**group, "execution": at_once}]}
+    )
+    assert busplan.capacity(short).verdicts[0].deciding == busplan.capacity(whole).verdicts[0].deciding
+    assert [*busplan.latency(short).transactions] == [*busplan.latency(whole).transactions]
+    assert "assumed of inputs" in busplan.forms.render(busplan.latency(short).report(), "markdown")
+    assert override(short, {"cycle.period_us": 1000.0}).group[1].execution == whole.group[1].execution
+    assert "execution" not in short.group[1].model_fields_set
+    sercos = busplan.compare(short, buses=["ethercat", "sercos3"]).on("sercos3")
+    assert isinstance(sercos, MachineOnKind)
+    assert sercos.figures.verdict == "fits"
+    with pytest.raises(BusplanError, match=r"group\.inputs\.execution: missing section"):
+        override(short, {"group.inputs.axes": 1})
+    with pytest.raises(ValidationError, match="execution"):
+        EthercatProfile.model_validate({**data, "group": [drives, group]})
 
 
 def test_groups_are_answered_one_by_one() -> None:

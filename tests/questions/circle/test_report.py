@@ -110,10 +110,18 @@ def test_a_margin_that_the_profile_asks_for_is_no_default() -> None:
     assert "a phase margin of 40 deg or more and a gain margin of 6 dB (default)" in sentence_text(margins)
 
 
-def test_a_circle_without_a_tolerance_is_not_judged_and_that_is_said_first() -> None:
-    result = small().results[0]._replace(passed=None)
+@pytest.mark.parametrize(
+    ("g_mm", "measure"),
+    [
+        (0.0005, "circular deviation G 0.500 um; no tolerance set: tolerance.circular_deviation_mm"),
+        # A trapezoid has no G.
+        (None, "largest contour error 0.700 um; no tolerance set: tolerance.max_contour_error_mm"),
+    ],
+)
+def test_a_circle_without_a_tolerance_leads_with_its_figure(g_mm: float | None, measure: str) -> None:
+    result = small().results[0]._replace(passed=None, circular_deviation_mm=g_mm, max_contour_error_mm=0.0007)
     said, _ = circle_sentences(MINE, result)
-    assert sentence_text(said) == "mine at 4 ms and 2500 mm/min: NOT JUDGED: no contour tolerance is asked for."
+    assert sentence_text(said) == f"mine at 4 ms and 2500 mm/min: {measure}."
     assert (said.state, verdict_words(result).text) == ("warns", "NOT JUDGED")
 
 

@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from busplan.buses import kind_named
+from busplan.buses import kind_named, kind_names
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.forms import render
 from busplan.forms.bars import signed_bar
@@ -418,9 +418,9 @@ def test_words_and_curves_can_be_read_in_both_schemes(scheme: dict[str, str]) ->
 
 def test_letters_can_be_read_on_their_bars() -> None:
     letters = dict.fromkeys(INKS, ("#10151c", "#10151c"))
-    letters |= dict.fromkeys(("sync", "request", "acknowledge", "reserve"), ("#ffffff", "#10151c"))
+    letters |= dict.fromkeys(("sync", "request", "acknowledge", "reserve", "out"), ("#ffffff", "#10151c"))
     letters |= {"idle": (SCHEMES[0]["ink"], SCHEMES[1]["ink"]), "long-gap": ("#10151c", SCHEMES[1]["ink"])}
-    for term in (*TERMS, LEFT):
+    for term in (*(term for kind in kind_names() for term in kind_named(kind).figures.terms), LEFT):
         for letter, colour in zip(letters[term.ink], INKS[term.ink], strict=True):
             assert contrast(letter, colour) >= 4.5, term
 

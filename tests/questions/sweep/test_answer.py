@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
+import polars as pl
 import pytest
 
 import busplan
@@ -23,7 +25,9 @@ def test_columns_are_the_rows_of_the_document(models: list[Any]) -> None:
     answer = busplan.sweep("paper-4ms", vary=GRID, timing_model=models)
     document = answer.to_dict()
     assert (document["points"], document["complete"], document["timing_models"]) == (16, True, models)
-    assert len(answer) == len(document["rows"]) == 16 * len(models)
+    assert isinstance(answer, Mapping)
+    assert len(document["rows"]) == 16 * len(models)
+    assert len(answer) == len(answer.columns)
     assert list(answer) == list(answer.columns) == list(document["rows"][0]) == [*GRID, *figure_names(answer.profile)]
     for name, column in dict(answer).items():
         expected = [row[name] for row in document["rows"]]
@@ -35,7 +39,7 @@ def test_columns_are_the_rows_of_the_document(models: list[Any]) -> None:
             wanted = [float("nan") if one is None else one for one in expected]
             np.testing.assert_array_equal(column, wanted)
             assert {type(one) for one in column.tolist()} <= {float, *map(type, expected)}
-        assert column.shape == (len(answer),)
+        assert column.shape == (len(document["rows"]),)
 
 
 def test_numbers_are_numbers_and_words_are_text() -> None:
@@ -88,6 +92,42 @@ def test_many_blocks_are_one_table() -> None:
     assert len(answer.blocks) > 1
     assert answer["cycle.nonperiodic_us"].tolist() == list(range(20_000))
     assert [row["margin_us"] for row in answer.to_dict()["rows"]] == answer["margin_us"].tolist()
+
+
+def test_a_table_has_every_column_and_null_where_nothing_is() -> None:
+    vary = {**GRID, "cycle.nonperiodic_us": range(1500)}
+    answer = busplan.sweep("paper-4ms", vary=vary)
+    assert len(answer.blocks) > 1  # whose words have dictionaries of their own
+    arrow, pandas, polars = answer.to_arrow(), answer.to_pandas(), answer.to_polars()
+    assert list(pandas) == polars.columns == arrow.column_names == list(answer)
+    rows = len(answer["fits"])
+    assert len(pandas) == len(polars) == arrow.num_rows == rows
+    for name in ("bus.gap_count", "verdict", "safe_limited_by"):
+        words = [word or None for word in answer[name].tolist()]
+        assert arrow[name].to_pylist() == polars[name].to_list() == words
+        assert [None if pd.isna(word) else word for word in pandas[name]] == words
+    assert (
+        polars["safe_axes"].null_count() == pandas["safe_axes"].isna().sum() == np.isnan(answer["safe_axes"]).sum() > 0
+    )
+    assert polars.schema["max_axes"] == pl.Int64
+    assert arrow.schema.field("margin_us").metadata[b"unit"] == b"us"
+
+
+def test_pandas_makes_no_column_of_the_names() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]})
+    with pytest.raises(busplan.BusplanError, match=r"to_pandas\(\) gives a data frame, dict\(answer\) a dict"):
+        pd.DataFrame(answer)
+    assert list(pd.DataFrame(dict(answer))) == list(pl.DataFrame(answer).columns) == list(answer)
+    assert answer == answer  # noqa: PLR0124 - a mapping of arrays would compare these
+    assert len({answer, answer}) == 1
+
+
+@pytest.mark.parametrize(("method", "library"), [("pandas", "pandas"), ("polars", "polars"), ("arrow", "pyarrow")])
+def test_a_missing_library_is_named(method: str, library: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})
+    monkeypatch.setattr("busplan.extras.find_spec", lambda _: None)
+    with pytest.raises(busplan.BusplanError, match=rf"^to_{method}\(\) needs {library}: install it"):
+        getattr(answer, f"to_{method}")()
 
 
 def test_an_array_is_the_callers_own() -> None:

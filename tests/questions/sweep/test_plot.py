@@ -30,7 +30,7 @@ def values(given: Sequence[Any] | range) -> Values:
     return listed(list(given), name="vary", words=("optimal",))
 
 
-def added(figure: str, profile: Any = PAPER, **vary: Any) -> FigureData:
+def added(figure: str | None, profile: Any = PAPER, **vary: Any) -> FigureData:
     grid = checked_grid(profile, {key.replace("__", "."): values(one) for key, one in vary.items()}, with_circle=False)
     data = FigureData(Sweep(profile, grid, MODELS, ()), figure=figure)
     for block in sweep(profile, grid, timing_models=MODELS, chunk_points=7):
@@ -38,7 +38,7 @@ def added(figure: str, profile: Any = PAPER, **vary: Any) -> FigureData:
     return data
 
 
-def plotted(figure: str, profile: Any = PAPER, **vary: Any) -> Plotted:
+def plotted(figure: str | None, profile: Any = PAPER, **vary: Any) -> Plotted:
     return added(figure, profile, **vary).plotted()
 
 
@@ -215,6 +215,34 @@ def test_the_line_parts_the_cells_of_zero_or_more_from_the_others(plots: Plots) 
         assert expected
 
 
+def test_the_line_and_the_grey_are_of_the_verdict(plots: Plots) -> None:
+    # At 540 us the margin is above zero, and less than its uncertainty.
+    one = plotted("margin_corrected_us", bus__nodes=(2, 3), cycle__period_us=(500, 540, 4000))
+    (panel,) = one.panels
+    assert (panel.values[0] >= 0).tolist() == [False, True, True]
+    (plot,) = plots(drawn(one))
+    (points,) = plot.paths["border"]
+    assert {round(3 * x) for x, _ in points} == {2}
+    assert texts(drawn(one))[-2:] == ["edge of the settings that are shown to fit", "this design"]
+    (plot,) = plots(drawn(plotted("safe_axes", cycle__period_us=(500, 540, 4000))))
+    assert max(x for x, _ in plot.values("unproven")) == pytest.approx((540 + 4000) / 2, abs=8)
+
+
+def test_a_figure_that_does_not_vary_gives_way_to_the_margin() -> None:
+    # Whatever number of nodes there is, as many axes would fit.
+    assert plotted(None, bus__nodes=(1, 2)).figure.key == "margin_corrected_us"
+    assert plotted(None, cycle__period_us=(500, 4000)).figure.key == "safe_axes"
+
+
+def test_a_map_of_one_value_is_a_sentence(plots: Plots) -> None:
+    one = plotted("max_nodes", bus__nodes=(1, 2), cycle__period_us=(500, 501))
+    root = drawn(one)
+    assert plots(root) == []
+    written = " ".join(texts(root))
+    assert "paper model: 2 at every setting" in written
+    assert "Most nodes by the standard model: 1 at every setting." in written
+
+
 def test_unsafe_points_and_this_design_are_marked(plots: Plots) -> None:
     root = drawn(plotted("margin_us", bus__gap_count=(5, 7, 63), cycle__period_us=(250, 4000)))
     for plot in plots(root):
@@ -223,7 +251,7 @@ def test_unsafe_points_and_this_design_are_marked(plots: Plots) -> None:
             pytest.approx(place, rel=1e-3, abs=1e-3) for place in ((250, 0), (4000, 0))
         ]
         assert marks(plot, "circle", "above") == [pytest.approx((4000, 2), rel=1e-3)]
-    assert texts(root)[-3:] == ["margin of 0", "unsafe gap count", "this design"]
+    assert texts(root)[-3:] == ["margin of 0 (paper model)", "unsafe gap count", "this design"]
     (plot,) = plots(drawn(plotted("margin_us", bus__gap_count=(5, 63))))
     plot.across = {"0": 0.25, "1": 0.75}
     assert {x for x, _ in marks(plot, "path", "cross")} == {0}
@@ -278,17 +306,25 @@ def test_figures_are_drawn_in_the_unit_of_their_label() -> None:
             "margin_us",
             {"cycle__period_us": (250, 500, 4000)},
             (
-                "A margin of 0 or more in 1 of 3 settings by the standard model, on one side of the dashed line; "
-                "this design has 1737 us."
+                "Margin by the standard model: -138.3 us to 1737 us; this design has 1737 us. "
+                "Shown to fit: 1 of 3 settings, outside the grey."
             ),
         ),
         (
             "safe_axes",
             {"bus__gap_count": (63, "optimal")},
-            "Safe axes by the standard model: 52 to 56; this design has 52.",
+            "Safe axes by the standard model: 52 to 56; this design has 52. Every setting is shown to fit.",
         ),
-        ("safe_axes", {"cycle__period_us": (500, 1000)}, "Safe axes by the standard model: 4 to 12."),
-        ("max_nodes", {"bus__nodes": (1, 2)}, "Most nodes by the standard model: 13; this design has 13."),
+        (
+            "safe_axes",
+            {"cycle__period_us": (250, 500)},
+            "Safe axes by the standard model: 0 to 4. No setting is shown to fit.",
+        ),
+        (
+            "max_nodes",
+            {"bus__nodes": (1, 2), "cycle__period_us": (4000, 4001)},
+            "Most nodes by the standard model: 13 at every setting; this design has 13. Every setting is shown to fit.",
+        ),
     ],
 )
 def test_the_caption_says_what_to_see(figure: str, vary: dict[str, Any], said: str) -> None:

@@ -29,8 +29,8 @@ _DAVIS: Final = BUS_LOAD.reference
 EVENTS: Final = (
     EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
     EventKind("wait", "wait for nodes", "profile", "=", "work"),
-    EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "response"),
-    EventKind("command_frame", "command PDO", _DAVIS, ">", "request"),
+    EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "in"),
+    EventKind("command_frame", "command PDO", _DAVIS, ">", "out"),
     EventKind("host", "host", "profile", "h", "idle"),
     EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
     EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),

@@ -75,7 +75,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     evidence_data = ("can", "paper")
 
     def cycle(self, network: Network, *, model: str) -> CanCycle:
-        """The cycle of a network under one timing model."""
+        """The cycle of a network under a timing model."""
         return CanCycle(network, model)
 
     def latency_subject(self, network: Network) -> str:

@@ -41,17 +41,17 @@ EVENTS: Final = (
     EventKind("master", "master", "profile", "M", "contention"),
     EventKind("jitter", "master's jitter", "profile", "j", "contention"),
     EventKind("overhead", "frame overhead", FRAME, "f", "gap"),
-    EventKind("data", "process data", FRAME, ">", "request"),
+    EventKind("data", "process data", FRAME, ">", "out"),
     EventKind("mailbox", "mailbox poll", FRAME, "b", "acknowledge"),
     EventKind("cable", "cable", "SOEM", "-", "sync"),
     EventKind("device", "device", "DC time stamps", "=", "work"),
-    EventKind("receive", "receiving again", "acontis", "<", "response"),
+    EventKind("receive", "receiving again", "acontis", "<", "in"),
     EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
 )
 """Kinds of events, in the order of the cycle."""
 STRETCHES: Final = (
     EventKind("frame", "frames", "", "F", "out"),
-    EventKind("way", "way through the devices", "", "W", "in"),
+    EventKind("way", "way through the devices", "", "W", "work"),
 )
 """Stretches that several events make together."""
 

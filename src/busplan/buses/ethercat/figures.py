@@ -43,7 +43,7 @@ TERMS: Final = (
         letter="F",
     ),
     Figure("cycle_data_us", "data", FRAME, "process data of all devices", "process data", ink="out", letter="D"),
-    Figure("cycle_mailbox_us", "mailbox", FRAME, "frames of mailbox polls", "mailbox", ink="request", letter="B"),
+    Figure("cycle_mailbox_us", "mailbox", FRAME, "frames of mailbox polls", "mailbox", ink="acknowledge", letter="B"),
     Figure(
         "cycle_devices_us",
         "devices",

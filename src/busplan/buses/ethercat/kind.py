@@ -87,7 +87,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     evidence_data = ("ethercat",)
 
     def cycle(self, network: Network, *, model: str) -> EthercatCycle:
-        """The cycle of a network under one timing model."""
+        """The cycle of a network under a timing model."""
         return EthercatCycle(network, model)
 
     def latency_subject(self, network: Network) -> str:

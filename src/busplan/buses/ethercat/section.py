@@ -1,9 +1,9 @@
 """The keys that only profiles of an EtherCAT bus have, in [bus], [node] and [[group]]."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
 from busplan.buses.ethercat.equations import (
@@ -18,9 +18,9 @@ from busplan.buses.ethercat.equations import (
     room_bytes,
 )
 from busplan.elementwise import Number
-from busplan.sections.base import MAX_COUNT, Bytes, Count, TimeUs
+from busplan.sections.base import MAX_COUNT, MISSING, Bytes, Count, Problem, TimeUs, refused
 from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
-from busplan.sections.execution import UNKNOWN_SHARE
+from busplan.sections.execution import UNKNOWN_SHARE, Execution
 from busplan.sections.profile import Profile
 
 HousekeepingBytes = Annotated[int, Field(ge=0, le=int(room_bytes(1)))]
@@ -133,16 +133,36 @@ class EthercatNode(NodeSection):
     )
 
 
+def _at_once(group: dict[str, Any]) -> dict[str, Any] | None:
+    """Execution time of devices without axes; None of others."""
+    if group.get("axes", 1):
+        return None
+    return {"kind": "linear", "grade": "assumed", "base_us": 0.0, "per_byte_us": 0.0}
+
+
 class EthercatGroup(EthercatNode, GroupSection):
     """One of the sections [[group]]: devices that are alike, in the order of the segment."""
 
     axes: GroupAxes = Field(examples=[4])
+    execution: Execution = Field(
+        default_factory=_at_once,
+        validate_default=True,
+        description="Execution time T_exec in the device, measured; without axes it may be left out: couplers and "
+        "terminals take the data of their frame at once, which is assumed",
+    )
     read_bytes: Bytes | None = Field(
         default=None, description="Inputs of each device, or their fixed part; 0 of a coupler [bytes]", examples=[12]
     )
     write_bytes: Bytes | None = Field(
         default=None, description="Outputs of each device, or their fixed part; 0 of a coupler [bytes]", examples=[12]
     )
+
+    @field_validator("execution", mode="before")
+    @classmethod
+    def _drives_execute(cls, value: object) -> object:
+        if value is None:
+            raise refused(Problem(MISSING, kind="missing-key"))
+        return value
 
     @model_validator(mode="after")
     def _has_payloads(self) -> Self:

@@ -72,7 +72,7 @@ def transaction_latency_us(
     response_us: Number,
     response_acknowledge_us: Number,
 ) -> Number:
-    """Latency of one asynchronous transaction from its five parts.
+    """Latency of an asynchronous transaction from its five parts.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def transaction_latency_us(
 
 @published(4, 5, 6, symbol="T_phy", section="III-E", part="14 / Bandwidth, in the clock of the gaps")
 def phy_delay_us(gap_clock_mbit_s: Number) -> Number:
-    """Repeat delay of one PHY.
+    """Repeat delay of a PHY.
 
     Parameters
     ----------
@@ -138,14 +138,14 @@ def phy_delay_us(gap_clock_mbit_s: Number) -> Number:
     part="their bracket, for a cable of 4.5 m; in proportion to the length for others",
 )
 def hop_delay_us(cable_length_m: Number, *, phy_delay_us: Number) -> Number:
-    """Delay of one hop, cable and PHY.
+    """Delay of a hop, cable and PHY.
 
     Parameters
     ----------
     cable_length_m
-        Length of one cable [m]; float or array.
+        Length of a cable [m]; float or array.
     phy_delay_us
-        Repeat delay of one PHY [us]; float or array.
+        Repeat delay of a PHY [us]; float or array.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def arbitration_phase_us(hops: Number, *, hop_us: Number, gap_count: Number, gap
     hops
         Cable hops between the two nodes, N in the paper's chain [1]; float or array.
     hop_us
-        Delay of one hop [us]; float or array.
+        Delay of a hop [us]; float or array.
     gap_count
         Gap count of the bus, 0..63 [1]; float or array.
     gap_clock_mbit_s
@@ -202,7 +202,7 @@ def data_phase_us(hops: Number, *, hop_us: Number, packet_bytes: Number, data_ra
     hops
         Cable hops between the two nodes [1]; float or array.
     hop_us
-        Delay of one hop [us]; float or array.
+        Delay of a hop [us]; float or array.
     packet_bytes
         Packet size DataSize, payload and overhead [bytes]; float or array.
     data_rate_mbit_s
@@ -235,7 +235,7 @@ def acknowledge_phase_us(hops: Number, *, hop_us: Number) -> Number:
     hops
         Cable hops between the two nodes [1]; float or array.
     hop_us
-        Delay of one hop [us]; float or array.
+        Delay of a hop [us]; float or array.
 
     Returns
     -------
@@ -445,7 +445,7 @@ def published_nodes(available_us: Number, *, sync_us: Number, latency_us: Number
 
 @published(12, symbol="T_lant", section="IV-A")
 def interval_latency_us(t1_us: Number, *, t2_us: Number, t3_us: Number, t4_us: Number, t5_us: Number) -> Number:
-    """Latency of one transaction from the five intervals of the bench.
+    """Latency of a transaction from the five intervals of the bench.
 
     Parameters
     ----------

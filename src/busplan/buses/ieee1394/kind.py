@@ -170,7 +170,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     evidence_data = ("paper", "dvrk", "ieee1394")
 
     def cycle(self, network: Network, *, model: str) -> CycleWithStarts:
-        """The cycle of a network under one timing model, by its schedule."""
+        """The cycle of a network under a timing model, by its schedule."""
         schedule = BroadcastCycle if is_broadcast(network) else Ieee1394Cycle
         return schedule(network, model)  # type: ignore[arg-type]
 

@@ -216,7 +216,7 @@ class Ieee1394TableExecution(TableExecution, FittedExecution):
 
 
 class Ieee1394Node(NodeSection):
-    """Section [node]: one distributed node, and how it answers."""
+    """Section [node]: a distributed node, and how it answers."""
 
     execution: Annotated[Ieee1394LinearExecution | Ieee1394TableExecution, Field(discriminator="kind")] = Field(
         description="Execution time T_exec in the node, measured"

@@ -73,9 +73,9 @@ class Link(NamedTuple):
     hops
         Cable hops H between host and node [1].
     cable_length_m
-        Length of one cable [m].
+        Length of a cable [m].
     phy_delay_us
-        Repeat delay of one PHY [us]; None for that of the equations, 14 ticks of the gap clock.
+        Repeat delay of a PHY [us]; None for that of the equations, 14 ticks of the gap clock.
     """
 
     data_rate_mbit_s: Number

@@ -84,7 +84,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
     evidence_data = ("sercos2",)
 
     def cycle(self, network: Network, *, model: str) -> Sercos2Cycle:
-        """The cycle of a network under one timing model."""
+        """The cycle of a network under a timing model."""
         return Sercos2Cycle(network, model)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:

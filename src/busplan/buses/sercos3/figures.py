@@ -27,7 +27,7 @@ TERMS: Final = (
         _COSEMA,
         "delay of the ring, where the timing method has it",
         "ring delay",
-        ink="gap",
+        ink="long-gap",
         letter="R",
     ),
     NONPERIODIC,

@@ -112,7 +112,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     evidence_data = ("sercos3",)
 
     def cycle(self, network: Network, *, model: str) -> Sercos3Cycle:
-        """The cycle of a network under one timing model."""
+        """The cycle of a network under a timing model."""
         return Sercos3Cycle(network, model)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:

@@ -1,1 +1,1 @@
-"""What public functions share: the base of answers, and profiles as arguments."""
+"""Shared by public functions: the base of answers, and profiles as arguments."""

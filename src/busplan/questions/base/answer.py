@@ -17,7 +17,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.terminal import block_lines
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
-"""What must be there for a file, by ending."""
+"""Check that the library for a file is installed, by ending."""
 
 
 class Answer(ABC):
@@ -65,16 +65,16 @@ class Answer(ABC):
         write_file(Path(path), document_bytes(contents[ending]()), overwrite=True)
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
-        """What makes the content of a file, by ending."""
+        """Makers of a file's content, by ending."""
         texts = {ending: partial(self._text, form) for ending, form in ENDINGS.items()}
         return {**texts, ".svg": self._svg, ".png": self._png}
 
     def _svg(self) -> str:
         """The picture, which not every answer has."""
-        found = self._repr_svg_()
-        if found is None:
+        picture = self._repr_svg_()
+        if picture is None:
             raise BusplanError("there is nothing to draw: this answer has no picture")
-        return found
+        return picture
 
     def _png(self) -> bytes:
         from busplan.forms.raster import png
@@ -89,12 +89,16 @@ class Answer(ABC):
     def report(self) -> Report:
         """The answer in blocks, which every form but JSON and CSV is made of."""
 
+    def _shown(self) -> Report:
+        """The report for a reader in Python."""
+        return self.report()._replace(whole_by="to_dict() has all figures.")
+
     def _headline(self) -> str:
         """The answer in one line."""
         return " ".join(next(block_lines(self.report().blocks())).text.split())
 
     def __str__(self) -> str:
-        return render(self.report(), "table").removesuffix("\n")
+        return render(self._shown(), "table").removesuffix("\n")
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self._headline()}>"
@@ -102,7 +106,7 @@ class Answer(ABC):
     def _repr_html_(self) -> str:
         from busplan.forms.html import fragment
 
-        return fragment(self.report())
+        return fragment(self._shown())
 
     def _repr_svg_(self) -> str | None:
         from busplan.forms.picture import first_picture

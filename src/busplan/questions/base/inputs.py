@@ -60,8 +60,8 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     3
     """
     new = values_by_key(changes, name="changes")
-    found = profile if isinstance(profile, Profile) else load(argument(profile)).profile
-    return override(found, new)
+    loaded = profile if isinstance(profile, Profile) else load(argument(profile)).profile
+    return override(loaded, new)
 
 
 def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str, object]:
@@ -111,10 +111,10 @@ def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
     plain_values = plain(values)
     if isinstance(plain_values, str) or not isinstance(plain_values, Iterable):
         raise BusplanError(f"{name} {values!r}: expected several values, as a list")
-    found = [plain(value) for value in plain_values]
-    if not found:
+    values_found = [plain(value) for value in plain_values]
+    if not values_found:
         raise BusplanError(f"{name}: no values; give at least one")
-    return found
+    return values_found
 
 
 def one_or_several(values: Any, *, name: str) -> list[Any]:
@@ -125,9 +125,9 @@ def one_or_several(values: Any, *, name: str) -> list[Any]:
     BusplanError
         No values.
     """
-    found = plain(values)
-    is_one = isinstance(found, str | os.PathLike) or not isinstance(found, Iterable)
-    return [found] if is_one else items(found, name=name)
+    plain_values = plain(values)
+    is_one = isinstance(plain_values, str | os.PathLike) or not isinstance(plain_values, Iterable)
+    return [plain_values] if is_one else items(plain_values, name=name)
 
 
 def checked_models(timing_model: Models | None, profile: Profile) -> tuple[str, ...]:
@@ -140,13 +140,13 @@ def checked_models(timing_model: Models | None, profile: Profile) -> tuple[str, 
     """
     if timing_model is None:
         return model_names(profile)
-    found = one_or_several(timing_model, name="timing_model")
+    names_asked = one_or_several(timing_model, name="timing_model")
     names = [model.name for model in bus_of(profile).timing_models]
-    if len(set(map(str, found))) != len(found) or not set(map(str, found)) <= set(names):
+    if len(set(map(str, names_asked))) != len(names_asked) or not set(map(str, names_asked)) <= set(names):
         raise BusplanError(
             f"timing_model {timing_model!r}: expected {listed([*map(repr, names)], 'or')}, or a list of them, each once"
         )
-    return tuple(known_model(profile, one, name="timing_model") for one in found)
+    return tuple(known_model(profile, name, name="timing_model") for name in names_asked)
 
 
 def known_model(profile: Profile, model: str, *, name: str) -> str:
@@ -159,7 +159,7 @@ def known_model(profile: Profile, model: str, *, name: str) -> str:
     model
         The name.
     name
-        What messages call it.
+        Name of the parameter, for messages.
 
     Raises
     ------
@@ -181,18 +181,18 @@ def known_model(profile: Profile, model: str, *, name: str) -> str:
 
 
 def finite(value: object, *, name: str) -> float:
-    """A number that is one.
+    """A finite number.
 
     Raises
     ------
     BusplanError
         NaN, infinite, a bool, or not a number.
     """
-    found = plain(value)
+    number = plain(value)
     # Comparing first: float() of a huge int would raise OverflowError.
-    if type(found) not in (int, float) or not -MOST_FLOAT <= found <= MOST_FLOAT:
-        raise BusplanError(f"{name} {found!r}: expected a finite number")
-    return float(found)
+    if type(number) not in (int, float) or not -MOST_FLOAT <= number <= MOST_FLOAT:
+        raise BusplanError(f"{name} {number!r}: expected a finite number")
+    return float(number)
 
 
 def whole(value: object, *, name: str) -> int:
@@ -203,10 +203,10 @@ def whole(value: object, *, name: str) -> int:
     BusplanError
         Anything else, or more than the largest count in a profile.
     """
-    found = plain(value)
-    if type(found) is not int or not 1 <= found <= MAX_COUNT:
-        raise BusplanError(f"{name} {found!r}: expected a whole number from 1 to {MAX_COUNT:,}")
-    return found
+    number = plain(value)
+    if type(number) is not int or not 1 <= number <= MAX_COUNT:
+        raise BusplanError(f"{name} {number!r}: expected a whole number from 1 to {MAX_COUNT:,}")
+    return number
 
 
 Origin = tuple[str, KeyChanges]
@@ -260,7 +260,7 @@ def _changes_of_shipped(profile: Profile) -> KeyChanges | None:
     """Changes from the shipped profile of the same name; None if none lead to it."""
     shipped = load(profile.name).profile
     old, new = dotted_keys(shipped), dotted_keys(profile)
-    differing = {key: one.value for key, one in new.items() if key not in old or old[key].value != one.value}
+    differing = {key: place.value for key, place in new.items() if key not in old or old[key].value != place.value}
     try:
         changes = key_changes(differing)
         return changes if changes.applied(shipped) == profile else None

@@ -43,5 +43,5 @@ def period_option(period_us: float) -> tuple[str, str]:
 
 def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
     """Options of the changes, quoted for a shell; --period with the profile's period [us]."""
-    for one in changes.each:
-        yield from period_option(period_us) if one.option == "--period" else (one.option, shell_word(one.text))
+    for change in changes.each:
+        yield from period_option(period_us) if change.option == "--period" else (change.option, shell_word(change.text))

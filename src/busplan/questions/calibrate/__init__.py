@@ -167,10 +167,10 @@ def calibrate(
     network = load_profile(profile)
     if form not in (None, "table", "linear"):
         raise BusplanError(f"form {form!r}: expected 'table' or 'linear'")
-    found, name, shipped = _measured(measurements, name=source or _IN_MEMORY)
+    read, name, shipped = _measured(measurements, name=source or _IN_MEMORY)
     result = analysis.calibrate(
         network,
-        found,
+        read,
         source=name,
         group=group,
         timing_model=None if timing_model is None else checked_models(timing_model, network)[0],

@@ -87,7 +87,7 @@ class Calibration(NamedTuple):
     profile: Profile
     """The network that was measured."""
     nodes: AlikeNodes
-    """Those of its nodes that were measured."""
+    """The nodes that were measured."""
     timing_model: str
     way: Way
     method: Method
@@ -103,7 +103,7 @@ class Calibration(NamedTuple):
     outliers: tuple[ComparedMeasurement, ...]
     """Measurements far from the others, slow or fast."""
     worst_extra_us: float | None
-    """What the slowest execution takes beyond the fit; None where no measurement outside the fit is slow."""
+    """Time of the slowest execution beyond the fit; None where no measurement outside the fit is slow."""
     unchecked_bytes: tuple[int, ...]
     """Payloads with too few measurements to tell an outlier."""
     uncertainty_us: float | None
@@ -173,7 +173,12 @@ def calibrate(
     raw = _with_packets(measurements, measurements, halves)
     _require_possible(profile, raw, source=source, way=way, model=model)
     screening = screen(
-        [Sample(one.transaction, one.payload_bytes, one.latency_us, one.latency_us - us) for one, us in raw]
+        [
+            Sample(
+                measurement.transaction, measurement.payload_bytes, measurement.latency_us, measurement.latency_us - us
+            )
+            for measurement, us in raw
+        ]
     )
     left_out = frozenset(screening.expected_us)
     kept = [place for place in range(len(raw)) if place not in left_out]
@@ -181,16 +186,18 @@ def calibrate(
         # The smallest payload gives T4 + T5 to all others: that of an outlier would stay in them.
         raw = _with_packets(measurements, [measurements[place] for place in kept], halves)
     groups: defaultdict[int, list[float]] = defaultdict(list)
-    for one, packets_us in (raw[place] for place in kept):
-        groups[one.payload_bytes].append(one.latency_us - packets_us)
+    for measurement, packets_us in (raw[place] for place in kept):
+        groups[measurement.payload_bytes].append(measurement.latency_us - packets_us)
     chosen = form or nodes.node.execution.kind
     fit = fit_execution(groups, chosen, grade=grade, source=source)
     fitted_us = {
-        size: plain(fit.execution_us(size)) for size in {one.payload_bytes for one, _ in raw} if fit.covers(size)
+        size: plain(fit.execution_us(size))
+        for size in {measurement.payload_bytes for measurement, _ in raw}
+        if fit.covers(size)
     }
     compared = [
-        _compared(one, packets_us, fitted_us.get(one.payload_bytes), screening.expected_us.get(place))
-        for place, (one, packets_us) in enumerate(raw)
+        _compared(measurement, packets_us, fitted_us.get(measurement.payload_bytes), screening.expected_us.get(place))
+        for place, (measurement, packets_us) in enumerate(raw)
     ]
     residuals, outliers = (tuple(compared[place] for place in places) for places in (kept, sorted(left_out)))
     residuals_us = _residuals_us(residuals)
@@ -205,13 +212,13 @@ def calibrate(
         residuals=residuals,
         payloads=tuple(_payload_fits(measurements, compared, halves, fitted_us)),
         rms_residual_us=fmean(us**2 for us in residuals_us) ** 0.5,
-        largest=max(residuals, key=lambda one: abs(one.residual_us or 0.0)),
+        largest=max(residuals, key=lambda measurement: abs(measurement.residual_us or 0.0)),
         outliers=outliers,
         worst_extra_us=_worst_extra_us(outliers, residuals_us),
         unchecked_bytes=screening.unchecked_bytes,
         uncertainty_us=_uncertainty_us(residuals_us, fit),
         fit_keys=_latencies(profile).fit_keys(network_of(profile), model if way == "timing-model" else None),
-        at_most_us=max(one.shortest_us for one in halves.values()),
+        at_most_us=max(half.shortest_us for half in halves.values()),
     )
 
 
@@ -220,12 +227,12 @@ _Halves = Mapping[tuple[str, int], Halves]
 
 def _nodes(profile: Profile, group: str | None) -> AlikeNodes:
     """The nodes that were measured."""
-    each = {one.name: one for one in profile.alike_nodes}
-    if group is None and len(each) == 1:
+    by_name = {alike.name: alike for alike in profile.alike_nodes}
+    if group is None and len(by_name) == 1:
         return profile.alike_nodes[0]
-    if group in each:
-        return each[group]
-    known = f"the groups {', '.join(each)}" if profile.group else "no groups"
+    if group in by_name:
+        return by_name[group]
+    known = f"the groups {', '.join(by_name)}" if profile.group else "no groups"
     if group is None:
         raise BusplanError(f"{profile.name} has {known}; give the group that was measured")
     raise BusplanError(f"group {group}: {profile.name} has {known}")
@@ -236,7 +243,9 @@ def _packets(profile: Profile, nodes: AlikeNodes, measurements: Sequence[Measure
     halves, network = _latencies(profile).halves, network_of(profile)
     return {
         (kind, size): halves(network, nodes.name, model, kind, size)
-        for kind, size in dict.fromkeys((one.transaction, one.payload_bytes) for one in measurements)
+        for kind, size in dict.fromkeys(
+            (measurement.transaction, measurement.payload_bytes) for measurement in measurements
+        )
     }
 
 
@@ -259,7 +268,7 @@ def _with_packets(
 ) -> list[tuple[Measurement, float]]:
     """Each measurement with its latency minus T_exec [us]."""
     second_us = _second_halves_us(measurements, trusted, halves)
-    return [(one, _packets_us(one, halves, second_us)) for one in measurements]
+    return [(measurement, _packets_us(measurement, halves, second_us)) for measurement in measurements]
 
 
 def _second_halves_us(
@@ -270,24 +279,28 @@ def _second_halves_us(
     It is the T1 + T2 of the smallest payload that is trusted, where the two packets differ least, and what the sizes of
     the packets change. Two equal halves would charge the payload of a write to its response, too.
     """
-    found: dict[tuple[str, int], float] = {}
-    for kind in {one.transaction for one in measurements}:
-        own = [one for one in measurements if one.transaction == kind]
-        sure = [one for one in trusted if one.transaction == kind] or own
-        smallest = min(one.payload_bytes for one in sure)
-        measured_us = [one.request_and_acknowledge_us for one in sure if one.payload_bytes == smallest]
+    second_halves_us: dict[tuple[str, int], float] = {}
+    for kind in {measurement.transaction for measurement in measurements}:
+        own = [measurement for measurement in measurements if measurement.transaction == kind]
+        sure = [measurement for measurement in trusted if measurement.transaction == kind] or own
+        smallest = min(measurement.payload_bytes for measurement in sure)
+        measured_us = [
+            measurement.request_and_acknowledge_us for measurement in sure if measurement.payload_bytes == smallest
+        ]
         first_us = median(us for us in measured_us if us is not None) if None not in measured_us else 0.0
-        for size in {one.payload_bytes for one in own}:
+        for size in {measurement.payload_bytes for measurement in own}:
             second, first = halves[kind, size], halves[kind, smallest]
-            found[kind, size] = first_us + second.response_and_acknowledge_us - first.request_and_acknowledge_us
-    return found
+            second_halves_us[kind, size] = (
+                first_us + second.response_and_acknowledge_us - first.request_and_acknowledge_us
+            )
+    return second_halves_us
 
 
-def _packets_us(one: Measurement, halves: _Halves, second_us: Mapping[tuple[str, int], float]) -> float:
+def _packets_us(measurement: Measurement, halves: _Halves, second_us: Mapping[tuple[str, int], float]) -> float:
     """Latency minus T_exec [us]."""
-    key = (one.transaction, one.payload_bytes)
-    if one.request_and_acknowledge_us is not None:
-        return one.request_and_acknowledge_us + second_us[key]
+    key = (measurement.transaction, measurement.payload_bytes)
+    if measurement.request_and_acknowledge_us is not None:
+        return measurement.request_and_acknowledge_us + second_us[key]
     return halves[key].latency_us
 
 
@@ -311,15 +324,16 @@ def _require_possible(
         "its T1 + T2 and T4 + T5 are" if way == "measured-halves" else f"the packets alone take in the {model} model"
     )
     problems = [
-        f"{source}:{one.line}: payload {one.payload_bytes} bytes is over the {limit} bytes of {payloads.carrier}"
-        for one, _ in raw
-        if one.payload_bytes > limit
+        f"{source}:{measurement.line}: payload {measurement.payload_bytes} bytes is over the {limit} bytes of "
+        f"{payloads.carrier}"
+        for measurement, _ in raw
+        if measurement.payload_bytes > limit
     ]
-    short = [(one, packets_us) for one, packets_us in raw if one.latency_us < packets_us]
+    short = [(measurement, packets_us) for measurement, packets_us in raw if measurement.latency_us < packets_us]
     problems += [
-        f"{source}:{one.line}: latency {one.latency_us:g} us at {one.payload_bytes} bytes is below the "
-        f"{packets_us:.3f} us that {needed}"
-        for one, packets_us in short
+        f"{source}:{measurement.line}: latency {measurement.latency_us:g} us at {measurement.payload_bytes} bytes is "
+        f"below the {packets_us:.3f} us that {needed}"
+        for measurement, packets_us in short
     ]
     if len(short) == len(raw) and way == "timing-model":
         problems.append(f"{source}: every latency is too short: is latency_us in us?")
@@ -355,15 +369,17 @@ def _compared(
 
 def _residuals_us(compared: Sequence[ComparedMeasurement]) -> list[float]:
     """Residuals of measurements that the fit covers [us]."""
-    return [one.residual_us for one in compared if one.residual_us is not None]
+    return [measurement.residual_us for measurement in compared if measurement.residual_us is not None]
 
 
 def _worst_extra_us(outliers: Sequence[ComparedMeasurement], residuals_us: Sequence[float]) -> float | None:
     """Time of the slowest of all measurements beyond the fit, where some are slow [us]."""
-    slow = [one for one in outliers if one.off_us > 0]
+    slow = [outlier for outlier in outliers if outlier.off_us > 0]
     if not slow:
         return None
-    worst_us = max(*(one.off_us if one.residual_us is None else one.residual_us for one in slow), *residuals_us)
+    worst_us = max(
+        *(outlier.off_us if outlier.residual_us is None else outlier.residual_us for outlier in slow), *residuals_us
+    )
     return ceil(1000 * worst_us - _PICOSECOND) / 1000
 
 
@@ -374,24 +390,27 @@ def _payload_fits(
     fitted_us: Mapping[int, float],
 ) -> list[PayloadFit]:
     groups: defaultdict[int, list[int]] = defaultdict(list)
-    for place, one in enumerate(compared):
-        groups[one.payload_bytes].append(place)
+    for place, measurement in enumerate(compared):
+        groups[measurement.payload_bytes].append(place)
 
     def of_payload(size: int, places: Sequence[int]) -> PayloadFit:
         in_fit = [place for place in places if compared[place].expected_us is None]
         group = [compared[place] for place in in_fit or places]
-        times_us = [one.execution_us for one in group]
-        by_kind = {kind: [one.execution_us for one in group if one.transaction == kind] for kind in ("read", "write")}
+        times_us = [measurement.execution_us for measurement in group]
+        by_kind = {
+            kind: [measurement.execution_us for measurement in group if measurement.transaction == kind]
+            for kind in ("read", "write")
+        }
         halves_us = (measurements[place].request_and_acknowledge_us for place in in_fit or places)
         measured_us = [us for us in halves_us if us is not None]
         own_us = fitted_us.get(size)
         half_us = median(measured_us) if measured_us else None
-        model_us = median([halves[one.transaction, size].request_and_acknowledge_us for one in group])
+        model_us = median([halves[measurement.transaction, size].request_and_acknowledge_us for measurement in group])
         return PayloadFit(
             payload_bytes=size,
             measurements=len(places),
-            latency_us=median([one.latency_us for one in group]),
-            packets_us=median([one.packets_us for one in group]),
+            latency_us=median([measurement.latency_us for measurement in group]),
+            packets_us=median([measurement.packets_us for measurement in group]),
             execution_us=median(times_us),
             deviation_us=stdev(times_us) if len(group) > 1 else None,
             range_us=round(max(times_us) - min(times_us), _EXACT_DECIMALS),

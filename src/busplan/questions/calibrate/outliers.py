@@ -27,7 +27,7 @@ PAYLOADS_TO_COMPARE: Final = 4
 
 
 class Sample(NamedTuple):
-    """What one measurement says of the execution time."""
+    """Execution time derived from one measurement."""
 
     transaction: str
     payload_bytes: int
@@ -37,7 +37,7 @@ class Sample(NamedTuple):
 
 
 class Screening(NamedTuple):
-    """What can be told of outliers; measurements by their place."""
+    """Outliers among the samples, by their index; and payloads that cannot be screened."""
 
     expected_us: Mapping[int, float]
     """The outliers, with the T_exec that the others say: above it they are slow executions."""
@@ -59,15 +59,15 @@ def screen(samples: Sequence[Sample]) -> Screening:
 
     Examples
     --------
-    >>> found = screen([Sample("write", 4, 60.0, time_us) for time_us in (52.1, 200.0, 52.0, 51.9)])
-    >>> found.expected_us
+    >>> screening = screen([Sample("write", 4, 60.0, time_us) for time_us in (52.1, 200.0, 52.0, 51.9)])
+    >>> screening.expected_us
     {1: 52.0}
     """
     groups: defaultdict[tuple[str, int], list[int]] = defaultdict(list)
-    for place, one in enumerate(samples):
-        groups[one.transaction, one.payload_bytes].append(place)
+    for place, sample in enumerate(samples):
+        groups[sample.transaction, sample.payload_bytes].append(place)
     few = [group for group in groups.values() if len(group) < REPETITIONS_TO_COMPARE]
-    comparable = len({one.payload_bytes for one in samples}) >= PAYLOADS_TO_COMPARE
+    comparable = len({sample.payload_bytes for sample in samples}) >= PAYLOADS_TO_COMPARE
     repeated = dict(_off_their_repetitions(samples, list(groups.values())))
     single = dict(_off_the_line(samples, list(chain(*few)), repeated)) if comparable else {}
     return Screening(
@@ -82,42 +82,42 @@ def _is_far(off_us: float, sample: Sample, spread_us: float) -> bool:
 
 def _distances_us(samples: Sequence[Sample], group: Sequence[int]) -> list[float]:
     """Distance of each from the median of its group [us]; the smallest is left out, for the median follows it."""
-    middle_us = median(samples[one].execution_us for one in group)
-    return sorted(abs(samples[one].execution_us - middle_us) for one in group)[1:]
+    middle_us = median(samples[place].execution_us for place in group)
+    return sorted(abs(samples[place].execution_us - middle_us) for place in group)[1:]
 
 
 def _off_their_repetitions(samples: Sequence[Sample], groups: Sequence[Sequence[int]]) -> Iterator[tuple[int, float]]:
-    """Those that are far from the median of three or more repetitions, with the median of the others."""
+    """Samples far from the median of three or more repetitions, by index, with the median of the others [us]."""
     repeated = [_distances_us(samples, group) for group in groups if len(group) > 1]
     all_us = median_low(chain(*repeated)) if repeated else 0.0
     for group in groups:
         if len(group) < REPETITIONS_TO_COMPARE:
             continue
-        middle_us = median(samples[one].execution_us for one in group)
+        middle_us = median(samples[place].execution_us for place in group)
         # Long executions may scatter more than short ones.
         spread_us = DEVIATION_PER_MAD * max(all_us, median_low(_distances_us(samples, group)))
-        off = [one for one in group if _is_far(samples[one].execution_us - middle_us, samples[one], spread_us)]
-        rest_us = [samples[one].execution_us for one in group if one not in off]
-        yield from ((one, median(rest_us or [middle_us])) for one in off)
+        off = [place for place in group if _is_far(samples[place].execution_us - middle_us, samples[place], spread_us)]
+        rest_us = [samples[place].execution_us for place in group if place not in off]
+        yield from ((place, median(rest_us or [middle_us])) for place in off)
 
 
 def _off_the_line(
     samples: Sequence[Sample], few: Sequence[int], left_out: Mapping[int, float]
 ) -> Iterator[tuple[int, float]]:
-    """Those measured once or twice that are far from the line through all payloads, with the T_exec of the line."""
+    """Samples of payloads measured once or twice that are off the line through all, by index, with its T_exec [us]."""
     groups: defaultdict[int, list[float]] = defaultdict(list)
-    for place, one in enumerate(samples):
+    for place, sample in enumerate(samples):
         if place not in left_out:
-            groups[one.payload_bytes].append(one.execution_us)
+            groups[sample.payload_bytes].append(sample.execution_us)
     base_us, per_byte_us = theil_sen(groups)
     middle_us = {size: median(values) for size, values in sorted(groups.items())}
     spread_us = DEVIATION_PER_MAD * median(abs(us - base_us - per_byte_us * size) for size, us in middle_us.items())
     smaller_us = {size: middle_us[before] for before, size in pairwise(middle_us)}
     larger_us = {size: middle_us[behind] for size, behind in pairwise(middle_us)}
     for place in few:
-        one = samples[place]
-        line_us = base_us + per_byte_us * one.payload_bytes
-        size, off_us = one.payload_bytes, one.execution_us - line_us
-        in_order = smaller_us.get(size, -inf) <= one.execution_us <= larger_us.get(size, inf)
-        if not in_order and _is_far(off_us, one, spread_us):
+        sample = samples[place]
+        line_us = base_us + per_byte_us * sample.payload_bytes
+        size, off_us = sample.payload_bytes, sample.execution_us - line_us
+        in_order = smaller_us.get(size, -inf) <= sample.execution_us <= larger_us.get(size, inf)
+        if not in_order and _is_far(off_us, sample, spread_us):
             yield place, line_us

@@ -60,13 +60,13 @@ _OF_OUTLIERS: Final = ("expected_us", "off_us")
 
 def execution_keys(result: Calibration) -> dict[str, object]:
     """Keys and values of the execution time, as in a profile."""
-    found = {**result.execution.model_dump(exclude_none=True, exclude={_WORST}), **result.fit_keys}
+    keys = {**result.execution.model_dump(exclude_none=True, exclude={_WORST}), **result.fit_keys}
     if result.uncertainty_us is not None:
-        found["uncertainty_us"] = result.uncertainty_us
+        keys["uncertainty_us"] = result.uncertainty_us
     if result.worst_extra_us is not None:
         # The profile may know of a slower one.
-        found[_WORST] = max(result.worst_extra_us, result.nodes.node.execution.worst_extra_us)
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in found.items()}
+        keys[_WORST] = max(result.worst_extra_us, result.nodes.node.execution.worst_extra_us)
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in keys.items()}
 
 
 def execution_changes(result: Calibration) -> dict[str, object]:
@@ -132,7 +132,7 @@ def _blocks(result: Calibration, source: str) -> Iterator[Block]:
         Code(source),
     )
     yield from fit_sentences(result)
-    yield from (joined(sentence("Warning: ", state="warns"), one, by="") for one in warning_sentences(result))
+    yield from (joined(sentence("Warning: ", state="warns"), warning, by="") for warning in warning_sentences(result))
     yield _by_payload(result.payloads, measured=result.way == "measured-halves")
     keys = (f"{key} = {value_text(value)}" for key, value in execution_keys(result).items())
     where = f"[group.execution]  # of {result.nodes.name}" if result.nodes.name else f"[{section(result)}]"
@@ -155,7 +155,7 @@ def _cell(value: float | None, key: str) -> Cell:
 
 
 def calibration_warnings(result: Calibration) -> list[str]:
-    """What to check before using these figures."""
+    """Warnings: things to check before these figures are used."""
     return list(map(sentence_text, warning_sentences(result)))
 
 
@@ -184,7 +184,7 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         at_most_us=result.at_most_us,
         rms_residual_us=result.rms_residual_us,
         largest_residual={key: value for key, value in result.largest._asdict().items() if key not in _OF_OUTLIERS},
-        outliers=[one._asdict() for one in result.outliers],
+        outliers=[outlier._asdict() for outlier in result.outliers],
         worst_extra_us=result.worst_extra_us,
         unchecked_bytes=list(result.unchecked_bytes),
         payloads=calibration_records(result),

@@ -74,15 +74,17 @@ def _form(result: Calibration) -> Sentence:
 
 
 def _residual(result: Calibration) -> Sentence:
-    one = result.largest
+    largest = result.largest
     said = sentence(
         "Measured less fitted: rms {}, largest {}",
         time_value(result.rms_residual_us, "rms_residual_us"),
-        time_value(one.residual_us or 0.0, "residual_us"),
+        time_value(largest.residual_us or 0.0, "residual_us"),
     )
-    if one.residual_us:
+    if largest.residual_us:
         place = sentence(
-            " at {} (line {})", ShownValue(one.payload_bytes, "payload_bytes", "bytes"), count_value(one.line, "line")
+            " at {} (line {})",
+            ShownValue(largest.payload_bytes, "payload_bytes", "bytes"),
+            count_value(largest.line, "line"),
         )
         said = joined(said, place, by="")
     repeated = [fit.deviation_us for fit in result.payloads if fit.deviation_us is not None]
@@ -143,8 +145,8 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
 
 def slow_and_fast(result: Calibration) -> tuple[list[ComparedMeasurement], list[ComparedMeasurement]]:
     """The outliers that are slow executions, and those that the others contradict."""
-    slow = [one for one in result.outliers if one.off_us > 0]
-    return slow, [one for one in result.outliers if one.off_us <= 0]
+    slow = [outlier for outlier in result.outliers if outlier.off_us > 0]
+    return slow, [outlier for outlier in result.outliers if outlier.off_us <= 0]
 
 
 def _outliers(result: Calibration) -> Iterator[Sentence]:
@@ -154,7 +156,7 @@ def _outliers(result: Calibration) -> Iterator[Sentence]:
             continue
         said = joined(
             sentence(f"{{}} {word} {nouns(len(outliers), 'measurement')}: ", count_value(len(outliers))),
-            joined(*(_outlier(one) for one in outliers[:_MOST_LINES]), by=", "),
+            joined(*(_outlier(outlier) for outlier in outliers[:_MOST_LINES]), by=", "),
             by="",
         )
         if len(outliers) > _MOST_LINES:
@@ -169,11 +171,11 @@ def _effect(result: Calibration, word: str) -> Sentence:
     return sentence("; not in the fit: the slowest execution takes {} more, worst_extra_us.", worst)
 
 
-def _outlier(one: ComparedMeasurement) -> Sentence:
+def _outlier(outlier: ComparedMeasurement) -> Sentence:
     return sentence(
         "line {} ({} at {}: T_exec {} off what the others say)",
-        count_value(one.line, "line"),
-        ShownValue(one.latency_us, "latency_us", "us"),
-        ShownValue(one.payload_bytes, "payload_bytes", "bytes"),
-        time_value(one.off_us, "off_us")._replace(signed=True, decimals=1),
+        count_value(outlier.line, "line"),
+        ShownValue(outlier.latency_us, "latency_us", "us"),
+        ShownValue(outlier.payload_bytes, "payload_bytes", "bytes"),
+        time_value(outlier.off_us, "off_us")._replace(signed=True, decimals=1),
     )

@@ -1,13 +1,15 @@
 """`busplan.capacity`."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
+from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
 from busplan.questions.capacity.verdict import Verdict, verdicts
 from busplan.questions.fit import figures as analysis
+from busplan.questions.fit.certainty import FITS, VerdictWord
 from busplan.questions.fit.figures import Capacity, CapacityFigures
 from busplan.sections.profile import Profile
 
@@ -28,13 +30,37 @@ class CapacityAnswer(Answer):
     verdicts
         One verdict for each period.
     sensitivities
-        What moves the margin, one for each period; empty if it was not asked for.
+        Effects of small changes on the margin, one for each period; empty if it was not asked for.
     """
 
     profile: Profile
     periods: tuple[tuple[CapacityFigures, ...], ...]
     verdicts: tuple[Verdict, ...]
     sensitivities: "tuple[Sensitivity, ...]" = ()
+
+    @property
+    def verdict(self) -> VerdictWord:
+        """The verdict on a single period, by the timing model that decides."""
+        return cast("VerdictWord", self._deciding.verdict)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the cycle is shown to fit a single period: `verdict` is "fits"."""
+        return self.verdict == FITS
+
+    @property
+    def margin_us(self) -> float:
+        """Free time of a single period's slice, less the bias: `margin_corrected_us` of that model [us]."""
+        return cast("float", self._deciding.margin_corrected_us)
+
+    @property
+    def _deciding(self) -> CapacityFigures:
+        if len(self.verdicts) > 1:
+            raise BusplanError(
+                f"{len(self.verdicts)} periods have no single verdict: each has its own, "
+                "as verdicts[0].deciding.verdict"
+            )
+        return self.verdicts[0].deciding
 
     @property
     def results(self) -> tuple[CapacityFigures, ...]:
@@ -96,25 +122,27 @@ def capacity(
     Examples
     --------
     >>> import busplan
+    >>> busplan.capacity("paper-4ms").verdict
+    'fits'
     >>> answer = busplan.capacity("paper-1ms", period_us=500)
-    >>> [(one.timing_model, one.fits, one.max_axes) for one in answer.results]
+    >>> [(figures.timing_model, figures.fits, figures.max_axes) for figures in answer.results]
     [('paper', True, 8), ('standard', False, 4)]
     >>> answer.verdicts[0].models_agree, answer.verdicts[0].deciding.verdict
     (False, 'does not fit')
-    >>> (found,) = busplan.capacity("paper-1ms", sensitivity=True).sensitivities
-    >>> [(one.change, round(one.margin_change_us, 1)) for one in found.effects[:2]]
+    >>> (sensitivity,) = busplan.capacity("paper-1ms", sensitivity=True).sensitivities
+    >>> [(effect.change, round(effect.margin_change_us, 1)) for effect in sensitivity.effects[:2]]
     [('one node more', -128.1), ('one busy retry more', -28.0)]
-    >>> found.next_bottleneck.next_binding_term.name
+    >>> sensitivity.next_bottleneck.next_binding_term.name
     'idle'
     """
     network = load_profile(profile)
-    found = analysis.capacity(
+    result = analysis.capacity(
         network,
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         timing_models=checked_models(timing_model, network),
     )
     if not sensitivity:
-        return CapacityAnswer(*found, verdicts=verdicts(found))
+        return CapacityAnswer(*result, verdicts=verdicts(result))
     from busplan.questions.capacity.sensitivity import sensitivities
 
-    return CapacityAnswer(*found, verdicts=verdicts(found), sensitivities=sensitivities(found))
+    return CapacityAnswer(*result, verdicts=verdicts(result), sensitivities=sensitivities(result))

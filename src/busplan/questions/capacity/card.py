@@ -73,7 +73,7 @@ def _gauge(figures: CapacityFigures, profile: Profile) -> Gauge:
 
 
 def _used_us(figures: CapacityFigures) -> float:
-    """What the cycle takes of its slice, with the bias of the model [us]."""
+    """Time the cycle takes, with the bias of the model [us]."""
     return figures.available_us - (figures.margin_corrected_us or 0.0)
 
 
@@ -129,12 +129,12 @@ def _kept_by(figures: CapacityFigures, profile: Profile) -> str:
 def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     """Nodes that fit beside those there are; the cure, where there is none or the machine does not run as planned."""
     figures = verdict.deciding
-    spare = [(one.name or "nodes", (one.safe_nodes or 0) - one.nodes) for one in figures.counts]
+    spare = [(count.name or "nodes", (count.safe_nodes or 0) - count.nodes) for count in figures.counts]
     if verdict.all_well and any(number > 0 for _, number in spare):
-        each = (
+        rooms = (
             f"{number} more{f' of {name}' if figures.groups else f' {name}'}" for name, number in spare if number > 0
         )
-        yield "room for", Sentence((listed([*each], "or"),))
+        yield "room for", Sentence((listed([*rooms], "or"),))
         return
     if verdict.all_well:
         yield "room for", Sentence(("no more nodes",))
@@ -175,10 +175,10 @@ def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
         )
     )
     yield "tested", Sentence((words or "not against figures of others",))
-    for other in verdict.others:
-        if contradicts(other.fits, figures):
-            said = f"{_us(other.required_us, figures.uncertainty_us)} us needed of {_us(other.available_us, None)}"
-            yield f"{other.timing_model} model", Sentence((f"says otherwise, {said}, but does not decide",), "warns")
+    for model in verdict.others:
+        if contradicts(model.fits, figures):
+            said = f"{_us(model.required_us, figures.uncertainty_us)} us needed of {_us(model.available_us, None)}"
+            yield f"{model.timing_model} model", Sentence((f"says otherwise, {said}, but does not decide",), "warns")
     if verdict.after_reset is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in bus.safety.after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")

@@ -60,11 +60,11 @@ def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
 
 def _of_all(said: Sequence[Sequence[Sentence]]) -> Iterator[Sentence]:
     """The sentences of each period, and at the end once those that are the same for all."""
-    first, *others = ([sentence_text(words) for words in sentences] for sentences in said)
-    common = {text for text in first if all(text in other for other in others)}
+    texts = [{sentence_text(words) for words in sentences} for sentences in said]
+    common = set.intersection(*texts)
     for sentences in said:
         yield from (words for words in sentences if sentence_text(words) not in common)
-    yield from (one for one in said[0] if sentence_text(one) in common)
+    yield from (words for words in said[0] if sentence_text(words) in common)
 
 
 def capacity_table(result: Capacity) -> Table:
@@ -83,7 +83,7 @@ def capacity_table(result: Capacity) -> Table:
         count_value(first.axes, "axes"),
     )
     owners = list(_owners(result))
-    shown = {*_DECIDES, *(term.key for one in result.results for term in one.terms if term.us)}
+    shown = {*_DECIDES, *(term.key for figures in result.results for term in figures.terms if term.us)}
     return figure_table(
         [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)],
         owners,
@@ -100,7 +100,7 @@ def _owners(result: Capacity) -> Iterator[Owner]:
     for results in result.periods:
         several = len(result.periods) > 1
         group = period(results[0].period_us) if several else ""
-        for figures in sorted(results, key=lambda each: each.timing_model != leading):
+        for figures in sorted(results, key=lambda figures: figures.timing_model != leading):
             rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
             yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures)
 
@@ -128,10 +128,12 @@ def groups_table(result: Capacity) -> Table:
     """
     columns = [TableColumn("group", kind="words"), TableColumn("nodes"), TableColumn("axes")]
     shown: list[tuple[int, tuple[Figure, ...]]] = []
-    for number, one in enumerate(result.results):
-        keys = _GROUP_CLOSED if one.verdict is None else _GROUP_SAFE
+    for number, figures in enumerate(result.results):
+        keys = _GROUP_CLOSED if figures.verdict is None else _GROUP_SAFE
         shown.append((number, keys))
-        models = f"{period(one.period_us)}, {one.timing_model}" if len(result.periods) > 1 else one.timing_model
+        models = (
+            f"{period(figures.period_us)}, {figures.timing_model}" if len(result.periods) > 1 else figures.timing_model
+        )
         columns += (
             TableColumn(key.label, kind="words" if key.sort == "word" else "figures", group=models) for key in keys
         )
@@ -151,8 +153,8 @@ _GROUP_CLOSED: Final[tuple[Figure, ...]] = (figure.MAX_NODES, figure.LIMITED_BY)
 
 
 _DECIDES: Final = frozenset(
-    one.key
-    for one in (
+    row.key
+    for row in (
         *(figure.VERDICT, figure.FITS, figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS),
         *(figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY),
         *(figure.AVAILABLE, figure.REQUIRED, figure.MARGIN),
@@ -188,7 +190,7 @@ def capacity_records(result: Capacity) -> list[Record]:
     return [
         {
             **figures.by_key(),
-            **{f"group.{one.name}.{key}": getattr(one, key) for one in figures.groups for key in COUNTS},
+            **{f"group.{group.name}.{key}": getattr(group, key) for group in figures.groups for key in COUNTS},
         }
         for figures in result.results
     ]
@@ -243,4 +245,4 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
 
 def certainty_record(figures: CapacityFigures) -> Record:
     """Figures of how sure the verdict is, without its word."""
-    return fields(figures, *(one.key for one in figure.CERTAINTY if one is not figure.VERDICT))
+    return fields(figures, *(key.key for key in figure.CERTAINTY if key is not figure.VERDICT))

@@ -1,4 +1,4 @@
-"""What moves the margin: each small change of a network, and what binds once the first bottleneck is gone."""
+"""Sensitivity of the margin: the effect of each small change, and the next bottleneck behind the first."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final, NamedTuple
@@ -29,7 +29,7 @@ from busplan.sections.profile import Profile
 
 
 class NextLimit(NamedTuple):
-    """What limits the nodes of one group now, and what would next, the other groups as they are."""
+    """Limit of the nodes of one group now, and the next limit behind it; the other groups stay as they are."""
 
     group: str
     """Empty where all nodes are alike."""
@@ -44,7 +44,7 @@ class NextLimit(NamedTuple):
 
 
 class NextBottleneck(NamedTuple):
-    """What binds now, and what would bind next, by the timing model that decides."""
+    """The bottleneck now and the next one behind it, by the timing model that decides."""
 
     limits: tuple[NextLimit, ...]
     """One for each group of nodes."""
@@ -54,7 +54,7 @@ class NextBottleneck(NamedTuple):
     """Whether something would take that term out of the cycle. If so, the figures below are of the cycle without it;
     else they are of the cycle as it is."""
     next_binding_term: Term
-    """The largest other term."""
+    """The largest of the other terms."""
     next_margin_corrected_us: float | None
     """Corrected margin without the largest term; None where nothing takes it out."""
 
@@ -62,8 +62,8 @@ class NextBottleneck(NamedTuple):
 def next_bottleneck(profile: Profile) -> NextBottleneck:
     """Find what binds a network once its first bottleneck is gone.
 
-    A term is taken out at its cause, and the cycle is computed anew: without execution, for one, the bus is idle for
-    longer.
+    A term is taken out at its cause, and the cycle is computed anew: without execution, for
+    example, the bus is idle for longer.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _relieved(network: Network) -> Iterator[Network]:
 
 
 def _largest(cycle: BusCycle, *, but: str = "") -> Term:
-    return max((term for term in cycle.terms if term.key != but), key=lambda one: plain(one.us))
+    return max((term for term in cycle.terms if term.key != but), key=lambda term: plain(term.us))
 
 
 def _of(cycle: BusCycle, key: str) -> float:
@@ -115,9 +115,9 @@ class Perturbed(NamedTuple):
 
     change: str
     key: str
-    """What changes: a key of the profile, or a figure of `latency`."""
+    """Key of the profile, or figure of `latency`, that changes."""
     before: Any
-    """Its value; None where it has no single one."""
+    """Value of the key before; None where groups differ."""
     after: Any
     network: Network | None
     """None where the change cannot be made."""
@@ -138,7 +138,7 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     yield _more_bytes(network)
     own = bus.perturbations(network)
     reset = Perturbation("a bus reset", bus.safety.after_reset, if_nothing="it is set so already")
-    yield from (_with_keys(network.profile, one) for one in (*own, *((reset,) if bus.safety.after_reset else ())))
+    yield from (_with_keys(network.profile, change) for change in (*own, *((reset,) if bus.safety.after_reset else ())))
 
 
 def _slower(network: Network, *, if_nothing: str) -> Perturbed:
@@ -148,8 +148,8 @@ def _slower(network: Network, *, if_nothing: str) -> Perturbed:
         for group in network.groups
     )
     before, after = (
-        _the_one(us for group in each for us in (group.read_execution_us, group.write_execution_us))
-        for each in (network.groups, groups)
+        _common_value(us for group in state for us in (group.read_execution_us, group.write_execution_us))
+        for state in (network.groups, groups)
     )
     label = f"execution time +{_EXECUTION_SHARE:.0%}"
     return Perturbed(label, "execution_us", before, after, network._replace(groups=groups), if_nothing)
@@ -157,15 +157,15 @@ def _slower(network: Network, *, if_nothing: str) -> Perturbed:
 
 def _one_node_more(network: Network, alike: AlikeNodes) -> Perturbed:
     more = alike.nodes + 1
-    found = network.asking(alike.name).with_nodes(more)
-    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, found, "")
+    changed = network.asking(alike.name).with_nodes(more)
+    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, changed, "")
 
 
 def _one_axis_more(network: Network, alike: AlikeNodes) -> Perturbed:
     key, axes = alike.node_key("axes"), alike.node.axes + 1
-    found, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
+    changed, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
     note = unknown or ("" if alike.payload.follows_axes else "no payload follows the axes")
-    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, found, note)
+    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, changed, note)
 
 
 def _more_bytes(network: Network) -> Perturbed:
@@ -176,13 +176,13 @@ def _more_bytes(network: Network) -> Perturbed:
     def change() -> Network:
         pairs = zip(network.groups, sizes, strict=True)
         return network._replace(
-            groups=tuple(with_payloads(one, read_bytes=read, write_bytes=write) for one, (read, write) in pairs)
+            groups=tuple(with_payloads(group, read_bytes=read, write_bytes=write) for group, (read, write) in pairs)
         )
 
-    before = _the_one(size for one in network.groups for size in (one.read_bytes, one.write_bytes))
-    found, unknown = _if_known(change)
-    label = f"payload +{_PAYLOAD_STEP_BYTES} bytes"
-    return Perturbed(label, "payload_bytes", before, _the_one(size for one in sizes for size in one), found, unknown)
+    before = _common_value(size for group in network.groups for size in (group.read_bytes, group.write_bytes))
+    changed, unknown = _if_known(change)
+    after = _common_value(size for pair in sizes for size in pair)
+    return Perturbed(f"payload +{_PAYLOAD_STEP_BYTES} bytes", "payload_bytes", before, after, changed, unknown)
 
 
 def _with_keys(profile: Profile, perturbation: Perturbation) -> Perturbed:
@@ -194,10 +194,10 @@ def _with_keys(profile: Profile, perturbation: Perturbation) -> Perturbed:
     if perturbation.why_not:
         return Perturbed(perturbation.label, key, before, None, None, perturbation.why_not)
     try:
-        found = network_of(override(profile, dict(perturbation.changes)))
+        changed = network_of(override(profile, dict(perturbation.changes)))
     except BusplanError as error:
         return Perturbed(perturbation.label, key, before, after, None, "; ".join(error.problems))
-    return Perturbed(perturbation.label, key, before, after, found, perturbation.if_nothing)
+    return Perturbed(perturbation.label, key, before, after, changed, perturbation.if_nothing)
 
 
 def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:
@@ -212,10 +212,10 @@ def _in(alike: AlikeNodes) -> str:
     return f" in {alike.name}" if alike.name else ""
 
 
-def _the_one(values: Iterable[Any]) -> Any:
+def _common_value(values: Iterable[Any]) -> Any:
     """The value that all share; None where they differ."""
-    first, *others = values
-    return first if all(other == first for other in others) else None
+    first, *rest = values
+    return first if all(value == first for value in rest) else None
 
 
 class Standing(NamedTuple):
@@ -234,14 +234,14 @@ class Standing(NamedTuple):
 
 
 class Effect(NamedTuple):
-    """What one small change does to the margin."""
+    """Effect of one small change on the margin."""
 
     change: str
-    """What changes, in words."""
+    """The change, in words."""
     key: str
     """A key of the profile, or a figure of `latency`."""
     before: Any
-    """Its value, in the unit of its key; None where the change has no single one."""
+    """Value of the key before, in the key's unit; None where groups differ."""
     after: Any
     margin_change_us: float | None
     """By how much the corrected margin grows; None where the change cannot be made."""
@@ -252,7 +252,7 @@ class Effect(NamedTuple):
 
 
 class Sensitivity(NamedTuple):
-    """What moves the margin of a network at one period, by the timing model that decides."""
+    """Effects of small changes on the margin at one period, by the timing model that decides."""
 
     profile: Profile
     """At that period."""
@@ -274,19 +274,19 @@ def sensitivity(profile: Profile) -> Sensitivity:
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> found = sensitivity(load("paper-1ms").profile)
-    >>> [one.change for one in found.effects[:2]]
+    >>> result = sensitivity(load("paper-1ms").profile)
+    >>> [effect.change for effect in result.effects[:2]]
     ['one node more', 'one busy retry more']
     """
     network = network_of(profile)
     now = standing(network)
     effects = [_effect(change, now) for change in perturbed(network)]
-    effects.sort(key=lambda one: (one.margin_change_us is None, -abs(one.margin_change_us or 0.0)))
+    effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
     return Sensitivity(profile, bus_of(profile).deciding_model, now, tuple(effects), next_bottleneck(profile))
 
 
 def sensitivities(capacity: Capacity) -> tuple[Sensitivity, ...]:
-    """What moves the margin at each period of a capacity result."""
+    """Sensitivity at each period of a capacity result."""
     periods_us = (results[0].period_us for results in capacity.periods)
     return tuple(sensitivity(override(capacity.profile, {"cycle.period_us": period_us})) for period_us in periods_us)
 
@@ -295,13 +295,13 @@ def standing(network: Network) -> Standing:
     """Compute where a network stands: what `capacity` says of a profile, of any network."""
     bus = bus_of(network.profile)
     cycle = bus.cycle(network, model=bus.deciding_model)
-    found, codes = certainty(cycle), limit_codes(network)
+    sure, codes = certainty(cycle), limit_codes(network)
     broken = tuple(key for key, code in codes.items() if code == BROKEN)
-    codes[TIME] = time_code(found, network)
+    codes[TIME] = time_code(sure, network)
     late = not fits_in(cycle.required_us, available_us=available_us(network))
     return Standing(
-        margin_corrected_us=plain(found.margin_corrected_us),
-        uncertainty_us=existing(found.known_uncertainty_us),
+        margin_corrected_us=plain(sure.margin_corrected_us),
+        uncertainty_us=existing(sure.known_uncertainty_us),
         verdict=VERDICTS[int(verdict_code(codes))],
         safe=bus.is_safe(network),
         exceeded=(*broken, *((TIME,) if late else ())),

@@ -1,4 +1,4 @@
-"""What moves the margin, of `busplan capacity --sensitivity`: sentences, a table and a chart for each period."""
+"""Report of `busplan capacity --sensitivity`: sentences, a table and a chart for each period."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -49,8 +49,8 @@ class SensitivityDrawing(Drawing):
 
     Parameters
     ----------
-    found
-        What moves the margin.
+    sensitivity
+        Effects of small changes.
     """
 
     def __init__(self, sensitivity: Sensitivity) -> None:
@@ -96,13 +96,13 @@ class SensitivityDrawing(Drawing):
         figures = max(len(bar.words) for bar in self._bars)
         columns = max(_NARROWEST, width - names - figures - 5)
         left, right = _shared(columns, least=self._least_us, most=self._most_us)
-        for one in self._bars:
+        for bar in self._bars:
             size = _columns(
-                one.value, self._least_us if one.value < 0 else self._most_us, left if one.value < 0 else right
+                bar.value, self._least_us if bar.value < 0 else self._most_us, left if bar.value < 0 else right
             )
-            takes, adds = (_TAKES * size, "") if one.value < 0 else ("", _ADDS * size)
-            bar = f"{takes.rjust(left)}{_ZERO}{adds.ljust(right)}"
-            yield f"{one.label.ljust(names)}  {bar}  {one.words.rjust(figures)}"
+            takes, adds = (_TAKES * size, "") if bar.value < 0 else ("", _ADDS * size)
+            drawn = f"{takes.rjust(left)}{_ZERO}{adds.ljust(right)}"
+            yield f"{bar.label.ljust(names)}  {drawn}  {bar.words.rjust(figures)}"
 
 
 def _bar(change: str, us: float) -> SignedBar:
@@ -122,43 +122,43 @@ def _columns(us: float, of_us: float, columns: int) -> int:
     return max(1, round(columns * us / of_us)) if us else 0
 
 
-def next_bottleneck_sentence(found: NextBottleneck, profile: Profile) -> Sentence:
+def next_bottleneck_sentence(bottlenecks: NextBottleneck, profile: Profile) -> Sentence:
     """Say what binds once the largest term, or the limit of the nodes, is gone.
 
     Parameters
     ----------
-    found
-        The bottlenecks.
+    bottlenecks
+        The bottleneck now, and the next one.
     profile
         The network.
     """
-    term, behind = (_term(one, profile) for one in (found.binding_term, found.next_binding_term))
+    term, behind = (_term(term, profile) for term in (bottlenecks.binding_term, bottlenecks.next_binding_term))
     term_us, behind_us, margin_us = (
         ShownValue(us, key, "us", 3)
         for us, key in (
-            (found.binding_term.us, "binding_term_us"),
-            (found.next_binding_term.us, "next_binding_term_us"),
-            (found.next_margin_corrected_us, "next_margin_corrected_us"),
+            (bottlenecks.binding_term.us, "binding_term_us"),
+            (bottlenecks.next_binding_term.us, "next_binding_term_us"),
+            (bottlenecks.next_margin_corrected_us, "next_margin_corrected_us"),
         )
     )
-    if found.is_gone:
+    if bottlenecks.is_gone:
         text = f"Next bottleneck: without {term}, now {{}}, the largest term is {behind}, {{}}, and the margin {{}}"
         of_term = sentence(text, term_us, behind_us, margin_us)
     else:
         text = f"Next bottleneck: behind {term}, {{}}, which no key takes away, comes {behind}, {{}}"
         of_term = sentence(text, term_us, behind_us)
-    limits = map(_limit, found.limits)
+    limits = map(_limit, bottlenecks.limits)
     return joined(joined(of_term, *limits, by="; "), Sentence((".",)), by="")
 
 
-def _limit(found: NextLimit) -> Sentence:
+def _limit(limit: NextLimit) -> Sentence:
     """Say what limits the nodes, or those of a group, now and next."""
-    of = f" of {found.group}" if found.group else ""
+    of = f" of {limit.group}" if limit.group else ""
     return sentence(
-        f"without the limit of {found.limited_by}, now at {{}} {nouns(found.safe_nodes, 'node')}{of}, the next limit "
-        f"is {found.next_limited_by}, at {{}} {nouns(found.next_safe_nodes, 'node')}",
-        count_value(found.safe_nodes, SAFE_NODES.key),
-        count_value(found.next_safe_nodes, "next_safe_nodes"),
+        f"without the limit of {limit.limited_by}, now at {{}} {nouns(limit.safe_nodes, 'node')}{of}, the next limit "
+        f"is {limit.next_limited_by}, at {{}} {nouns(limit.next_safe_nodes, 'node')}",
+        count_value(limit.safe_nodes, SAFE_NODES.key),
+        count_value(limit.next_safe_nodes, "next_safe_nodes"),
     )
 
 
@@ -179,28 +179,28 @@ def next_bottleneck_record(bottleneck: NextBottleneck, profile: Profile) -> Reco
     }
 
 
-def _limits(found: Sequence[NextLimit]) -> Record:
-    """What limits the nodes; of groups a list, and nothing for the whole."""
-    each = [
+def _limits(limits: Sequence[NextLimit]) -> Record:
+    """Limit of the nodes; of groups a list, and nothing for the whole."""
+    records = [
         {
-            "safe_limited_by": one.limited_by,
-            "safe_nodes": one.safe_nodes,
-            "next_safe_limited_by": one.next_limited_by,
-            "next_safe_nodes": one.next_safe_nodes,
+            "safe_limited_by": limit.limited_by,
+            "safe_nodes": limit.safe_nodes,
+            "next_safe_limited_by": limit.next_limited_by,
+            "next_safe_nodes": limit.next_safe_nodes,
         }
-        for one in found
+        for limit in limits
     ]
-    if not found[0].group:
-        return each[0]
-    named = [{"name": one.group, **record} for one, record in zip(found, each, strict=True)]
-    return {**dict.fromkeys(each[0]), "groups": named}
+    if not limits[0].group:
+        return records[0]
+    named = [{"name": limit.group, **record} for limit, record in zip(limits, records, strict=True)]
+    return {**dict.fromkeys(records[0]), "groups": named}
 
 
 _DIGITS = 4
 """Digits of what changes: enough to see a tenth of it."""
 
 
-def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], found: Sequence[Sensitivity]) -> Report:
+def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], sensitivities: Sequence[Sensitivity]) -> Report:
     """Report of `capacity --sensitivity`.
 
     Parameters
@@ -209,25 +209,27 @@ def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], found: Seq
         The capacity.
     verdicts
         One for each period.
-    found
-        What moves the margin, one for each period.
+    sensitivities
+        Effects of small changes, one for each period.
     """
     report = capacity_report(result, verdicts)
     return report._replace(
-        blocks=lambda: (*report.blocks(), *_of_periods(found)),
-        document=partial(sensitivity_document, result, verdicts, found),
-        records=lambda: with_profile(result.profile.name, [row for one in found for row in _rows(one)]),
+        blocks=lambda: (*report.blocks(), *_of_periods(sensitivities)),
+        document=partial(sensitivity_document, result, verdicts, sensitivities),
+        records=lambda: with_profile(
+            result.profile.name, [row for sensitivity in sensitivities for row in _rows(sensitivity)]
+        ),
         is_card_enough=False,
     )
 
 
-def _of_periods(found: Sequence[Sensitivity]) -> Iterator[Block]:
-    for one in found:
-        yield from sensitivity_blocks(one)
+def _of_periods(sensitivities: Sequence[Sensitivity]) -> Iterator[Block]:
+    for sensitivity in sensitivities:
+        yield from sensitivity_blocks(sensitivity)
 
 
 def sensitivity_blocks(sensitivity: Sensitivity) -> Iterator[Block]:
-    """What moves the margin at one period.
+    """Effects of small changes at one period.
 
     Parameters
     ----------
@@ -339,12 +341,14 @@ def _capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
-def sensitivity_document(result: Capacity, verdicts: Sequence[Verdict], found: Sequence[Sensitivity]) -> JsonDocument:
+def sensitivity_document(
+    result: Capacity, verdicts: Sequence[Verdict], sensitivities: Sequence[Sensitivity]
+) -> JsonDocument:
     """Document of `busplan capacity --sensitivity --format json`: that of `capacity`, with more in each verdict."""
     whole = capacity_document(result, verdicts)
-    for verdict, one in zip(whole["verdicts"], found, strict=True):
-        verdict["sensitivity"] = [_record(effect, one.profile) for effect in one.effects]
-        verdict["next_bottleneck"] = next_bottleneck_record(one.next_bottleneck, one.profile)
+    for verdict, sensitivity in zip(whole["verdicts"], sensitivities, strict=True):
+        verdict["sensitivity"] = [_record(effect, sensitivity.profile) for effect in sensitivity.effects]
+        verdict["next_bottleneck"] = next_bottleneck_record(sensitivity.next_bottleneck, sensitivity.profile)
     return whole
 
 

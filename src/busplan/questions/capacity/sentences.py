@@ -137,28 +137,28 @@ def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
     said = sentence(f"{{}}{{}}{why}.", attribute_value(VERDICT, figures)._replace(state=state), Words(safe, state))
     if limits and figures.verdict == DOES_NOT_FIT:
         return said  # whatever the time is
-    found = [said, _margin(figures, bus_of(profile))]
+    sentences = [said, _margin(figures, bus_of(profile))]
     largest = next(iter(uncertainty_parts(figures)), None)
     if largest is not None and largest["share"]:
         share = ShownValue(largest["share"], "share", "%", 0)
-        found.append(sentence(f"Largest doubt: {largest['label']}, {{}} of U squared.", share))
+        sentences.append(sentence(f"Largest doubt: {largest['label']}, {{}} of U squared.", share))
     if profile.limits.reserve:
         reserve = ShownValue(profile.limits.reserve, "reserve", "%", 0)
-        found.append(sentence("{} of the slice must stay free (limits.reserve).", reserve))
-    return joined(*found)
+        sentences.append(sentence("{} of the slice must stay free (limits.reserve).", reserve))
+    return joined(*sentences)
 
 
 def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
-    """What the uncertainty is made of, the largest first."""
+    """Parts of the uncertainty, the largest first."""
     whole = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     return [
         {
-            "input": one.key,
-            "label": one.label,
-            "standard_uncertainty_us": float(one.us),
-            "share": float(one.us) ** 2 / whole if whole else 0.0,
+            "input": doubt.key,
+            "label": doubt.label,
+            "standard_uncertainty_us": float(doubt.us),
+            "share": float(doubt.us) ** 2 / whole if whole else 0.0,
         }
-        for one in sorted(figures.doubts, key=lambda one: -float(one.us))
+        for doubt in sorted(figures.doubts, key=lambda doubt: -float(doubt.us))
     ]
 
 
@@ -188,11 +188,11 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
 def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
     """Say where another timing model contradicts the verdict, and which cannot express the profile."""
     figures = verdict.deciding
-    for other in verdict.others:
-        if contradicts(other.fits, figures):
-            needed = attribute_value(REQUIRED, other)
-            available = attribute_value(AVAILABLE, other)
-            text = f"The {other.timing_model} model says otherwise: {{}} needed of {{}}. It decides nothing."
+    for model in verdict.others:
+        if contradicts(model.fits, figures):
+            needed = attribute_value(REQUIRED, model)
+            available = attribute_value(AVAILABLE, model)
+            text = f"The {model.timing_model} model says otherwise: {{}} needed of {{}}. It decides nothing."
             yield sentence(text, needed, available, state="warns")
     yield from not_applicable(profile)
 
@@ -200,14 +200,14 @@ def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
 def _carries(figures: CapacityFigures) -> Sentence:
     safely = "" if figures.safe else " on a bus that is set safely"
     if figures.groups:
-        each = (
+        groups = (
             sentence(
                 f"{group.name} up to {{}} {nouns(group.safe_nodes or 0, 'node')} ({group.safe_limited_by})",
                 _safe(group),
             )
             for group in figures.groups
         )
-        return Sentence((f"Shown to fit{safely}, one group at a time: ", *joined(*each, by=", ").parts, "."))
+        return Sentence((f"Shown to fit{safely}, one group at a time: ", *joined(*groups, by=", ").parts, "."))
     return Sentence(
         (
             *(f"Shown to fit{safely}: ", *_nodes(figures.safe_nodes or 0, figures.safe_axes or 0).parts),

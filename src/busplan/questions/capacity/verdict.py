@@ -1,4 +1,4 @@
-"""The verdict on one period: by the timing model that decides, with what the others say and what to do."""
+"""The verdict on one period: by the timing model that decides, with the other models' figures and a change."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from busplan.questions.plan.constraints import Need, missed_limits
 
 
 class Verdict(NamedTuple):
-    """What a person acts on."""
+    """Verdict on one period, and the change that mends it."""
 
     period_us: float
     deciding: CapacityFigures
@@ -19,25 +19,25 @@ class Verdict(NamedTuple):
     others: tuple[CapacityFigures, ...]
     """Figures of the other models that were asked for."""
     missed_limits: tuple[Need, ...]
-    """What keys of [limits] ask for, and the slice does not give."""
+    """Needs of [limits] that the slice does not meet."""
     after_reset: CapacityFigures | None
     """Figures after a bus reset, where the cycle fits as it is set and is not shown to fit then."""
     change: Change | None
     """The least change after which every constraint of a plan holds; or, where all do already, one that carries another
     node."""
     no_change: str
-    """What stands in the way of a change; empty if there is one."""
+    """Reason that no change is given; empty if one is."""
 
     @property
     def models_agree(self) -> bool | None:
         """Whether required <= available is the same under every model; None where there is no other."""
-        return all(other.fits == self.deciding.fits for other in self.others) if self.others else None
+        return all(figures.fits == self.deciding.fits for figures in self.others) if self.others else None
 
     @property
     def all_well(self) -> bool:
         """Whether the cycle is shown to fit, on a safe bus, within [limits], and the circle can be run."""
-        one = self.deciding
-        return one.verdict == FITS and one.safe and not one.circle_refused_by and not self.missed_limits
+        figures = self.deciding
+        return figures.verdict == FITS and figures.safe and not figures.circle_refused_by and not self.missed_limits
 
 
 def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:

@@ -56,7 +56,7 @@ class CircleTestAnswer(Answer, CircleTest):
         Parameters
         ----------
         note
-            What the title says besides the profile's name.
+            Title, beside the profile's name.
 
         Raises
         ------
@@ -119,10 +119,10 @@ def circle_test(
     """
     from busplan.questions.circle import roundness
 
-    found = roundness.circle_test(
+    test = roundness.circle_test(
         load_profile(profile),
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         with_contributions=contributions,
         progress=progress,
     )
-    return CircleTestAnswer(*found)
+    return CircleTestAnswer(*test)

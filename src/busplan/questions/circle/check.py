@@ -72,13 +72,13 @@ class CircleCheck:
 
 
 def rests_on(profile: Profile) -> tuple[float, ...]:
-    """What of bus and cycle a circle rests on: the period, its steps, delays in a loop on the host, skew and jitter."""
+    """Inputs of a circle from bus and cycle: the period, its steps, delays in a loop on the host, skew and jitter."""
     own = profile.cycle.period_us, profile.servo.step_us
     return *own, *loop_delays_us(profile), skew_us(profile), jitter_us(profile)
 
 
 def failures_within(profile: Profile, *, most_steps: int) -> tuple[str, ...] | None:
-    """What the circle of a profile does not hold, or why it cannot be run; None where it is too long to be run.
+    """Limits that the circle of a profile breaks, or why it cannot be run; None where it is too long to be run.
 
     Parameters
     ----------

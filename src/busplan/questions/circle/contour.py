@@ -1,4 +1,4 @@
-"""What drawings and files take from a simulation: the error around the circle, and every step."""
+"""Contour data of a simulation, for drawings and files: the error around the circle, and every step."""
 
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple

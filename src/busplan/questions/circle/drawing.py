@@ -172,7 +172,7 @@ def contour_lines(profile: ContourProfile, *, width: int) -> list[Line]:
     labels = _labels(edges, per_um=unit.per_um)
     gutter = max(len(text) for text in (*labels, unit.name, "deg"))
     room = width - gutter - len(" |")
-    columns = next((one for one in _COLUMNS if one <= room), _COLUMNS[-1])
+    columns = next((number for number in _COLUMNS if number <= room), _COLUMNS[-1])
     axis = "".join(f"{angle:<{columns // 4}}" for angle in (0, 90, 180, 270)).rstrip()
     rows = zip(labels, _rows(profile.condensed(sectors=columns), edges), strict=True)
     return [
@@ -252,7 +252,9 @@ class CircleDrawing(Drawing):
     def __init__(self, profile: ContourProfile, *, tolerance_mm: float | None, direction: Direction) -> None:
         self._profile = profile
         self._direction = direction
-        largest_mm = max((abs(one) for one in (*profile.low_mm, *profile.high_mm) if one is not None), default=0.0)
+        largest_mm = max(
+            (abs(error) for error in (*profile.low_mm, *profile.high_mm) if error is not None), default=0.0
+        )
         self.scale = magnified(largest_mm, tolerance_mm=tolerance_mm)
 
     def svg(self) -> str | None:
@@ -327,7 +329,7 @@ def _runs(values: Sequence[float | None]) -> Iterator[list[int]]:
     size = len(values)
     first = next((index for index in range(size) if values[index] is None), -1)
     run: list[int] = []
-    for index in (one % size for one in range(first + 1, first + 1 + size)):
+    for index in (place % size for place in range(first + 1, first + 1 + size)):
         if values[index] is not None:
             run.append(index)
         elif run:

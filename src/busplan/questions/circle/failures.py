@@ -104,13 +104,13 @@ class Failure(NamedTuple):
     said: str = ""
     """Message of a broken limit of the bus; empty for other failures."""
     is_default: bool = False
-    """Whether the limit is the default of its key: the profile does not say it."""
+    """Whether the limit is the default of its key, not set in the profile."""
     more: str = ""
-    """What the message goes on to say."""
+    """End of the message."""
 
     @property
     def is_of_bus(self) -> bool:
-        """Whether the bus is what fails, and not the circle."""
+        """Whether the bus fails, and not the circle."""
         return bool(self.said) or self.name in _OF_TIME
 
     def document(self) -> dict[str, Any]:
@@ -154,7 +154,7 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
     if not all(axis.stable for axis in axes):
         return None, None, None
     gains = [axis.gain_margin_db for axis in axes if axis.gain_margin_db is not None]
-    phase = min(axes, key=lambda one: inf if one.phase_margin_deg is None else one.phase_margin_deg)
+    phase = min(axes, key=lambda axis: inf if axis.phase_margin_deg is None else axis.phase_margin_deg)
     return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
 
 

@@ -57,7 +57,7 @@ class CircleRow(NamedTuple):
 
 
 class Scales(NamedTuple):
-    """What all rows share, so that they compare."""
+    """Scales and limits that all rows share, so that they compare."""
 
     circle: Magnified | None
     """None if there is no error to show."""
@@ -86,7 +86,7 @@ def common_scales(rows: Sequence[CircleRow], tolerance: ToleranceSection) -> Sca
     rows
         The rows, one or more.
     tolerance
-        What the circle must hold.
+        Limits of the circle.
     """
     shown = [row for row in rows if not row.run.diverged] or rows
     measured = [curve.error_um for row in shown for curve in row.curves if curve.measured]
@@ -183,7 +183,7 @@ def circle_svg(test: CircleTest, *, note: str = "") -> str:
     test
         The circle test, of which one period at least was simulated.
     note
-        What the title says besides the profile's name.
+        Title, beside the profile's name.
     """
     rows = circle_rows(test)
     scales = common_scales(rows, test.profile.tolerance)
@@ -201,7 +201,7 @@ def circle_svg(test: CircleTest, *, note: str = "") -> str:
 def _title(body: Element, test: CircleTest, note: str) -> int:
     """Name, note, grade of the servo values, and the periods that are not drawn."""
     servo = "ideal drive" if test.results[0].ideal_drive else f"servo values: {test.profile.servo.grades_text}"
-    missing = [period(one.period_us) for one, run in zip(test.results, test.runs, strict=True) if run is None]
+    missing = [period(result.period_us) for result, run in zip(test.results, test.runs, strict=True) if run is None]
     without = f"not drawn, for the bus does not carry it: {', '.join(missing)}" if missing else ""
     y = paragraph(body, test.profile.name, y=8, css="head")
     for line in filter(None, (note, f"circle test, {servo}", without)):
@@ -301,16 +301,16 @@ def _ranking(body: Element, row: CircleRow, rows: Sequence[CircleRow], scales: S
         )
         + 4
     )
-    alike = [each for each in rows if each.run.diverged == row.run.diverged]
-    taken = [one.removed_mm * 1e3 * unit.per_um for each in alike for one in each.result.contributions or ()]
+    alike = [drawn for drawn in rows if drawn.run.diverged == row.run.diverged]
+    taken = [source.removed_mm * 1e3 * unit.per_um for row in alike for source in row.result.contributions or ()]
     low, high = min(0.0, *taken), max(0.0, *taken)
     scale = Scale(low, high if high > low else low + 1.0)
     bars = []
-    for one in row.result.contributions:
-        value = one.removed_mm * 1e3 * unit.per_um
+    for source in row.result.contributions:
+        value = source.removed_mm * 1e3 * unit.per_um
         words = decimals_of(value, 3, signed=True)
         bars.append(
-            SignedBar(one.source.replace("_", " "), value, words, unit.name, "takes" if value >= 0 else "hides")
+            SignedBar(source.source.replace("_", " "), value, words, unit.name, "takes" if value >= 0 else "hides")
         )
     bottom = y + ROW * len(bars)
     draw_zero(body, scale, top=y, bottom=bottom)
@@ -320,7 +320,7 @@ def _ranking(body: Element, row: CircleRow, rows: Sequence[CircleRow], scales: S
 
 def _legend(body: Element, rows: Sequence[CircleRow], *, y: int) -> int:
     """Explain each kind of line that is drawn once, and return the y below."""
-    drawn = {each.get("class") for each in body.iter()}
+    drawn = {element.get("class") for element in body.iter()}
     turn = rows[0].result.path != "trapezoid"
     entries = {
         "curve measured": "measured: one whole turn" if turn else "measured: arc at constant speed",

@@ -66,8 +66,10 @@ def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Senten
         yield Sentence((*subject, ": ", verdict, ", ", *failure_words(result).parts, "."), verdict.state)
         yield from _attack(result)
         return
-    said = "the circle holds every tolerance" if result.passed else f"{verdict.text}: no contour tolerance is asked for"
-    yield Sentence((*subject, ": ", Words(said, verdict.state), "."), verdict.state)
+    if result.passed:
+        yield Sentence((*subject, ": ", Words("the circle holds every tolerance", verdict.state), "."), verdict.state)
+    else:
+        yield Sentence((*subject, ": ", *_unjudged(result), "."), verdict.state)
     yield sentence(
         "The loop is stable, with a phase margin of {}{} or more and a gain margin of {}{} or more.",
         *(
@@ -79,6 +81,14 @@ def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Senten
             )
         ),
     )
+
+
+def _unjudged(result: CircleFigures) -> tuple[Part, ...]:
+    """The measure to set a tolerance of, and its key: G of a whole turn, else the largest contour error."""
+    key = "max_contour_error_mm" if result.circular_deviation_mm is None else "circular_deviation_mm"
+    measure = CIRCLE_BY_KEY[key]
+    value = attribute_value(measure, result)
+    return f"{measure.label} ", value, "; ", Words("no tolerance set", "warns"), ": ", Code(f"tolerance.{key}")
 
 
 def _attack(result: CircleFigures) -> Iterator[Sentence]:
@@ -110,15 +120,15 @@ def setup_values(result: CircleFigures) -> tuple[ShownValue, ShownValue]:
 
 
 def failure_words(result: CircleFigures) -> Sentence:
-    """What the circle does not hold, without a full stop.
+    """Limits that the circle breaks, in words, without a full stop.
 
     Parameters
     ----------
     result
         The circle test at one period, which fails.
     """
-    each = (Sentence(tuple(map(_part, failure.parts()))) for failure in result.failures)
-    return joined(*each, by=", and ")
+    phrases = (Sentence(tuple(map(_part, failure.parts()))) for failure in result.failures)
+    return joined(*phrases, by=", and ")
 
 
 def _part(part: str | Stated) -> Part:
@@ -234,10 +244,14 @@ def contributions_table(result: CircleFigures) -> Table:
     removed = [source.removed_mm for source in ranked]
     least, most = min((0.0, *removed)), max((0.0, *removed))
     rows = []
-    for one in ranked:
-        takes = ShownValue(one.removed_mm, "removed_mm", "um", 3, signed=True)
-        left = (attribute_value(CIRCLE_BY_KEY[key], one) for key in ("max_contour_error_mm", "circular_deviation_mm"))
-        rows.append(TableRow((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
+    for source in ranked:
+        takes = ShownValue(source.removed_mm, "removed_mm", "um", 3, signed=True)
+        left = (
+            attribute_value(CIRCLE_BY_KEY[key], source) for key in ("max_contour_error_mm", "circular_deviation_mm")
+        )
+        rows.append(
+            TableRow((source_words(source.source), Bar(takes, least, most) if most > least else "", takes, *left))
+        )
     columns = (
         TableColumn("source", kind="words"),
         TableColumn("", kind="drawing"),
@@ -294,14 +308,14 @@ def circle_chart(contour: ContourProfile, result: CircleFigures, profile: Profil
 
 def circle_records(test: CircleTest) -> list[Record]:
     """One flat row for each period: the centre in two columns, failures by name, a column for each error source."""
-    sources = sorted({one.source for result in test.results for one in result.contributions or ()})
+    sources = sorted({part.source for result in test.results for part in result.contributions or ()})
     records = []
     for result in test.results:
         record = result._asdict()
         offset = record.pop("centre_offset_mm") or (None, None)
         record |= {"centre_offset_x_mm": offset[0], "centre_offset_y_mm": offset[1]}
         record["failures"] = [failure.name for failure in result.failures]
-        removed = {one.source: one.removed_mm for one in record.pop("contributions") or ()}
+        removed = {part.source: part.removed_mm for part in record.pop("contributions") or ()}
         if test.with_contributions:
             record |= {f"removed_{source}_mm": removed.get(source) for source in sources}
         records.append(record)

@@ -56,7 +56,7 @@ def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
     measure = failed_measure(result)
     if measure is None or not result.contributions:
         return None
-    first = min(result.contributions, key=lambda one: float(getattr(one, measure)))
+    first = min(result.contributions, key=lambda source: float(getattr(source, measure)))
     removed_mm = float(getattr(result, measure)) - float(getattr(first, measure))
     return (first, removed_mm) if removed_mm > 0 else None
 
@@ -109,12 +109,12 @@ def circle_test(
     ]
     simulated = [prepared for prepared in setups if isinstance(prepared, Setup)]
     ranked = [sources(prepared) if with_contributions and isinstance(prepared, Setup) else {} for prepared in setups]
-    passing = [source for each in ranked for source in each.values()]
+    passing = [source for without in ranked for source in without.values()]
     counter.expect(*simulated, *passing)
     announce(estimate(simulated, passing))
     pairs = [
-        _test(variant, capacity, one, without if with_contributions else None, explain=explain, counter=counter)
-        for variant, capacity, one, without in zip(variants, capacities, setups, ranked, strict=True)
+        _test(variant, capacity, prepared, without if with_contributions else None, explain=explain, counter=counter)
+        for variant, capacity, prepared, without in zip(variants, capacities, setups, ranked, strict=True)
     ]
     return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs), with_contributions)
 
@@ -136,7 +136,7 @@ class _Counter:
     def expect(self, *setups: Setup) -> None:
         self._expected += sum(2 * prepared.steps for prepared in setups)
 
-    def run(self, one: Setup) -> CircleRun:
+    def run(self, setup: Setup) -> CircleRun:
         before = self._done
 
         def report(done: int, _total: int) -> None:
@@ -145,34 +145,34 @@ class _Counter:
                 self._progress(self._done, max(self._expected, self._done))
 
         run = simulate_circle(
-            one.path,
-            x=one.x,
-            y=one.y,
-            timing=one.timing,
-            delivery=one.delivery,
-            mechanics=one.mechanics,
+            setup.path,
+            x=setup.x,
+            y=setup.y,
+            timing=setup.timing,
+            delivery=setup.delivery,
+            mechanics=setup.mechanics,
             progress=report,
         )
-        self._done = before + 2 * one.steps
+        self._done = before + 2 * setup.steps
         return run
 
 
 def _test(
     profile: Profile,
     capacity: CapacityFigures,
-    one: Setup | LoopTiming,
+    prepared: Setup | LoopTiming,
     without: Mapping[str, Setup] | None,
     *,
     explain: bool,
     counter: _Counter,
 ) -> tuple[CircleFigures, CircleRun | None]:
     """Test one period; `without` has the setup without each error source, if they are to be ranked."""
-    if isinstance(one, LoopTiming):
-        return _figures(profile, one, capacity, None, settled=True), None
-    run = counter.run(one)
-    result = _figures(profile, one.timing, capacity, run, settled=one.settled)
+    if isinstance(prepared, LoopTiming):
+        return _figures(profile, prepared, capacity, None, settled=True), None
+    run = counter.run(prepared)
+    result = _figures(profile, prepared.timing, capacity, run, settled=prepared.settled)
     if without is None and explain and failed_measure(result):
-        without = sources(one)
+        without = sources(prepared)
         counter.expect(*without.values())
         announce(estimate((), tuple(without.values())))
     if without is not None:

@@ -63,14 +63,14 @@ class Contribution(NamedTuple):
 Removal = Callable[[Setup], Setup]
 
 
-def _with_setpoints_every_step(one: Setup) -> Setup:
+def _with_setpoints_every_step(setup: Setup) -> Setup:
     """Return the setup with a set-point at every step; unchanged if the period has other effects than chords."""
-    path, timing, delivery = one.path, one.timing, one.delivery
+    path, timing, delivery = setup.path, setup.timing, setup.delivery
     # A host's loop, jitter, skew and losses act once per period, so that another period would change them.
     irregular = delivery.jitter_us or delivery.skew_us or delivery.loss_probability
-    if timing.loop == "host" or irregular or timing.steps_per_period == 1 or one.steps >= MAX_SETPOINTS:
-        return one
-    return one._replace(
+    if timing.loop == "host" or irregular or timing.steps_per_period == 1 or setup.steps >= MAX_SETPOINTS:
+        return setup
+    return setup._replace(
         path=circle_path(
             path.radius_mm,
             feed_mm_per_min=path.feed_mm_per_min,
@@ -84,34 +84,34 @@ def _with_setpoints_every_step(one: Setup) -> Setup:
 
 
 _REMOVALS: Mapping[str, Removal] = {
-    "velocity_feedforward": lambda one: one.with_axes(velocity_feedforward=1.0),
-    "acceleration_feedforward": lambda one: one.with_axes(acceleration_feedforward_s=0.0),
-    "drive_lag": lambda one: one.with_axes(drive_lag_us=0.0),
-    "drive_offset": lambda one: one.with_axes(drive_offset_mm_s=0.0),
-    "dac_resolution": lambda one: one.with_axes(dac_bits=0),
-    "encoder_resolution": lambda one: one.with_axes(encoder_resolution_mm=0.0),
-    "reversal": lambda one: one.with_axes(reversal_mm_s=0.0),
-    "axis_mismatch": lambda one: one._replace(y=replace(one.x, delay_us=one.y.delay_us)),
-    "hold": lambda one: one._replace(timing=replace(one.timing, interpolation="linear")),
+    "velocity_feedforward": lambda setup: setup.with_axes(velocity_feedforward=1.0),
+    "acceleration_feedforward": lambda setup: setup.with_axes(acceleration_feedforward_s=0.0),
+    "drive_lag": lambda setup: setup.with_axes(drive_lag_us=0.0),
+    "drive_offset": lambda setup: setup.with_axes(drive_offset_mm_s=0.0),
+    "dac_resolution": lambda setup: setup.with_axes(dac_bits=0),
+    "encoder_resolution": lambda setup: setup.with_axes(encoder_resolution_mm=0.0),
+    "reversal": lambda setup: setup.with_axes(reversal_mm_s=0.0),
+    "axis_mismatch": lambda setup: setup._replace(y=replace(setup.x, delay_us=setup.y.delay_us)),
+    "hold": lambda setup: setup._replace(timing=replace(setup.timing, interpolation="linear")),
     "period": _with_setpoints_every_step,
-    "bus_delay": lambda one: one.with_axes(delay_us=0.0),
-    "jitter": lambda one: one._replace(delivery=replace(one.delivery, jitter_us=0.0)),
-    "skew": lambda one: one._replace(delivery=replace(one.delivery, skew_us=0.0)),
-    "loss": lambda one: one._replace(delivery=replace(one.delivery, loss_probability=0.0)),
-    "backlash": lambda one: one._replace(mechanics=replace(one.mechanics, backlash_mm=0.0)),
-    "scale": lambda one: one._replace(mechanics=replace(one.mechanics, scale_x_ppm=0.0, scale_y_ppm=0.0)),
-    "squareness": lambda one: one._replace(mechanics=replace(one.mechanics, squareness_um_per_m=0.0)),
+    "bus_delay": lambda setup: setup.with_axes(delay_us=0.0),
+    "jitter": lambda setup: setup._replace(delivery=replace(setup.delivery, jitter_us=0.0)),
+    "skew": lambda setup: setup._replace(delivery=replace(setup.delivery, skew_us=0.0)),
+    "loss": lambda setup: setup._replace(delivery=replace(setup.delivery, loss_probability=0.0)),
+    "backlash": lambda setup: setup._replace(mechanics=replace(setup.mechanics, backlash_mm=0.0)),
+    "scale": lambda setup: setup._replace(mechanics=replace(setup.mechanics, scale_x_ppm=0.0, scale_y_ppm=0.0)),
+    "squareness": lambda setup: setup._replace(mechanics=replace(setup.mechanics, squareness_um_per_m=0.0)),
 }
 """How to remove each source. A velocity feed-forward of 1 has no error of its own."""
 
 
-def sources(one: Setup) -> dict[str, Setup]:
+def sources(whole: Setup) -> dict[str, Setup]:
     """Error sources of a setup, each with the setup without it."""
-    without = {source: remove(one) for source, remove in _REMOVALS.items()}
-    if one.timing.loop == "host":
+    without = {source: remove(whole) for source, remove in _REMOVALS.items()}
+    if whole.timing.loop == "host":
         # A host's loop holds its command between periods: interpolation does not apply.
         del without["hold"]
-    return {source: setup for source, setup in without.items() if setup != one}
+    return {source: setup for source, setup in without.items() if setup != whole}
 
 
 def contributions(
@@ -196,27 +196,27 @@ _LONG_S: Final = 10.0
 
 
 class Estimate(NamedTuple):
-    """What some simulations cost, about."""
+    """Approximate cost of some simulations."""
 
     steps: int
     """Simulated steps, an axis at a time."""
     time_s: float
     memory_bytes: float
 
-    def then(self, other: "Estimate") -> "Estimate":
-        """What this costs and, when its memory is free again, another.
+    def then(self, following: "Estimate") -> "Estimate":
+        """Cost of this and, with its memory free again, of what follows.
 
         Parameters
         ----------
-        other
-            What comes behind.
+        following
+            Cost of the runs that follow.
         """
-        memory_bytes = max(self.memory_bytes, other.memory_bytes)
-        return Estimate(self.steps + other.steps, self.time_s + other.time_s, memory_bytes)
+        memory_bytes = max(self.memory_bytes, following.memory_bytes)
+        return Estimate(self.steps + following.steps, self.time_s + following.time_s, memory_bytes)
 
     @property
     def is_long(self) -> bool:
-        """Whether it is worth a word before it starts."""
+        """Whether it takes long enough to be announced."""
         return self.time_s > _LONG_S
 
     @property
@@ -228,7 +228,7 @@ class Estimate(NamedTuple):
 
 
 NOTHING: Final = Estimate(0, 0.0, 0.0)
-"""What no simulation costs."""
+"""Cost of no simulation."""
 
 
 def estimate(kept: Sequence[Setup], passing: Sequence[Setup] = ()) -> Estimate:
@@ -242,11 +242,11 @@ def estimate(kept: Sequence[Setup], passing: Sequence[Setup] = ()) -> Estimate:
         Simulations that are only measured.
     """
     rate_us = _STEP_US[compiled_kernel("auto") is not None]
-    every = [*kept, *passing]
-    sizes = [_STEP_BYTES * each.steps + _SETPOINT_BYTES * each.path.setpoints for each in every]
+    setups = [*kept, *passing]
+    sizes = [_STEP_BYTES * setup.steps + _SETPOINT_BYTES * setup.path.setpoints for setup in setups]
     return Estimate(
-        steps=_AXES * sum(each.steps for each in every),
-        time_s=sum(_AXES * rate_us * each.steps + _SETPOINT_US * each.path.setpoints for each in every) / 1e6,
+        steps=_AXES * sum(setup.steps for setup in setups),
+        time_s=sum(_AXES * rate_us * setup.steps + _SETPOINT_US * setup.path.setpoints for setup in setups) / 1e6,
         memory_bytes=sum(sizes[: len(kept)]) + max(sizes[len(kept) :], default=0),
     )
 

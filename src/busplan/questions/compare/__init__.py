@@ -100,13 +100,13 @@ def compare(
     --------
     >>> import busplan
     >>> answer = busplan.compare("paper-4ms", buses=["ieee1394", "can"])
-    >>> [(one.figures.verdict, one.safe.axes, round(one.smallest.us)) for one in answer.kinds]
+    >>> [(kind.figures.verdict, kind.safe.axes, round(kind.smallest.us)) for kind in answer.kinds]
     [('fits', 52, 552), ('fits', 16, 2126)]
-    >>> [one.key for one in answer.on("can").assumed if one.source == "new profile"]
+    >>> [term.key for term in answer.on("can").assumed if term.source == "new profile"]
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
     network = load_profile(profile)
     kinds = None
     if buses is not None:
-        kinds = analysis.checked_kinds([str(one) for one in one_or_several(buses, name="buses")], option="buses")
+        kinds = analysis.checked_kinds([str(kind) for kind in one_or_several(buses, name="buses")], option="buses")
     return CompareAnswer(*analysis.compare(network, kinds=kinds, with_circle=circle, progress=progress))

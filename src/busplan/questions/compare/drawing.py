@@ -53,25 +53,25 @@ def kind_lines(comparison: KindComparison) -> tuple[KindLine, ...]:
     """A line for each kind that can have the machine; its letter is one of the kind's name."""
     taken: set[str] = set()
     lines = []
-    for number, one in enumerate(comparison.compared):
-        letters = [each for each in f"{one.profile.bus.kind.upper()}{ascii_uppercase}" if each in ascii_uppercase]
-        letter = next((each for each in letters if each not in taken), "#")
+    for number, machine in enumerate(comparison.compared):
+        letters = f"{machine.profile.bus.kind.upper()}{ascii_uppercase}"
+        letter = next((letter for letter in letters if letter in ascii_uppercase and letter not in taken), "#")
         taken.add(letter)
-        own, points = " (this profile)" if one.is_own else "", _points(one)
+        own, points = " (this profile)" if machine.is_own else "", _points(machine)
         none = "" if points else ": none"
         ink = INKS_OF_LINES[number % len(INKS_OF_LINES)]
-        lines.append(KindLine(letter, ink, f"{bus_of(one.profile).title}{own}{none}", points))
+        lines.append(KindLine(letter, ink, f"{bus_of(machine.profile).title}{own}{none}", points))
     return tuple(lines)
 
 
 def _points(machine: MachineOnKind) -> tuple[tuple[float, int], ...]:
-    return tuple((each.period_us, each.axes) for each in machine.curve if each.axes)
+    return tuple((point.period_us, point.axes) for point in machine.curve if point.axes)
 
 
 def plane_of(comparison: KindComparison) -> Plane:
     """The scales that hold every line and the machine itself."""
-    periods_us = [each.period_us for one in comparison.compared for each in one.curve]
-    axes = [each.axes or 1 for one in comparison.compared for each in one.curve]
+    periods_us = [point.period_us for machine in comparison.compared for point in machine.curve]
+    axes = [point.axes or 1 for machine in comparison.compared for point in machine.curve]
     return Plane(min(periods_us), max(periods_us), max(_LEAST_TOP, own_axes(comparison), *axes))
 
 
@@ -82,7 +82,7 @@ def own_axes(comparison: KindComparison) -> int:
 
 def axes_labels(plane: Plane) -> list[int]:
     """Round numbers of axes to label, as few as can be read."""
-    return [int(one) for one in round_numbers(1, plane.top_axes, most=_MOST_LABELS)]
+    return [int(number) for number in round_numbers(1, plane.top_axes, most=_MOST_LABELS)]
 
 
 def period_labels(comparison: KindComparison) -> list[tuple[float, str]]:
@@ -91,7 +91,7 @@ def period_labels(comparison: KindComparison) -> list[tuple[float, str]]:
 
 
 def _periods_us(compared: Sequence[MachineOnKind]) -> list[float]:
-    return sorted({each.period_us for one in compared for each in one.curve})
+    return sorted({point.period_us for machine in compared for point in machine.curve})
 
 
 _ROWS: Final = 13
@@ -148,9 +148,9 @@ def _below(comparison: KindComparison, plane: Plane, columns: int) -> str:
     """Periods below their columns, this machine's first, the others as far as there is room."""
     taken: dict[int, str] = {}
     own_us = comparison.profile.cycle.period_us
-    for period_us, text in sorted(period_labels(comparison), key=lambda one: one[0] != own_us):
+    for period_us, text in sorted(period_labels(comparison), key=lambda label: label[0] != own_us):
         start = min(max(0, _column(plane, period_us, columns) - len(text) // 2), columns - len(text))
-        if all(start + len(text) < other or start > other + len(one) for other, one in taken.items()):
+        if all(start + len(text) < place or start > place + len(label) for place, label in taken.items()):
             taken[start] = text
     line = ""
     for start, text in sorted(taken.items()):

@@ -78,7 +78,7 @@ class MachineOnKind(NamedTuple):
 
     @property
     def assumed_host(self) -> tuple[AssumedKey, ...]:
-        """What is assumed of the host's own time, by its own profile, too: then it has no rank among known hosts."""
+        """Assumptions about the host's own time, of its own profile, too; with any it has no rank."""
         key = kind_named(self.profile.bus.kind).key_of("host")
         inputs = [given(self.profile, key)] if self.is_own and key else []
         own = (
@@ -123,7 +123,7 @@ def checked_kinds(names: Sequence[str], *, option: str) -> tuple[str, ...]:
     names
         The names.
     option
-        What gives them, for messages.
+        Option or key that gives them, for messages.
 
     Raises
     ------
@@ -160,35 +160,43 @@ def compare(
     """
     own = profile.bus.kind
     names = tuple(kinds) if kinds is not None else (own, *(kind for kind in kind_names() if kind != own))
-    found = [_on_kind(profile, name) for name in names]
-    periods_us = _curve_periods(profile, [one.smallest.us for one in found if isinstance(one, MachineOnKind)])
-    found = [one if isinstance(one, NotOnKind) else one._replace(curve=_curve(one, periods_us)) for one in found]
+    machines = [_on_kind(profile, name) for name in names]
+    periods_us = _curve_periods(
+        profile, [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
+    )
+    machines = [
+        machine if isinstance(machine, NotOnKind) else machine._replace(curve=_curve(machine, periods_us))
+        for machine in machines
+    ]
     if with_circle:
-        run = circle_tests(progress, of=len(found))
-        found = [one if isinstance(one, NotOnKind) else one._replace(circle=_circle(one, run)) for one in found]
-    return KindComparison(profile, tuple(found), with_circle)
+        run = circle_tests(progress, of=len(machines))
+        machines = [
+            machine if isinstance(machine, NotOnKind) else machine._replace(circle=_circle(machine, run))
+            for machine in machines
+        ]
+    return KindComparison(profile, tuple(machines), with_circle)
 
 
 def _on_kind(profile: Profile, kind: str) -> MachineOnKind | NotOnKind:
     try:
-        other = converted(profile, kind)
+        conversion = converted(profile, kind)
     except BusplanError as error:
         return NotOnKind(kind, error.problems)
-    needed = {} if kind == profile.bus.kind else needed_settings(other.profile)
+    needed = {} if kind == profile.bus.kind else needed_settings(conversion.profile)
     if needed:
-        assumed = (assumed for assumed in other.assumed if assumed.key not in needed)
+        assumed = (assumed for assumed in conversion.assumed if assumed.key not in needed)
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
-        other = other._replace(profile=override(other.profile, dict(needed)), assumed=(*tried, *assumed))
-    found = figures(other.profile, model=kind_named(kind).deciding_model)
+        conversion = conversion._replace(profile=override(conversion.profile, dict(needed)), assumed=(*tried, *assumed))
+    capacity = figures(conversion.profile, model=kind_named(kind).deciding_model)
     return MachineOnKind(
-        profile=other.profile,
+        profile=conversion.profile,
         is_own=kind == profile.bus.kind,
-        assumed=other.assumed,
-        left_out=other.left_out,
-        figures=found,
-        after_reset=after_reset(other.profile, found),
-        safe=most_safe_axes(other.profile),
-        smallest=smallest_period(other.profile),
+        assumed=conversion.assumed,
+        left_out=conversion.left_out,
+        figures=capacity,
+        after_reset=after_reset(conversion.profile, capacity),
+        safe=most_safe_axes(conversion.profile),
+        smallest=smallest_period(conversion.profile),
         circle=None,
         curve=(),
     )
@@ -206,9 +214,11 @@ def most_safe_axes(profile: Profile) -> SafeAxes:
     """
     varied = varied_nodes(profile)
     nodes, limit = safe_nodes(profile, group=varied.name)
-    each = int(varied.node.axes)
-    others = sum(int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name)
-    axes = None if not each else others + nodes * each if nodes else 0
+    node_axes = int(varied.node.axes)
+    axes_beside = sum(
+        int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name
+    )
+    axes = None if not node_axes else axes_beside + nodes * node_axes if nodes else 0
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
 
 
@@ -232,10 +242,10 @@ def _circle(machine: MachineOnKind, run: ComputeCircleFigures) -> CircleAtSmalle
         return None
     step_us = dividing_step_us(machine.smallest.us, most_us=machine.profile.servo.step_us)
     try:
-        found = run(override(machine.profile, {PERIOD: machine.smallest.us, STEP: step_us}))
+        result = run(override(machine.profile, {PERIOD: machine.smallest.us, STEP: step_us}))
     except BusplanError as error:
         return CircleAtSmallest(step_us, None, error.problems)
-    return CircleAtSmallest(step_us, found, tuple(failure.text for failure in found.failures))
+    return CircleAtSmallest(step_us, result, tuple(failure.text for failure in result.failures))
 
 
 def fitting(comparison: KindComparison) -> Iterator[MachineOnKind]:

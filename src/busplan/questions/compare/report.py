@@ -81,8 +81,8 @@ def _flat(record: Record) -> Record:
     flat = {key: value for key, value in record.items() if key not in {"circle", "curve", "assumed"}}
     return {
         **flat,
-        **{key: [one["part"] for one in record[key]] for key in ("set_by", "tested")},
-        "assumed": [one["key"] for one in record["assumed"]],
+        **{key: [row["part"] for row in record[key]] for key in ("set_by", "tested")},
+        "assumed": [row["key"] for row in record["assumed"]],
         "circle_passed": circle["passed"],
         "circle_step_us": circle["step_us"],
     }
@@ -106,17 +106,17 @@ def _bus_record(machine: MachineOnKind | NotOnKind) -> Record:
         "no_period": machine.smallest.why or None,
         "circle": None if machine.circle is None else _circle_record(machine.circle),
         "assumed": [fields(assumed, *assumed._fields) for assumed in machine.assumed],
-        "assumed_host": [each.key for each in machine.assumed_host],
+        "assumed_host": [assumed.key for assumed in machine.assumed_host],
         "left_out": list(machine.left_out),
-        "curve": [{"period_us": each.period_us, **_safe_record(each)} for each in machine.curve],
+        "curve": [{"period_us": point.period_us, **_safe_record(point)} for point in machine.curve],
     }
 
 
 def tested_record(bus: Bus) -> Record:
     """Which parts of a kind figures of others set, which they test, and which they do not test."""
-    found = parts_tested(bus.evidence_data)
-    set_by, tested = map(parts_by, (found.set_by, found.parts))
-    return {"set_by": set_by, "tested": tested, "not_tested": list(found.untested)}
+    tested_parts = parts_tested(bus.evidence_data)
+    set_by, tested = map(parts_by, (tested_parts.set_by, tested_parts.parts))
+    return {"set_by": set_by, "tested": tested, "not_tested": list(tested_parts.untested)}
 
 
 def _head(kind: str, *, is_own: bool, why_not: list[str]) -> Record:
@@ -146,21 +146,25 @@ def notes(comparison: KindComparison) -> Iterator[Sentence]:
     comparison
         The comparison.
     """
-    for one in comparison.kinds:
-        if isinstance(one, NotOnKind):
-            why = "; ".join(one.why)
-            yield Sentence((f"{kind_named(one.kind).title} cannot have this machine: {why}.",), "warns")
+    for machine in comparison.kinds:
+        if isinstance(machine, NotOnKind):
+            why = "; ".join(machine.why)
+            yield Sentence((f"{kind_named(machine.kind).title} cannot have this machine: {why}.",), "warns")
         else:
-            said = [*_obstacles(one), *reset_sentence(one.after_reset, one.profile), *_circle_problems(one)]
-            said += _execution(one, comparison.profile)
-            said += evidence_sentence(bus_of(one.profile))
+            said = [
+                *_obstacles(machine),
+                *reset_sentence(machine.after_reset, machine.profile),
+                *_circle_problems(machine),
+            ]
+            said += _execution(machine, comparison.profile)
+            said += evidence_sentence(bus_of(machine.profile))
             if said:
-                yield joined(Sentence((f"{bus_of(one.profile).title}:",)), *said)
+                yield joined(Sentence((f"{bus_of(machine.profile).title}:",)), *said)
     yield from _left_out(comparison)
 
 
 def _left_out(comparison: KindComparison) -> Iterator[Sentence]:
-    """What of the profile is left out, once for the kinds that leave out the same."""
+    """Keys of the profile that are left out, once for the kinds that leave out the same."""
     titles: dict[tuple[str, ...], list[str]] = {}
     for machine in comparison.compared:
         if machine.left_out:
@@ -188,7 +192,7 @@ def _circle_problems(machine: MachineOnKind) -> Iterator[Sentence]:
 
 
 def _execution(machine: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
-    """What the execution times of the profile stand for."""
+    """Meaning of the profile's execution times on other kinds."""
     bus, own = bus_of(machine.profile), bus_of(profile)
     owns_any = own.has_execution(network_of(profile))
     if machine.is_own:
@@ -275,14 +279,14 @@ def _best(comparison: KindComparison) -> Iterator[Sentence]:
     ranked = [machine for machine in comparison.compared if not machine.assumed_host]
     shortest = [(machine.smallest.us, machine) for machine in ranked if machine.smallest.us is not None]
     if shortest:
-        us, one = min(shortest, key=lambda each: each[0])
+        us, machine = min(shortest, key=lambda each: each[0])
         value = ShownValue(us, "smallest_period_us", "us", 3)
-        yield sentence(f"The smallest period is {{}} on {bus_of(one.profile).title}.", value)
+        yield sentence(f"The smallest period is {{}} on {bus_of(machine.profile).title}.", value)
     most = [(machine.safe.axes, machine) for machine in ranked if machine.safe.axes]
     if most:
-        axes, one = max(most, key=lambda each: each[0])
+        axes, machine = max(most, key=lambda each: each[0])
         yield sentence(
-            f"The most axes at {{}} are {{}} on {bus_of(one.profile).title}.",
+            f"The most axes at {{}} are {{}} on {bus_of(machine.profile).title}.",
             period_value(comparison.profile.cycle.period_us),
             count_value(axes, SAFE_AXES.key),
         )
@@ -301,8 +305,8 @@ def _words(assumed: Sequence[AssumedKey]) -> str:
 
 
 def _assumed(machine: MachineOnKind) -> str:
-    """What a kind has of a new profile, with the number of its defaults."""
-    new = [each for each in machine.assumed if each.source == "new profile"]
+    """Values that a kind takes from a new profile, with the number of its defaults."""
+    new = [assumed for assumed in machine.assumed if assumed.source == "new profile"]
     defaults = len(machine.assumed) - len(new)
     return ", ".join(filter(None, (_words(new), f"{defaults} {nouns(defaults, 'default')}" if defaults else ""))) or "-"
 
@@ -376,7 +380,7 @@ def compare_chart(comparison: KindComparison) -> Chart:
 
 
 def assumed_table(comparison: KindComparison) -> Table:
-    """What each kind needs and the machine does not say; defaults are details.
+    """Values that each kind needs and the machine does not give; defaults are details.
 
     Parameters
     ----------
@@ -385,11 +389,11 @@ def assumed_table(comparison: KindComparison) -> Table:
     """
     rows = [
         TableRow(
-            (bus_of(one.profile).title, Code(assumed.key), short_text(assumed.value), assumed.source),
+            (bus_of(machine.profile).title, Code(assumed.key), short_text(assumed.value), assumed.source),
             is_detail=assumed.source == "default",
         )
-        for one in comparison.compared
-        for assumed in one.assumed
+        for machine in comparison.compared
+        for assumed in machine.assumed
     ]
     words = "Assumed, as a new profile of the kind has it or by default, until somebody knows better"
     return Table(_ASSUMED, tuple(rows), Sentence((words,)))

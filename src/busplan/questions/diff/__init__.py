@@ -30,7 +30,7 @@ class DiffAnswer(Answer):
     circles
         Circle tests of A and B; None if neither asks for one, or none was to be run.
     arguments
-        What the report calls A and B: as they were given, and the name of a `Profile`.
+        Names of A and B in the report: as they were given, and the name of a `Profile`.
     """
 
     a: Profile
@@ -116,7 +116,7 @@ def diff(
     progress
         Called from time to time with the steps simulated and the steps known to be needed.
     arguments
-        What the report calls A and B; by default as they are given, and the name of a `Profile`.
+        Names of A and B in the report; by default as they are given, and the name of a `Profile`.
 
     Returns
     -------
@@ -132,36 +132,36 @@ def diff(
     --------
     >>> import busplan
     >>> answer = busplan.diff("paper-1ms", "paper-optimal-gap", timing_model="standard", circle=False)
-    >>> [(one.key, one.a.value, one.b.value) for one in answer.keys if one.key == "bus.gap_count"]
-    [('bus.gap_count', 63, 'optimal')]
-    >>> [(one.part, round(one.difference, 3)) for one in answer.figures if one.figure.key == "margin_us"]
-    [('standard', 75.195)]
+    >>> [(change.a.value, change.b.value) for change in answer.keys if change.key == "bus.gap_count"]
+    [(63, 'optimal')]
+    >>> [round(row.difference, 3) for row in answer.figures if row.figure.key == "margin_us"]
+    [75.195]
     >>> answer.regressions()
     ()
     """
-    (given_a, one), (given_b, other) = _given(a), _given(b)
-    found = analysis.difference(
-        one,
-        other,
-        timing_models=None if timing_model is None else _models(timing_model, one, other),
+    (given_a, profile_a), (given_b, profile_b) = _given(a), _given(b)
+    difference = analysis.difference(
+        profile_a,
+        profile_b,
+        timing_models=None if timing_model is None else _models(timing_model, profile_a, profile_b),
         circle=circle_tests(progress) if circle else None,
     )
-    return DiffAnswer(*found, arguments=arguments or (given_a, given_b))
+    return DiffAnswer(*difference, arguments=arguments or (given_a, given_b))
 
 
 def _given(side: ProfileLike) -> tuple[str, Profile]:
     """One side as it was given, and its profile."""
     if isinstance(side, Profile):
         return side.name, side
-    found = load_revision(argument(side)).profile if isinstance(side, str) else load_profile(side)
-    return os.fspath(side), found
+    profile = load_revision(argument(side)).profile if isinstance(side, str) else load_profile(side)
+    return os.fspath(side), profile
 
 
-def _models(timing_model: Models, one: Profile, other: Profile) -> tuple[str, ...]:
-    if one.bus.kind != other.bus.kind:
+def _models(timing_model: Models, a: Profile, b: Profile) -> tuple[str, ...]:
+    if a.bus.kind != b.bus.kind:
         raise BusplanError(
-            f"timing_model {timing_model}: the kinds of bus, {one.bus.kind} and {other.bus.kind}, have no timing "
+            f"timing_model {timing_model}: the kinds of bus, {a.bus.kind} and {b.bus.kind}, have no timing "
             "model in common; leave it out"
         )
-    checked_models(timing_model, other)  # refuses a model that cannot express this one
-    return checked_models(timing_model, one)
+    checked_models(timing_model, b)  # refuses a model that cannot express this one
+    return checked_models(timing_model, a)

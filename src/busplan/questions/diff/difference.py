@@ -189,10 +189,10 @@ def difference(
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> found = difference(load("paper-1ms").profile, load("paper-optimal-gap").profile, timing_models=["standard"])
-    >>> "bus.timing_model" in [one.key for one in found.keys]
+    >>> changed = difference(load("paper-1ms").profile, load("paper-optimal-gap").profile, timing_models=["standard"])
+    >>> "bus.timing_model" in [change.key for change in changed.keys]
     True
-    >>> found.judged("worse")
+    >>> changed.judged("worse")
     []
     """
     keys = tuple(_keys(a, b))
@@ -206,9 +206,9 @@ def difference(
 def _keys(a: Profile, b: Profile) -> Iterator[KeyDifference]:
     of_a, of_b = dotted_keys(a), dotted_keys(b)
     for key in dict.fromkeys((*of_a, *of_b)):
-        one, other = of_a.get(key), of_b.get(key)
-        if one is None or other is None or one.value != other.value:
-            yield KeyDifference(key, one, other)
+        value_a, value_b = of_a.get(key), of_b.get(key)
+        if value_a is None or value_b is None or value_a.value != value_b.value:
+            yield KeyDifference(key, value_a, value_b)
 
 
 def _circle_side(profile: Profile, circle: ComputeCircleFigures) -> CircleSide:
@@ -248,7 +248,7 @@ def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:
 
 
 def _counts(figures: CapacityFigures, figure: Figure) -> _Figures:
-    return {f"group.{one.name}.{figure.key}": getattr(one, figure.key) for one in figures.groups}
+    return {f"group.{group.name}.{figure.key}": getattr(group, figure.key) for group in figures.groups}
 
 
 def _plan(profile: Profile) -> _Figures:
@@ -260,8 +260,8 @@ def _plan(profile: Profile) -> _Figures:
 
 def _cycle(profile: Profile, model: str) -> _Figures:
     """Figures of one cycle by key: those of `capacity`, and others that the bus compares."""
-    found = figures(profile, model=model)
-    return {**found.by_key(), **found.own, **_counts(found, known.MAX_NODES)}
+    cycle = figures(profile, model=model)
+    return {**cycle.by_key(), **cycle.own, **_counts(cycle, known.MAX_NODES)}
 
 
 def _compared(part: str, measures: Sequence[Figure], a: _Figures, b: _Figures) -> Iterator[ComparedFigure]:

@@ -64,11 +64,11 @@ def change_table(keys: Iterable[KeyDifference]) -> Table:
     return Table(_COLUMNS, tuple(map(TableRow, rows)))
 
 
-def _cell(key: str, value: KeyValue | None, other: KeyValue | None) -> Cell:
+def _cell(key: str, value: KeyValue | None, opposite: KeyValue | None) -> Cell:
     """One side of a difference; the other side decides which part or how many digits of a long value are shown."""
     if value is None:
         return MISSING
-    own, beside = value.value, None if other is None else other.value
+    own, beside = value.value, None if opposite is None else opposite.value
     shown: ShownValue | Code
     if isinstance(own, int | float) and not isinstance(own, bool):
         shown = ShownValue(own, key)
@@ -83,7 +83,7 @@ def _cell(key: str, value: KeyValue | None, other: KeyValue | None) -> Cell:
     return shown if value.source == "file" else Sentence((shown, " (default)"))
 
 
-def shown_value(value: object, other: object = None) -> str:
+def shown_value(value: object, opposite: object = None) -> str:
     """Write a value as TOML; of a long one, only the part that differs from the other.
 
     Examples
@@ -97,9 +97,9 @@ def shown_value(value: object, other: object = None) -> str:
         case None:
             return "none"
         case str():
-            return _text(value, other if isinstance(other, str) else "")
+            return _text(value, opposite if isinstance(opposite, str) else "")
         case tuple() | list():
-            return _list(tuple(value), tuple(other) if isinstance(other, tuple | list) else ())
+            return _list(tuple(value), tuple(opposite) if isinstance(opposite, tuple | list) else ())
         case bool():
             return value_text(value)
         case float():
@@ -107,16 +107,16 @@ def shown_value(value: object, other: object = None) -> str:
     return str(value)
 
 
-def _alike(one: Sequence[object], other: Sequence[object]) -> int:
+def _alike(left: Sequence[object], right: Sequence[object]) -> int:
     """Length of the common beginning of two sequences."""
-    return sum(takewhile(bool, map(eq, one, other)))
+    return sum(takewhile(bool, map(eq, left, right)))
 
 
-def _list(items: tuple[object, ...], other: tuple[object, ...]) -> str:
+def _list(items: tuple[object, ...], opposite: tuple[object, ...]) -> str:
     if len(items) <= _MOST_ITEMS:
         return f"[{', '.join(map(shown_value, items))}]"
-    before = _alike(items, other)
-    after = _alike(items[before:][::-1], other[before:][::-1])
+    before = _alike(items, opposite)
+    after = _alike(items[before:][::-1], opposite[before:][::-1])
     middle = items[before : len(items) - after]
     more = len(middle) - _MOST_ITEMS
     parts = (
@@ -128,10 +128,10 @@ def _list(items: tuple[object, ...], other: tuple[object, ...]) -> str:
     return f"[{', '.join(parts)}]"
 
 
-def _text(text: str, other: str) -> str:
+def _text(text: str, opposite: str) -> str:
     if len(text) <= _MOST_CHARACTERS:
         return json_text(text)
-    start = max(0, _alike(text, other) - _CONTEXT)
+    start = max(0, _alike(text, opposite) - _CONTEXT)
     end = start + _MOST_CHARACTERS
     piece = json_text(text[start:end])
     return f"{'..' if start else ''}{piece}{'..' if end < len(text) else ''}"
@@ -173,9 +173,9 @@ def headline(difference: Difference) -> Sentence:
     if not difference.keys:
         return sentence("A and B are the same profile: every key has the same value.")
     verdicts = [
-        one
+        verdict
         for judgement in ("worse", "better")
-        for one in (*_loud(difference, judgement), *_counted(difference, judgement))
+        for verdict in (*_loud(difference, judgement), *_counted(difference, judgement))
     ]
     if verdicts:
         said = joined(*verdicts, by="; ")
@@ -290,29 +290,29 @@ def diff_report(difference: Difference, *, arguments: Arguments) -> Report:
     )
 
 
-def diff_document(found: Difference, *, arguments: Arguments) -> JsonDocument:
+def diff_document(difference: Difference, *, arguments: Arguments) -> JsonDocument:
     """Document of `busplan diff --format json`.
 
     Parameters
     ----------
-    found
+    difference
         The difference.
     arguments
         A and B as they were typed.
     """
-    circles = found.circles or (None, None)
+    circles = difference.circles or (None, None)
     a, b = (
         _side_document(argument, profile, circle)
-        for argument, profile, circle in zip(arguments, (found.a, found.b), circles, strict=True)
+        for argument, profile, circle in zip(arguments, (difference.a, difference.b), circles, strict=True)
     )
     return document(
         "diff",
         a=a,
         b=b,
-        verdict=sentence_text(headline(found)),
-        same=not found.keys,
-        changes=[change_document(difference) for difference in found.keys],
-        figures=diff_records(found),
+        verdict=sentence_text(headline(difference)),
+        same=not difference.keys,
+        changes=[change_document(change) for change in difference.keys],
+        figures=diff_records(difference),
     )
 
 
@@ -364,7 +364,7 @@ def _sides(difference: Difference, arguments: Arguments) -> Table:
 def _notes(difference: Difference) -> Iterator[Sentence]:
     """Say why a circle fails or has no figures, and how well the inputs of the figures are known."""
     for side, profile in zip("AB", (difference.a, difference.b), strict=True):
-        yield from (joined(sentence(f"{side}:"), one) for one in not_applicable(profile))
+        yield from (joined(sentence(f"{side}:"), reason) for reason in not_applicable(profile))
     executions = (execution_grades(difference.a), execution_grades(difference.b))
     yield from _graded("execution time behind these figures is", *executions)
     if difference.circles is None:

@@ -17,13 +17,13 @@ _PAPER = ("ieee1394", "paper")
 
 
 class KindEvidence(NamedTuple):
-    """What is known of one kind of bus; no section where nothing is."""
+    """Published figures about one kind of bus; no section where there are none."""
 
     kind: str
     title: str
-    """What the kind is called."""
+    """Name of the kind."""
     tested: Tested
-    """Which parts of it figures of others test."""
+    """Parts of the model that published figures test."""
     sections: tuple[EvidenceSection, ...]
 
 
@@ -37,7 +37,7 @@ class EvidenceAnswer(Answer):
         Each kind of bus with its `sections`, whose `comparisons` have a published figure, its grade, and the computed
         one.
     paper
-        Whether it is what the paper publishes, and nothing else.
+        Whether these are the figures of the paper alone.
     """
 
     kinds: tuple[KindEvidence, ...]
@@ -80,8 +80,8 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
     --------
     >>> import busplan
     >>> (can,) = busplan.evidence("can").kinds
-    >>> one = can.sections[0].comparisons[1]
-    >>> one.quantity, one.published, one.computed, one.grade
+    >>> comparison = can.sections[0].comparisons[1]
+    >>> comparison.quantity, comparison.published, comparison.computed, comparison.grade
     ('8 bytes, 11 bits of identifier, worst stuffing', 135, 135.0, 'published')
     """
     if paper and kind is not None:
@@ -91,7 +91,9 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
 
     def known(name: str, *only: str) -> KindEvidence:
         bus = kind_named(name)
-        sections = (found for data in only or bus.evidence_data for found in sections_of(bus, data, progress=progress))
+        sections = (
+            section for data in only or bus.evidence_data for section in sections_of(bus, data, progress=progress)
+        )
         return KindEvidence(name, bus.title, parts_tested(bus.evidence_data), tuple(sections))
 
     if paper:

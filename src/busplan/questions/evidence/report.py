@@ -113,8 +113,8 @@ def _table(comparisons: Sequence[Comparison]) -> Table:
             )
         ),
     )
-    each = (_row(by_method, methods, is_weighed=is_weighed) for by_method in rows.values())
-    return Table(columns, tuple(each), heads=3)
+    table_rows = (_row(by_method, methods, is_weighed=is_weighed) for by_method in rows.values())
+    return Table(columns, tuple(table_rows), heads=3)
 
 
 def _row(by_method: dict[str, Comparison], methods: Sequence[str], *, is_weighed: bool) -> TableRow:

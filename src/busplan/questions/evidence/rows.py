@@ -72,7 +72,7 @@ class EvidenceSection(NamedTuple):
 
 
 class Row(Section):
-    """What a row says, with what its table and its method say; `set` and `given` of all three are joined."""
+    """A row with the keys of its table and its method filled in; `set` and `given` of all three are joined."""
 
     quantity: str
     unit: Unit

@@ -91,10 +91,10 @@ def explain(
     Examples
     --------
     >>> import busplan
-    >>> (found,) = busplan.explain("paper-4ms", "required_us").derivations
-    >>> found.steps[-1].formula
+    >>> (explanation,) = busplan.explain("paper-4ms", "required_us").derivations
+    >>> explanation.steps[-1].formula
     'CTS + arbitration + data + acknowledge + execution + worst extra + idle + T_npd'
-    >>> round(found.value, 3), found.weakest_grade
+    >>> round(explanation.value, 3), explanation.weakest_grade
     (207.117, 'recalled')
     >>> busplan.explain("paper-4ms").assumptions[0].grade
     'assumed'
@@ -108,7 +108,7 @@ def explain(
         return ExplainAnswer(network, (), analysis.assumptions(network))
     if not isinstance(figure, str):
         raise BusplanError(f'figure {figure!r}: expected a key of the JSON, as "required_us"')
-    found = analysis.explain(
+    explanation = analysis.explain(
         network,
         figure,
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
@@ -116,7 +116,7 @@ def explain(
         transactions=None if transaction is None else _transactions(transaction, network),
         progress=progress,
     )
-    return ExplainAnswer(network, found.derivations, ())
+    return ExplainAnswer(network, explanation.derivations, ())
 
 
 def figure_names() -> list[str]:
@@ -133,9 +133,9 @@ def figure_names() -> list[str]:
 
 
 def _transactions(transaction: str | Iterable[str], profile: Profile) -> list[str]:
-    found: list[str] = one_or_several(transaction, name="transaction")
+    asked: list[str] = one_or_several(transaction, name="transaction")
     known = latency_names(profile)
-    for one in found:
-        if one not in known:
-            raise BusplanError(f"transaction {one!r}: expected {' or '.join(map(repr, known))}")
-    return found
+    for name in asked:
+        if name not in known:
+            raise BusplanError(f"transaction {name!r}: expected {' or '.join(map(repr, known))}")
+    return asked

@@ -10,8 +10,7 @@ from busplan.buses.network import Network
 from busplan.elementwise import Number, Traced, value_of
 from busplan.forms.numbers import listed
 from busplan.questions.capacity.verdict import verdicts
-from busplan.questions.explain.formulas import against, found
-from busplan.questions.explain.formulas import found as result_of
+from busplan.questions.explain.formulas import against, result_of
 from busplan.questions.fit.certainty import available_us, certainty
 from busplan.questions.fit.circle_refusal import STEP
 from busplan.questions.fit.figures import CapacityFigures, capacity, certainty_numbers, figures, numeric_figures
@@ -63,16 +62,16 @@ def latency_figures(
         By key, all figures of `latency`; one that this transaction does not have is None.
     """
     latencies = latencies or traced_latencies(profile, model=model)
-    (one,) = (each for each in latencies.each if each.label == kind)
-    found: dict[str, Number | None] = {
+    (latency,) = (latency for latency in latencies.each if latency.label == kind)
+    numbers: dict[str, Number | None] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         "transaction": chosen(kind, "transaction", "transaction asked for"),
-        "payload_bytes": one.payload_bytes,
+        "payload_bytes": latency.payload_bytes,
         "nodes": latencies.nodes,
-        **{key: if_finite(number) for key, number in one.phases.items()},
+        **{key: if_finite(number) for key, number in latency.phases.items()},
     }
     return {
-        figure.key: remembered(found.get(figure.key), figure.key, figure.symbol)
+        figure.key: remembered(numbers.get(figure.key), figure.key, figure.symbol)
         for figure in bus_of(profile).figures.latency
     }
 
@@ -102,7 +101,7 @@ _SENTENCES: Final = "sentences on what the command computes"
 OF_DOCUMENT: Final = ("missed_limits", "verdict_after_reset", "uncertainty_parts", "not_in_it", "not_applicable")
 """Figures whose values the document of `capacity` has."""
 OF_SENSITIVITY: Final = ("sensitivity", "next_bottleneck")
-"""Those that it has with --sensitivity."""
+"""Figures that it has with --sensitivity."""
 VERDICT_KEYS: Final = (
     *("models_agree", "reserve", *OF_DOCUMENT, "cheapest_change", "warnings", "text"),
     *OF_SENSITIVITY,
@@ -140,20 +139,22 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     if network.is_uniform:
         named |= _most(network, plain, model=model)
     else:
-        each = (named["required_us"], named["available_us"])
-        others = known.keys() if model == bus.deciding_model else known.keys() - by_key(CERTAINTY).keys()
+        parts = (named["required_us"], named["available_us"])
+        certain = known.keys() if model == bus.deciding_model else known.keys() - by_key(CERTAINTY).keys()
         named |= {
-            key: found(None, _OF_GROUPS, each) for key in others if key not in named and getattr(plain, key) is None
+            key: result_of(None, _OF_GROUPS, parts)
+            for key in certain
+            if key not in named and getattr(plain, key) is None
         }
     named |= {
-        key: found(None, "none for this network", (named["required_us"],))
+        key: result_of(None, "none for this network", (named["required_us"],))
         for key, number in cycle.figures().items()
         if number is None and key not in named
     }
     if model == bus.deciding_model:
         named |= _certainty(profile, cycle, plain)
     named |= _words(named, plain, cycle.terms, _limits(bus, network))
-    named["circle_refused_by"] = found(
+    named["circle_refused_by"] = result_of(
         list(plain.circle_refused_by),
         "what of the period, the servo, the circle and the delivery does not go together",
         (named["period_us"], traced(profile, STEP)),
@@ -172,7 +173,7 @@ def _most(network: Network, plain: CapacityFigures, *, model: str) -> dict[str, 
     # It does not depend on the profile's own: replace that by a number that is no input.
     searched = network.with_nodes(Traced((plain.max_nodes or 0) + 1))
     needed_us = bus.cycle(searched, model=model).required_us
-    most = found(
+    most = result_of(
         plain.max_nodes,
         f"a search: the largest whole N with T_need <= alpha T_s, within the limits of {_limit_names(bus)}",
         (*_limits(bus, searched), available_us(network), needed_us),
@@ -180,7 +181,7 @@ def _most(network: Network, plain: CapacityFigures, *, model: str) -> dict[str, 
     return {
         "max_nodes": most,
         "max_axes": network.asked_nodes.node.axes * most,
-        "limited_by": found(plain.limited_by, "a search: what keeps N_max + 1 nodes off the bus", (most,)),
+        "limited_by": result_of(plain.limited_by, "a search: what keeps N_max + 1 nodes off the bus", (most,)),
     }
 
 
@@ -229,7 +230,7 @@ def _most_safe(network: Network, plain: CapacityFigures) -> dict[str, Traced]:
     bus = bus_of(network.profile)
     beyond = network.with_nodes(Traced((plain.safe_nodes or 0) + 1))
     needed_us = certainty(bus.cycle(beyond, model=bus.deciding_model)).safe_required_us
-    most = found(
+    most = result_of(
         plain.safe_nodes,
         "a search: the largest whole N with T_safe <= alpha T_s, on a bus set safely for N, within the limits of "
         f"{_limit_names(bus)}",
@@ -238,7 +239,9 @@ def _most_safe(network: Network, plain: CapacityFigures) -> dict[str, Traced]:
     return {
         "safe_nodes": most,
         "safe_axes": network.asked_nodes.node.axes * most,
-        "safe_limited_by": found(plain.safe_limited_by, "a search: what keeps N_safe + 1 nodes off the bus", (most,)),
+        "safe_limited_by": result_of(
+            plain.safe_limited_by, "a search: what keeps N_safe + 1 nodes off the bus", (most,)
+        ),
     }
 
 
@@ -249,8 +252,8 @@ def _limit_names(bus: Bus) -> str:
 def _limits(bus: Bus, network: Network, *, with_safety: bool = False) -> tuple[Number, ...]:
     """Values, bounds and uncertainties of the limits of the bus."""
     limits = (limit for limit in bus.limits if with_safety or not limit.is_safety)
-    each = ((limit.value(network), limit.most(network), limit.uncertainty(network)) for limit in limits)
-    return tuple(number for numbers in each for number in numbers)
+    limit_numbers = ((limit.value(network), limit.most(network), limit.uncertainty(network)) for limit in limits)
+    return tuple(number for numbers in limit_numbers for number in numbers)
 
 
 def _words(
@@ -284,7 +287,7 @@ def _words(
 
 def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     """Derive a figure of the verdict, which compares the models."""
-    others = (other for other in model_names(profile) if other != model)
+    others = (name for name in model_names(profile) if name != model)
     (verdict,) = verdicts(capacity(profile, timing_models=(model, *others)))
     bus, derived = bus_of(profile), [capacity_figures(profile, model=name) for name in model_names(profile)]
     fits = tuple(figures["fits"] for figures in derived)
@@ -292,25 +295,25 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     safety = () if bus.safety.figure is None else (bus.safety.figure.key,)
     safe = tuple(figures[key] for figures in derived for key in safety)
     if key == "models_agree":
-        return found(verdict.models_agree, "a comparison: fits is the same under every timing model", fits)
+        return result_of(verdict.models_agree, "a comparison: fits is the same under every timing model", fits)
     if key == "reserve":
         return traced(profile, "limits.reserve")
     (deciding,) = (figures for figures in derived if "uncertainty_us" in figures)
     # The report fills in the values of changes, lists and sentences.
     if key in OF_DOCUMENT:
-        return found(None, _SENTENCES, (deciding["uncertainty_us"],))
+        return result_of(None, _SENTENCES, (deciding["uncertainty_us"],))
     if key in OF_SENSITIVITY:
         words = "the cycle computed anew, after each change or without what binds"
-        return found(None, words, (deciding["margin_corrected_us"], *judged))
+        return result_of(None, words, (deciding["margin_corrected_us"], *judged))
     if key == "cheapest_change":
         is_for_more = verdict.change is not None and verdict.change.nodes > verdict.deciding.nodes
         purpose = "carries another node" if is_for_more else "holds every constraint of a plan"
         words = f"a search: the least change of {listed(changeable(profile), 'and')} that {purpose}"
-        return found(None, words, (*judged, *safe))
+        return result_of(None, words, (*judged, *safe))
     warned: tuple[Number, ...] = tuple(
         number
         for name, key in bus.keys.items()
         if key.warned_at is not None
         for number in (traced(profile, name), key.warned_at)
     )
-    return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *judged, *safe, *warned))
+    return result_of(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *judged, *safe, *warned))

@@ -12,7 +12,7 @@ from busplan.progress import Progress
 from busplan.questions.circle.figures import CIRCLE_FIGURES, JITTER, CircleFigures
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.explain.bus import capacity_figures, remembered
-from busplan.questions.explain.formulas import found
+from busplan.questions.explain.formulas import result_of
 from busplan.questions.fit.inputs import traced, traced_profile
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.machine import CONTOUR_MEASURES, AxisKeys
@@ -85,7 +85,7 @@ def circle_figures(
     bus = capacity_figures(profile, model=result.timing_model)
     derived = {
         **{key: traced(profile, given) for key, given in _GIVEN.items()},
-        "timing_model": found(result.timing_model, "the timing model that decides, whichever leads", ()),
+        "timing_model": result_of(result.timing_model, "the timing model that decides, whichever leads", ()),
         **{key: bus[own] for key, own in _OF_BUS.items()},
         **{key: _delay(profile, key, result, bus["required_us"]) for key in _DELAYS},
         JITTER.key: _jitter(profile, result),
@@ -106,16 +106,16 @@ def simulated_inputs(profile: Profile) -> tuple[Input, ...]:
 def _delay(profile: Profile, key: str, result: CircleFigures, required: Traced) -> Traced:
     loop, value = traced(profile, "servo.loop"), getattr(result, key)
     if result.loop == "node":
-        return found(value, "none: the loop is closed on the node", (loop,))
+        return result_of(value, "none: the loop is closed on the node", (loop,))
     update, period_us = traced(profile, "servo.update"), traced(profile, "cycle.period_us")
     if result.update == "next_sync":
         words = (
             "T_s: the synchronous packet triggers the sample and the update with the last command (paper, III-C); "
             "and the periods that the kind of bus and its host add"
         )
-        return found(value, words, (loop, update, period_us))
+        return result_of(value, words, (loop, update, period_us))
     words = "from the sample to the end of the command's execution on the axis: x on the first node, y on the last"
-    return found(value, words, (loop, update, required, period_us))
+    return result_of(value, words, (loop, update, required, period_us))
 
 
 def _jitter(profile: Profile, result: CircleFigures) -> Traced:
@@ -126,7 +126,9 @@ def _jitter(profile: Profile, result: CircleFigures) -> Traced:
     both_us = remembered(own_us + bus_us, JITTER.key, JITTER.symbol)
     if both_us.value == result.jitter_us:
         return both_us
-    return found(result.jitter_us, "no more than leaves set-points in their order: half the period", (own_us, bus_us))
+    return result_of(
+        result.jitter_us, "no more than leaves set-points in their order: half the period", (own_us, bus_us)
+    )
 
 
 def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Traced]) -> Traced:
@@ -135,18 +137,18 @@ def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Tra
     if key in ("servo_grade", "ideal_drive"):
         graded = sorted(profile.servo.grades.model_fields_set) if key == "servo_grade" else ()
         keys = ("servo.grade", *(f"servo.grades.{name}" for name in graded))
-        return found(value, _WAYS[key], tuple(traced(profile, key) for key in keys))
+        return result_of(value, _WAYS[key], tuple(traced(profile, key) for key in keys))
     if key in _PATH:
-        return found(value, _WAYS[key], tuple(_path_inputs(profile, key)))
+        return result_of(value, _WAYS[key], tuple(_path_inputs(profile, key)))
     if not result.bus_fits:
         words = _WAYS[key] if key in _VERDICT else "not simulated: the cycle does not fit the bus"
-        return found(value, words, (bus["fits"], bus["verdict"]) if key in _VERDICT else (bus["fits"],))
+        return result_of(value, words, (bus["fits"], bus["verdict"]) if key in _VERDICT else (bus["fits"],))
     parts = _loop_inputs(profile) if key in _LOOP else _simulation_inputs(profile)
     delay = (_delay(profile, "delay_us", result, bus["required_us"]),) if result.loop == "host" or key in _LOOP else ()
     verdict = (bus["fits"], bus["verdict"], *_tolerances(profile)) if key in _VERDICT else ()
     if key == "settled":
         verdict = tuple(_tolerances(profile, CONTOUR_MEASURES))
-    return found(value, _WAYS.get(key, _SIMULATION), (*parts, *delay, *verdict))
+    return result_of(value, _WAYS.get(key, _SIMULATION), (*parts, *delay, *verdict))
 
 
 def _plain(result: CircleFigures, key: str) -> object:

@@ -198,35 +198,35 @@ def explain(
     BusplanError
         There is no such figure, an option does not apply to it, or the command fails.
     """
-    command, one = figure_named(figure, bus=bus_of(profile))
-    if (command, one) not in explained_figures(profile):
-        raise BusplanError(f"{one.key}: no bias is known for this bus, {bus_of(profile).title}")
+    command, asked = figure_named(figure, bus=bus_of(profile))
+    if (command, asked) not in explained_figures(profile):
+        raise BusplanError(f"{asked.key}: no bias is known for this bus, {bus_of(profile).title}")
     deciding = bus_of(profile).deciding_model
-    is_decided = command == "circle-test" or one in CERTAINTY
-    of_one = is_decided or one.key in VERDICT_KEYS
-    models = [deciding if of_one else leading_model(profile)] if timing_models is None else timing_models
+    is_decided = command == "circle-test" or asked in CERTAINTY
+    has_one_model = is_decided or asked.key in VERDICT_KEYS
+    models = [deciding if has_one_model else leading_model(profile)] if timing_models is None else timing_models
     kinds: Sequence[str | None] = (transactions or latency_names(profile)) if command == "latency" else [None]
     if is_decided and list(models) != [deciding]:
-        raise BusplanError(f"{one.key}: belongs to the timing model that decides and to no other, {deciding}")
-    if one.key in VERDICT_KEYS and timing_models is not None:
-        raise BusplanError(f"{one.key}: compares the timing models, so it has no timing model of its own")
+        raise BusplanError(f"{asked.key}: belongs to the timing model that decides and to no other, {deciding}")
+    if asked.key in VERDICT_KEYS and timing_models is not None:
+        raise BusplanError(f"{asked.key}: compares the timing models, so it has no timing model of its own")
     if command != "latency" and transactions is not None:
-        raise BusplanError(f"{one.key}: not a figure of latency, so it has no transaction")
-    found = []
+        raise BusplanError(f"{asked.key}: not a figure of latency, so it has no transaction")
+    derivations = []
     for where in at_periods(profile, periods_us):
         latencies = {model: traced_latencies(where, model=model) for model in models if command == "latency"}
         for kind in kinds:
             for model in models:
-                for each in (one, *_BESIDE.get(one.key, ())):
+                for shown in (asked, *_BESIDE.get(asked.key, ())):
                     known = latencies.get(model)
                     traced = _traced(
-                        where, command, each.key, model=model, kind=kind, latencies=known, progress=progress
+                        where, command, shown.key, model=model, kind=kind, latencies=known, progress=progress
                     )
-                    steps = tuple(_steps(where, traced, command, each))
-                    found.append(
+                    steps = tuple(_steps(where, traced, command, shown))
+                    derivations.append(
                         Derivation(
                             command,
-                            each,
+                            shown,
                             model,
                             kind,
                             where.cycle.period_us,
@@ -235,7 +235,7 @@ def explain(
                             tuple(inputs(traced)),
                         )
                     )
-    return Explanation(profile, tuple(found))
+    return Explanation(profile, tuple(derivations))
 
 
 def explained_figures(profile: Profile) -> Iterator[tuple[CommandName, Figure]]:
@@ -253,7 +253,7 @@ def explained_figures(profile: Profile) -> Iterator[tuple[CommandName, Figure]]:
 
 
 def assumptions(profile: Profile) -> tuple[Input, ...]:
-    """What the figures of a profile rest on, each with its grade, the least well known first.
+    """Inputs that the figures of a profile rest on, each with its grade, the least well known first.
 
     Parameters
     ----------
@@ -266,23 +266,23 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
         Inputs of the cycle under every timing model, and of the circle, without "given" ones. An execution time without
         a grade comes first.
     """
-    found: dict[str, Input] = {}
+    by_name: dict[str, Input] = {}
     for model in model_names(profile):
         figures = capacity_figures(profile, model=model)
         for key in ("fits", "verdict"):
-            for one in inputs(figures[key]) if key in figures else ():
-                found.setdefault(one.name, one)
+            for input_ in inputs(figures[key]) if key in figures else ():
+                by_name.setdefault(input_.name, input_)
     if profile.asks_for_circle:
         from busplan.questions.explain.circle import simulated_inputs  # loads the simulation, and numpy with it
 
-        for one in simulated_inputs(profile):
-            found.setdefault(one.name, one)
+        for input_ in simulated_inputs(profile):
+            by_name.setdefault(input_.name, input_)
     # An execution time is a fact, not a choice: without a grade it is the least well known input.
     choices = choosing_keys(bus_of(profile))
     executions = tuple(alike.node_key("execution.") for alike in profile.alike_nodes)
     known = (
         given
-        for given in found.values()
+        for given in by_name.values()
         if given.grade != "given"
         or (
             given.name.startswith(executions)
@@ -290,7 +290,7 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
             and not given.source.startswith("default")
         )
     )
-    return tuple(sorted(known, key=lambda one: -1 if one.grade == "given" else _GRADES.index(one.grade)))
+    return tuple(sorted(known, key=lambda input_: -1 if input_.grade == "given" else _GRADES.index(input_.grade)))
 
 
 def _traced(

@@ -1,4 +1,4 @@
-"""What stands behind a traced number: its steps and inputs, and its formula in symbols and in numbers."""
+"""Steps, inputs and formula of a traced number, in symbols and in numbers."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from inspect import signature
@@ -110,22 +110,22 @@ def _chained(operand: Traced) -> list[Number]:
     """The operands of a sum, or of the largest or smallest of several; of other operations none."""
     if operand.operation not in ("add", "larger", "smaller"):
         return []
-    found: list[Number] = []
+    operands: list[Number] = []
     left: Number = operand
     while isinstance(left, Traced) and left.operation == operand.operation and (left is operand or not left.symbol):
         left, right = left.parts
-        found.append(right)
-    return [left, *reversed(found)]
+        operands.append(right)
+    return [left, *reversed(operands)]
 
 
 def _shortened(name: str, terms: Sequence[Number], *, in_numbers: bool) -> tuple[str, int]:
     """The first operands and the last: nobody reads a sum of hundreds."""
     operation = OPERATIONS[name]
-    each = [_written(term, in_numbers=in_numbers)[0] for term in (*terms[:_SHOWN_TERMS], terms[-1])]
-    each.insert(-1, f"... {len(terms) - len(each)} more ...")
+    written = [_written(term, in_numbers=in_numbers)[0] for term in (*terms[:_SHOWN_TERMS], terms[-1])]
+    written.insert(-1, f"... {len(terms) - len(written)} more ...")
     if operation.rank == FUNCTION:
-        return f"{operation.sign}({', '.join(each)})", FUNCTION
-    return f" {operation.sign} ".join(each), operation.rank
+        return f"{operation.sign}({', '.join(written)})", FUNCTION
+    return f" {operation.sign} ".join(written), operation.rank
 
 
 def _joined(operand: Traced, parts: list[tuple[str, int]], *, in_numbers: bool) -> tuple[str, int]:
@@ -163,12 +163,12 @@ def formula_of(equation: Equation) -> str:
     """
     names = list(signature(equation.function).parameters)
     # Any number but 0 and 1, which truth values equal.
-    first, *others = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
-    found = equation.function(first, **dict(zip(names[1:], others, strict=True)))
-    return found.symbol or formula_text(found, in_numbers=False)
+    first, *rest = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
+    result = equation.function(first, **dict(zip(names[1:], rest, strict=True)))
+    return result.symbol or formula_text(result, in_numbers=False)
 
 
-def found(value: object, words: str, parts: Iterable[Number]) -> Traced:
+def result_of(value: object, words: str, parts: Iterable[Number]) -> Traced:
     """A result without an equation, as of a search or a simulation: it has no steps, but all inputs of its parts.
 
     Parameters
@@ -191,12 +191,12 @@ def lines(figure: Traced) -> Iterator[Traced]:
 
 def inputs(figure: Traced) -> Iterator[Input]:
     """Inputs of a figure: keys of the profile and constants, each once."""
-    found: dict[tuple[str, str], Input] = {}
+    leaves: dict[tuple[str, str], Input] = {}
     for number in _visit(figure):
         for leaf in (number.given, *(input_of(part) for part in number.parts if isinstance(part, Sourced))):
             if leaf is not None:
-                found.setdefault((leaf.name, leaf.symbol), leaf)
-    yield from found.values()
+                leaves.setdefault((leaf.name, leaf.symbol), leaf)
+    yield from leaves.values()
 
 
 def _visit(figure: Traced) -> Iterator[Traced]:
@@ -204,10 +204,10 @@ def _visit(figure: Traced) -> Iterator[Traced]:
     seen: set[int] = set()
     waiting = [(figure, False)]
     while waiting:
-        one, has_parts_behind = waiting.pop()
+        number, has_parts_behind = waiting.pop()
         if has_parts_behind:
-            yield one
-        elif id(one) not in seen:
-            seen.add(id(one))
-            waiting.append((one, True))
-            waiting.extend((part, False) for part in reversed(one.parts) if isinstance(part, Traced))
+            yield number
+        elif id(number) not in seen:
+            seen.add(id(number))
+            waiting.append((number, True))
+            waiting.extend((part, False) for part in reversed(number.parts) if isinstance(part, Traced))

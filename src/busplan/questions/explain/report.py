@@ -93,8 +93,8 @@ def assumptions_table(assumptions: Sequence[Input]) -> Table:
 def figure_rows(profile: Profile) -> list[Record]:
     """One row for each figure that can be explained."""
     return [
-        {"command": command, "figure": one.key, **fields(one, "symbol", "unit", "reference", "meaning")}
-        for command, one in explained_figures(profile)
+        {"command": command, "figure": figure.key, **fields(figure, "symbol", "unit", "reference", "meaning")}
+        for command, figure in explained_figures(profile)
     ]
 
 
@@ -102,20 +102,20 @@ def equation_rows() -> list[Record]:
     """One row for each equation: numbers, formula, function and source."""
     return [
         {
-            "reference": one.reference,
-            "formula": f"{one.symbol} = {formula_of(one)}",
+            "reference": equation.reference,
+            "formula": f"{equation.symbol} = {formula_of(equation)}",
             "function": name,
-            "source": one.source,
+            "source": equation.source,
         }
-        for name, one in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
+        for name, equation in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
     ]
 
 
 def constant_rows(bus: Bus) -> list[Record]:
     """One row for each constant: value, unit, grade and source."""
     return [
-        {"name": name, "value": float(one), **fields(one, "unit", "grade", "source", "meaning")}
-        for name, one in bus.constants.items()
+        {"name": name, "value": float(constant), **fields(constant, "unit", "grade", "source", "meaning")}
+        for name, constant in bus.constants.items()
     ]
 
 
@@ -139,8 +139,8 @@ def input_cells(given: Input) -> tuple[Cell, ...]:
 
 def _figure_table(profile: Profile) -> Table:
     rows = (
-        TableRow((command, Code(one.key), one.reference, one.unit, one.meaning))
-        for command, one in explained_figures(profile)
+        TableRow((command, Code(figure.key), figure.reference, figure.unit, figure.meaning))
+        for command, figure in explained_figures(profile)
     )
     return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
 
@@ -161,13 +161,15 @@ def explain_report(explanation: Explanation) -> Report:
     explanation
         The derivations.
     """
-    found = _in_words(explanation)
-    name = found.profile.name
+    filled = _in_words(explanation)
+    name = filled.profile.name
     return Report(
-        Sentence(("Where ", Code(found.derivations[0].figure.key), " of ", Code(name), " comes from")),
-        lambda: tuple(_sections(found)),
-        partial(_explain_document, found),
-        lambda: with_profile(name, [record for one in found.derivations for record in _step_records(one)]),
+        Sentence(("Where ", Code(filled.derivations[0].figure.key), " of ", Code(name), " comes from")),
+        lambda: tuple(_sections(filled)),
+        partial(_explain_document, filled),
+        lambda: with_profile(
+            name, [record for derivation in filled.derivations for record in _step_records(derivation)]
+        ),
     )
 
 
@@ -184,10 +186,10 @@ def _with_words(derivation: Derivation, explanation: Explanation) -> Derivation:
         return derivation
     result = capacity(explanation.profile, periods_us=[derivation.period_us])
     if key in OF_SENSITIVITY:
-        found = sensitivity_document(result, verdicts(result), sensitivities(result))
+        answer = sensitivity_document(result, verdicts(result), sensitivities(result))
     else:
-        found = capacity_document(result, verdicts(result))
-    value = found["verdicts"][0][key]
+        answer = capacity_document(result, verdicts(result))
+    value = answer["verdicts"][0][key]
     *before, last = derivation.steps
     return derivation._replace(value=value, steps=(*before, last._replace(value=value)))
 
@@ -265,8 +267,8 @@ def _result_parts(derivation: Derivation) -> tuple[Part, ...]:
             Sentence((Code(key), " = ", ShownValue(new, key))) for key, new in derivation.value["changes"].items()
         )
         return joined(*settings, by=", ").parts
-    found = _result(derivation.value, derivation.figure.key, derivation.figure.unit)
-    return (found if isinstance(found, ShownValue) else found.text,)
+    result = _result(derivation.value, derivation.figure.key, derivation.figure.unit)
+    return (result if isinstance(result, ShownValue) else result.text,)
 
 
 def _result(value: object, key: str, unit: str) -> ShownValue | Words:

@@ -1,4 +1,4 @@
-"""What a verdict rests on and nobody has measured: the assumed keys that carry much of the cycle or of its doubt."""
+"""Assumed keys that carry much of the cycle or of its uncertainty: a verdict rests on them unmeasured."""
 
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
@@ -34,12 +34,12 @@ class HeavyAssumption(NamedTuple):
 
     @property
     def is_execution(self) -> bool:
-        """Whether it is the execution times."""
+        """Whether these are execution times."""
         return self.keys[0].endswith(f".{_EXECUTION}")
 
     def covers(self, key: str) -> bool:
-        """Whether a key is one of these, or stands in one of these sections."""
-        return any(key == one or key.startswith(f"{one}.") for one in self.keys)
+        """Whether a key is among these, or in one of these sections."""
+        return any(key == covered or key.startswith(f"{covered}.") for covered in self.keys)
 
 
 def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssumption, ...]:
@@ -79,10 +79,10 @@ def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> li
     if not assumed:
         return []
     without = network._replace(groups=tuple(_at_once(group) if group in assumed else group for group in network.groups))
-    cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(one.key(_EXECUTION) for one in assumed)
-    whole_us, rest_us = (_doubt_us(each) for each in (figures.doubts, cycle.doubts()))
+    cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(group.key(_EXECUTION) for group in assumed)
+    whole_us, rest_us = (_doubt_us(doubts) for doubts in (figures.doubts, cycle.doubts()))
     rest = {term.key: plain(term.us) for term in cycle.terms}
-    # A term that grows, as the wait for a gap does, is none of theirs.
+    # A term that grows without execution times, as the wait for a gap does, is not carried by them.
     carried_us = sum(max(0.0, plain(term.us) - rest[term.key]) for term in figures.terms)
     of_time = (keys, carried_us / figures.required_us, "the required time")
     return [(keys, whole_us * (whole_us - rest_us) / variance, "U squared"), of_time] if variance else [of_time]

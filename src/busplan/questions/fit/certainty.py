@@ -1,4 +1,4 @@
-"""What a cycle needs, what its slice gives it, and how sure it is that it fits."""
+"""Time that a cycle needs, time that its slice gives it, and how sure it is that it fits."""
 
 from collections.abc import Callable, Mapping
 from functools import reduce
@@ -53,7 +53,7 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
     """The limits of closed forms: those of a network's kind of bus, without safety and doubts, and time the last."""
     bus = bus_of(network.profile)
-    time = time_limit(lambda one: bus.cycle(one, model=model).most_required_us)
+    time = time_limit(lambda tried: bus.cycle(tried, model=model).most_required_us)
     return (*(limit.nominal for limit in bus.limits if not limit.is_safety), time)
 
 
@@ -79,13 +79,13 @@ class Certainty(NamedTuple):
     """A cycle with its bias and its uncertainty [us]. The numbers may be of any sort."""
 
     bias_us: Number | None
-    """What the bus takes beyond the timing model; None where nobody has measured it."""
+    """Time that the bus takes beyond the timing model; None where nobody has measured it."""
     margin_corrected_us: Number
-    """What is left of the slice, less the bias."""
+    """Rest of the slice after the cycle, less the bias."""
     uncertainty_us: Number
     """U, two standard uncertainties."""
     safe_required_us: Number
-    """What the slice must give for the cycle to be shown to fit, with the reserve."""
+    """Slice with which the cycle is shown to fit, with the reserve."""
     doubts: tuple[Doubt, ...]
 
     @property
@@ -177,5 +177,5 @@ def limits_behind(judged: Judged) -> tuple[str, ...]:
 def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
     """Every limit that a network must keep to be shown to fit on a bus that is set safely; time is the last."""
     bus = bus_of(network.profile)
-    time = time_limit(lambda one: certainty(bus.cycle(one, model=bus.deciding_model)).safe_required_us)
+    time = time_limit(lambda tried: certainty(bus.cycle(tried, model=bus.deciding_model)).safe_required_us)
     return (*(limit.shown for limit in bus.limits), time)

@@ -44,7 +44,7 @@ def refusals(profile: Profile) -> tuple[Refused, ...]:
     --------
     >>> from busplan.profile.shipped import load
     >>> from busplan.profile.toml import override
-    >>> [one.name for one in refusals(override(load("paper-1ms").profile, {"servo.step_us": 300.0}))]
+    >>> [cause.name for cause in refusals(override(load("paper-1ms").profile, {"servo.step_us": 300.0}))]
     ['servo.step_us']
     """
     causes = loop_refusals(profile)
@@ -70,9 +70,9 @@ def require_circle(profile: Profile) -> None:
     ParameterError
         Its `refusals`.
     """
-    found = refusals(profile)
-    if found:
-        raise ParameterError(*found)
+    causes = refusals(profile)
+    if causes:
+        raise ParameterError(*causes)
 
 
 def loop_refusals(profile: Profile) -> tuple[Refused, ...]:
@@ -97,10 +97,10 @@ def run_refusals(profile: Profile, of_loop: tuple[Refused, ...]) -> tuple[Refuse
     for name in AXIS_NAMES:
         try:
             axes.append(axis_of(profile, name))
-            found = [*out_of_reach(axes[-1], name=name, feed_mm_per_min=profile.circle.feed_mm_per_min)]
+            refused = [*out_of_reach(axes[-1], name=name, feed_mm_per_min=profile.circle.feed_mm_per_min)]
         except ParameterError as error:
-            found = [*error.refused]
-        causes += (_at_key(cause, profile, name) for cause in found)
+            refused = [*error.refused]
+        causes += (_at_key(cause, profile, name) for cause in refused)
     causes += _out_of_order(profile)
     if not (causes or of_loop):
         causes += _move(profile, axes)
@@ -126,8 +126,8 @@ def step_refusals(profile: Profile, period_us: float) -> Iterator[Refused]:
         Communication period [us].
     """
     default = "" if "step_us" in profile.servo.model_fields_set else f"; it is the default of {STEP}"
-    for one in no_multiple(period_us=period_us, step_us=profile.servo.step_us):
-        yield one._replace(name=STEP, right=f"{one.right}{default}", beside=("cycle.period_us",))
+    for refused in no_multiple(period_us=period_us, step_us=profile.servo.step_us):
+        yield refused._replace(name=STEP, right=f"{refused.right}{default}", beside=("cycle.period_us",))
 
 
 def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:
@@ -170,7 +170,7 @@ def _move(profile: Profile, axes: Sequence[Axis]) -> list[Refused]:
 
 
 def _unfit(profile: Profile, axes: Sequence[Axis], settling_us: float | None) -> Iterator[Refused]:
-    """What is wrong with the move of a lead-in."""
+    """Reasons why the move of a lead-in cannot be made."""
     move, radius_mm = move_of(profile, settling_us), profile.circle.radius_mm
     timing = LoopTiming(period_us=profile.cycle.period_us, step_us=profile.servo.step_us)
     yield from (_at_key(cause, profile) for cause in unfit_move(move, radius_mm=radius_mm))
@@ -238,7 +238,7 @@ def parameters_in(section: Section, of: type) -> dict[str, Any]:
 
 
 _REST_SHARE: Final = 1e-3
-"""What settling may leave of the smallest contour tolerance."""
+"""Rest after settling, as a share of the smallest contour tolerance."""
 
 
 def loop_timing(profile: Profile) -> LoopTiming:
@@ -284,11 +284,11 @@ def path_settling_us(profile: Profile) -> float | None:
     tolerances_mm = [getattr(profile.tolerance, name) for name in CONTOUR_MEASURES]
     least_mm = min((tolerance_mm for tolerance_mm in tolerances_mm if tolerance_mm), default=None)
     x, y = loop_axes(profile)
-    found = settling_time_us(
+    settling_us = settling_time_us(
         x,
         y,
         timing=loop_timing(profile),
         feed_mm_per_min=profile.circle.feed_mm_per_min,
         rest_mm=REST_MM if least_mm is None else max(_REST_SHARE * least_mm, FINEST_ENCODER_MM),
     )
-    return inf if found is None else found
+    return inf if settling_us is None else settling_us

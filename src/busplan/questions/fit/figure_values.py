@@ -19,8 +19,8 @@ class FigureValues(Mapping[str, FigureValue]):
 
     Examples
     --------
-    >>> found = FigureValues({"rounds": 2})
-    >>> found.rounds, found["rounds"], dict(found)
+    >>> values = FigureValues({"rounds": 2})
+    >>> values.rounds, values["rounds"], dict(values)
     (2, 2, {'rounds': 2})
     """
 

@@ -146,7 +146,7 @@ class CapacityFigures(NamedTuple):
     """Keys of the limits that are neither broken nor shown to be kept, time among them."""
     verdict: VerdictWord | None
     doubts: tuple[Doubt, ...]
-    """What the uncertainty is made of."""
+    """Parts of the uncertainty."""
     counts: tuple[GroupCapacity, ...]
     """How many nodes fit: of each [[group]], or of all where they are alike."""
     safe: bool
@@ -207,8 +207,8 @@ class CapacityFigures(NamedTuple):
 
     def by_key(self) -> dict[str, Any]:
         """The figures of the document by key, in its order."""
-        found = {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).figures.capacity}
-        return {key: list(one) if isinstance(one, tuple) else one for key, one in found.items()}
+        named = {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).figures.capacity}
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in named.items()}
 
 
 class Capacity(NamedTuple):
@@ -310,13 +310,13 @@ _UNDECIDED: Final[dict[str, Any]] = {
 
 def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Any]:
     """Figures of how sure the verdict is, by the names of `CapacityFigures`, without counts."""
-    found = certainty(cycle)
-    codes = {**limits, TIME: time_code(found, cycle.network)}
+    sure = certainty(cycle)
+    codes = {**limits, TIME: time_code(sure, cycle.network)}
     return {
-        **{key: None if one is None else existing(one) for key, one in certainty_numbers(found, cycle).items()},
+        **{key: None if number is None else existing(number) for key, number in certainty_numbers(sure, cycle).items()},
         "not_shown": tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
         "verdict": VERDICTS[int(verdict_code(codes))],
-        "doubts": found.doubts,
+        "doubts": sure.doubts,
     }
 
 
@@ -380,16 +380,18 @@ def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) 
     network
         The network; its own period plays no part. Its numbers may be of any sort.
     needed_us
-        What the cycle needs [us].
+        Time that the cycle needs [us].
     is_shown
         Whether limits must be shown to be kept; otherwise doubts of their values play no part.
     """
     bus = bus_of(network.profile)
-    found = bus.periods.from_us(needed_us / network.slice_ratio)
+    period_us = bus.periods.from_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
         if limit.period is not None:
-            found = larger(found, bus.periods.from_us((limit.shown if is_shown else limit.nominal).period_us(network)))
-    return found
+            period_us = larger(
+                period_us, bus.periods.from_us((limit.shown if is_shown else limit.nominal).period_us(network))
+            )
+    return period_us
 
 
 def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures | None:
@@ -408,5 +410,5 @@ def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures 
     reset = override(profile, dict(changes))
     if reset == profile:
         return None
-    found = figures(reset, model=deciding.timing_model)
-    return None if found.verdict == FITS else found
+    after = figures(reset, model=deciding.timing_model)
+    return None if after.verdict == FITS else after

@@ -99,8 +99,8 @@ def given(profile: Profile, key: str) -> Input:
 
 def traced(profile: Profile, key: str) -> Traced:
     """Make a traced number from a key of a profile."""
-    one = given(profile, key)
-    return Traced(one.value, given=one)
+    input_ = given(profile, key)
+    return Traced(input_.value, given=input_)
 
 
 def traced_profile(profile: Profile) -> Profile:
@@ -108,24 +108,24 @@ def traced_profile(profile: Profile) -> Profile:
 
     So are words that choose between numbers.
     """
-    found = profile
+    copy = profile
     for key in cycle_keys(profile):
         value = value_at(profile, key)
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if is_number or (isinstance(value, str) and _chooses(profile, key)):
-            found = with_unchecked(found, key, traced(profile, key))
+            copy = with_unchecked(copy, key, traced(profile, key))
     for alike in profile.alike_nodes:
         execution, key = alike.node.execution, alike.node_key(_TABLE)
         if isinstance(execution, TableExecution):
             table = GivenTable(execution.time_us)
             symbol = f"table,{alike.name}" if alike.name else "table"
             table.given = given(profile, key)._replace(symbol=symbol, value=f"{len(execution.time_us)} points")
-            found = with_unchecked(found, key, table)
-    return found
+            copy = with_unchecked(copy, key, table)
+    return copy
 
 
 def _chooses(profile: Profile, key: str) -> bool:
-    """Whether the word of a key chooses between numbers."""
+    """Whether a key is text-valued and selects a formula."""
     own = choosing_keys(bus_of(profile))
     return any(key == alike.node_key(name) for alike in profile.alike_nodes for name in own)
 

@@ -20,7 +20,7 @@ def bus_of(profile: Profile) -> Bus:
 
 def varied_nodes(profile: Profile) -> AlikeNodes:
     """The nodes whose number axes are counted by: all where they are alike, otherwise the group of the most axes."""
-    return max(profile.alike_nodes, key=lambda one: int(one.nodes * one.node.axes))
+    return max(profile.alike_nodes, key=lambda alike: int(alike.nodes * alike.node.axes))
 
 
 def network_of(profile: Profile) -> Network:
@@ -57,26 +57,26 @@ def _group(members: Sequence[AlikeNodes]) -> Group:
     )
 
 
-def _side_by_side(each: Sequence[AlikeNodes]) -> list[list[AlikeNodes]]:
+def _side_by_side(groups: Sequence[AlikeNodes]) -> list[list[AlikeNodes]]:
     """Put neighbours that are alike in all but name and number together: then their cycle is that of a uniform bus."""
-    found: list[list[AlikeNodes]] = []
-    for one in each:
-        if found and _is_alike(found[-1][0].node, one.node):
-            found[-1].append(one)
+    runs: list[list[AlikeNodes]] = []
+    for group in groups:
+        if runs and _is_alike(runs[-1][0].node, group.node):
+            runs[-1].append(group)
         else:
-            found.append([one])
-    return found
+            runs.append([group])
+    return runs
 
 
 _OF_ONE_GROUP: Final = ("name", "nodes")
 
 
-def _is_alike(one: object, other: object) -> bool:
-    """Whether two groups, sections or values are equal; arrays only where they are one."""
-    if isinstance(one, Section) and type(one) is type(other):
-        keys = (key for key in type(one).model_fields if key not in _OF_ONE_GROUP)
-        return all(_is_alike(getattr(one, key), getattr(other, key)) for key in keys)
-    return one is other or (isinstance(one, _COMPARED) and isinstance(other, _COMPARED) and bool(one == other))
+def _is_alike(left: object, right: object) -> bool:
+    """Whether two groups, sections or values are equal; an array equals only itself."""
+    if isinstance(left, Section) and type(left) is type(right):
+        keys = (key for key in type(left).model_fields if key not in _OF_ONE_GROUP)
+        return all(_is_alike(getattr(left, key), getattr(right, key)) for key in keys)
+    return left is right or (isinstance(left, _COMPARED) and isinstance(right, _COMPARED) and bool(left == right))
 
 
 _COMPARED: Final = (int, float, str, tuple, Traced)
@@ -109,7 +109,7 @@ def with_execution(group: Group, *, read_us: Number, write_us: Number) -> Group:
 def model_names(profile: Profile) -> tuple[str, ...]:
     """Names of the timing models that can express a profile, in the order reports show them."""
     bus, network = bus_of(profile), network_of(profile)
-    return tuple(one.name for one in bus.timing_models if not bus.cannot_express(network, model=one.name))
+    return tuple(model.name for model in bus.timing_models if not bus.cannot_express(network, model=model.name))
 
 
 def leading_model(profile: Profile) -> str:

@@ -90,14 +90,14 @@ def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_
     nodes: Number = ceiling
     # Limits that keep the same ceiling ask one network, whose parts are computed once.
     full = lru_cache(maxsize=1)(network.with_nodes)
-    found: dict[int, Number] = {}
-    for index in sorted(range(len(limits)), key=lambda one: limits[one].is_slow):
+    most: dict[int, Number] = {}
+    for index in sorted(range(len(limits)), key=lambda index: limits[index].is_slow):
         # One more, so that a limit that keeps the ceiling does not give its name to the answer of another.
-        found[index] = _most_within(limits[index], network, full, int(_greatest(nodes)) + 1)
-        nodes = smaller(nodes, found[index])
+        most[index] = _most_within(limits[index], network, full, int(_greatest(nodes)) + 1)
+        nodes = smaller(nodes, most[index])
     place: Number = len(limits) - 1  # time, where none keeps any out
     for index in reversed(range(len(limits))):
-        place = choose(found[index] <= nodes, index, place)
+        place = choose(most[index] <= nodes, index, place)
     return MostNodes(nodes, place)
 
 
@@ -119,7 +119,7 @@ def _most_within(limit: Limit, network: Network, full: Callable[[int], Network],
         counted = ceiling * (_size(limit.least_value(network.with_nodes(1))) * _VALUE_COST + whole)
         if counted <= ceiling.bit_length() * whole * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))
-            return total(choose(one, 0, 1) for one in broken)
+            return total(choose(is_over, 0, 1) for is_over in broken)
     low, high = choose(over, 0, ceiling), choose(over, ceiling - 1, ceiling)
     for _ in range((ceiling - 1).bit_length()):
         middle = larger(rounded_up((low + high) / 2), 1)

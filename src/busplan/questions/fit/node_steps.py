@@ -27,7 +27,7 @@ class NodeSteps(NamedTuple):
     from_us: tuple[float, ...]
     """Smallest period that 1, 2, ... nodes fit in; none where no period helps."""
     limited_by: str
-    """What keeps it from going on."""
+    """The limit that ends the steps."""
     is_safe: bool
     """Whether the nodes are shown to fit."""
     own_nodes: int

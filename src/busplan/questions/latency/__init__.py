@@ -62,14 +62,14 @@ def latency(
     --------
     >>> import busplan
     >>> answer = busplan.latency("paper-two-node", payload_bytes=[4, 1024], timing_model="paper")
-    >>> [(one.transaction, one.payload_bytes, round(one.phases.latency_us, 2)) for one in answer.transactions]
+    >>> [(row.transaction, row.payload_bytes, round(row.phases.latency_us, 2)) for row in answer.transactions]
     [('read', 4, 43.17), ('write', 4, 43.17), ('read', 1024, 474.57), ('write', 1024, 474.57)]
     """
     network = load_profile(profile)
     sizes = None if payload_bytes is None else one_or_several(payload_bytes, name="payload_bytes")
-    found = analysis.latency(
+    result = analysis.latency(
         network,
         payloads_bytes=sizes and [whole(size, name="payload_bytes") for size in sizes],
         timing_models=checked_models(timing_model, network),
     )
-    return LatencyAnswer(*found)
+    return LatencyAnswer(*result)

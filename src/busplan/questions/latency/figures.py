@@ -81,10 +81,17 @@ def latency(
     return LatencyResult(
         profile,
         tuple(
-            Transaction(model, one.name, one.group, one.payload_bytes, nodes, FigureValues(_whole_bytes(one.phases)))
+            Transaction(
+                model,
+                bus_latency.name,
+                bus_latency.group,
+                bus_latency.payload_bytes,
+                nodes,
+                FigureValues(_whole_bytes(bus_latency.phases)),
+            )
             for variant in variants
             for alike in zip(*(_latencies(variant, model) for model in models), strict=True)
-            for model, one in zip(models, alike, strict=True)
+            for model, bus_latency in zip(models, alike, strict=True)
         ),
         tuple(payloads_bytes or ()),
     )
@@ -100,7 +107,7 @@ def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float | None]:
 
 def with_payload(profile: Profile, size_bytes: int) -> Profile:
     """Return a copy with the payload of both read and write replaced [bytes], unvalidated."""
-    sections = [f"group.{one.name}" for one in profile.group] or ["payload"]
+    sections = [f"group.{group.name}" for group in profile.group] or ["payload"]
     for section, kind in product(sections, TRANSACTION_KINDS):
         profile = with_unchecked(profile, f"{section}.{kind}_bytes", size_bytes)
         profile = with_unchecked(profile, f"{section}.{kind}_bytes_per_axis", None)
@@ -114,10 +121,10 @@ def _latencies(profile: Profile, model: str) -> tuple[BusLatency, ...]:
 def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
     """Refuse payloads whose execution time is not known, all in one error."""
     unknown = dict.fromkeys(
-        f"payload {size} bytes: outside the execution table of {one.name or profile.name}, {execution.range_bytes}; "
+        f"payload {size} bytes: outside the execution table of {alike.name or profile.name}, {execution.range_bytes}; "
         "nothing is extrapolated"
-        for one in profile.alike_nodes
-        if isinstance(execution := one.node.execution, TableExecution)
+        for alike in profile.alike_nodes
+        if isinstance(execution := alike.node.execution, TableExecution)
         for size in payloads_bytes
         if not execution.covers(size)
     )

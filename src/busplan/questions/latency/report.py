@@ -48,7 +48,9 @@ def latency_tables(result: LatencyResult) -> Iterator[Table]:
     """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
     bus = bus_of(result.profile)
     figures = tuple(
-        figure for figure in bus.figures.latency_table if all(figure.key in one.phases for one in result.transactions)
+        figure
+        for figure in bus.figures.latency_table
+        if all(figure.key in transaction.phases for transaction in result.transactions)
     )
     subject = bus.latency_subject(network_of(result.profile))
     if bus.figures.has_many_transactions:
@@ -56,8 +58,8 @@ def latency_tables(result: LatencyResult) -> Iterator[Table]:
         return
     rows = [(figure, 0) for figure in figures]
     caption = Sentence((f"Phases in us, {subject}",))
-    for _, group in groupby(_numbered(result.transactions), key=lambda one: one[0]):
-        owners = [Owner(_column(one), one.phases) for _, one in group]
+    for _, group in groupby(_numbered(result.transactions), key=lambda transaction: transaction[0]):
+        owners = [Owner(_column(transaction), transaction.phases) for _, transaction in group]
         yield figure_table(rows, owners, caption=caption, unit=False)
 
 
@@ -65,9 +67,9 @@ def _by_transaction(result: LatencyResult, figures: Sequence[Figure], subject: s
     """One row for each transaction; one table for each payload and timing model."""
     columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
     tables: dict[tuple[int, str], list[TableRow]] = {}
-    for number, one in _numbered(result.transactions):
-        values = (attribute_value(figure, one.phases) for figure in figures)
-        tables.setdefault((number, one.timing_model), []).append(TableRow((_name(one), *values)))
+    for number, transaction in _numbered(result.transactions):
+        values = (attribute_value(figure, transaction.phases) for figure in figures)
+        tables.setdefault((number, transaction.timing_model), []).append(TableRow((_name(transaction), *values)))
     for (_, model), rows in tables.items():
         yield Table(columns, tuple(rows), Sentence((f"By the {model} model in us, {subject}",)), heads=1)
 
@@ -76,22 +78,22 @@ def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, Transa
     """Each transaction with the number of its table; a repeated one begins a new table."""
     seen: set[tuple[str, str, str]] = set()
     number = 0
-    for one in transactions:
-        key = (one.timing_model, one.transaction, one.group)
+    for transaction in transactions:
+        key = (transaction.timing_model, transaction.transaction, transaction.group)
         if key in seen:
             number, seen = number + 1, set()
         seen.add(key)
-        yield number, one
+        yield number, transaction
 
 
-def _column(one: Transaction) -> TableColumn:
-    return TableColumn(one.timing_model, group=_name(one))
+def _column(transaction: Transaction) -> TableColumn:
+    return TableColumn(transaction.timing_model, group=_name(transaction))
 
 
-def _name(one: Transaction) -> str:
-    """What it is called: whose it is, what it is, and its payload."""
-    payload = "" if one.payload_bytes is None else f"{one.payload_bytes} B"
-    return " ".join(filter(None, (one.group, one.transaction, payload)))
+def _name(transaction: Transaction) -> str:
+    """Name of a transaction: its group, its kind and its payload."""
+    payload = "" if transaction.payload_bytes is None else f"{transaction.payload_bytes} B"
+    return " ".join(filter(None, (transaction.group, transaction.transaction, payload)))
 
 
 def _over(result: LatencyResult) -> list[str]:

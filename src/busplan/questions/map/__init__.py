@@ -63,7 +63,7 @@ def map_(
     profile
         The network: a `Profile`, a path or a shipped name.
     x, y
-        What lies across and what lies up: one dotted key, or "axes" for the axes of all nodes, with up to 64 values in
+        Quantities on the x and the y axis: one dotted key, or "axes" for the axes of all nodes, with up to 64 values in
         its unit, as `sweep` takes them: {"bus.gap_count": [7, 63, "optimal"]}. By default the axes, and the period
         [us].
     circle
@@ -84,7 +84,7 @@ def map_(
     BusplanError
         Not a profile, an invalid key or values, no setting that can exist, or too many circle tests.
     Exception
-        What `executor` raises.
+        Anything that `executor` raises.
 
     Examples
     --------

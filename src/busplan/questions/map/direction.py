@@ -60,13 +60,13 @@ def nodes_with(axes: Value, profile: Profile, *, nodes_key: str) -> int:
     3
     """
     alike = next(alike for alike in profile.alike_nodes if alike.nodes_key == nodes_key)
-    each = int(alike.node.axes)
-    others = int(plain(network_of(profile).axes)) - int(alike.nodes) * each
-    own = axes - others if isinstance(axes, int) else 0
-    if own < max(each, 1) or not each or own % each:
-        beside = f" beside {others} others" if others else ""
-        raise BusplanError(f"axes = {axes}: no whole number of nodes, with {each} axes each{beside}")
-    return own // each
+    node_axes = int(alike.node.axes)
+    axes_beside = int(plain(network_of(profile).axes)) - int(alike.nodes) * node_axes
+    own = axes - axes_beside if isinstance(axes, int) else 0
+    if own < max(node_axes, 1) or not node_axes or own % node_axes:
+        beside = f" beside {axes_beside} others" if axes_beside else ""
+        raise BusplanError(f"axes = {axes}: no whole number of nodes, with {node_axes} axes each{beside}")
+    return own // node_axes
 
 
 def own_value(key: str, profile: Profile) -> Any:
@@ -90,9 +90,9 @@ def checked_direction(
     values
         Its values.
     option
-        What gives them, for messages.
+        Option or key that gives them, for messages.
     circle_option
-        What requests circle tests, for messages; None where they are run.
+        Option or key that asks for circle tests, for messages; None where they are run.
 
     Raises
     ------
@@ -105,8 +105,8 @@ def checked_direction(
         raise BusplanError(
             f"{option} {key}: {values.size:,} values; a map shows up to {MOST_VALUES} of a key. A sweep takes more"
         )
-    found = [whole(value) for value in values.part(0, values.size).tolist()]
-    return Direction(key, tuple(found if values.has_words else sorted(found)))
+    numbers = [whole(value) for value in values.part(0, values.size).tolist()]
+    return Direction(key, tuple(numbers if values.has_words else sorted(numbers)))
 
 
 _FACTORS: Final = ((1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 2, 5), (1,))
@@ -133,11 +133,11 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
     steps = node_steps(profile, model=bus_of(profile).deciding_model, group=varied.name)
     from_us, to_us = telling_periods(profile, [steps])
     if key == AXES:
-        nodes, each = _nodes(steps, to_us), int(varied.node.axes)
-        if not each:  # nodes without axes are counted themselves
+        nodes, node_axes = _nodes(steps, to_us), int(varied.node.axes)
+        if not node_axes:  # nodes without axes are counted themselves
             return Direction(varied.nodes_key, nodes)
-        others = own_value(AXES, profile) - steps.own_nodes * each
-        return Direction(AXES, tuple(others + one * each for one in nodes))
+        axes_beside = own_value(AXES, profile) - steps.own_nodes * node_axes
+        return Direction(AXES, tuple(axes_beside + count * node_axes for count in nodes))
     own_us = own_value(PERIOD, profile)
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
     known = [known_us for known_us in bus_of(profile).periods.us if least_us <= known_us <= most_us]
@@ -151,7 +151,15 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
 
 
 def _nodes(steps: NodeSteps, to_us: float) -> tuple[int, ...]:
-    """Numbers of nodes, from one to some beyond the most that fit the longest period drawn."""
-    last = min(max(steps.own_nodes + 1, steps.max_nodes(to_us) + _BEYOND), MAX_COUNT)
-    step = next(one for one in (f * 10**p for p in range(7) for f in (1, 2, 5)) if last <= _MOST * one)
-    return tuple(sorted({1, steps.own_nodes, *range(step, min(last + step, MAX_COUNT + 1), step)}))
+    """Numbers of nodes, from one to some beyond the most that fit the longest period drawn.
+
+    Steps of one size about this design, to twice its nodes; beyond, steps that grow.
+    """
+    own = steps.own_nodes
+    last = min(max(own + 1, steps.max_nodes(to_us) + _BEYOND), MAX_COUNT)
+    near = last if last <= _MOST else min(2 * own, last)
+    most = _MOST if near == last else _MOST // 2
+    step = next(size for size in (f * 10**p for p in range(7) for f in (1, 2, 5)) if near <= most * size)
+    about = range(own % step or step, near + 1, step)
+    beyond = round_numbers(near, last, most=_MOST - len(about), decades=_FACTORS) if near < last else []
+    return tuple(sorted({1, *about, *(ceil(nodes) for nodes in beyond), last}))

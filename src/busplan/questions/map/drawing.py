@@ -63,13 +63,13 @@ def looks_of(trade_off: TradeOff) -> Looks:
     """
     looks: dict[tuple[State, tuple[str, ...]], Look] = {}
     taken: set[str] = set()
-    for one in trade_off.regions:
-        looks[one.state, one.limited_by] = LOOKS[one.state]
-        if one.state == "does not fit" and one.limited_by != (TIME,):
-            letters = (letter for letter in "".join(one.limited_by) + ascii_lowercase if letter in ascii_lowercase)
+    for region in trade_off.regions:
+        looks[region.state, region.limited_by] = LOOKS[region.state]
+        if region.state == "does not fit" and region.limited_by != (TIME,):
+            letters = (letter for letter in "".join(region.limited_by) + ascii_lowercase if letter in ascii_lowercase)
             mark = next((letter for letter in letters if letter not in taken), _BARRED.mark)
             taken.add(mark)
-            looks[one.state, one.limited_by] = _BARRED._replace(mark=mark)
+            looks[region.state, region.limited_by] = _BARRED._replace(mark=mark)
     return looks
 
 
@@ -103,7 +103,7 @@ def state_words(state: State, trade_off: TradeOff) -> str:
 
 
 def limit_words(region: Region | Cell, profile: Profile) -> str:
-    """What keeps a region from fitting; empty where it fits."""
+    """Limits that keep a region from fitting; empty where it fits."""
     words = " and ".join(region.limited_by)
     if region.limited_by != (TIME,):
         return words
@@ -128,7 +128,8 @@ def value_text(direction: Direction, value: Value) -> str:
 def setting_words(trade_off: TradeOff, cell: Cell) -> str:
     """Write the setting of a cell, as "8 axes, period 4 ms"."""
     return ", ".join(
-        _along(one, value, trade_off.profile) for one, value in ((trade_off.x, cell.x), (trade_off.y, cell.y))
+        _along(direction, value, trade_off.profile)
+        for direction, value in ((trade_off.x, cell.x), (trade_off.y, cell.y))
     )
 
 
@@ -181,7 +182,7 @@ def map_lines(trade_off: TradeOff, *, width: int) -> list[Line]:
     indent = " " * (gutter + len(_EDGE))
     return [
         *reversed(lines),
-        *(Line(f"{indent}{one}".rstrip(), "drawn") for one in _below(trade_off, own_column, cell_width=cell_width)),
+        *(Line(f"{indent}{row}".rstrip(), "drawn") for row in _below(trade_off, own_column, cell_width=cell_width)),
         BLANK,
         *legend_lines(_legend_words(trade_off, looks, is_bracketed=cell_width >= _BRACKETED), width=width),
     ]
@@ -197,7 +198,7 @@ def _cells(row: Sequence[Cell | NotDrawn], looks: Looks, *, own: int | None, cel
 
 def _tones(row: Sequence[Cell | NotDrawn], *, start: int, cell_width: int) -> Iterator[Mark]:
     """Colours of runs of cells, on a terminal that has them."""
-    for tone, run in groupby(row, key=lambda one: LOOKS[one.state].tone if isinstance(one, Cell) else "neutral"):
+    for tone, run in groupby(row, key=lambda cell: LOOKS[cell.state].tone if isinstance(cell, Cell) else "neutral"):
         end = start + cell_width * len(list(run))
         if tone != "neutral":
             yield Mark(start, end, tone)
@@ -298,11 +299,11 @@ def _row(
     area: Element, trade_off: TradeOff, row: Sequence[Cell | NotDrawn], looks: Looks, *, top: int, tall: int
 ) -> None:
     """Draw the cells of a row, whose words are tooltips, and their marks where there is room."""
-    drawn = {column: one for column, one in enumerate(row) if isinstance(one, Cell)}
-    for column, one in drawn.items():
-        css = f"cell {look_of(one, looks).ink}"
+    drawn = {column: cell for column, cell in enumerate(row) if isinstance(cell, Cell)}
+    for column, cell in drawn.items():
+        css = f"cell {look_of(cell, looks).ink}"
         rect = SubElement(area, "rect", {**_box(column, top, of=len(row), tall=tall), "class": css})
-        SubElement(rect, "title").text = cell_words(trade_off, one)
+        SubElement(rect, "title").text = cell_words(trade_off, cell)
     if drawn and len(row) <= _MOST_TALL and tall == _CELL:
         # One text with a place for each character: a page may have many maps.
         places = " ".join(f"{100 * (column + 0.5) / len(row):.4g}%" for column in drawn)

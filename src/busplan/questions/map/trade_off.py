@@ -218,18 +218,18 @@ def judged(
     places = list(runs)
     for start in range(0, len(places), _AT_ONCE):
         part = places[start : start + _AT_ONCE]
-        for place, found in zip(part, mapper(_judge, [runs[place] for place in part]), strict=True):
-            cells[place] = _with_circle(cells[place], found)
+        for place, judgement in zip(part, mapper(_judge, [runs[place] for place in part]), strict=True):
+            cells[place] = _with_circle(cells[place], judgement)
         if progress is not None:
             progress(start + len(part), len(places))
     return cells
 
 
-def _with_circle(cell: Cell, found: _Judgement) -> Cell:
-    cell = cell._replace(circle_passed=found.passed)
-    if found.passed is False:
-        return cell._replace(state="circle fails", limited_by=found.failures)
-    return cell if found.passed else cell._replace(state="circle not judged")
+def _with_circle(cell: Cell, judgement: _Judgement) -> Cell:
+    cell = cell._replace(circle_passed=judgement.passed)
+    if judgement.passed is False:
+        return cell._replace(state="circle fails", limited_by=judgement.failures)
+    return cell if judgement.passed else cell._replace(state="circle not judged")
 
 
 MOST_CIRCLES: Final = 1000
@@ -249,12 +249,12 @@ class TradeOff(NamedTuple):
     @property
     def cells(self) -> tuple[Cell, ...]:
         """Cells that are drawn, row by row."""
-        return tuple(one for row in self.rows for one in row if isinstance(one, Cell))
+        return tuple(cell for row in self.rows for cell in row if isinstance(cell, Cell))
 
     @property
     def not_drawn(self) -> tuple[NotDrawn, ...]:
         """Combinations of values that no profile can have, row by row."""
-        return tuple(one for row in self.rows for one in row if isinstance(one, NotDrawn))
+        return tuple(cell for row in self.rows for cell in row if isinstance(cell, NotDrawn))
 
     @property
     def own_place(self) -> Place | None:
@@ -270,15 +270,15 @@ class TradeOff(NamedTuple):
         if self.own_place is None:
             return None
         row, column = self.own_place
-        found = self.rows[row][column]
-        return found if isinstance(found, Cell) else None
+        cell = self.rows[row][column]
+        return cell if isinstance(cell, Cell) else None
 
     @property
     def regions(self) -> tuple[Region, ...]:
         """Cells by state and limit: the states in the order of `STATES`, of each the largest region first."""
         counts = Counter(map(_region, self.cells))
-        found = [one._replace(cells=number) for one, number in counts.items()]
-        return tuple(sorted(found, key=lambda one: (STATES.index(one.state), -one.cells)))
+        regions = [region._replace(cells=number) for region, number in counts.items()]
+        return tuple(sorted(regions, key=lambda region: (STATES.index(region.state), -region.cells)))
 
 
 def _region(cell: Cell) -> Region:
@@ -326,8 +326,8 @@ def trade_off(
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> found = trade_off(load("paper-4ms").profile, y=Direction("cycle.period_us", (500, 4000)))
-    >>> [[cell.state for cell in row[:3]] for row in found.rows]
+    >>> result = trade_off(load("paper-4ms").profile, y=Direction("cycle.period_us", (500, 4000)))
+    >>> [[cell.state for cell in row[:3]] for row in result.rows]
     [['fits', 'does not fit', 'does not fit'], ['fits', 'fits', 'fits']]
     """
     if x is None:
@@ -339,20 +339,20 @@ def trade_off(
     if key_x == key_y:
         raise BusplanError(f"{x.key} across and {y.key} up both vary {key_x}; give two keys")
     settings = {
-        (row, column): _setting(profile, (x.key, one_x), (y.key, one_y))
-        for row, one_y in enumerate(y.values)
-        for column, one_x in enumerate(x.values)
+        (row, column): _setting(profile, (x.key, value_x), (y.key, value_y))
+        for row, value_y in enumerate(y.values)
+        for column, value_x in enumerate(x.values)
     }
-    found = {place: one for place, one in settings.items() if isinstance(one, MapPoint)}
-    if not found:
+    points = {place: point for place, point in settings.items() if isinstance(point, MapPoint)}
+    if not points:
         reason = next(value for value in settings.values() if not isinstance(value, MapPoint))
         raise BusplanError(f"no setting of this map can exist: {reason}")
     cells = {
-        (row, column): cell_of(found[row, column], figures, x=x.values[column], y=y.values[row])
-        for (row, column), figures in _swept(profile, found)
+        (row, column): cell_of(points[row, column], figures, x=x.values[column], y=y.values[row])
+        for (row, column), figures in _swept(profile, points)
     }
     if with_circle:
-        fitting = {place: (cell, found[place]) for place, cell in cells.items() if cell.state == "fits"}
+        fitting = {place: (cell, points[place]) for place, cell in cells.items() if cell.state == "fits"}
         if len(fitting) > MOST_CIRCLES:
             raise BusplanError(
                 f"{len(fitting):,} settings fit, and a map runs up to {MOST_CIRCLES:,} circle tests; give fewer values"
@@ -360,10 +360,10 @@ def trade_off(
         cells |= judged(profile, fitting, mapper=mapper, progress=progress)
     rows = tuple(
         tuple(
-            cells[row, column] if (row, column) in cells else NotDrawn(one_x, one_y, str(settings[row, column]))
-            for column, one_x in enumerate(x.values)
+            cells[row, column] if (row, column) in cells else NotDrawn(value_x, value_y, str(settings[row, column]))
+            for column, value_x in enumerate(x.values)
         )
-        for row, one_y in enumerate(y.values)
+        for row, value_y in enumerate(y.values)
     )
     return TradeOff(profile, x, y, rows, with_circle)
 
@@ -373,7 +373,7 @@ def _setting(profile: Profile, *along: tuple[str, Value]) -> MapPoint | str:
     changes: dict[str, Value] = {}
     try:
         # How many nodes some axes are is asked with the other direction's value.
-        for key, value in sorted(along, key=lambda one: one[0] == AXES):
+        for key, value in sorted(along, key=lambda key_value: key_value[0] == AXES):
             own = profile_key(key, profile)
             is_axes = key == AXES
             changes[own] = nodes_with(value, override(profile, dict(changes)), nodes_key=own) if is_axes else value
@@ -384,7 +384,9 @@ def _setting(profile: Profile, *along: tuple[str, Value]) -> MapPoint | str:
 
 def _swept(profile: Profile, settings: Mapping[Place, MapPoint]) -> Iterator[tuple[Place, Mapping[str, Any]]]:
     """Figures of each setting, from sweeps over grids without any other setting."""
-    places: dict[tuple[object, ...], Place] = {tuple(one.changes.values()): at for at, one in settings.items()}
+    places: dict[tuple[object, ...], Place] = {
+        tuple(point_set.changes.values()): at for at, point_set in settings.items()
+    }
     model = bus_of(profile).deciding_model
     for grid in _grids(settings.values()):
         for block in sweep(profile, grid, timing_models=[model], with_counts=False):
@@ -397,8 +399,8 @@ def _grids(settings: Collection[MapPoint]) -> Iterator[Grid]:
     """Full grids that have every setting once: lines with the same values along them are one grid."""
     across_key, along_key = next(iter(settings)).changes
     lines: dict[Value, list[Value]] = {}
-    for one in settings:
-        lines.setdefault(one.changes[across_key], []).append(one.changes[along_key])
+    for point in settings:
+        lines.setdefault(point.changes[across_key], []).append(point.changes[along_key])
     alike: dict[tuple[Value, ...], list[Value]] = {}
     for across, along in lines.items():
         alike.setdefault(tuple(along), []).append(across)

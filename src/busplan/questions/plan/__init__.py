@@ -128,14 +128,14 @@ def plan(
     changes = KeyChanges(kept)
     goal = changes.applied(network)
     tries = whole(max_circles, name="max_circles")
-    found = analysis.plan(
+    result = analysis.plan(
         network,
         wanted=changes.values,
-        free=None if free is None else [str(one) for one in items(free, name="free")],
+        free=None if free is None else [str(name) for name in items(free, name="free")],
         circle=CircleCheck(progress=progress, expected=tries) if circle and goal.asks_for_circle else None,
         max_circles=tries,
     )
-    return PlanAnswer(*found)
+    return PlanAnswer(*result)
 
 
 def _changes(values: Mapping[str, object]) -> tuple[KeyChange, ...]:

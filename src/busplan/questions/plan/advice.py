@@ -1,4 +1,4 @@
-"""What to change in a profile: the one answer of `capacity` and of `check`, which is that of `plan`."""
+"""The change that mends a profile: `capacity` and `check` give the same one, that of `plan`."""
 
 from typing import Final, NamedTuple
 
@@ -14,7 +14,7 @@ from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
 UNTESTED_CIRCLE: Final = "the circle is another one then, and is not simulated here"
-"""What is said of a change whose circle nobody has tested."""
+"""Words for a change whose circle was not tested."""
 
 
 class Change(NamedTuple):
@@ -27,22 +27,22 @@ class Change(NamedTuple):
     figures: CapacityFigures
     """The capacity after it, under the model that decides."""
     circle_is_untested: bool
-    """Whether the profile has another circle after it, which nobody has simulated."""
+    """Whether the change alters the circle, which was not simulated."""
 
 
 class Cure(NamedTuple):
-    """What to change for a profile to hold every constraint."""
+    """Change after which a profile holds every constraint."""
 
     changes: dict[str, Value] | None
     """New value by dotted key, the dearest change first; empty if nothing is to change, None if no change is enough."""
     why: str = ""
-    """What stands in the way, if no change is enough."""
+    """Reason that no change is enough."""
     circle_failures: tuple[str, ...] | None = ()
-    """What the circle does not hold after it; None where it is another one then, and was not simulated."""
+    """Limits that the circle breaks after it; None where the change alters the circle, which was not simulated."""
 
 
 def changeable(profile: Profile) -> tuple[str, ...]:
-    """What may be changed unless a user says otherwise, in words, the cheapest first."""
+    """Default freedoms of a plan, in words, the cheapest first."""
     return tuple(freedom.label for freedom in freed(profile, None))
 
 
@@ -59,10 +59,10 @@ def cure(profile: Profile, *, circle_steps: int | None = None) -> Cure:
         Most simulated steps of each axis of that circle; None for no simulation.
     """
     search, levels = Search(profile), freed(profile, None)
-    found = search.least(levels)
-    if found is None:
+    least = search.least(levels)
+    if least is None:
         return Cure(None, search.binding(levels).why)
-    changes, after = dict(found), search.profile(found)
+    changes, after = dict(least), search.profile(least)
     if not profile.asks_for_circle or rests_on(after) == rests_on(profile):
         return Cure(changes)
     failures = None if circle_steps is None else failures_within(after, most_steps=circle_steps)

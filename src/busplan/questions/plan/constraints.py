@@ -1,4 +1,4 @@
-"""What a plan must hold, and what planning reads and writes of a profile's nodes and payloads."""
+"""Constraints of a plan, and the nodes and payloads of a profile as planning reads and writes them."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from itertools import product
@@ -35,7 +35,7 @@ class Room(NamedTuple):
 
 def payload_keys(profile: Profile) -> tuple[str, ...]:
     """Every key that a payload of a network has, or may have."""
-    sections = [f"group.{one.name}" for one in profile.group] or ["payload"]
+    sections = [f"group.{group.name}" for group in profile.group] or ["payload"]
     return tuple(f"{section}.{key}" for section in sections for key in _PAYLOADS)
 
 
@@ -85,18 +85,18 @@ def with_payload_within(profile: Profile, most_bytes: int, *, kept: Collection[s
     kept
         Keys that must stay.
     """
-    found: dict[str, Value] = {}
+    changes: dict[str, Value] = {}
     for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS):
-        over, (key, each) = int(alike.bytes_of(kind)) - most_bytes, _cut(alike, kind)
+        over, (key, bytes_cut) = int(alike.bytes_of(kind)) - most_bytes, _cut(alike, kind)
         if over > 0 and key not in kept:
-            found[key] = getattr(alike.payload, key.rpartition(".")[2]) - ceil(over / each)
-    return found if all(int(value) > 0 for value in found.values()) else None
+            changes[key] = getattr(alike.payload, key.rpartition(".")[2]) - ceil(over / bytes_cut)
+    return changes if all(int(value) > 0 for value in changes.values()) else None
 
 
 def least_cut_bytes(profile: Profile, *, kept: Collection[str] = ()) -> int:
-    """The least that any payload is cut by: what a byte of each axis makes of it, where axes add to it [bytes]."""
+    """Smallest step by which a payload can be cut; with payloads that follow axes, a byte for each axis [bytes]."""
     cuts = (_cut(alike, kind) for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS))
-    return min((each for key, each in cuts if key not in kept), default=1)
+    return min((cut for key, cut in cuts if key not in kept), default=1)
 
 
 def _cut(alike: AlikeNodes, kind: TransactionKind) -> tuple[str, int]:
@@ -118,14 +118,14 @@ _MOST_SLICE_US: Final = 1e12
 
 
 class Need(NamedTuple):
-    """What one constraint asks of the slice, or of the period itself."""
+    """Time that one constraint asks of the slice, or of the period itself."""
 
     slice_us: float
-    """What the slice must give; infinite where none is enough [us]."""
+    """Length that the slice must have; infinite where none is enough [us]."""
     key: str
-    """What asks: time, the key of a limit of the bus, or a key of the profile."""
+    """Source of the need: time, the key of a limit of the bus, or a key of the profile."""
     why: str = ""
-    """What no slice and no period mends, in words."""
+    """Reason that no slice and no period helps, in words."""
     least_us: float = 0.0
     """The shortest period, whatever the slice ratio; 0 where any will do [us]."""
 
@@ -152,7 +152,7 @@ class Need(NamedTuple):
 
 
 def shown(network: Network) -> Iterator[Need]:
-    """What a network needs to be shown to fit, with bias, uncertainty and reserve, on a bus that is set safely.
+    """Need of a network to be shown to fit, with bias, uncertainty and reserve, on a bus that is set safely.
 
     Time first, and then each limit that asks for a longer period than all before it.
     """
@@ -182,7 +182,7 @@ def most_asking(needs: Iterable[Need], *, ratio: float) -> Need:
 
 
 def keeps_limits(network: Network) -> bool:
-    """Whether a network keeps the limits that its period plays a part in, at its own period and slice ratio."""
+    """Whether a network keeps the limits that depend on the period, at its own period and slice ratio."""
     limits = bus_of(network.profile).limits
     return not any(limit.kept_from_us is not None and limit.shown.is_broken(network) for limit in limits)
 
@@ -205,16 +205,16 @@ def utilisation(profile: Profile) -> Iterator[Need]:
 def spare(profile: Profile) -> Iterator[Need]:
     """[limits] min_spare_nodes and min_spare_axes: more nodes must be shown to fit, too."""
     for room in rooms(profile):
-        for found in shown(room.network):
-            why = found.why and f"{room.key} asks for room for {room.words}: {found.why}"
-            yield found._replace(key=room.key, why=why)
+        for need in shown(room.network):
+            why = need.why and f"{room.key} asks for room for {room.words}: {need.why}"
+            yield need._replace(key=room.key, why=why)
 
 
 CONSTRAINTS: Final[tuple[Callable[[Profile], Iterator[Need]], ...]] = (verdict, utilisation, spare)
 
 
 def missed_limits(profile: Profile) -> tuple[Need, ...]:
-    """What each key of [limits] asks that the slice of a profile does not give; the verdict is not among it."""
+    """Needs of [limits] that the slice of a profile does not meet; the verdict is not among them."""
     cycle = profile.cycle
     asked = (need for constraint in CONSTRAINTS[1:] for need in constraint(profile))
     missed = (need for need in asked if not within(need.period_us(cycle.slice_ratio), cycle.period_us))
@@ -222,7 +222,7 @@ def missed_limits(profile: Profile) -> tuple[Need, ...]:
 
 
 def needs(profile: Profile) -> list[Need]:
-    """What every constraint asks, those of the verdict first."""
+    """Needs of every constraint, those of the verdict first."""
     return [need for constraint in CONSTRAINTS for need in constraint(profile)]
 
 

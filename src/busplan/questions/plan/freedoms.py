@@ -1,4 +1,4 @@
-"""What a plan may change, in the order of its cost; each is asked for its values again after each change."""
+"""Freedoms of a plan, in the order of their cost; each gives its values again after each change."""
 
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -125,7 +125,7 @@ PERIOD_STEP_US: Final = 1.0
 RATIO: Final = "cycle.slice_ratio"
 PERIOD: Final = "cycle.period_us"
 DEFAULT_COSTS: Final = (Cost.SIMULATION, Cost.REGISTER, Cost.HOST_TIME, Cost.PERIOD)
-"""What a plan may change where nobody says otherwise."""
+"""Freedoms of a plan by default."""
 
 
 class Freedom(NamedTuple):
@@ -136,11 +136,11 @@ class Freedom(NamedTuple):
     cost: Cost
     keys: tuple[str, ...]
     values: "Callable[[Search, Changes, Sequence[Freedom]], Iterator[Changes]]"
-    """What it may be after some changes, with cheaper freedoms: the least change first, and nothing that cannot do."""
+    """Possible values after some changes, with cheaper freedoms: the least change first, nothing that cannot help."""
 
     @property
     def gives_time(self) -> bool:
-        """Whether it changes what the slice gives, and not what the cycle needs."""
+        """Whether it lengthens the slice, and leaves the cycle as it is."""
         return self.cost in (Cost.HOST_TIME, Cost.PERIOD)
 
 
@@ -151,7 +151,7 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
         Freedom(setting.name, setting.label, setting.cost, setting.keys, partial(_of_bus, setting.name))
         for setting in bus_of(profile).settings(network)
     )
-    found = (
+    freedoms_known = (
         *own,
         *(() if goes_with_step(profile, profile.cycle.period_us) else (_STEP_OF_CIRCLE,)),
         Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,), _ratios),
@@ -160,13 +160,13 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
         # Where nodes differ, nobody but the user knows which can go.
         *((Freedom("nodes", "nodes", Cost.NODES, (NODES_KEY,), _fewer_nodes),) if network.is_uniform else ()),
     )
-    return tuple(sorted(found, key=lambda one: one.cost))
+    return tuple(sorted(freedoms_known, key=lambda freedom: freedom.cost))
 
 
 def freed(
     profile: "Profile", names: Sequence[str] | None, *, asked: Collection[str] = (), option: str = "free"
 ) -> tuple[Freedom, ...]:
-    """What a plan may change, the cheapest first.
+    """Freedoms of a plan, the cheapest first.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def freed(
     asked
         Keys with a value that was asked for, which stays.
     option
-        What messages call the names.
+        Option or parameter that gives the names, for messages.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def _of_bus(name: str, search: "Search", changes: Changes, _cheaper: Sequence[Fr
     """Values of a setting of the bus, safe for all nodes that [limits] asks for."""
     profile = search.profile(changes)
     networks = (network_of(profile), *(room.network for room in rooms(profile)))
-    network = max(networks, key=lambda one: float(plain(one.nodes)))
+    network = max(networks, key=lambda network: float(plain(network.nodes)))
     for setting in bus_of(profile).settings(network):
         if setting.name == name:
             yield from setting.values
@@ -220,9 +220,9 @@ def _dividing_steps(search: "Search", changes: Changes, _cheaper: Sequence[Freed
     """The longest step, up to the own one, that divides the period, where that one does not."""
     profile = search.profile(changes)
     if not goes_with_step(profile, search.period_us(changes)):
-        one = {STEP: dividing_step_us(search.period_us(changes), most_us=profile.servo.step_us)}
-        if search.allows({**changes, **one}):
-            yield one
+        step = {STEP: dividing_step_us(search.period_us(changes), most_us=profile.servo.step_us)}
+        if search.allows({**changes, **step}):
+            yield step
 
 
 _STEP_OF_CIRCLE: Final = Freedom("step", "step of the circle", Cost.SIMULATION, (STEP,), _dividing_steps)
@@ -231,12 +231,12 @@ _STEP_OF_CIRCLE: Final = Freedom("step", "step of the circle", Cost.SIMULATION, 
 def _ratios(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
     """The smallest ratio for each combination of what is cheaper: between two of them nothing new fits."""
     period_us, own = search.period_us(changes), search.ratio(changes)
-    found = set()
-    for one in search.combinations(changes, cheaper):
-        if within(search.needed_us(one, ratio=MOST_RATIO), period_us):
-            needed_us = max(need.slice_us for need in search.needs(one))
-            found.add(RATIOS.number(place_of(RATIOS, needed_us, each_us=period_us)))
-    yield from ({RATIO: ratio} for ratio in sorted(found) if own < ratio <= MOST_RATIO)
+    ratios = set()
+    for combination in search.combinations(changes, cheaper):
+        if within(search.needed_us(combination, ratio=MOST_RATIO), period_us):
+            needed_us = max(need.slice_us for need in search.needs(combination))
+            ratios.add(RATIOS.number(place_of(RATIOS, needed_us, each_us=period_us)))
+    yield from ({RATIO: ratio} for ratio in sorted(ratios) if own < ratio <= MOST_RATIO)
 
 
 def _payloads(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
@@ -251,8 +251,8 @@ def _payloads(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) ->
     sizes = range(min(int(network.largest_payload_bytes) - 1, payloads.most_bytes) // step * step, 0, -step)
 
     def cut(size: int) -> Changes | None:
-        one = with_payload_within(profile, size, kept=search.kept)
-        return one if one is not None and search.allows({**changes, **one}) else None
+        change = with_payload_within(profile, size, kept=search.kept)
+        return change if change is not None and search.allows({**changes, **change}) else None
 
     sizes = sizes[: bisect_left(sizes, x=True, key=lambda size: cut(size) is None)]
     # Below a point after which a table of execution times falls, a smaller payload may take longer.
@@ -263,10 +263,10 @@ def _payloads(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) ->
     )
     before: Changes | None = None
     for size in search.in_strides(sizes[min(first, len(sizes) - 1) :] if sizes else sizes):
-        one = cut(size)
-        if one is not None and one != before:
-            yield one
-        before = one
+        change = cut(size)
+        if change is not None and change != before:
+            yield change
+        before = change
 
 
 def _periods(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
@@ -337,9 +337,9 @@ def place_of(grid: NumberGrid, needed_us: float, *, each_us: float) -> int:
     grid
         Periods [us], or slice ratios [1].
     needed_us
-        What the slice must give [us].
+        Length that the slice must have [us].
     each_us
-        What it gives for each unit of the grid: the slice ratio, or the period.
+        Length of the slice for each unit of the grid: the slice ratio, or the period.
     """
     place = grid.place(needed_us / each_us)
     while not fits_in(needed_us, available_us=each_us * grid.number(place)):

@@ -1,4 +1,4 @@
-"""What a plan offers: one way to set a network, what the machine could reach, and what would make a plan possible."""
+"""Offers of a plan: one way to set a network, what the machine could reach, and what would make a plan possible."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
@@ -61,7 +61,7 @@ class Impossible(NamedTuple):
     title: str
     reason: str
     proven: bool = True
-    """Whether no value exists; False if the search was cut short."""
+    """Whether it is proven that no value exists; False if the search was cut short."""
 
 
 def option(search: Search, title: str, changes: Changes, *, held_by: str | None = None) -> Option:
@@ -72,7 +72,7 @@ def option(search: Search, title: str, changes: Changes, *, held_by: str | None 
     search
         The search.
     title
-        What the option is called.
+        Name of the option.
     changes
         New values by dotted key.
     held_by
@@ -87,7 +87,7 @@ def option(search: Search, title: str, changes: Changes, *, held_by: str | None 
         changes=dict(changes),
         profile=changed,
         deciding=deciding,
-        others=tuple(figures(changed, model=other) for other in model_names(changed) if other != model),
+        others=tuple(figures(changed, model=model_name) for model_name in model_names(changed) if model_name != model),
         passes=search.passes(changes),
         held_by=held_by,
         circle_failures=search.circle_failures(changes) if is_run else None,
@@ -105,7 +105,7 @@ def frontier(goal: Profile, search: Search, levels: Sequence[Freedom]) -> Iterat
     search
         A search for it.
     levels
-        What may be changed, of which what is cheaper than a payload is.
+        Freedoms, of which those cheaper than a payload are used.
     """
     cheap = [level for level in levels if level.cost < Cost.PAYLOAD]
     yield _shortest_period(goal, search, cheap)
@@ -122,11 +122,11 @@ def _shortest_period(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
     first = place = place_of(grid, needed_us, each_us=1)
     tried = 0
     while grid.number(place) <= MAX_TIME_US:
-        found = search.least(cheap, {PERIOD: grid.number(place)})
+        changes = search.least(cheap, {PERIOD: grid.number(place)})
         proven = tried < search.max_circles
-        if found is not None:
-            held_by = CIRCLE if place > first else most_asking(search.needs(found), ratio=search.ratio(found)).key
-            return option(search, title, found, held_by=held_by)._replace(proven=proven)
+        if changes is not None:
+            held_by = CIRCLE if place > first else most_asking(search.needs(changes), ratio=search.ratio(changes)).key
+            return option(search, title, changes, held_by=held_by)._replace(proven=proven)
         tried += 1
         place += 1 if tried < search.max_circles else 2 ** (tried - search.max_circles + 1)
     if not tried:
@@ -147,23 +147,23 @@ def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
     sizes = sizes[bisect_left(sizes, least) : bisect_right(sizes, most)]
 
     def is_out(size: int) -> bool:
-        one = with_payload(goal, size) or {}
-        return not (search.allows(one) and search.reaches(one, cheap))
+        payload = with_payload(goal, size) or {}
+        return not (search.allows(payload) and search.reaches(payload, cheap))
 
     first = bisect_left(sizes, execution.ascends_from_bytes)
     sizes = sizes[: bisect_left(sizes, True, lo=first, key=is_out) + 1]
     place, failed = len(sizes) - 1, 0
     while place >= 0:
         size = sizes[place]
-        one = with_payload(goal, size) or {}
-        if search.allows(one):
-            is_near = search.reaches(one, cheap)
-            found = search.least(cheap, one) if is_near else None
-            if found is not None:
+        payload = with_payload(goal, size) or {}
+        if search.allows(payload):
+            is_near = search.reaches(payload, cheap)
+            changes = search.least(cheap, payload) if is_near else None
+            if changes is not None:
                 bound = payloads.bound if size == largest else "execution"
                 held_by = bound if tried is None else search.binding(cheap, tried).key
-                return option(search, title, found, held_by=held_by)._replace(proven=failed < search.max_circles)
-            tried = one
+                return option(search, title, changes, held_by=held_by)._replace(proven=failed < search.max_circles)
+            tried = payload
             failed += is_near  # in time, and refused for something else
         place -= 1 if failed < search.max_circles else 2 ** (failed - search.max_circles + 1)
     if tried is None:
@@ -174,11 +174,11 @@ def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
 def _most_nodes(search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:
     title = "most nodes"
     nodes = most_nodes(search, {}, cheap, below=MAX_COUNT + 1)
-    found = search.least(cheap, with_nodes(nodes)) if nodes else None
-    if found is None:
+    changes = search.least(cheap, with_nodes(nodes)) if nodes else None
+    if changes is None:
         return Impossible(title, search.binding(cheap, with_nodes(max(nodes, 1))).why)
     held_by = search.binding(cheap, with_nodes(nodes + 1)).key if nodes < MAX_COUNT else None
-    return option(search, title, found, held_by=held_by)
+    return option(search, title, changes, held_by=held_by)
 
 
 _SHARES = 100
@@ -193,7 +193,7 @@ class Relaxation(NamedTuple):
     value: Value | None
     """Value of the key of [limits] that is enough; None for others."""
     changes: dict[str, Value]
-    """What to set then; keys of the goal with new values."""
+    """Changes to make then: keys of the goal with new values."""
 
 
 def relaxations(
@@ -211,7 +211,7 @@ def relaxations(
     goal
         The profile with the wanted values, for which there is no plan.
     levels
-        What may be changed.
+        Freedoms.
     kept
         Keys that were asked for: each is relaxed by itself.
     circle
@@ -227,11 +227,11 @@ def relaxations(
     names = {level.name for level in levels}
     for freedom in freedoms(goal):
         if freedom.name not in names:
-            more = [each for each in freedoms(goal) if each.name in {*names, freedom.name}]
+            more = [level for level in freedoms(goal) if level.name in {*names, freedom.name}]
             search = Search(goal, circle=circle, kept=set(kept) - set(freedom.keys), max_circles=max_circles)
-            found = search.least(more)
-            if found is not None:
-                yield Relaxation(freedom.name, None, dict(found))
+            least = search.least(more)
+            if least is not None:
+                yield Relaxation(freedom.name, None, dict(least))
     for key, values in _weaker_limits(goal):
         relaxed = _least_relaxed(goal, key, values, levels, kept=kept)
         if relaxed is not None:

@@ -25,13 +25,13 @@ class Plan(NamedTuple):
     wanted: dict[str, Value]
     """Wanted values that differ from the profile, by dotted key."""
     free: tuple[str, ...]
-    """Names of what may be changed, the cheapest first."""
+    """Names of the freedoms, the cheapest first."""
     options: tuple[Option, ...]
     impossible: tuple[Impossible, ...]
     binding: Need | None
     """The constraint that stands in the way; None if there is a plan."""
     relaxations: tuple[Relaxation, ...]
-    """What alone would make a plan possible, with what to set then; empty if there is a plan."""
+    """Relaxations that would each make a plan possible, with their changes; empty if there is a plan."""
     with_circle: bool
     """Whether the circle test was run."""
 
@@ -95,8 +95,8 @@ def plan(
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> found = plan(load("paper-1ms").profile, wanted={"bus.nodes": 4})
-    >>> found.recommended.changes, round(found.recommended.deciding.margin_us, 1)
+    >>> answer = plan(load("paper-1ms").profile, wanted={"bus.nodes": 4})
+    >>> answer.recommended.changes, round(answer.recommended.deciding.margin_us, 1)
     ({'bus.gap_count': 10}, 106.1)
     """
     asked = dict(wanted or {})
@@ -105,15 +105,15 @@ def plan(
     levels = freed(goal, free, asked=kept)
     search = Search(goal, circle=circle, kept=kept, max_circles=max_circles)
     steps = [*_steps(search, levels)]
-    found = [*steps, *frontier(goal, search, levels)]
+    offers = [*steps, *frontier(goal, search, levels)]
     has_plan = any(isinstance(step, Option) and step.recommended for step in steps)
     return Plan(
         profile=profile,
         goal=goal,
         wanted={key: value for key, value in asked.items() if _differs(profile, goal, key)},
         free=tuple(level.name for level in levels),
-        options=tuple(offer for offer in found if isinstance(offer, Option)),
-        impossible=tuple(offer for offer in found if isinstance(offer, Impossible)),
+        options=tuple(offer for offer in offers if isinstance(offer, Option)),
+        impossible=tuple(offer for offer in offers if isinstance(offer, Impossible)),
         binding=None if has_plan else search.binding(levels),
         relaxations=()
         if has_plan
@@ -125,7 +125,7 @@ def plan(
 def _differs(profile: Profile, goal: Profile, key: str) -> bool:
     """Whether two profiles differ in a key, or in one of a section; other changes may be needed for either alone."""
     own, asked = (dict(flat(side.model_dump())) for side in (profile, goal))
-    keys = [one for one in {**own, **asked} if one == key or one.startswith(f"{key}.")]
+    keys = [name for name in {**own, **asked} if name == key or name.startswith(f"{key}.")]
     return any(own.get(key) != asked.get(key) for key in keys)
 
 
@@ -135,9 +135,9 @@ def _steps(search: Search, levels: Sequence[Freedom]) -> Iterator[Option | Impos
     for number in range(len(levels) + 1):
         freed_now = levels[:number]
         title = AS_IT_IS if not number else f"{'+ ' if number > 1 else ''}{freed_now[-1].label}"
-        found = search.least(freed_now)
-        if found is not None:
-            yield option(search, title, found)._replace(recommended=True)
+        changes = search.least(freed_now)
+        if changes is not None:
+            yield option(search, title, changes)._replace(recommended=True)
             return
         binding = search.binding(freed_now)
         if not number or search.is_bounded(freed_now):

@@ -115,7 +115,7 @@ def _headline(plan: Plan) -> Sentence:
 
 
 def _freed(plan: Plan, before: str | None = None) -> str:
-    """What may be changed, in words; only what is cheaper than the freedom of a key."""
+    """Freedoms, in words; only those cheaper than the freedom of a key."""
     known = [freedom for freedom in freedoms(plan.goal) if freedom.name in plan.free]
     cost = next((freedom.cost for freedom in known if before in freedom.keys), None)
     labels = [freedom.label for freedom in known if cost is None or freedom.cost < cost]
@@ -171,9 +171,9 @@ def _record(plan: Plan, option: Option) -> Record:
         "changes": plan.all_changes(option),
         "recommended": option.recommended,
         **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
-        "fits_other_model": all(other.fits for other in others) if others else None,
+        "fits_other_model": all(model.fits for model in others) if others else None,
         "margin_us": figures.margin_us,
-        "margin_other_model_us": min((other.margin_us for other in others), default=None),
+        "margin_other_model_us": min((model.margin_us for model in others), default=None),
         **fields(figures, "bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
         **fields(option, "passes", "held_by", "proven", "circle_passed"),
         "circle_failures": list(option.circle_failures or ()),
@@ -256,11 +256,11 @@ def option_margin(option: Option) -> tuple[ShownValue, ShownValue]:
     option
         The option.
     """
-    margin, doubt = (attribute_value(figure, option.deciding) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
-    one = option.deciding
+    figures = option.deciding
+    margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     # A margin beyond its uncertainty is none of the causes where limits of the bus are.
-    beyond_us = (one.margin_corrected_us or 0.0) - (one.uncertainty_us or 0.0)
-    is_enough = one.verdict == FITS or (beyond_us > 0 and limits_behind(one))
+    beyond_us = (figures.margin_corrected_us or 0.0) - (figures.uncertainty_us or 0.0)
+    is_enough = figures.verdict == FITS or (beyond_us > 0 and limits_behind(figures))
     return margin._replace(state="neutral" if is_enough else "fails"), doubt
 
 
@@ -305,5 +305,5 @@ def _counted(words: str, value: BusValue) -> str:
 
 
 def _short_value(key: str, value: BusValue) -> ShownValue:
-    found = key_value(key, value)
-    return found._replace(unit=period_value(float(value)).unit) if key.endswith("_us") else found
+    shown = key_value(key, value)
+    return shown._replace(unit=period_value(float(value)).unit) if key.endswith("_us") else shown

@@ -69,9 +69,9 @@ class Search:
         Parameters
         ----------
         levels
-            What may be changed, the cheapest first.
+            Freedoms, the cheapest first.
         changes
-            What is changed already.
+            Changes made already.
 
         Returns
         -------
@@ -89,13 +89,13 @@ class Search:
         if kept is not None:
             return kept
         for change in dearest.values(self, changes, cheaper):
-            found = None if self.kept & set(change) else self._least(cheaper, {**changes, **change})
-            if found is not None:
-                return found
+            least = None if self.kept & set(change) else self._least(cheaper, {**changes, **change})
+            if least is not None:
+                return least
         return None
 
     def passes(self, changes: Changes) -> bool:
-        """Whether every constraint holds after some changes, the circle last; none does once too many were tried."""
+        """Whether every constraint holds after some changes, the circle last; False once too many circles were run."""
         self._left -= 1
         if self._left < 0:
             self.proven = False
@@ -109,7 +109,7 @@ class Search:
         )
 
     def circle_failures(self, changes: Changes) -> tuple[str, ...]:
-        """What the circle does not hold after some changes that fit the bus; nothing where it is not run."""
+        """Limits that the circle breaks after some changes that fit the bus; nothing where it is not run."""
         if self._circle is None:
             return ()
         return self._circle(self.profile(changes))
@@ -135,11 +135,11 @@ class Search:
         return True
 
     def needs(self, changes: Changes) -> list[Need]:
-        """What each constraint asks; neither period nor slice ratio nor step plays a part."""
-        others = {key: value for key, value in changes.items() if key not in (PERIOD, RATIO, STEP)}
-        key = frozenset(others.items())
+        """Needs of each constraint; they depend neither on period nor slice ratio nor step."""
+        relevant = {key: value for key, value in changes.items() if key not in (PERIOD, RATIO, STEP)}
+        key = frozenset(relevant.items())
         if key not in self._needs:
-            self._needs[key] = needs(self.profile(others))
+            self._needs[key] = needs(self.profile(relevant))
         return self._needs[key]
 
     def needed_us(self, changes: Changes, *, ratio: float) -> float:
@@ -187,8 +187,8 @@ class Search:
         """The combination that needs least, with a step that divides the period and the largest ratio that is free."""
         ratio = self.most_ratio(changes, levels)
 
-        def lacks(one: Changes) -> tuple[float, bool]:
-            return self.needed_us(one, ratio=ratio), bool(refused_period(self.profile(one)))
+        def lacks(combination: Changes) -> tuple[float, bool]:
+            return self.needed_us(combination, ratio=ratio), bool(refused_period(self.profile(combination)))
 
         least = min(self.combinations(changes, levels), key=lacks)
         return {**({} if ratio == self.ratio(changes) else {RATIO: ratio}), **least}
@@ -209,7 +209,7 @@ class Search:
         return longest_period_us(self._own) if is_free else self.period_us(changes)
 
     def is_bounded(self, levels: Sequence[Freedom]) -> bool:
-        """Whether some freedoms have an end: no period is free, and no limit of the bus is broken."""
+        """Whether freedoms have a largest value: no period is free, and no limit of the bus is broken."""
         return all(level.cost != Cost.PERIOD for level in levels) and self.least_needed_us({}, levels) < inf
 
     def reaches(self, changes: Changes, levels: Sequence[Freedom]) -> bool:
@@ -222,9 +222,9 @@ class Search:
         Parameters
         ----------
         levels
-            What may be changed.
+            Freedoms.
         changes
-            What is changed already.
+            Changes made already.
         """
         furthest = self.furthest(changes or {}, levels)
         most_us, ratio = self.most_period_us(furthest, levels), self.most_ratio(furthest, levels)

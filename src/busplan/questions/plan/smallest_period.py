@@ -62,7 +62,7 @@ def _known_us(bus: Bus, least_us: float) -> float:
 
 
 def _need(profile: Profile, period_us: float) -> Need | None:
-    """What a profile lacks at a period; None where it is shown to fit."""
+    """Need that a profile does not meet at a period; None where it is shown to fit."""
     network = network_of(override(profile, {PERIOD: period_us}))
     need = most_asking(shown(network), ratio=profile.cycle.slice_ratio)
     is_given = within(need.period_us(profile.cycle.slice_ratio), period_us)
@@ -96,9 +96,9 @@ def needed_settings(profile: Profile) -> Changes:
     network = network_of(profile)
     if _is_carried(network):
         return {}
-    each = sorted(bus_of(profile).settings(network), key=lambda setting: setting.cost)
-    changes = (dict(values) for setting in each for values in setting.values)
-    return next((one for one in changes if _is_carried(network_of(override(profile, dict(one))))), {})
+    settings = sorted(bus_of(profile).settings(network), key=lambda setting: setting.cost)
+    changes = (dict(values) for setting in settings for values in setting.values)
+    return next((change for change in changes if _is_carried(network_of(override(profile, dict(change))))), {})
 
 
 def _is_carried(network: Network) -> bool:

@@ -106,8 +106,11 @@ def report(
     named = list(origins)
     if len(named) != len(given):
         raise BusplanError(f"origins: {len(named)} for {plural(len(given), 'profile')}; expected one for each")
-    found = answers_of_each(loaded, with_circle=circle, progress=progress)
+    answers_ = answers_of_each(loaded, with_circle=circle, progress=progress)
     return ReportAnswer(
-        tuple(ReportedProfile(argument, one, changes) for (argument, changes), one in zip(named, found, strict=True)),
+        tuple(
+            ReportedProfile(argument, answer, changes)
+            for (argument, changes), answer in zip(named, answers_, strict=True)
+        ),
         title,
     )

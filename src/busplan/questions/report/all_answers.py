@@ -107,11 +107,11 @@ def answers_of_each(
     """
     return [
         all_answers(
-            one,
+            profile,
             with_circle=with_circle,
             progress=None if progress is None else part_of(progress, number=number, of=len(profiles)),
         )
-        for number, one in enumerate(profiles)
+        for number, profile in enumerate(profiles)
     ]
 
 

@@ -47,7 +47,7 @@ def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[s
     changes
         KeyChanges of its file, which the commands repeat.
     """
-    found: dict[str, Source] = {}
+    by_name: dict[str, Source] = {}
 
     def add(
         name: str,
@@ -59,10 +59,10 @@ def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[s
     ) -> None:
         changed = change_options(own, period_us=answer.profile.cycle.period_us)
         words = ("busplan", command or name, shell_word(argument), *options, *changed, "--format", "json")
-        found[name] = Source(Command(" ".join(words), purpose), lambda: changed_document(document(), own))
+        by_name[name] = Source(Command(" ".join(words), purpose), lambda: changed_document(document(), own))
 
     # Neither latency nor the list of explain takes --period.
-    elsewhere = KeyChanges(tuple(one for one in changes.each if one.option != "--period"))
+    elsewhere = KeyChanges(tuple(change for change in changes.each if change.option != "--period"))
     add(
         "capacity",
         "verdict, timing models, terms, what moves the margin",
@@ -87,4 +87,4 @@ def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[s
         add("circle", purpose, lambda: circle_document(circle), "--contributions", command="circle-test")
     assumptions = answer.assumptions
     add("explain", "what the figures rest on", lambda: assumptions_document(answer.profile, assumptions), own=elsewhere)
-    return found
+    return by_name

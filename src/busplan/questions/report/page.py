@@ -90,11 +90,11 @@ def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None
     subjects = [
         _Subject(
             f"p{number}",
-            shell_word(one.argument),
-            one.answer,
-            sources(one.answer, argument=one.argument, changes=one.changes),
+            shell_word(profile.argument),
+            profile.answer,
+            sources(profile.answer, argument=profile.argument, changes=profile.changes),
         )
-        for number, one in enumerate(profiles, start=1)
+        for number, profile in enumerate(profiles, start=1)
     ]
     own = Code(subjects[0].name) if len(subjects) == 1 else plural(len(subjects), "profile")
     return Report(
@@ -128,19 +128,19 @@ def _blocks(subjects: Sequence[_Subject]) -> Iterator[Block]:
 
 def _chapter(subject: _Subject) -> Iterator[Block]:
     """All blocks of one profile."""
-    answer, found = subject.answer, subject.sources
+    answer, sources_ = subject.answer, subject.sources
     if answer.profile.description.strip():
         yield Sentence((" ".join(answer.profile.description.split()),))
     yield _facts(subject)
     verdicts: tuple[Block, ...] = (card(answer.verdict, answer.profile), circle_question(answer))
     if answer.no_circle:
         verdicts = verdicts[::-1]  # the cause first
-    lines = (found[name].line for name in ("capacity", "circle") if name in found)
+    lines = (sources_[name].line for name in ("capacity", "circle") if name in sources_)
     yield part("verdict", "Verdict", (*_assumed(answer), *verdicts, *lines))
-    yield from parts(answer, found)
-    assumptions = (assumptions_table(answer.assumptions), found["explain"].line)
+    yield from parts(answer, sources_)
+    assumptions = (assumptions_table(answer.assumptions), sources_["explain"].line)
     yield part("assumptions", "What it rests on", assumptions)
-    yield _commands(found)
+    yield _commands(sources_)
 
 
 _MOST_NAMED: Final = 3
@@ -172,7 +172,7 @@ def _facts(subject: _Subject) -> Facts:
     return Facts(
         (
             *(item("nodes", NODES), item("axes", AXES)),
-            *(item(one.label, one) for one in setup),
+            *(item(figure_.label, figure_) for figure_ in setup),
             *(item("period", PERIOD), item("slice", AVAILABLE)),
             ("deciding model", ShownValue(subject.answer.verdict.deciding.timing_model, TIMING_MODEL.key)),
             ("profile", Code(subject.origin)),

@@ -69,7 +69,7 @@ def part(kind: str, title: str, blocks: Iterable[Block]) -> Chapter:
 
 
 def parts(answer: AllAnswers, sources: Sources) -> Iterator[Chapter]:
-    """What a page says of a profile, below its verdict."""
+    """Parts of a page about a profile, below its verdict."""
     several = len(bus_of(answer.profile).timing_models) > 1
     by_groups = bool(answer.profile.group)
     yield part("models", f"The timing model{'s, side by side' if several else ''}", _models(answer, sources))
@@ -130,7 +130,7 @@ def _terms(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 def _largest_term(answer: AllAnswers) -> Sentence:
     """Say which term takes most, by the model that decides."""
     deciding = answer.verdict.deciding
-    term = max(bus_of(answer.profile).figures.terms, key=lambda one: getattr(deciding, one.key))
+    term = max(bus_of(answer.profile).figures.terms, key=lambda figure: getattr(deciding, figure.key))
     return sentence(
         f"Of the {{}} that the cycle needs by the {deciding.timing_model} model, {term.label} takes the most, {{}}",
         attribute_value(REQUIRED, deciding),
@@ -203,7 +203,7 @@ def _over_period(
 
 
 def _shown_of(is_safe: bool) -> tuple[Figure, ...]:
-    """What is shown over the period: what is shown to fit, or the closed form of a model that decides nothing."""
+    """Figures over the period: nodes shown to fit, or the closed form of a model that does not affect the verdict."""
     return _OVER_PERIOD if is_safe else _CLOSED
 
 

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import TYPE_CHECKING, Final, NoReturn
 
 import numpy as np
 
 from busplan.errors import BusplanError
+from busplan.extras import require_extra, require_pyarrow
 from busplan.forms import ROWS_ENDINGS, RowsForm
 from busplan.forms.blocks import Report
 from busplan.forms.csv_rows import spelled
@@ -25,10 +26,15 @@ from busplan.questions.sweep.circle_run import sweep_blocks
 from busplan.questions.sweep.digest import Digest, default_columns
 from busplan.questions.sweep.execution import Here, Work, require_executor
 from busplan.questions.sweep.grid import Array, Grid
-from busplan.questions.sweep.plot import FigureData
+from busplan.questions.sweep.plot import FigureData, is_drawable
 from busplan.questions.sweep.rows import rows_writer
 from busplan.questions.sweep.values import axis_values
 from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import polars as pl
+    import pyarrow as pa
 
 __all__ = [
     "Digest",
@@ -51,16 +57,15 @@ _SHOWN: Final = 20
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
-class SweepAnswer(Answer):
-    """Answer of `sweep`: a table with a row for each point and timing model, in the order of the grid.
+class SweepAnswer(Answer, Mapping[str, Array]):
+    """Answer of `sweep`: columns by name, with a row for each point and timing model, in the order of the grid.
 
-    `answer["max_axes"]` is a new array of shape (rows,): numbers (NaN if missing) or words. Iterating gives the names
-    of the columns, `len(answer)` the number of rows.
+    `answer["max_axes"]` is a new array of shape (rows,): numbers (NaN if missing) or words ("" if missing).
 
     Parameters
     ----------
     sweep
-        What was asked.
+        The sweep as asked for.
     blocks
         The figures, block by block.
     """
@@ -99,11 +104,56 @@ class SweepAnswer(Answer):
         return iter(self.columns)
 
     def __len__(self) -> int:
-        return self.grid.points * len(self.timing_models)
+        return len(self.columns)
 
-    def keys(self) -> tuple[str, ...]:
-        """Names of all columns; `dict(answer)` is a table."""
-        return self.columns
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
+    # A mapping would compare its columns: arrays, which have no single truth.
+    __eq__, __hash__ = object.__eq__, object.__hash__
+
+    def __array__(self, *_: object, **__: object) -> NoReturn:
+        # pandas.DataFrame takes the columns of a dict alone; of this mapping it would make a column of their names.
+        raise BusplanError("columns of several types are no array; to_pandas() gives a data frame, dict(answer) a dict")
+
+    def to_arrow(self) -> "pa.Table":
+        """Make a table of Apache Arrow (extra `table`): typed columns with unit and meaning, null where none is.
+
+        Raises
+        ------
+        BusplanError
+            pyarrow is not installed.
+        """
+        require_pyarrow("to_arrow()")
+        from busplan.questions.sweep.parquet import arrow_table
+
+        return arrow_table(self.sweep, self.blocks)
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Make a data frame of pandas from `to_arrow`; words are categories.
+
+        Raises
+        ------
+        BusplanError
+            pandas or pyarrow is not installed.
+        """
+        require_extra("pandas", option="to_pandas()", module="pandas")
+        require_pyarrow("to_pandas()")
+        return self.to_arrow().to_pandas()
+
+    def to_polars(self) -> "pl.DataFrame":
+        """Make a data frame of polars from `to_arrow`; words are categories.
+
+        Raises
+        ------
+        BusplanError
+            polars or pyarrow is not installed.
+        """
+        require_extra("polars", option="to_polars()", module="polars")
+        require_pyarrow("to_polars()")
+        import polars as pl
+
+        return pl.DataFrame(self.to_arrow())
 
     def to_json(self) -> str:
         """Write the document of `busplan sweep --format json`."""
@@ -115,10 +165,23 @@ class SweepAnswer(Answer):
 
     def _svg(self) -> str:
         """The picture of `busplan sweep --plot`."""
-        drawn = FigureData(self.sweep)
+        return self._figure().svg(self.profile.name)
+
+    def _repr_svg_(self) -> str | None:
+        return self._svg() if is_drawable(self.grid) else None
+
+    def _repr_html_(self) -> str:
+        from busplan.forms.html import fragment
+
+        report = self._shown()
+        charts = [self._figure().chart()] if is_drawable(self.grid) else []
+        return fragment(report._replace(blocks=lambda: (*report.blocks(), *charts)))
+
+    def _figure(self) -> FigureData:
+        figure = FigureData(self.sweep)
         for block in self.blocks:
-            drawn.add(block)
-        return drawn.svg(self.profile.name)
+            figure.add(block)
+        return figure
 
     def _rows_in(self, form: RowsForm) -> bytes:
         """Every row in a form."""
@@ -192,7 +255,7 @@ def sweep(
     BusplanError
         Not a profile, an invalid key or value, a point whose circle test cannot be run, or too many points.
     Exception
-        What `executor` raises.
+        Any error that `executor` raises.
 
     References
     ----------
@@ -204,8 +267,8 @@ def sweep(
     >>> answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": [500, 1000, 4000]}, timing_model="standard")
     >>> answer["safe_axes"]
     array([ 4, 12, 52])
-    >>> answer["limited_by"].tolist(), len(answer)
-    (['time', 'time', 'time'], 3)
+    >>> answer["limited_by"].tolist()
+    ['time', 'time', 'time']
     """
     require_executor(executor, circle=circle)
     network = load_profile(profile)

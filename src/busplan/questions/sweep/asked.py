@@ -1,4 +1,4 @@
-"""What is asked of a sweep, checked."""
+"""A sweep as asked for: its keys, values and columns, checked."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -100,10 +100,10 @@ def checked_sweep(
 
 def column_figures(profile: Profile) -> dict[str, Figure]:
     """The registered figures of a sweep's columns, those of groups with the name of the group."""
-    found = by_key((*CIRCLE_FIGURES, *SUMMARY_FIGURES, *bus_of(profile).figures.capacity))
+    figures = by_key((*CIRCLE_FIGURES, *SUMMARY_FIGURES, *bus_of(profile).figures.capacity))
     groups = {
-        f"group.{one.name}.{key}": found[key]._replace(label=f"{found[key].label} of {one.name}")
-        for one in profile.group
+        f"group.{group.name}.{key}": figures[key]._replace(label=f"{figures[key].label} of {group.name}")
+        for group in profile.group
         for key in COUNTS
     }
-    return {**found, **groups}
+    return {**figures, **groups}

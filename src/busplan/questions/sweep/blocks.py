@@ -41,22 +41,21 @@ _CAUSES_KEPT: Final = 1 << 16
 """Most values of which the causes that refuse a circle are kept: about ten megabytes."""
 
 Word: TypeAlias = str | float | list[str] | None
-"""What stands in a column that is no array of numbers: a word, a value of a key that also takes words, a list, or
-nothing."""
+"""Cell of a column that is no array of numbers: a word, a value of a key that also takes words, a list, or nothing."""
 
 _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
 
 
 def figure_names(profile: Profile) -> tuple[str, ...]:
     """Columns of a sweep after the varied keys; `timing_model` is the first, counts of groups are the last."""
-    groups = (f"group.{one.name}.{key}" for one in profile.group for key in COUNTS)
+    groups = (f"group.{group.name}.{key}" for group in profile.group for key in COUNTS)
     return (*(figure.key for figure in bus_of(profile).figures.capacity), *groups)
 
 
 def word_figures(profile: Profile) -> tuple[str, ...]:
     """Columns whose values are words."""
     words = [figure.key for figure in bus_of(profile).figures.capacity if figure.sort in ("word", "words")]
-    return (*words, *(f"group.{one.name}.{key}" for one in profile.group for key in COUNTS if key in words))
+    return (*words, *(f"group.{group.name}.{key}" for group in profile.group for key in COUNTS if key in words))
 
 
 class Column(NamedTuple):
@@ -97,8 +96,8 @@ class SweepBlock(NamedTuple):
         return {name: self._value(self.columns(name)[model], where) for name in names}
 
     def _value(self, column: Column, where: tuple[np.intp, ...]) -> Word:
-        found: float = np.broadcast_to(column.values, self.chunk.shape)[where].item()
-        return found if column.words is None else column.words[int(found)]
+        number: float = np.broadcast_to(column.values, self.chunk.shape)[where].item()
+        return number if column.words is None else column.words[int(number)]
 
     def rows(self, name: str) -> Array:
         """One column as a flat array: point by point, and for each point timing model by timing model."""
@@ -143,14 +142,14 @@ def sweep(
     """
     causes_at = lru_cache(_CAUSES_KEPT)(partial(_causes, profile))
     for chunk in grid.chunks(chunk_points):
-        found = {model: _figures(profile, chunk.values, model, with_counts=with_counts) for model in timing_models}
+        by_model = {model: _figures(profile, chunk.values, model, with_counts=with_counts) for model in timing_models}
         decides = bus_of(profile).deciding_model
-        own = found[decides] if decides in found else _figures(profile, chunk.values, decides, with_counts=False)
+        own = by_model[decides] if decides in by_model else _figures(profile, chunk.values, decides, with_counts=False)
         refused = {CIRCLE_REFUSED_BY.key: _refused(profile, chunk, own[FITS.key].values, causes_at)}
         yield SweepBlock(
             chunk,
             {key: _varied(values) for key, values in chunk.values.items()},
-            tuple({**figures, **refused} for figures in found.values()),
+            tuple({**figures, **refused} for figures in by_model.values()),
         )
 
 
@@ -206,12 +205,12 @@ def _columns(where: Profile, model: str, *, axes: int, with_counts: bool) -> dic
         **own,
     }
     sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
-    found = {
+    columns = {
         key: words[key] if key in words else _number(numbers[key], sorts[key])
         for key in figure_names(network.profile)
         if key != CIRCLE_REFUSED_BY.key and (with_counts or key.rpartition(".")[2] not in COUNTS)
     }
-    return {name: column._replace(values=_with_axes(column.values, axes)) for name, column in found.items()}
+    return {name: column._replace(values=_with_axes(column.values, axes)) for name, column in columns.items()}
 
 
 _Causes: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
@@ -284,24 +283,24 @@ def _counts(network: Network, limits: Sequence[Limit], *, model: str) -> dict[st
     whole = {**dict.fromkeys(COUNTS, _NO_NUMBER), "limited_by": _NO_WORD, "safe_limited_by": _NO_WORD}
     if network.is_uniform:
         return _counts_of(network, limits, model=model)
-    each = ((name, _counts_of(network.asking(name), limits, model=model)) for name in network.names)
-    return {**whole, **{f"group.{name}.{key}": column for name, found in each for key, column in found.items()}}
+    counts = ((name, _counts_of(network.asking(name), limits, model=model)) for name in network.names)
+    return {**whole, **{f"group.{name}.{key}": column for name, columns in counts for key, column in columns.items()}}
 
 
 def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict[str, Column]:
     most, axes = most_nodes(network, limits), network.asked_nodes.node.axes
-    found = {
+    counted = {
         "max_nodes": _number(most.nodes, "count"),
         "max_axes": _number(axes * most.nodes, "count"),
         "limited_by": Column(np.asarray(most.limit, np.uint8), tuple(limit.key for limit in limits)),
     }
     if model != bus_of(network.profile).deciding_model:
-        return {**found, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _NO_WORD}
+        return {**counted, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _NO_WORD}
     to_be_safe = limits_to_be_safe(network)
     # No more nodes are shown to fit than fit.
     safe = most_nodes(network, to_be_safe, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
     return {
-        **found,
+        **counted,
         "safe_nodes": _number(safe.nodes, "count"),
         "safe_axes": _number(axes * safe.nodes, "count"),
         "safe_limited_by": Column(np.asarray(safe.limit, np.uint8), tuple(limit.key for limit in to_be_safe)),
@@ -310,11 +309,11 @@ def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict
 
 def _certainty(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Column]:
     """Figures of how sure the verdict is, of a cycle under the timing model that decides."""
-    found = certainty(cycle)
-    codes = {**limits, TIME: time_code(found, cycle.network)}
+    sure = certainty(cycle)
+    codes = {**limits, TIME: time_code(sure, cycle.network)}
     sorts = {figure.key: figure.sort for figure in CERTAINTY}
     return {
-        **{key: _number(number, sorts[key]) for key, number in certainty_numbers(found, cycle).items()},
+        **{key: _number(number, sorts[key]) for key, number in certainty_numbers(sure, cycle).items()},
         "not_shown": _sets(_where(codes, NOT_SHOWN_KEPT)),
         "verdict": Column(np.asarray(verdict_code(codes), np.uint8), VERDICTS),
     }
@@ -340,20 +339,20 @@ def _combinations(keys: tuple[str, ...]) -> tuple[list[str], ...]:
 
 def _typed(number: Number, sort: Sort) -> Array:
     """Array of the type that the sort of a figure has; NaN for what does not exist."""
-    found: Array = np.asarray(number, dtype=_TYPES[sort])
-    return np.where(np.isinf(found), np.nan, found) if sort == "number" else found
+    array: Array = np.asarray(number, dtype=_TYPES[sort])
+    return np.where(np.isinf(array), np.nan, array) if sort == "number" else array
 
 
 def _with_axes(values: Number, axes: int) -> Array:
-    found = np.asarray(values)
-    return found.reshape((1,) * axes) if found.ndim == 0 else found
+    array = np.asarray(values)
+    return array.reshape((1,) * axes) if array.ndim == 0 else array
 
 
 def _largest(terms: list[Number]) -> Array:
     """Index of the largest term; the first one among equals."""
-    best, *others = map(np.asarray, terms)
+    best, *rest = map(np.asarray, terms)
     place = np.zeros((), np.uint8)
-    for index, term in enumerate(others, start=1):
+    for index, term in enumerate(rest, start=1):
         place = np.where(np.greater(term, best), np.uint8(index), place)
         best = np.maximum(term, best)
     return place

@@ -57,7 +57,7 @@ def sweep_blocks(asked: Sweep, work: Work, *, chunk_points: int = CHUNK_POINTS) 
     BusplanError
         The first point whose circle test cannot be run, before any is run.
     Exception
-        What `work` raises.
+        Any error that `work` raises.
     """
     if asked.circle:
         cost = require_circles(asked, work)
@@ -92,8 +92,8 @@ def require_circles(asked: Sweep, work: Work) -> Estimate:
     where = work.executor if points > MOST_CIRCLES_UNASKED else Here()
     chunks = _chunks(asked.profile, enumerate(asked.grid.each_point()), _CHECKED_AT_ONCE)
     with work.progress("check of the points") as report:
-        for number, one in enumerate(run_in_order(where, check_chunk, chunks, watch=work.watch), start=1):
-            cost = cost.then(one)
+        for number, estimate in enumerate(run_in_order(where, check_chunk, chunks, watch=work.watch), start=1):
+            cost = cost.then(estimate)
             report(min(number * _CHECKED_AT_ONCE, points), points)
     cost = cost._replace(steps=asked.tests_each * cost.steps, time_s=asked.tests_each * cost.time_s)
     announce(cost)
@@ -123,8 +123,8 @@ def _circle_blocks(asked: Sweep, work: Work, report: Progress, *, cost: Estimate
     size = chunk_tests(asked.tests, time_s=cost.time_s)
     runs = groupby(enumerate(asked.test_points()), key=lambda test: kept is not None and test[0] in kept)
     chunks = (chunk for _, run in runs for chunk in _chunks(asked.profile, run, size))
-    found = run_in_order(work.executor, run_chunk, chunks, known=known, finished=finished, watch=work.watch)
-    results = (row for chunk in found for row in chunk)
+    chunk_results = run_in_order(work.executor, run_chunk, chunks, known=known, finished=finished, watch=work.watch)
+    results = (row for chunk in chunk_results for row in chunk)
     most = max(1, _within(asked.tests // _BLOCKS, _BLOCK_TESTS) // asked.tests_each)
     for block in sweep(asked.profile, asked.grid, timing_models=asked.timing_models, chunk_points=most):
         yield with_circles(block, results) if asked.seeds is None else with_seeds(block, results, asked.tests_each)

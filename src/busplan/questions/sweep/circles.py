@@ -68,7 +68,7 @@ def require_few(grid: Grid, *, seeds: int, option: str, consent: str) -> None:
     seeds
         Circle tests of each point.
     option, consent
-        What requests circle tests, and what allows any number, for messages.
+        Options that request circle tests and that allow any number, for messages.
 
     Raises
     ------

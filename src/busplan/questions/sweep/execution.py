@@ -115,7 +115,7 @@ def run_in_order(
     executor
         Where they run.
     function
-        What is done: for other processes, a function at the top of its module.
+        The work: for other processes, a function at the top of its module.
     tasks
         Its arguments; they are taken as there is room.
     known
@@ -135,7 +135,7 @@ def run_in_order(
     Raises
     ------
     Exception
-        What the first task that failed raised, after the results of those before it.
+        The error of the first task that failed, after the results of those before it.
     CancelledError
         The executor cancelled a task.
     """

@@ -41,13 +41,15 @@ class Listed(NamedTuple):
     def part(self, start: int, stop: int) -> Array:
         """Values from index `start` to before `stop`."""
         # All parts of the axis have one type.
-        common = object if self.has_words else float if any(isinstance(one, float) for one in self.values) else np.int64
+        common = (
+            object if self.has_words else float if any(isinstance(value, float) for value in self.values) else np.int64
+        )
         return np.array(self.values[start:stop], dtype=common)
 
     @property
     def has_words(self) -> bool:
         """Whether a value is a word."""
-        return any(isinstance(one, str | bool) for one in self.values)
+        return any(isinstance(value, str | bool) for value in self.values)
 
 
 class Steps(NamedTuple):
@@ -221,9 +223,9 @@ def require_keys(profile: Profile, keys: Iterable[str], *, option: str, circle_o
     keys
         Dotted keys.
     option
-        What gives them, for messages.
+        Option that gives them, for messages.
     circle_option
-        What requests circle tests, for messages; None where they are run.
+        Option that requests circle tests, for messages; None where they are run.
 
     Raises
     ------
@@ -247,7 +249,7 @@ def grid_models(profile: Profile, grid: Grid, asked: Sequence[str] | None, *, na
     asked
         Names of timing models; by default all that can.
     name
-        What messages call them.
+        Name of the timing models in messages.
 
     Raises
     ------
@@ -257,10 +259,10 @@ def grid_models(profile: Profile, grid: Grid, asked: Sequence[str] | None, *, na
     variants = [override(profile, {key: value}) for key, axis in grid.axes.items() for value in _samples(axis)]
     if asked is not None:
         for model in asked:
-            for one in variants:
-                known_model(one, model, name=name)
+            for variant in variants:
+                known_model(variant, model, name=name)
         return tuple(asked)
-    return tuple(model for model in model_names(profile) if all(model in model_names(one) for one in variants))
+    return tuple(model for model in model_names(profile) if all(model in model_names(variant) for variant in variants))
 
 
 def _require_known(profile: Profile, key: str, *, name: str) -> None:
@@ -273,7 +275,7 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
     if not isinstance(table, dict) or last not in table:
         section = ".".join(tables)
         siblings = list(table) if isinstance(table, dict) and tables else []
-        close = [f"{section}.{one}" for one in get_close_matches(last, siblings, n=1, cutoff=0.7)]
+        close = [f"{section}.{sibling}" for sibling in get_close_matches(last, siblings, n=1, cutoff=0.7)]
         read = cycle_keys(profile)
         close = close or get_close_matches(key, read, n=1, cutoff=0.8) * (not siblings)
         known = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(read)}"
@@ -300,9 +302,9 @@ def _samples(axis: Values) -> list[Value]:
     if isinstance(axis, Listed):
         if axis.size <= _CHECKED_EACH:
             return list(dict.fromkeys(axis.values))
-        numbers = [one for one in axis.values if not isinstance(one, str | bool)]
+        numbers = [value for value in axis.values if not isinstance(value, str | bool)]
         # A fraction among whole numbers may lie between the extremes.
-        fractions = [one for one in numbers if isinstance(one, float)][:1]
+        fractions = [value for value in numbers if isinstance(value, float)][:1]
         words = set(axis.values) - set(numbers)
         return [*dict.fromkeys((axis.values[0], min(numbers), max(numbers), *fractions, *words))]
     # In equal steps from a whole number, the second value is a fraction if any is.
@@ -312,9 +314,9 @@ def _samples(axis: Values) -> list[Value]:
 
 
 def _least(values: list[Value]) -> Value:
-    return min((one for one in values if not isinstance(one, str | bool)), default=values[0])
+    return min((value for value in values if not isinstance(value, str | bool)), default=values[0])
 
 
 def _greatest(values: list[Value]) -> Value:
-    words = [one for one in values if isinstance(one, str | bool)]
+    words = [value for value in values if isinstance(value, str | bool)]
     return words[0] if words else max(values)

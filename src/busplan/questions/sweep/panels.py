@@ -7,11 +7,12 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from busplan.forms.blocks import Drawing
 from busplan.forms.picture import styled
 from busplan.forms.plot_area import MARGIN_PERCENT, PlotArea, Ruler, choices, draw_across, draw_plot_area, numbers
 from busplan.forms.svg import LINE, PHONE, drawing, inside, markup, paragraph, text_at
 from busplan.questions.sweep.grid import Array
-from busplan.questions.sweep.plotted import Panel, PlotScale, Plotted, caption
+from busplan.questions.sweep.plotted import Panel, PlotScale, Plotted, caption, is_constant, value_text
 from busplan.questions.words.drawings import CURVES, draw_mark
 
 _CURVES: Final = 300
@@ -39,6 +40,7 @@ _STYLE: Final = """\
 .chart .border { fill: none; stroke: #10151c; stroke-width: 2.2; vector-effect: non-scaling-stroke; }
 .chart .below { fill: none; stroke: #ffffff; stroke-width: 4.4; }
 .chart .above { fill: none; stroke: #10151c; stroke-width: 1.8; }
+.chart .unproven { fill: var(--rule); opacity: .6; }
 .chart .blank { fill: none; stroke: var(--rule); }
 """
 
@@ -51,16 +53,40 @@ def sweep_svg(plotted: Plotted, *, title: str) -> str:
     Parameters
     ----------
     plotted
-        What is drawn.
+        The figure, its scales and its values.
     title
         Title of the picture.
     """
     root = drawing(caption(plotted), css="chart sweep")
     body = inside(root, x_percent=MARGIN_PERCENT, width_percent=100 - 2 * MARGIN_PERCENT, y=0)
     y = paragraph(body, caption(plotted), y=paragraph(body, title, y=8, css="head"), css="small") + _GAP
+    return styled(_drawn(root, body, plotted, y=y), css=_STYLE)
+
+
+class SweepDrawing(Drawing):
+    """The picture of a sweep for a page, which has its title, caption and style sheet.
+
+    Parameters
+    ----------
+    plotted
+        The figure, its scales and its values.
+    """
+
+    stylesheet = _STYLE
+
+    def __init__(self, plotted: Plotted) -> None:
+        self._plotted = plotted
+
+    def svg(self) -> str:
+        """Draw it for a page."""
+        root = drawing(caption(self._plotted), css="chart sweep")
+        return _drawn(root, root, self._plotted, y=0)
+
+
+def _drawn(root: Element, body: Element, plotted: Plotted, *, y: int) -> str:
     y = (_curves if len(plotted.scales) == 1 else _maps)(body, plotted, y=y)
     root.set("height", str(y + _GAP))
-    return styled(markup(root), css=_STYLE)
+    return markup(root)
 
 
 def _ruler(scale: PlotScale, *, as_cells: bool) -> Ruler:
@@ -83,6 +109,8 @@ def _curves(body: Element, plotted: Plotted, *, y: int) -> int:
     room = _ROOM * (high - low)
     up = numbers(plotted.label, low - room if low else low, high + room if high else high, whole=is_count)
     plot = draw_plot_area(body, _ruler(scale, as_cells=False), up, y=y, height=_CURVES)
+    for panel in plotted.panels:
+        _unproven(plot, scale, panel)
     if plotted.has_zero:
         plot.line(y=0.0, css="limit")
     if scale.own is not None:
@@ -97,8 +125,10 @@ def _curves(body: Element, plotted: Plotted, *, y: int) -> int:
 
 def _ends(plotted: Plotted) -> tuple[float, float]:
     """Smallest and largest value."""
-    known = [one.values[np.isfinite(one.values)] for one in plotted.panels]
-    return (float(min(one.min() for one in known)), float(max(one.max() for one in known))) if known else (0.0, 0.0)
+    known = [panel.values[np.isfinite(panel.values)] for panel in plotted.panels]
+    if not known:
+        return 0.0, 0.0
+    return float(min(values.min() for values in known)), float(max(values.max() for values in known))
 
 
 def _curve(plot: PlotArea, scale: PlotScale, panel: Panel) -> None:
@@ -119,13 +149,28 @@ def _curve(plot: PlotArea, scale: PlotScale, panel: Panel) -> None:
             draw_mark(plot.area, css, x=plot.x(x), y=plot.y(y))
 
 
+def _unproven(plot: PlotArea, scale: PlotScale, panel: Panel) -> None:
+    """Shade the settings that are not shown to fit, to the middle between neighbours."""
+    if panel.frontier is None:
+        return
+    middles = (scale.places[1:] + scale.places[:-1]) / 2
+    edges = [plot.across.low, *middles.tolist(), plot.across.high]
+    d = "".join(
+        f"M{plot.point(left, plot.up.low)}L{plot.point(left, plot.up.high)}"
+        f"L{plot.point(right, plot.up.high)}L{plot.point(right, plot.up.low)}Z"
+        for (left, right), fits in zip(pairwise(edges), panel.frontier.tolist(), strict=True)
+        if not fits
+    )
+    SubElement(plot.paths, "path", {"class": "unproven", "d": d})
+
+
 def _css(panel: Panel) -> str:
     return CURVES[panel.number % len(CURVES)]
 
 
 def _cross(place: Element, *css: str) -> None:
-    for one in css:
-        SubElement(place, "path", {"d": _CROSS, "class": one})
+    for name in css:
+        SubElement(place, "path", {"d": _CROSS, "class": name})
 
 
 def _legend_of_curves(body: Element, plotted: Plotted, *, y: int) -> int:
@@ -141,6 +186,9 @@ def _legend_of_curves(body: Element, plotted: Plotted, *, y: int) -> int:
     if plotted.scales[0].own is not None:
         _sample(body, y, "own")
         y = _entry(body, "this design", y)
+    if any(panel.frontier is not None for panel in plotted.panels):
+        SubElement(body, "rect", {"x": "0", "y": str(y + 4), "width": "28", "height": "12", "class": "unproven"})
+        y = _entry(body, "not shown to fit", y)
     return _unsafe_entry(body, plotted, y)
 
 
@@ -174,31 +222,40 @@ class _Colours(NamedTuple):
 
 
 def _maps(body: Element, plotted: Plotted, *, y: int) -> int:
-    """Draw a heat map for each timing model, all with the same colours, and return the y below them."""
+    """Draw a heat map for each timing model, all with the same colours, and return the y below them.
+
+    A figure that is the same at every setting is said, not drawn.
+    """
     up, across = plotted.scales
+    for panel in plotted.panels:
+        if is_constant(panel.values) and panel is not plotted.told:  # the caption tells of that
+            words = f"{panel.model} model: {value_text(plotted, float(panel.values.flat[0]))} at every setting"
+            y = paragraph(body, words, y=y, css="head")
+    plotted = plotted._replace(panels=tuple(panel for panel in plotted.panels if not is_constant(panel.values)))
+    if not plotted.panels:
+        return y
     low, high = _ends(plotted)
     colours = _Colours(*((min(low, 0.0), max(high, 0.0)) if plotted.has_zero else (low, high)), plotted.has_zero)
     for panel in plotted.panels:
         y = paragraph(body, f"{panel.model} model", y=y, css="head")
         height = min(_MOST_MAP, max(_LEAST_MAP, _CELL * up.places.size))
-        rulers = (_ruler(one, as_cells=True) for one in (across, up))
+        rulers = (_ruler(scale, as_cells=True) for scale in (across, up))
         plot = draw_plot_area(body, *rulers, y=y, height=height)
         _cells(plot, plotted, panel, colours)
         y = plot.bottom + _GAP
-    if plotted.panels:
-        y = _bar(body, plotted, colours, y=y) + _GAP
-    return _legend_of_maps(body, plotted, y=y)
+    return _legend_of_maps(body, plotted, y=_bar(body, plotted, colours, y=y) + _GAP)
 
 
 def _cells(plot: PlotArea, plotted: Plotted, panel: Panel, colours: _Colours) -> None:
-    """Draw the cells, the line of zero, the unsafe cells and this design."""
+    """Draw the cells, the frontier of the verdict or of zero, the unsafe cells and this design."""
     up, across = plotted.scales
     x, y = _edges(across.places), _edges(up.places)
     area = SubElement(plot.paths, "g", {"class": "cells"})
     for level, d in _runs(plot, panel.values, colours, x, y):
         SubElement(area, "path", {"d": d, "fill": colours.colour(level)})
-    if plotted.has_zero:
-        d = "".join(f"M{plot.point(*start)}L{plot.point(*end)}" for start, end in _border(panel.values, x, y))
+    if panel.fits is not None or plotted.has_zero:
+        fits = np.where(np.isfinite(panel.values), panel.values >= 0, np.nan) if panel.fits is None else panel.fits
+        d = "".join(f"M{plot.point(*start)}L{plot.point(*end)}" for start, end in _border(fits.astype(float), x, y))
         SubElement(plot.paths, "path", {"class": "border", "d": d})
     rows, columns = np.nonzero(panel.unsafe)
     every = -(-rows.size // _MOST_CROSSED) or 1
@@ -231,9 +288,9 @@ def _edges(places: Array) -> Array:
     return np.append(places - half, places[-1] + half)
 
 
-def _border(values: Array, x: Array, y: Array) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
-    """Edges between cells of zero or more and cells below zero."""
-    fits, known = values >= 0, np.isfinite(values)
+def _border(fits: Array, x: Array, y: Array) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+    """Edges between cells of 1 and cells of 0; NaN has none."""
+    known = np.isfinite(fits)
     for row, column in zip(*np.nonzero((fits[:, 1:] != fits[:, :-1]) & known[:, 1:] & known[:, :-1]), strict=True):
         yield (x[column + 1], y[row]), (x[column + 1], y[row + 1])
     for row, column in zip(*np.nonzero((fits[1:] != fits[:-1]) & known[1:] & known[:-1]), strict=True):
@@ -258,14 +315,18 @@ def _bar(body: Element, plotted: Plotted, colours: _Colours, *, y: int) -> int:
 
 
 def _legend_of_maps(body: Element, plotted: Plotted, *, y: int) -> int:
-    if plotted.has_zero:
+    if any(panel.frontier is not None for panel in plotted.panels):
         _sample(body, y, "zero")
-        y = _entry(body, _zero(plotted), y)
+        y = _entry(body, "edge of the settings that are shown to fit", y)
+    without_verdict = [panel.model for panel in plotted.panels if panel.fits is None]
+    if plotted.has_zero and without_verdict:
+        _sample(body, y, "zero")
+        y = _entry(body, f"{_zero(plotted)} ({', '.join(without_verdict)} model)", y)
     y = _unsafe_entry(body, plotted, y)
-    if all(one.own is not None for one in plotted.scales):
+    if all(scale.own is not None for scale in plotted.scales):
         SubElement(body, "circle", {"cx": "14", "cy": str(y + 10), "r": "6", "class": "cross"})
         y = _entry(body, "this design", y)
-    if any(np.isnan(one.values).any() for one in plotted.panels):
+    if any(np.isnan(panel.values).any() for panel in plotted.panels):
         SubElement(body, "rect", {"x": "7", "y": str(y + 4), "width": "14", "height": "12", "class": "blank"})
         y = _entry(body, "blank: no value", y)
     return y

@@ -5,7 +5,7 @@ meaning as metadata, the schema has the profile.
 """
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from types import MappingProxyType
@@ -57,6 +57,16 @@ def table_schema(sweep: Sweep) -> pa.Schema:
     return pa.schema(fields, metadata=metadata)
 
 
+def arrow_table(sweep: Sweep, blocks: Iterable[SweepBlock]) -> pa.Table:
+    """Table of some blocks; each text is once in the dictionary of its column."""
+    schema = table_schema(sweep)
+    return pa.concat_tables([_table(schema, block) for block in blocks]).unify_dictionaries()
+
+
+def _table(schema: pa.Schema, block: SweepBlock) -> pa.Table:
+    return pa.table([_array(block, field.name, field.type) for field in schema], schema=schema)
+
+
 def _axis_field(key: str, axis: Values) -> pa.Field:
     return pa.field(key, _axis_type(axis), metadata={"unit": unit_of(key)})
 
@@ -68,7 +78,7 @@ def _field(name: str, figure: Figure) -> pa.Field:
 def _axis_type(axis: Values) -> pa.DataType:
     values = axis.part(0, axis.size if axis.has_words else 1)
     if values.dtype == object:
-        return pa.bool_() if all(isinstance(one, bool) for one in values) else _WORDS
+        return pa.bool_() if all(isinstance(value, bool) for value in values) else _WORDS
     return pa.from_numpy_dtype(values.dtype)
 
 
@@ -87,11 +97,11 @@ def _words(block: SweepBlock, name: str) -> pa.Array:
     texts = [[str(spelled(word)) for word in column.words or ()] for column in columns]
     known = dict.fromkeys(text for own in texts for text in own if text)
     codes = {text: code for code, text in enumerate(known)}
-    found = [
-        np.array([codes.get(text, -1) for text in own], dtype=np.int32)[one.values]
-        for own, one in zip(texts, columns, strict=True)
+    own_codes = [
+        np.array([codes.get(text, -1) for text in own], dtype=np.int32)[column.values]
+        for own, column in zip(texts, columns, strict=True)
     ]
-    values = block.interleaved(found)
+    values = block.interleaved(own_codes)
     indices = pa.array(values, mask=values < 0)
     return pa.DictionaryArray.from_arrays(indices, pa.array(list(known), type=pa.string()))
 
@@ -109,7 +119,7 @@ class ParquetWriter:
     Parameters
     ----------
     sweep
-        What the rows are of.
+        The sweep that gives the rows.
     write
         Writes bytes to the destination, which need not be seekable.
     """
@@ -123,8 +133,7 @@ class ParquetWriter:
 
     def add(self, block: SweepBlock) -> None:
         """Add a block."""
-        arrays = [_array(block, field.name, field.type) for field in self._schema]
-        self._pending.append(pa.table(arrays, schema=self._schema))
+        self._pending.append(_table(self._schema, block))
         if sum(part.num_rows for part in self._pending) >= GROUP_ROWS:
             self._write_group()
 

@@ -4,13 +4,16 @@ from typing import Final
 
 import numpy as np
 
+from busplan.buses.figure import VERDICT
 from busplan.errors import BusplanError
+from busplan.forms.blocks import Chart, Sentence
+from busplan.questions.fit.certainty import FITS, VERDICTS
 from busplan.questions.fit.network import bus_of
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import SweepBlock
 from busplan.questions.sweep.grid import Grid
-from busplan.questions.sweep.panels import sweep_svg
-from busplan.questions.sweep.plotted import Panel, Plotted, key_label, plot_scale, plotted_figure
+from busplan.questions.sweep.panels import SweepDrawing, sweep_svg
+from busplan.questions.sweep.plotted import Panel, Plotted, caption, is_constant, key_label, plot_scale, plotted_figure
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
@@ -19,20 +22,26 @@ MAX_DRAWN: Final = 250_000
 _MAX_KEYS: Final = 2
 
 
-def _default_figure(profile: Profile) -> str:
-    """Column that is drawn if none is asked for; of groups, the most axes are no single number."""
-    return "margin_corrected_us" if profile.group else "safe_axes"
+def _default_figures(profile: Profile) -> tuple[str, ...]:
+    """Columns of which the first that varies is drawn, if none is asked for."""
+    margins = ("margin_corrected_us", "margin_us")
+    # Of groups, the most axes are no single number.
+    return margins if profile.group else ("safe_axes", *margins)
 
 
-def _require_drawable(grid: Grid, *, option: str) -> None:
-    """Refuse a grid that cannot be drawn."""
+def is_drawable(grid: Grid) -> bool:
+    """Whether a figure over a grid can be drawn."""
+    return not _not_drawable(grid)
+
+
+def _not_drawable(grid: Grid) -> str:
+    """The reason why a figure over a grid cannot be drawn; empty if it can."""
     varied = [key for key, axis in grid.axes.items() if axis.size > 1]
     if not grid.axes:
-        raise BusplanError(f"{option}: draws figures over one or two keys, and none varies but the seed; vary another")
+        return "draws figures over one or two keys, and none varies but the seed; vary another"
     if len(varied) > _MAX_KEYS:
-        raise BusplanError(f"{option}: draws one or two keys, and {', '.join(varied)} vary; give the others one value")
-    if grid.points > MAX_DRAWN:
-        raise BusplanError(f"{option}: {grid.points:,} points; a figure shows at most {MAX_DRAWN:,}")
+        return f"draws one or two keys, and {', '.join(varied)} vary; give the others one value"
+    return f"{grid.points:,} points; a figure shows at most {MAX_DRAWN:,}" if grid.points > MAX_DRAWN else ""
 
 
 class FigureData:
@@ -43,9 +52,9 @@ class FigureData:
     sweep
         The sweep; its profile is this design, which the picture marks.
     figure
-        Name of the column; by default the safe axes, or of groups the margin.
+        Name of the column; by default the safe axes or, of groups and where these do not vary, the corrected margin.
     option
-        What asks for the picture, for messages.
+        Name of the option that asks for the picture, for messages.
 
     Raises
     ------
@@ -54,18 +63,25 @@ class FigureData:
     """
 
     def __init__(self, sweep: Sweep, *, figure: str | None = None, option: str = "the picture of a sweep") -> None:
-        _require_drawable(sweep.grid, option=option)
+        if reason := _not_drawable(sweep.grid):
+            raise BusplanError(f"{option}: {reason}")
         self._profile, self._grid, self._models = sweep.profile, sweep.grid, sweep.timing_models
-        self._name = figure or _default_figure(sweep.profile)
         points = self._grid.points, len(self._models)
-        self._values, self._unsafe = np.full(points, np.nan), np.zeros(points, dtype=bool)
+        names = (figure,) if figure else _default_figures(sweep.profile)
+        self._values = {name: np.full(points, np.nan) for name in names}
+        self._unsafe, self._fits = np.zeros(points, dtype=bool), np.zeros(points[0], dtype=bool)
 
     def add(self, block: SweepBlock) -> None:
         """Add a block."""
         points = slice(block.chunk.start, block.chunk.start + block.chunk.points)
-        self._values[points] = block.rows(self._name).reshape(-1, len(self._models))
-        safety = bus_of(self._profile).safety.figure
-        for number, safe in enumerate(block.columns(safety.key) if safety else ()):
+        for name, values in self._values.items():
+            values[points] = block.rows(name).reshape(-1, len(self._models))
+        bus = bus_of(self._profile)
+        if bus.deciding_model in self._models:
+            verdicts = block.columns(VERDICT.key)[self._models.index(bus.deciding_model)]
+            fits = np.equal(verdicts.values, VERDICTS.index(FITS))
+            self._fits[points] = np.broadcast_to(fits, block.chunk.shape).ravel()
+        for number, safe in enumerate(block.columns(bus.safety.figure.key) if bus.safety.figure else ()):
             unsafe = ~safe.are_true.astype(bool) & ~safe.are_missing.astype(bool)
             self._unsafe[points, number] = np.broadcast_to(unsafe, block.chunk.shape).ravel()
 
@@ -80,24 +96,41 @@ class FigureData:
         plotted = self.plotted()
         return sweep_svg(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
 
+    def chart(self) -> Chart:
+        """The picture as a block of a page."""
+        plotted = self.plotted()
+        return Chart(SweepDrawing(plotted), Sentence((caption(plotted),)))
+
     def plotted(self) -> Plotted:
-        """What is drawn, in words and in its unit."""
+        """The picture's content, in words and in the unit of the figure."""
         keys = self._varied()
-        figure, factor = plotted_figure(self._profile, self._name)
-        shape = tuple(self._grid.axes[key].size for key in keys)
+        name = self._drawn()
+        figure, factor = plotted_figure(self._profile, name)
+        shape, bus = tuple(self._grid.axes[key].size for key in keys), bus_of(self._profile)
         panels = tuple(
-            Panel(model, number, factor * values.reshape(shape), unsafe.reshape(shape))
+            Panel(
+                model,
+                number,
+                factor * values.reshape(shape),
+                unsafe.reshape(shape),
+                self._fits.reshape(shape) if model == bus.deciding_model else None,
+            )
             for number, (model, values, unsafe) in enumerate(
-                zip(self._models, self._values.T, self._unsafe.T, strict=True)
+                zip(self._models, self._values[name].T, self._unsafe.T, strict=True)
             )
             if not np.isnan(values).all()  # a figure that the model does not have
         )
         as_cells = len(keys) == _MAX_KEYS
         scales = tuple(plot_scale(self._profile, key, self._grid.axes[key], as_cells=as_cells) for key in keys)
         if not self._is_own():
-            scales = tuple(one._replace(own=None) for one in scales)
-        bus = bus_of(self._profile)
+            scales = tuple(scale._replace(own=None) for scale in scales)
         return Plotted(figure, scales, panels, bus.deciding_model, bus.safety.setting)
+
+    def _drawn(self) -> str:
+        """Name of the first figure that varies; if none does, of the first that a timing model has."""
+        known = {name: values for name, values in self._values.items() if not np.isnan(values).all()}
+        varying = (name for name, values in known.items() if not all(map(is_constant, values.T)))
+        return next(varying, next(iter(known or self._values)))
 
     def _varied(self) -> list[str]:
         """Keys with several values; the only key if none has."""

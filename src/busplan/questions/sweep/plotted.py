@@ -23,7 +23,7 @@ class PlotScale(NamedTuple):
     """One varied key along an axis."""
 
     label: str
-    """What it is, with its unit."""
+    """Quantity along the axis, with its unit."""
     places: Array
     """Where its values stand: the values themselves, or 0, 1, 2 and so on for choices."""
     labels: tuple[str, ...]
@@ -64,7 +64,7 @@ def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> P
     if not are_choices:
         inside = isinstance(own, int | float) and values.min() <= own <= values.max()
         return PlotScale(label, values, (), whole, float(own) if inside else None)
-    names = tuple(_name(one) for one in values.tolist())
+    names = tuple(_name(value) for value in values.tolist())
     place = names.index(_name(own)) if _name(own) in names else None
     return PlotScale(label, np.arange(values.size), names, whole, place)
 
@@ -89,7 +89,7 @@ def key_label(profile: Profile, key: str) -> str:
     >>> [key_label(profile, key) for key in ("cycle.period_us", "bus.gap_count", "payload.read_bytes")]
     ['period T_s, us', 'gap count', 'payload read, bytes']
     """
-    setup = {f"bus.{one.key}": one for one in bus_of(profile).figures.setup}
+    setup = {f"bus.{setting.key}": setting for setting in bus_of(profile).figures.setup}
     figure = {"cycle.period_us": PERIOD, "bus.nodes": NODES, **setup}.get(key)
     if figure is not None:
         return figure_label(figure)
@@ -130,6 +130,19 @@ class Panel(NamedTuple):
     """In the unit of the label, shaped as the scales; NaN for a missing value."""
     unsafe: Array
     """Where the network is not set safely."""
+    fits: Array | None
+    """Where the cycle is shown to fit; None under a model that does not decide."""
+
+    @property
+    def frontier(self) -> Array | None:
+        """`fits`, if it is not the same at all points."""
+        return self.fits if self.fits is not None and self.fits.any() and not self.fits.all() else None
+
+
+def is_constant(values: Array) -> bool:
+    """Whether all values are the same number, or missing."""
+    known = values[np.isfinite(values)]
+    return bool((known == known[:1]).all()) and known.size in (0, values.size)
 
 
 class Plotted(NamedTuple):
@@ -142,11 +155,11 @@ class Plotted(NamedTuple):
     deciding: str
     """The timing model that decides."""
     safety: str
-    """What must be set safely on this kind of bus."""
+    """The setting of this kind of bus that must be safe."""
 
     @property
     def label(self) -> str:
-        """What is drawn, with its unit."""
+        """The figure drawn, with its unit."""
         return figure_label(self.figure)
 
     @property
@@ -156,45 +169,61 @@ class Plotted(NamedTuple):
 
     @property
     def any_unsafe(self) -> bool:
-        """Whether a point is not set safely."""
-        return any(bool(one.unsafe.any()) for one in self.panels)
+        """Whether any point is set unsafely."""
+        return any(bool(panel.unsafe.any()) for panel in self.panels)
 
     @property
     def told(self) -> Panel | None:
         """The panel that the caption tells of: that of the model that decides, where it has one."""
-        return next((one for one in self.panels if one.model == self.deciding), next(iter(self.panels), None))
+        return next((panel for panel in self.panels if panel.model == self.deciding), next(iter(self.panels), None))
 
     def value_at_own(self, panel: Panel) -> float | None:
         """The figure at this design; None if it is no point of the grid."""
         places = []
-        for one in self.scales:
-            found = np.flatnonzero(one.places == one.own) if one.own is not None else np.array([], dtype=int)
-            if not found.size:
+        for scale in self.scales:
+            at_own = np.flatnonzero(scale.places == scale.own) if scale.own is not None else np.array([], dtype=int)
+            if not at_own.size:
                 return None
-            places.append(int(found[0]))
+            places.append(int(at_own[0]))
         value = float(panel.values[tuple(places)])
         return None if np.isnan(value) else value
 
 
 def caption(plotted: Plotted) -> str:
-    """Say in one sentence what the figure shows."""
+    """Say what the figure shows, and where the cycle is shown to fit."""
     panel = plotted.told
     if panel is None:
         return f"No timing model gives {plotted.figure.label or plotted.figure.key} here."
     known = panel.values[np.isfinite(panel.values)]
     own = plotted.value_at_own(panel)
     by = f"by the {panel.model} model"
-    design = "" if own is None else f"; this design has {_text(plotted, own)}"
+    design = "" if own is None else f"; this design has {value_text(plotted, own)}"
     name = plotted.figure.label or plotted.figure.key
-    if plotted.has_zero and known.min() < 0 <= known.max():
+    if plotted.has_zero and panel.fits is None and known.min() < 0 <= known.max():
         fitting, line = int((known >= 0).sum()), "line" if len(plotted.scales) > 1 else "dashed line"
         settings = f"{fitting:,} of {known.size:,} settings"
         return f"A {name} of 0 or more in {settings} {by}, on one side of the {line}{design}."
-    least, most = _text(plotted, float(known.min())), _text(plotted, float(known.max()))
-    spread = least if least == most else f"{least} to {most}"
-    return f"{name[:1].upper()}{name[1:]} {by}: {spread}{design}."
+    least, most = value_text(plotted, float(known.min())), value_text(plotted, float(known.max()))
+    spread = f"{least} to {most}"
+    if least == most:
+        spread = f"{least} at every setting" if known.size > 1 else least
+    return f"{name[:1].upper()}{name[1:]} {by}: {spread}{design}.{_fitting(plotted, panel)}"
 
 
-def _text(plotted: Plotted, value: float) -> str:
+def _fitting(plotted: Plotted, panel: Panel) -> str:
+    """Say at how many settings the cycle is shown to fit, and how they are drawn."""
+    if panel.fits is None:
+        return ""
+    fitting, settings = int(panel.fits.sum()), panel.fits.size
+    if panel.frontier is None:
+        return " Every setting is shown to fit." if fitting else " No setting is shown to fit."
+    drawn = ", outside the grey"
+    if len(plotted.scales) > 1:
+        drawn = "" if is_constant(panel.values) else ", on one side of the line"
+    return f" Shown to fit: {fitting:,} of {settings:,} settings{drawn}."
+
+
+def value_text(plotted: Plotted, value: float) -> str:
+    """Write a value of the figure with its unit."""
     unit = plotted.figure.column or plotted.figure.unit
     return with_unit(ShownValue(value, unit=unit, digits=_DIGITS))

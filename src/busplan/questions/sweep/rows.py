@@ -21,7 +21,7 @@ TEXT_POINTS: Final = 4096
 
 
 def sweep_facts(sweep: Sweep) -> JsonDocument:
-    """What a reader must know besides the rows, and how many there are."""
+    """Description of the sweep that comes with its rows: profile, keys, timing models and counts."""
     facts = document(
         "sweep",
         profile=sweep.profile.name,
@@ -65,7 +65,7 @@ class TextWriter:
     form
         "csv"; "jsonl", whose first line describes the sweep; or "json", one document.
     sweep
-        What the rows are of.
+        The sweep that gives the rows.
     write
         Writes bytes to the destination.
     """
@@ -112,15 +112,17 @@ def _texts_by_model(block: SweepBlock, name: str, *, is_json: bool) -> list[Arra
     """Texts of one column under each timing model; what is the same under several is written once."""
     columns = block.columns(name)
     front = f"{json_text(name)}: " if is_json else ""
-    found: list[Array] = []
+    written: list[Array] = []
     for column in columns:
-        same = next((texts for texts, other in zip(found, columns, strict=False) if _is_same(column, other)), None)
-        found.append(_texts(column, front, is_json=is_json) if same is None else same)
-    return found
+        same = next(
+            (texts for texts, earlier in zip(written, columns, strict=False) if _is_same(column, earlier)), None
+        )
+        written.append(_texts(column, front, is_json=is_json) if same is None else same)
+    return written
 
 
-def _is_same(one: Column, other: Column) -> bool:
-    return one.words == other.words and np.array_equal(one.values, other.values)
+def _is_same(column: Column, earlier: Column) -> bool:
+    return column.words == earlier.words and np.array_equal(column.values, earlier.values)
 
 
 def _texts(column: Column, front: str, *, is_json: bool) -> Array:
@@ -160,7 +162,7 @@ def rows_writer(form: RowsForm, sweep: Sweep, write: Callable[[bytes], object]) 
     form
         The form.
     sweep
-        What the rows are of.
+        The sweep that gives the rows.
     write
         Writes bytes to the destination.
     """

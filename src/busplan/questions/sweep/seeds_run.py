@@ -69,7 +69,7 @@ SUMMARY_FIGURES: Final = (
     ),
     *(_figure(key, part) for key in _SPREAD for part in _PARTS),
 )
-"""What stands instead of the columns of circle tests."""
+"""Figures of a summary, in place of the columns of circle tests."""
 SUMMARY_COLUMNS: Final = tuple(figure.key for figure in SUMMARY_FIGURES)
 
 
@@ -81,7 +81,7 @@ def without_seed(grid: Grid, *, option: str) -> tuple[Grid, Values]:
     grid
         All varied keys.
     option
-        What asks for a summary, and what gives the values, for messages.
+        Names of the option that asks for a summary and of the option that gives the values, for messages.
 
     Raises
     ------

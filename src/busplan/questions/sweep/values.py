@@ -101,18 +101,18 @@ def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) 
     BusplanError
         No values, one that is not allowed, or a repeated one.
     """
-    found: dict[int | float | str, None] = {}
+    unique: dict[int | float | str, None] = {}
     for given in values:
         value = _TRUTHS.get(given, given) if isinstance(given, str) and given in words else given
         if not _is_value(value, words):
             known = f" and none of {', '.join(words)}" if words else ""
             raise BusplanError(f"{name}: {value!r} is not a finite number{known}")
-        if value in found:
+        if value in unique:
             raise BusplanError(f"{name}: {value} is given twice")
-        found[int(value) if isinstance(value, float) and _is_whole(value) else value] = None
-    if not found:
+        unique[int(value) if isinstance(value, float) and _is_whole(value) else value] = None
+    if not unique:
         raise BusplanError(f"{name}: no values; give at least one")
-    return Listed(tuple(found))
+    return Listed(tuple(unique))
 
 
 def stepped(values: range, *, name: str) -> Steps:
@@ -165,8 +165,8 @@ def _range(name: str, text: str) -> Values:
 def _steps(name: str, first: Decimal, step: Decimal, size: int) -> Values:
     if size == 1:
         return Listed((_plain(first),))
-    decimals = max(0, *(-int(one.normalize().as_tuple().exponent) for one in (first, step)))
-    start, stride = (int(one.scaleb(decimals)) for one in (first, step))
+    decimals = max(0, *(-int(number.normalize().as_tuple().exponent) for number in (first, step)))
+    start, stride = (int(number.scaleb(decimals)) for number in (first, step))
     if decimals > _MAX_DECIMALS or max(abs(start), abs(start + stride * size)) >= _EXACT:
         raise BusplanError(f"{name}: more digits than a number here can hold; use A:B:#COUNT")
     return Steps(start, stride, 10**decimals, size)
@@ -191,7 +191,7 @@ def _even(name: str, first: Decimal, last: Decimal, count: str) -> Values:
     if first == last:
         raise BusplanError(f"{name}: {count} values from {first} to {last} are one")
     step = (last - first) / (int(count) - 1)
-    if all(one == one.to_integral_value() for one in (first, step)):
+    if all(number == number.to_integral_value() for number in (first, step)):
         return _steps(name, first, step, int(count))
     return Even(float(first), float(last), int(count))
 

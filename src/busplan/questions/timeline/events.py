@@ -44,7 +44,7 @@ class Event(NamedTuple):
     term: str
     """Key of the term that it is a part of; empty for idle time."""
     label: str
-    """What happens, and who does it."""
+    """The event in words, with the node or device that causes it."""
 
     @property
     def duration_us(self) -> float:

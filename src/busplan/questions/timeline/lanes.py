@@ -103,8 +103,8 @@ def node_lanes(schedule: Schedule) -> tuple[Lane, ...]:
 def only_owner(schedule: Schedule) -> str | None:
     """Name of the transaction of all events in the window; None if they have several."""
     owners = {(event.transaction, event.node) for event in schedule.events}
-    ((kind, node), *others) = owners
-    return None if others or node is None else f"{kind} of node {node}"
+    ((kind, node), *more) = owners
+    return None if more or node is None else f"{kind} of node {node}"
 
 
 def event_lanes(schedule: Schedule) -> tuple[Lane, ...]:

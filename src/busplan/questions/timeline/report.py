@@ -95,10 +95,10 @@ def timeline_chart(schedule: Schedule) -> Chart:
 def _most(window: Schedule) -> Sentence:
     """Say what takes most of the window."""
     model = f"by the {window.figures.timing_model} model"
-    busy = [each for each in totals(window) if each.kind != IDLE.key]
+    busy = [total for total in totals(window) if total.kind != IDLE.key]
     if not busy:
         return Sentence((f"Nothing but idle time {model}",))
-    most = max(busy, key=lambda each: each.total_us)
+    most = max(busy, key=lambda total: total.total_us)
     label = kind_of(window.profile, most.kind).label
     taken = ShownValue(most.total_us, TOTAL.key, "us", TOTAL.decimals)
     return sentence(f"Mostly {label}, {{}} {model}", taken)
@@ -128,7 +128,7 @@ def totals_table(schedule: Schedule) -> Table:
             *(TableColumn("kind", kind="words"), TableColumn("eq", kind="words", rank=1)),
             *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
-        tuple(_total_row(schedule, each) for each in totals(schedule)),
+        tuple(_total_row(schedule, total) for total in totals(schedule)),
         sentence(f"What takes {part}, {{}}", ShownValue(schedule.to_us - schedule.from_us, "duration_us", "us", 3)),
     )
 
@@ -174,7 +174,7 @@ def timeline_document(schedule: Schedule) -> JsonDocument:
         {"timing_model": bar.timing_model, REQUIRED.key: bar.figures.required_us, MARGIN.key: bar.figures.margin_us}
         for bar in model_bars(schedule)
     ]
-    totals_ = [each._asdict() for each in totals(schedule)]
+    totals_ = [total._asdict() for total in totals(schedule)]
     return {**_facts(schedule), "margins": margins, "events": _event_records(schedule), "totals": totals_}
 
 

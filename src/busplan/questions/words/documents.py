@@ -121,5 +121,5 @@ def figure_table(
 
 
 def _value(figure: Figure, owner: Owner, state: Callable[[Figure, Any], State]) -> ShownValue:
-    found, own = attribute_value(figure, owner.figures), state(figure, owner.figures)
-    return found if own == "neutral" else found._replace(state=own)
+    value, own = attribute_value(figure, owner.figures), state(figure, owner.figures)
+    return value if own == "neutral" else value._replace(state=own)

@@ -160,13 +160,13 @@ class AxesDrawing(Drawing):
         _grid(root, plane)
         stretched = {"y": str(_TOP), "width": "100%", "height": str(_HEIGHT), "preserveAspectRatio": "none"}
         area = SubElement(root, "svg", {**stretched, "viewBox": f"0 0 {_WIDE} {_HEIGHT}", "overflow": "visible"})
-        for css, one in zip(CURVES, steps, strict=False):
-            SubElement(area, "path", {"class": f"curve {css}", "d": _path(one, plane)})
+        for css, model_steps in zip(CURVES, steps, strict=False):
+            SubElement(area, "path", {"class": f"curve {css}", "d": _path(model_steps, plane)})
         _figures(root, plane)
         _legend(root, steps)
         _own(root, plane, own_us, own_axes)
-        for css, one in zip(CURVES, steps, strict=False):
-            draw_mark(root, css, x=f"{plane.x(own_us):.5g}%", y=plane.y(one.max_axes(own_us)))
+        for css, model_steps in zip(CURVES, steps, strict=False):
+            draw_mark(root, css, x=f"{plane.x(own_us):.5g}%", y=plane.y(model_steps.max_axes(own_us)))
         return markup(root)
 
 
@@ -199,11 +199,11 @@ def _figures(root: Element, plane: _Plane) -> None:
 
 def _legend(root: Element, steps: Sequence[NodeSteps]) -> None:
     """Draw a piece of each curve with its name."""
-    for number, (css, one) in enumerate(zip(CURVES, steps, strict=False)):
+    for number, (css, model_steps) in enumerate(zip(CURVES, steps, strict=False)):
         place = SubElement(root, "svg", {"x": str(110 * number), "overflow": "visible"})
         SubElement(place, "line", {"x1": "2", "x2": "42", "y1": "9", "y2": "9", "class": f"curve {css}"})
         draw_mark(place, css, x="22", y=9)
-        text_at(place, one.timing_model, x="50", y=14)
+        text_at(place, model_steps.timing_model, x="50", y=14)
 
 
 def _path(steps: NodeSteps, plane: _Plane) -> str:

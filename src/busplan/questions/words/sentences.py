@@ -45,7 +45,7 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes
 
 
 def change_meanings(bus: "Bus") -> dict[str, str]:
-    """What a change of a key means on the machine, for keys that do not say so."""
+    """Meaning of a change on the machine, by key, for keys that do not say so."""
     return {name: key.meaning for name, key in bus.keys.items() if key.meaning}
 
 
@@ -57,8 +57,8 @@ def key_value(key: str, value: object) -> ShownValue:
 def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
     if isinstance(value, list):
         return (value_text(value),)
-    found = key_value(key, value)
-    return ('"', found, '"') if quotes and isinstance(value, str) else (found,)
+    shown = key_value(key, value)
+    return ('"', shown, '"') if quotes and isinstance(value, str) else (shown,)
 
 
 def refused_circle(profile: Profile) -> Iterator[Sentence]:
@@ -115,7 +115,7 @@ def execution_grades(profile: Profile) -> str | None:
         names.setdefault(alike.node.execution.grade or "without a grade", []).append(alike.name)
     if len(names) == 1:
         return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
-    return ", ".join(f"{grade} of {' and '.join(each)}" for grade, each in names.items())
+    return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items())
 
 
 def broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
@@ -127,18 +127,18 @@ def broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
 
 def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
     """Say by part what of a kind figures of others set and test; nothing where they test all of it."""
-    found = parts_tested(bus.evidence_data)
+    tested = parts_tested(bus.evidence_data)
     kind = f"{bus.title} (kind {bus.kind})"
-    if not found.parts:
+    if not tested.parts:
         yield Sentence((f"No figure that others have published or measured tests the model of {kind}.",))
-    elif found.untested:
-        said = {"set by figures of others": found.set_by, "tested by others": found.parts}
-        each = (
+    elif tested.untested:
+        said = {"set by figures of others": tested.set_by, "tested by others": tested.parts}
+        phrases = (
             f"{how}: {', '.join(f'{part} ({by})' for part, by in parts.items())}"
             for how, parts in said.items()
             if parts
         )
-        yield Sentence((f"Of {kind} {'; '.join(each)}; not tested: {', '.join(found.untested)}.",))
+        yield Sentence((f"Of {kind} {'; '.join(phrases)}; not tested: {', '.join(tested.untested)}.",))
 
 
 def not_applicable(profile: Profile) -> Iterator[Sentence]:
