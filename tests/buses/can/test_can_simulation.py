@@ -264,9 +264,7 @@ def climbed(own: Scene, random: Random, *, runs: int) -> dict[str, float]:
     return best
 
 
-def attacked(
-    seed: int, networks: int, *, runs: int, has_both_formats: bool = False
-) -> dict[str, tuple[float, int]]:
+def attacked(seed: int, networks: int, *, runs: int, has_both_formats: bool = False) -> dict[str, tuple[float, int]]:
     """The largest share of each bound and its seed, from a seed on, and how many networks were fit to attack."""
     best: dict[str, tuple[float, int]] = {}
     fit = 0

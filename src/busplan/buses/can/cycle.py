@@ -80,9 +80,7 @@ class CanCycle(BusCycle):
         return named(us, f"{message.name}_us", f"C,{message.name}")
 
     def _pdo_us(self, pdos: Pdos) -> Number:
-        pdo_us = payload_us(
-            pdos.payload_bytes, frame_bytes=pdos.frame_bytes, **self._wire, is_stuffed=self.is_stuffed
-        )
+        pdo_us = payload_us(pdos.payload_bytes, frame_bytes=pdos.frame_bytes, **self._wire, is_stuffed=self.is_stuffed)
         return named(pdo_us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
 
     @cached_property
@@ -107,9 +105,9 @@ class CanCycle(BusCycle):
     def _frames(self, kind: TransactionKind) -> Iterator[Run]:
         """All PDOs of one direction, node by node; a timeline shows their frames."""
         name, own = NAMES[kind], (pair for pair in self._pdos if pair[0].kind == kind)
-        for place, (pdos, us) in enumerate(own):
+        for number, (pdos, us) in enumerate(own):
             pdo = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
-            yield Run((pdo,), pdos.pdos, place, partial(self._of_pdo, pdo, pdos))
+            yield Run((pdo,), pdos.pdos, number, partial(self._of_pdo, pdo, pdos))
 
     def _of_pdo(self, pdo: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
         return (pdo._replace(us=self._frame_us(size)) for size in frame_sizes(pdos))

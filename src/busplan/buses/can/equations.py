@@ -141,7 +141,8 @@ def _payload_us(
         return choose(data_bytes > 0, of_frame(data_bytes), 0.0)
 
     *first_bytes, most_bytes = frame_bytes
-    first_us, rest_bytes = 0.0, payload_bytes
+    first_us: Number = 0.0
+    rest_bytes = payload_bytes
     for size in first_bytes:
         first_us = first_us + if_any(smaller(rest_bytes, size))
         rest_bytes = larger(rest_bytes - size, 0)

@@ -8,7 +8,7 @@ from typing import Any, Final
 from busplan.buses.can.constants import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.response import TooManyStepsError
-from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
+from busplan.buses.can.streams import Stream, collisions, has_format_of, identifiers_twice, last_identifier, streams
 from busplan.buses.can.traffic import Sent, Traffic, pdos_of, traffic_of, without_times
 from busplan.buses.can.waiting import Messages, messages
 from busplan.buses.limits import NODE_LIMIT
@@ -178,8 +178,8 @@ def _collisions(network: Network) -> Number:
 
 def _largest_identifier(network: Network) -> Number:
     def largest(each: Sequence[Stream]) -> Number:
-        bits = each[0].identifier_bits  # SYNC has the format of the bus; sections check others
-        last: Number = last_identifier(stream for stream in each if stream.identifier_bits is bits)
+        # SYNC comes first and has the format of the bus; the section checks messages of the other.
+        last: Number = last_identifier(stream for stream in each if has_format_of(each[0], stream))
         return last
 
     return _of_identifiers(network, largest, words="the largest identifier")
@@ -210,7 +210,9 @@ def _most_bytes(network: Network) -> int:
 
 def _payload_words(network: Network) -> str:
     over = next(pdos for pdos in traffic_of(network).pdos if pdos.payload_bytes > pdos.most_bytes)
-    frames = f"{over.name}_pdos" if len(over.frame_bytes) > 1 or over.most_bytes == over.frame_bytes[0] else "four frames"
+    frames = (
+        f"{over.name}_pdos" if len(over.frame_bytes) > 1 or over.most_bytes == over.frame_bytes[0] else "four frames"
+    )
     return f"a PDO of {plain(over.payload_bytes):.0f} bytes is over the {over.most_bytes} bytes of {frames}"
 
 

@@ -238,7 +238,9 @@ class CanProfile(Profile):
             if identifier is not None and identifier > MAX_IDENTIFIER[bits]
         ]
         problems += (
-            Problem(f"leaves no room for {MOST_NODES:g} nodes below {MAX_IDENTIFIER[bits]}", f"message.{place}.identifier")
+            Problem(
+                f"leaves no room for {MOST_NODES:g} nodes below {MAX_IDENTIFIER[bits]}", f"message.{place}.identifier"
+            )
             for place, message in enumerate(self.message)
             if message.per_node
             and (bits := message.identifier_bits or self.bus.identifier_bits)

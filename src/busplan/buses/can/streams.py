@@ -114,8 +114,13 @@ def streams(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
 def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
     def sent(name: str, block: int, size: Points, **more: Any) -> Stream:
         own: dict[str, Any] = {
-            **{"group": "", "first": block, "identifiers": 1, "identifier_bits": traffic.identifier_bits},
-            **{"period_us": traffic.period_us, "jitter_us": 0.0, "deadline_us": traffic.period_us},
+            "group": "",
+            "first": block,
+            "identifiers": 1,
+            "identifier_bits": traffic.identifier_bits,
+            "period_us": traffic.period_us,
+            "jitter_us": 0.0,
+            "deadline_us": traffic.period_us,
             **more,
         }
         us = frame_us(
@@ -210,11 +215,11 @@ def identifiers_twice(each: Sequence[Stream]) -> Points:
     return total(
         larger(smaller(early.last, late.last) - larger(early.first, late.first) + 1, 0)
         for early, late in combinations(each, 2)
-        if _has_format_of(early, late)
+        if has_format_of(early, late)
     )
 
 
-def _has_format_of(early: Stream, late: Stream) -> bool:
+def has_format_of(early: Stream, late: Stream) -> bool:
     """Whether two streams have identifiers of one length; lengths that vary from point to point are alike."""
     bits = early.identifier_bits, late.identifier_bits
     return not all(isinstance(length, int | float) for length in bits) or bits[0] == bits[1]
@@ -229,6 +234,6 @@ def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, in
         for number, place in enumerate(ordered)
         for behind in ordered[number + 1 : bisect_right(firsts, each[place].last)]
     )
-    for early, late in sorted(pair for pair in pairs if _has_format_of(*(each[place] for place in pair))):
+    for early, late in sorted(pair for pair in pairs if has_format_of(*(each[place] for place in pair))):
         first = max(each[early].first, each[late].first)
         yield each[early], each[late], first, min(each[early].last, each[late].last) - first + 1

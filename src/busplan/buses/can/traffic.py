@@ -74,7 +74,7 @@ class Traffic(NamedTuple):
 
     def numbers(self) -> tuple[Number, ...]:
         """All its numbers in a row, as `with_numbers` takes them."""
-        pdos = (number for pdos in self.pdos for number in pdos[_PDO_NUMBERS])
+        pdos = (number for pdos in self.pdos for number in (pdos.identifier, pdos.pdos, pdos.payload_bytes))
         own: tuple[Any, ...] = self[:_OWN_NUMBERS]
         return (*own, *pdos, *(number for message in self.messages for number in message[_MESSAGE_WORDS:]))
 
@@ -82,10 +82,8 @@ class Traffic(NamedTuple):
         """The same senders with other numbers, in the order of `numbers`."""
         rest: Iterator[Any] = iter(numbers)
         own = tuple(islice(rest, _OWN_NUMBERS))
-        count = _PDO_NUMBERS.stop - _PDO_NUMBERS.start
         pdos = tuple(
-            pdos._replace(**dict(zip(Pdos._fields[_PDO_NUMBERS], islice(rest, count), strict=True)))
-            for pdos in self.pdos
+            pdos._replace(identifier=next(rest), pdos=next(rest), payload_bytes=next(rest)) for pdos in self.pdos
         )
         count = len(Message._fields) - _MESSAGE_WORDS
         messages = tuple(Message(message.name, *islice(rest, count)) for message in self.messages)
@@ -94,8 +92,6 @@ class Traffic(NamedTuple):
 
 _OWN_NUMBERS: Final = len(Traffic._fields) - 2
 """Fields before the PDOs and the messages."""
-_PDO_NUMBERS: Final = slice(2, 5)
-"""Fields of PDOs between the words and what the frames hold."""
 _MESSAGE_WORDS: Final = 1
 """Fields of words, which stand before the numbers."""
 

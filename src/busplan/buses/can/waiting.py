@@ -76,7 +76,8 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     ]
     # Where the frames are not plain, all have the same bit rate and format: that with the most data is the longest.
     by_length = sorted(
-        messages, key=lambda stream: -plain(stream.frame_us if isinstance(stream.frame_us, float) else stream.data_bytes)
+        messages,
+        key=lambda stream: -plain(stream.frame_us if isinstance(stream.frame_us, float) else stream.data_bytes),
     )
     lower = tuple(stream for stream in by_length if (stream.last_place > last) is not False)
 
