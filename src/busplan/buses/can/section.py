@@ -127,7 +127,7 @@ class CanPayload(PayloadSection):
     def _parts(self, kind: TransactionKind) -> tuple[Number | None, Number | None]:
         fixed, per_axis = super()._parts(kind)
         lengths = getattr(self, f"{NAMES[kind]}_pdos")
-        if lengths is None or (fixed, per_axis) != (None, None):
+        if lengths is None or fixed is not None or per_axis is not None:
             return fixed, per_axis
         return (None, sum(lengths)) if self.pdo_per == "axis" else (sum(lengths), None)
 

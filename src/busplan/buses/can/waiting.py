@@ -8,8 +8,8 @@ from math import inf
 from operator import add
 from typing import Any, Final, NamedTuple
 
-from busplan.buses.can.constants import MOST_BLOCKS, SATURATED
-from busplan.buses.can.equations import bit_us
+from busplan.buses.can.constants import BASE_BITS, MOST_BLOCKS, SATURATED
+from busplan.buses.can.equations import bit_us, frame_bits
 from busplan.buses.can.response import (
     BELOW,
     Points,
@@ -74,11 +74,7 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
         for stream in messages
         if (is_higher := stream.first_place <= last) is not False
     ]
-    # Where the frames are not plain, all have the same bit rate and format: that with the most data is the longest.
-    by_length = sorted(
-        messages,
-        key=lambda stream: -plain(stream.frame_us if isinstance(stream.frame_us, float) else stream.data_bytes),
-    )
+    by_length = sorted(messages, key=lambda stream: -_length(stream, is_stuffed=is_stuffed))
     lower = tuple(stream for stream in by_length if (stream.last_place > last) is not False)
 
     def blocking_us(span_us: Points) -> Points:
@@ -95,6 +91,21 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
 
     lasts_us = settled_us(others_us, higher, more_us=blocking_us)
     return Waits(lasts_us, blocking_us(lasts_us), lower)
+
+
+def _length(stream: Stream, *, is_stuffed: bool) -> float:
+    """Number by which the frames of messages are in order of their length, at every point of arrays."""
+    if isinstance(stream.frame_us, float):
+        return stream.frame_us
+    # Bit rates, and formats that are no plain numbers, are the same for all messages.
+    bits = stream.identifier_bits
+    return plain(
+        frame_bits(
+            stream.data_bytes,
+            identifier_bits=bits if isinstance(bits, int | float) else BASE_BITS,
+            is_stuffed=is_stuffed,
+        )
+    )
 
 
 def _frames_within(stream: Stream, span_us: Points) -> Points:
