@@ -466,7 +466,7 @@ def test_a_baseline_without_keys_is_compared_and_is_one_with_keys_after_an_updat
     slower = CLEAN.replace("period_us = 4000", "period_us = 3000")
     (folder / "p" / "clean.toml").write_text(slower, encoding="utf-8")
     run = busplan("check", "p/clean.toml", "--baseline", "b.json", cwd=folder)
-    assert run.stdout.startswith("p/clean.toml:2:1: BP301 error: name: safe axes fell from 56 to ")
+    assert run.stdout.startswith("p/clean.toml:2:1: BP301 error: name: corrected margin fell from ")
     assert len(run.stdout.splitlines()) == 1
     busplan("check", "p/clean.toml", "--baseline", "b.json", "--update-baseline", cwd=folder)
     assert list(json.loads((folder / "b.json").read_text(encoding="utf-8"))["keys"]) == ["p/clean.toml"]

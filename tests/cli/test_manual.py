@@ -44,9 +44,22 @@ def test_a_pipe_gets_the_same_bytes_whatever_the_environment(run: Run) -> None:
     assert run("manual", "models", env=environment).stdout == run("manual", "models").stdout
 
 
-def test_a_terminal_gets_plain_markdown_too(on_terminal: Callable[..., tuple[int, str]], tmp_path: Path) -> None:
-    code, shown = on_terminal("manual", "limits", cwd=tmp_path)
-    assert (code, shown) == (0, (FOLDER / "limits.md").read_text(encoding="utf-8"))
+def test_a_terminal_gets_the_page_set_for_reading_and_no_word_cut_off(
+    on_terminal: Callable[..., tuple[int, str]], tmp_path: Path
+) -> None:
+    width = {"COLUMNS": "60", "NO_COLOR": "1"}
+    code, shown = on_terminal("manual", "profile", cwd=tmp_path, env=width)
+    assert code == 0
+    text = re.sub("\x1b\\[[0-9;]*m", "", shown)
+    assert "| key |" not in text
+    assert "\u2026" not in text
+    assert max(map(len, text.splitlines())) <= 60
+    # A table's column: the key is folded, as rich would cut it.
+    column = "".join(line[1:].split(" ")[0] for line in text.splitlines())
+    assert "cycle.nonperiodic_us" in column
+    # A file gets Markdown.
+    code, _ = on_terminal("manual", "profile", "-o", "x.md", cwd=tmp_path)
+    assert (tmp_path / "x.md").read_text(encoding="utf-8") == (FOLDER / "profile.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("topic", ["profiles", "", "Profile", "../manual/profile", "profile.md"])

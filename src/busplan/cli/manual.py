@@ -1,5 +1,6 @@
 """`busplan manual`."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -7,7 +8,7 @@ import typer
 
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import output_option
-from busplan.cli.output import write_document
+from busplan.cli.output import is_terminal, write_document
 from busplan.errors import BusplanError
 
 
@@ -29,8 +30,8 @@ def manual_command(
 ) -> None:
     """Show a reference page: profile keys, timing models, the circle test, the plan, the gate, JSON, Python, limits.
 
-    Pages are Markdown. Without a topic it lists the topics. `busplan COMMAND --help` describes a command and its
-    options. Exits 0 when the page is written.
+    Pages are Markdown, set for reading and paged on a terminal. Without a topic it lists the topics. `busplan COMMAND
+    --help` describes a command and its options. Exits 0 when the page is written.
 
     Example: busplan manual profile
     """
@@ -43,7 +44,22 @@ def manual_command(
         hints = "; ".join(filter(None, (f"there are {', '.join(known)}", did_you_mean(topic, known))))
         raise BusplanError(f"{topic or repr(topic)}: no such topic; {hints}")
     require_apart({"--output": output})
-    write_document(_contents(known) if topic is None else page(topic), output)
+    if topic is None:
+        write_document(_contents(known), output)
+    elif output is None and is_terminal():
+        _show(page(topic))
+    else:
+        write_document(page(topic), output)
+
+
+def _show(markdown: str) -> None:
+    """Show a page on a terminal, by the pager that the user has set, as git does."""
+    from pydoc import pager
+
+    from busplan.forms.pages import rendered
+
+    os.environ.setdefault("LESS", "-FRX")
+    pager(rendered(markdown))
 
 
 def _contents(headings: dict[str, str]) -> str:

@@ -158,8 +158,10 @@ _MOST_NAMED: Final = 3
 """Most keys that a finding names."""
 _LONGEST: Final = 30
 """Longest value that a finding repeats in full."""
-_NAMES: Final = by_key((SAFE_NODES, SAFE_AXES, MARGIN_CORRECTED, MAX_NODES, MAX_AXES, MARGIN))
+_NAMES: Final = by_key((MARGIN_CORRECTED, SAFE_NODES, SAFE_AXES, MARGIN, MAX_NODES, MAX_AXES))
 """Figures of a baseline, in the order in which a finding says them."""
+_MOST_FIGURES: Final = 3
+"""Most figures that a finding says; the diff of a new record shows all."""
 
 
 class ChangedValue(NamedTuple):
@@ -188,7 +190,7 @@ def regression(subject: Subject, recorded: Record) -> Iterator[RuleProblem]:
         key, words = next(iter(changes)), f"{_keys(changes)}: {figures}"
     else:
         key, words = "name", figures
-    yield RuleProblem(key, words, "if that is meant, record it with --update-baseline")
+    yield RuleProblem(key, words, "if that is meant, record it with --update-baseline, whose diff shows every figure")
 
 
 def fallen(now: Mapping[str, float], before: Mapping[str, float]) -> dict[str, tuple[float, float]]:
@@ -247,18 +249,16 @@ def _shown(value: object) -> str:
 
 
 def _figures(lost: Mapping[str, tuple[float, float]], *, deciding: str) -> str:
-    """Say what fell: first by the timing model that decides, then by the others."""
-    by_model: dict[str, list[str]] = {deciding: []}
-    for name in sorted(lost, key=_order):
+    """Say what fell: the margin first, and the figures of the deciding timing model before those of the others."""
+    names = sorted(lost, key=lambda name: (not name.startswith(f"{deciding}."), _order(name)))
+    said = []
+    for name in names[:_MOST_FIGURES]:
         model, _, figure = name.partition(".")
-        by_model.setdefault(model, []).append(_fell(figure, *lost[name]))
-    said = (
-        f"{'' if model == deciding else f'by the {model} timing '}{', '.join(words)}"
-        for model, words in by_model.items()
-        if words
-    )
-    # The first says the verb for all of them.
-    return "; ".join(said).replace(" from ", " fell from ", 1)
+        by_model = "" if model == deciding else f" by the {model} timing"
+        said.append(f"{_fell(figure, *lost[name])}{by_model}")
+    more = len(lost) - len(said)
+    words = ", ".join(said).replace(" from ", " fell from ", 1)  # the first says the verb for all of them
+    return f"{words}, and {more} more" if more else words
 
 
 def _order(name: str) -> int:

@@ -1,7 +1,7 @@
 """The plan is the least change there is, found by trying all; and what is written passes the gate."""
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import cycle, product
+from itertools import count, cycle, product
 from math import inf
 from typing import Any
 
@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
+from busplan.buses.parts import Cost
 from busplan.elementwise import FIT_ROUNDING
 from busplan.errors import BusplanError
 from busplan.gate.gate import check_document
@@ -23,7 +24,7 @@ from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.plan.advice import cure
 from busplan.questions.plan.constraints import needs, with_payload_within
-from busplan.questions.plan.freedoms import ShortNumbers, freed
+from busplan.questions.plan.freedoms import PERIOD, Freedom, ShortNumbers, freed
 from busplan.questions.plan.planning import plan
 from busplan.questions.plan.search import Search
 from busplan.sections.profile import Profile
@@ -444,9 +445,11 @@ def test_a_search_that_has_tried_enough_gives_up_and_proves_nothing(monkeypatch:
     levels = freed(profile, None)
     assert Search(profile).least(levels) == {}
     monkeypatch.setattr("busplan.questions.plan.search._MOST_TRIES", 0)
-    search = Search(profile)
-    assert search.least(levels) is None
-    assert not search.proven
+    endless = Freedom("x", "x", Cost.PERIOD, (PERIOD,), lambda *_: ({PERIOD: float(n)} for n in count(1)))
+    for freedoms in (levels, [endless]):
+        search = Search(profile)
+        assert search.least(freedoms) is None
+        assert not search.proven
 
 
 def test_a_payload_that_no_axis_adds_to_is_cut_at_its_fixed_part() -> None:

@@ -89,6 +89,8 @@ class Search:
         if kept is not None:
             return kept
         for change in dearest.values(self, changes, cheaper):
+            if self._left < 0:
+                return None
             least = None if self.kept & set(change) else self._least(cheaper, {**changes, **change})
             if least is not None:
                 return least

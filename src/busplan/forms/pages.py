@@ -1,0 +1,30 @@
+"""Markdown for a terminal."""
+
+import io
+
+from rich.console import Console
+from rich.markdown import Markdown, MarkdownContext, TableDataElement
+from rich.text import TextType
+from rich.theme import Theme
+
+_STYLES = Theme({"markdown.code": "bold cyan"})  # on the terminal's own ground, light or dark
+
+
+class _Cell(TableDataElement):
+    """A cell of a table whose long words are folded, where rich cuts them off."""
+
+    def on_text(self, context: MarkdownContext, text: TextType) -> None:
+        super().on_text(context, text)
+        self.content.overflow = "fold"
+
+
+class _Page(Markdown):
+    elements = {**Markdown.elements, "td_open": _Cell, "th_open": _Cell}  # noqa: RUF012 - as rich declares it
+
+
+def rendered(markdown: str) -> str:
+    """Write Markdown for a terminal of this width, in its colours; NO_COLOR is honoured."""
+    buffer = io.StringIO()
+    console = Console(file=buffer, force_terminal=True, theme=_STYLES)
+    console.print(_Page(markdown, code_theme="ansi_dark", hyperlinks=False))
+    return buffer.getvalue()
