@@ -17,6 +17,7 @@ from busplan.profile.keys import dotted_keys, flat, named_tables
 from busplan.profile.kinds import models_of
 from busplan.profile.toml import profile_of
 from busplan.sections.profile import Profile
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 _KIND, _NODES, _SHOWN_FIRST = "kind", "nodes", "timing_model"
 _SIZES = ("read_bytes", "write_bytes")
@@ -73,6 +74,7 @@ def converted(profile: Profile, kind: str) -> Conversion:
         # The other kind may have no default for it.
         table.setdefault("execution", group.execution.model_dump(exclude_none=True))
     machine, left_out = _common(data)
+    _say_payloads(machine, profile)
     # The host keeps its share of the period, whatever each kind has by default.
     machine["cycle"]["slice_ratio"] = profile.cycle.slice_ratio
     bus = kind_named(kind)
@@ -92,6 +94,15 @@ def converted(profile: Profile, kind: str) -> Conversion:
     new_profile = profile_of(_merged(machine, new))
     given = [*raised, *(AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}")]
     return Conversion(new_profile, (*given, *_defaults(new_profile)), (*left_out, *empty))
+
+
+def _say_payloads(machine: TomlTable, profile: Profile) -> None:
+    """Say payloads in bytes that the profile says in keys of its kind alone."""
+    for place, nodes in enumerate(profile.alike_nodes):
+        section = machine["group"][place] if nodes.name else machine["payload"]
+        for kind, key in zip(TRANSACTION_KINDS, _SIZES, strict=True):
+            if section.keys().isdisjoint({key, f"{key}_per_axis"}):
+                section[nodes.payload.key_of(kind)] = nodes.payload.bytes_of(kind, axes=1)
 
 
 def _with_payloads(machine: TomlTable) -> tuple[list[AssumedKey], list[str]]:

@@ -105,6 +105,10 @@ def test_update_brings_messages_of_a_database_into_a_profile(run: Run, folder: P
         *("[[message]]", "name", "=", '"Pressure"', "identifier", "=", "256", "#", "published:", "0x100,"),
         *("machine.dbc:9", "payload_bytes", "=", "8", "#", "published:", "machine.dbc:9"),
         *("period_us", "=", "20000", "#", "published:", "machine.dbc:9"),
+        *("[[message]]", "name", "=", '"Foreign"', "identifier", "=", "419361278", "#", "published:", "0x18fef1fe,"),
+        *("machine.dbc:15", "identifier_bits", "=", "29", "#", "published:", "machine.dbc:15"),
+        *("payload_bytes", "=", "8", "#", "published:", "machine.dbc:15"),
+        *("period_us", "=", "100000", "#", "published:", "machine.dbc:15"),
     ]
     # The same again, with another name and period: it is known by its identifier.
     path.write_text(new.replace('"Pressure"', '"oil"').replace("20000", "10000"), encoding="utf-8")

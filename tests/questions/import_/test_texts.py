@@ -130,10 +130,14 @@ def test_messages_of_a_database_go_beside_the_nodes_of_a_dcf(name: str, message:
     (group,) = profile.group
     assert (group.name, group.axes, group.read_bytes, group.write_bytes) == ("axis-five", 1, 6, 6)
     assert (group.feedback_identifier, group.command_identifier) == (0x185, 0x205)
+    of_database = [(message, 0x100, 8, 20_000)]
+    if name == "dbc":
+        assert profile.message[-1].identifier_bits == 29
+        of_database += [("Foreign", 0x18FEF1FE, 8, 100_000)]
     assert [(each.name, each.identifier, each.payload_bytes, each.period_us) for each in profile.message] == [
         ("axis-five-5-TPDO2", 0x285, 2, 10_000),
         ("axis-five-5-heartbeat", 0x705, 1, 250_000),
-        (message, 0x100, 8, 20_000),
+        *of_database,
     ]
     if name in ("dbc", "kcd"):
         assert any("no file says its period" in remark and remark.endswith(": Door") for remark in answer.remarks)
@@ -146,10 +150,10 @@ def test_a_database_alone_says_what_is_missing() -> None:
     with pytest.raises(busplan.BusplanError) as refused:
         imported("machine.dbc")
     first, nodes, period, *left_out = refused.value.problems
-    assert "1 message with a period, and no profile yet" in first
+    assert "2 messages with a period, and no profile yet" in first
     assert nodes.startswith("the nodes of the cycle and their PDOs: give the EDS or DCF")
     assert period == "cycle.period_us: the period of SYNC"
-    assert [each.rpartition(": ")[2] for each in left_out] == ["Door", "Foreign"]
+    assert [each.rpartition(": ")[2] for each in left_out] == ["Door"]
 
 
 def test_an_eds_has_defaults_and_says_so() -> None:
@@ -163,7 +167,7 @@ def test_an_eds_has_defaults_and_says_so() -> None:
 PDOS = {
     # Bytes of both PDOs and type of the second -> bytes of the group, and the message that the second is.
     "behind a full one": ((8, 4, 1), 12, []),
-    "behind one that is not full": ((6, 4, 1), 6, [(0x285, 4, 4000)]),
+    "behind one that is not full": ((6, 4, 1), 10, []),
     "with every fourth SYNC": ((8, 4, 4), 8, [(0x285, 4, 16_000)]),
 }
 
@@ -182,7 +186,8 @@ def test_a_second_pdo_goes_where_the_profile_can_say_it(case: str, tmp_path: Pat
     path = tmp_path / "axis.dcf"
     path.write_text(text, encoding="utf-8")
     profile: Any = busplan.import_profile(path).profile
-    assert profile.group[0].read_bytes == size
+    assert profile.alike_nodes[0].bytes_of("read") == size
+    assert (profile.group[0].feedback_pdos == (first, second)) is (size == 10)
     found = [(each.identifier, each.payload_bytes, each.period_us) for each in profile.message]
     assert [each for each in found if each[0] != 0x705] == messages
 

@@ -6,8 +6,10 @@ from typing import Final, Literal
 
 from busplan.sourced import Sourced, constants
 
-BitRate = Literal[10, 20, 50, 125, 250, 500, 800, 1000]
+BIT_RATES: Final = (10, 20, 50, 125, 250, 500, 800, 1000)
 """Bit rates that CiA 301 names [kbit/s]."""
+LEAST_BIT_RATE, MOST_BIT_RATE = 5, 1000
+"""Bit rates of transceivers and of the standard, any between them [kbit/s]."""
 IdentifierBits = Literal[11, 29]
 
 _DAVIS: Final = "Davis, Burns, Bril, Lukkien 2007; linux-can/can-utils, canframelen"

@@ -10,14 +10,14 @@ from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
 from busplan.buses.can.figures import BUS_LOAD, TERMS
 from busplan.buses.can.response import Response
-from busplan.buses.can.streams import Stream, frame_sizes, streams
+from busplan.buses.can.streams import Stream, frame_sizes, last_identifier, place, streams
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import is_higher, last_cyclic, messages, response, waits
+from busplan.buses.can.waiting import messages, response, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
 from busplan.buses.parts import EventKind
-from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, named, plain, rounded_up, total
+from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, named, plain, pointwise, rounded_up, total
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
@@ -72,11 +72,15 @@ class CanCycle(BusCycle):
     def _wire(self) -> dict[str, Number]:
         return {"identifier_bits": self.traffic.identifier_bits, "bit_rate_kbit_s": self.traffic.bit_rate_kbit_s}
 
-    def _frame_us(self, data_bytes: Number) -> Number:
-        return frame_us(data_bytes, **self._wire, is_stuffed=self.is_stuffed)
+    def _frame_us(self, data_bytes: Number, **wire: Number) -> Number:
+        return frame_us(data_bytes, **(self._wire | wire), is_stuffed=self.is_stuffed)
+
+    def _message_us(self, message: Message) -> Number:
+        us = self._frame_us(message.payload_bytes, identifier_bits=message.identifier_bits)
+        return named(us, f"{message.name}_us", f"C,{message.name}")
 
     def _pdo_us(self, pdos: Pdos) -> Number:
-        pdo_us = payload_us(pdos.payload_bytes, **self._wire, is_stuffed=self.is_stuffed)
+        pdo_us = payload_us(pdos.payload_bytes, frame_bytes=pdos.frame_bytes, **self._wire, is_stuffed=self.is_stuffed)
         return named(pdo_us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
 
     @cached_property
@@ -87,10 +91,7 @@ class CanCycle(BusCycle):
     @cached_property
     def _messages(self) -> tuple[tuple[Message, Number], ...]:
         """All other messages, each with the time of its frame."""
-        return tuple(
-            (message, named(self._frame_us(message.payload_bytes), f"{message.name}_us", f"C,{message.name}"))
-            for message in self.traffic.messages
-        )
+        return tuple((message, self._message_us(message)) for message in self.traffic.messages)
 
     @cached_property
     def sync_us(self) -> Number:
@@ -104,9 +105,9 @@ class CanCycle(BusCycle):
     def _frames(self, kind: TransactionKind) -> Iterator[Run]:
         """All PDOs of one direction, node by node; a timeline shows their frames."""
         name, own = NAMES[kind], (pair for pair in self._pdos if pair[0].kind == kind)
-        for place, (pdos, us) in enumerate(own):
+        for number, (pdos, us) in enumerate(own):
             pdo = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
-            yield Run((pdo,), pdos.pdos, place, partial(self._of_pdo, pdo, pdos))
+            yield Run((pdo,), pdos.pdos, number, partial(self._of_pdo, pdo, pdos))
 
     def _of_pdo(self, pdo: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
         return (pdo._replace(us=self._frame_us(size)) for size in frame_sizes(pdos))
@@ -202,8 +203,21 @@ class CanCycle(BusCycle):
         """Frames of each message that go before the last PDO in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
         for message, _ in self._messages:
-            count = rounded_up((window_us + message.jitter_us) / message.period_us)
-            yield choose(is_higher(message.identifier, self._last), count, 0)
+            count = _of_all(message, rounded_up((window_us + message.jitter_us) / message.period_us))
+            yield choose(self._goes_before_last(message), count, 0)
+
+    def _goes_before_last(self, message: Message) -> Number:
+        """Whether a message goes before the last of SYNC and all PDOs."""
+        bits = message.identifier_bits, self.traffic.identifier_bits
+        if bits[0] is bits[1]:
+            return message.identifier <= self._last
+
+        def is_before(*numbers: float) -> bool:
+            identifier, own_bits, last, last_bits = map(int, numbers)
+            return bool(place(identifier, own_bits) <= place(last, last_bits))
+
+        numbers = message.identifier, bits[0], self._last, bits[1]
+        return pointwise(is_before, *numbers, words="the first 11 bits decide, then the base frame goes first")
 
     @cached_property
     def _last(self) -> Number:
@@ -257,7 +271,7 @@ class CanCycle(BusCycle):
 
     @property
     def _messages_load(self) -> Number:
-        return total(us / message.period_us for message, us in self._messages)
+        return total(_of_all(message, us) / message.period_us for message, us in self._messages)
 
     @property
     def load_period_us(self) -> Number:
@@ -369,8 +383,14 @@ def _waits(is_stuffed: bool, key: str, traffic: Traffic, others_us: Number) -> N
     return number
 
 
+def _of_all(message: Message, number: Number) -> Number:
+    """A number of a message, of all nodes that send it."""
+    return number if is_off(message.senders - 1) else message.senders * number
+
+
 def _last(traffic: Traffic) -> Number:
-    last: Number = last_cyclic(streams(traffic, is_stuffed=True))
+    cyclic = (stream for stream in streams(traffic, is_stuffed=True) if not stream.is_message)
+    last: Number = last_identifier(cyclic)
     return last
 
 

@@ -18,7 +18,7 @@ from busplan.buses.can.constants import (
     STUFFED_BITS,
     STUFFED_BITS_EXTENDED,
 )
-from busplan.elementwise import Number, choose, rounded_down, rounded_up
+from busplan.elementwise import Number, choose, larger, rounded_down, rounded_up, smaller
 
 _PLAIN = (int, float)
 KBIT_US = 1000
@@ -93,53 +93,62 @@ def frame_us(data_bytes: Number, *, identifier_bits: Number, bit_rate_kbit_s: Nu
     return bits * bit_us(bit_rate_kbit_s)
 
 
-def full_frames(payload_bytes: Number) -> Number:
-    """Frames of 8 bytes that a payload fills [1].
-
-    Parameters
-    ----------
-    payload_bytes
-        Payload [bytes]; float or array.
-
-    Examples
-    --------
-    >>> full_frames(20), full_frames(16)
-    (2, 2)
-    """
-    return rounded_down(payload_bytes / FRAME_BYTES)
-
-
-def payload_us(payload_bytes: Number, *, identifier_bits: Number, bit_rate_kbit_s: Number, is_stuffed: bool) -> Number:
-    """Time of all frames of a payload: as many of 8 bytes as it fills, and a frame of the rest [us].
+def payload_us(
+    payload_bytes: Number,
+    *,
+    frame_bytes: tuple[float, ...] = (FRAME_BYTES,),
+    identifier_bits: Number,
+    bit_rate_kbit_s: Number,
+    is_stuffed: bool,
+) -> Number:
+    """Time of all frames of a payload: each is filled before the next, and the last has the rest [us].
 
     Parameters
     ----------
     payload_bytes
         Payload, 1 or more [bytes]; float or array.
+    frame_bytes
+        Most data of each frame in their order; further ones are as the last [bytes].
     identifier_bits, bit_rate_kbit_s, is_stuffed
         As `frame_us` takes them.
 
     Examples
     --------
-    >>> payload_us(10, identifier_bits=11, bit_rate_kbit_s=1000, is_stuffed=True)
-    210.0
+    >>> wire = {"identifier_bits": 11, "bit_rate_kbit_s": 1000, "is_stuffed": True}
+    >>> payload_us(10, **wire), payload_us(12, frame_bytes=(6, 6), **wire)
+    (210.0, 230.0)
     """
     wire = identifier_bits, bit_rate_kbit_s, is_stuffed
     is_plain = isinstance(payload_bytes, _PLAIN) and isinstance(identifier_bits, _PLAIN)
     if is_plain and isinstance(bit_rate_kbit_s, _PLAIN):
-        return _plain_payload_us(payload_bytes, *wire)
-    return _payload_us(payload_bytes, *wire)
+        return _plain_payload_us(payload_bytes, frame_bytes, *wire)
+    return _payload_us(payload_bytes, frame_bytes, *wire)
 
 
-def _payload_us(payload_bytes: Number, identifier_bits: Number, bit_rate_kbit_s: Number, is_stuffed: bool) -> Number:
+def _payload_us(
+    payload_bytes: Number,
+    frame_bytes: tuple[float, ...],
+    identifier_bits: Number,
+    bit_rate_kbit_s: Number,
+    is_stuffed: bool,
+) -> Number:
     def of_frame(data_bytes: Number) -> Number:
         return frame_us(
             data_bytes, identifier_bits=identifier_bits, bit_rate_kbit_s=bit_rate_kbit_s, is_stuffed=is_stuffed
         )
 
-    full = full_frames(payload_bytes)
-    rest_bytes = payload_bytes - FRAME_BYTES * full
-    return full * of_frame(float(FRAME_BYTES)) + choose(rest_bytes > 0, of_frame(rest_bytes), 0.0)
+    def if_any(data_bytes: Number) -> Number:
+        return choose(data_bytes > 0, of_frame(data_bytes), 0.0)
+
+    *first_bytes, most_bytes = frame_bytes
+    first_us: Number = 0.0
+    rest_bytes = payload_bytes
+    for size in first_bytes:
+        first_us = first_us + if_any(smaller(rest_bytes, size))
+        rest_bytes = larger(rest_bytes - size, 0)
+    full = rounded_down(rest_bytes / most_bytes)
+    others_us = full * of_frame(float(most_bytes)) + if_any(rest_bytes - most_bytes * full)
+    return first_us + others_us if first_bytes else others_us
 
 
 _plain_payload_us: Callable[..., Number] = lru_cache(maxsize=1024)(_payload_us)

@@ -8,15 +8,14 @@ from busplan.buses.can import rules
 from busplan.buses.can.constants import (
     BASE_BITS,
     CONSTANTS,
-    FRAME_BYTES,
     MAX_LOAD,
-    MOST_PDOS,
     PIPELINE_CYCLES,
     SYNC_IDENTIFIER,
 )
 from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle
 from busplan.buses.can.figures import FIGURES
 from busplan.buses.can.limits import LIMITS
+from busplan.buses.can.traffic import traffic_of
 from busplan.buses.network import Network
 from busplan.buses.parts import Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.elementwise import plain
@@ -109,7 +108,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
 
     def payloads(self, network: Network) -> PayloadRange:
         """Whole bytes up to four frames."""
-        largest = int(MOST_PDOS * FRAME_BYTES)
+        largest = min(pdos.most_bytes for pdos in traffic_of(network).pdos)
         each = min((plain(group.axes) for group in network.groups if group.said.payload.pdo_per == "axis"), default=1)
         return PayloadRange(1, largest * max(int(each), 1), "PDOs", carrier="four frames")
 
@@ -119,7 +118,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The bit rate."""
-        return (f"{network.profile.bus.bit_rate_kbit_s} kbit/s",)
+        return (f"{network.profile.bus.bit_rate_kbit_s:g} kbit/s",)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """Functions of `busplan.buses.can.evidence`."""

@@ -5,10 +5,10 @@ from functools import partial, reduce
 from math import inf
 from typing import Any, Final
 
-from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES, MOST_PDOS, MOST_STEPS, SATURATED
+from busplan.buses.can.constants import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.response import TooManyStepsError
-from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
+from busplan.buses.can.streams import Stream, collisions, has_format_of, identifiers_twice, last_identifier, streams
 from busplan.buses.can.traffic import Sent, Traffic, pdos_of, traffic_of, without_times
 from busplan.buses.can.waiting import Messages, messages
 from busplan.buses.limits import NODE_LIMIT
@@ -177,7 +177,12 @@ def _collisions(network: Network) -> Number:
 
 
 def _largest_identifier(network: Network) -> Number:
-    return _of_identifiers(network, last_identifier, words="the largest identifier")
+    def largest(each: Sequence[Stream]) -> Number:
+        # SYNC comes first and has the format of the bus; the section checks messages of the other.
+        last: Number = last_identifier(stream for stream in each if has_format_of(each[0], stream))
+        return last
+
+    return _of_identifiers(network, largest, words="the largest identifier")
 
 
 def _of_identifiers(network: Network, function: Callable[[Sequence[Stream]], Number], *, words: str) -> Number:
@@ -191,10 +196,24 @@ def _most_identifier(network: Network) -> Number:
 
 
 def _largest_pdo(network: Network) -> Number:
+    """The largest PDO, or one as much over the least limit as one is over its own [bytes]."""
     largest: Number = 0
     for pdos in traffic_of(network).pdos:
-        largest = larger(largest, pdos.payload_bytes)
+        largest = larger(largest, pdos.payload_bytes - (pdos.most_bytes - _most_bytes(network)))
     return largest
+
+
+def _most_bytes(network: Network) -> int:
+    """The most that any PDO may carry [bytes]."""
+    return min(pdos.most_bytes for pdos in traffic_of(network).pdos)
+
+
+def _payload_words(network: Network) -> str:
+    over = next(pdos for pdos in traffic_of(network).pdos if pdos.payload_bytes > pdos.most_bytes)
+    frames = (
+        f"{over.name}_pdos" if len(over.frame_bytes) > 1 or over.most_bytes == over.frame_bytes[0] else "four frames"
+    )
+    return f"a PDO of {plain(over.payload_bytes):.0f} bytes is over the {over.most_bytes} bytes of {frames}"
 
 
 def _kept_from_us(is_broken: Callable[[Network], Number], network: Network) -> float:
@@ -242,9 +261,10 @@ LIMITS: Final = (
     ),
     Limit(
         "payload",
-        "a PDO of {value:.0f} bytes is over the {most:.0f} bytes of four frames",
+        "a PDO of {value:.0f} bytes is over the {most:.0f} bytes of its frames",
         _largest_pdo,
-        lambda _network: MOST_PDOS * FRAME_BYTES,
+        _most_bytes,
+        says=_payload_words,
         way_out="a smaller payload would do",
         failure="payload_bytes",
     ),

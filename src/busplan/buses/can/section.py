@@ -7,12 +7,15 @@ from pydantic import Field, model_validator
 
 from busplan.buses.can.constants import (
     FRAME_BYTES,
+    LEAST_BIT_RATE,
     MAX_IDENTIFIER,
     MAX_LOAD,
+    MOST_BIT_RATE,
+    MOST_NODES,
+    MOST_PDOS,
     PIPELINE_CYCLES,
     SYNC_IDENTIFIER,
     UNMEASURED_SHARE,
-    BitRate,
     IdentifierBits,
 )
 from busplan.buses.can.cycle import WORST, TimingModelName
@@ -22,8 +25,14 @@ from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Problem, Sect
 from busplan.sections.cycle import BusSection, GroupAxes, GroupName, GroupSection, Limits, NodeSection, PayloadSection
 from busplan.sections.execution import UNKNOWN_SHARE
 from busplan.sections.profile import Profile
+from busplan.sections.transactions import TransactionKind
 
 Identifier = Annotated[int, Field(ge=0, le=MAX_IDENTIFIER[29])]
+BitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_BIT_RATE, allow_inf_nan=False)]
+PdoBytes = Annotated[
+    tuple[Annotated[int, Field(ge=1, le=int(FRAME_BYTES))], ...],
+    Field(strict=False, min_length=1, max_length=int(MOST_PDOS)),
+]
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
 _MOST_CYCLES = 1000
 
@@ -32,12 +41,13 @@ class CanBus(BusSection):
     """Section [bus]: a CAN 2.0 bus with a SYNC cycle; no CAN FD."""
 
     kind: Literal["can"] = Field(description="Kind of bus", examples=["can"])
-    bit_rate_kbit_s: BitRate = Field(
-        description="Bit rate of the bus, one of those of CiA 301 [kbit/s]", examples=[1000]
-    )
+    bit_rate_kbit_s: BitRate = Field(description="Bit rate of the bus [kbit/s]", examples=[1000])
     nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[8])
     identifier_bits: IdentifierBits = Field(
-        default=11, description="Length of all identifiers, 11 (CAN 2.0A) or 29 (CAN 2.0B) [bits]", examples=[11]
+        default=11,
+        description="Length of the identifiers, 11 (CAN 2.0A) or 29 (CAN 2.0B), of messages that do not say theirs "
+        "[bits]",
+        examples=[11],
     )
     sync_identifier: Identifier = Field(
         default=int(SYNC_IDENTIFIER), description="Identifier of SYNC", examples=[int(SYNC_IDENTIFIER)]
@@ -101,6 +111,25 @@ class CanPayload(PayloadSection):
         description="Identifier of the first command PDO, as that of feedback. Without it 0x201",
         examples=[0x201],
     )
+    feedback_pdos: PdoBytes | None = Field(
+        default=None,
+        description="Most data of each feedback PDO, whose sum is the default of read_bytes; without it 8 bytes each "
+        "[bytes]",
+        examples=[[6, 6]],
+    )
+    command_pdos: PdoBytes | None = Field(
+        default=None,
+        description="Most data of each command PDO, whose sum is the default of write_bytes; without it 8 bytes each "
+        "[bytes]",
+        examples=[[6, 6]],
+    )
+
+    def _parts(self, kind: TransactionKind) -> tuple[Number | None, Number | None]:
+        fixed, per_axis = super()._parts(kind)
+        lengths = getattr(self, f"{NAMES[kind]}_pdos")
+        if lengths is None or fixed is not None or per_axis is not None:
+            return fixed, per_axis
+        return (None, sum(lengths)) if self.pdo_per == "axis" else (sum(lengths), None)
 
 
 class CanGroup(CanPayload, GroupSection):
@@ -113,7 +142,18 @@ class CanMessage(Section):
     """One of the sections [[message]]: another message on the bus, as SDO, heartbeat or emergency."""
 
     name: GroupName = Field(description="Name of the message; its keys are message.NAME.key", examples=["sdo"])
-    identifier: Identifier = Field(description="Its identifier; a smaller one goes first", examples=[0x581])
+    identifier: Identifier = Field(
+        description="Its identifier; a smaller one goes first. Of each node, what its number from 1 on is added to",
+        examples=[0x581],
+    )
+    identifier_bits: IdentifierBits | None = Field(
+        default=None,
+        description="Length of its identifier, 11 or 29; without it that of the bus [bits]",
+        examples=[29],
+    )
+    per_node: bool = Field(
+        default=False, description="Whether each node sends it, in the order of the profile", examples=[True]
+    )
     payload_bytes: Annotated[int, Field(ge=0, le=int(FRAME_BYTES))] = Field(
         description="Its data [bytes]", examples=[8]
     )
@@ -192,24 +232,35 @@ class CanProfile(Profile):
 
     @model_validator(mode="after")
     def _identifiers_are_in_range(self) -> Self:
-        most = MAX_IDENTIFIER[self.bus.identifier_bits]
         problems = [
-            Problem(f"is over {most}, the largest of {self.bus.identifier_bits} bits", key, "inconsistent")
-            for key, identifier in self._identifiers()
-            if identifier is not None and identifier > most
+            Problem(f"is over {MAX_IDENTIFIER[bits]}, the largest of {bits} bits", key, "inconsistent")
+            for key, identifier, bits in self._identifiers()
+            if identifier is not None and identifier > MAX_IDENTIFIER[bits]
         ]
+        problems += (
+            Problem(
+                f"leaves no room for {MOST_NODES:g} nodes below {MAX_IDENTIFIER[bits]}", f"message.{place}.identifier"
+            )
+            for place, message in enumerate(self.message)
+            if message.per_node
+            and (bits := message.identifier_bits or self.bus.identifier_bits)
+            and MAX_IDENTIFIER[bits] - MOST_NODES < message.identifier <= MAX_IDENTIFIER[bits]
+        )
         if problems:
             raise refused(*problems)
         return self
 
-    def _identifiers(self) -> Iterator[tuple[str, int | None]]:
-        yield "bus.sync_identifier", self.bus.sync_identifier
+    def _identifiers(self) -> Iterator[tuple[str, int | None, int]]:
+        """Keys of identifiers, each with what it says and the length."""
+        bits = self.bus.identifier_bits
+        yield "bus.sync_identifier", self.bus.sync_identifier, bits
         sections = [("payload", self.payload), *((f"group.{place}", group) for place, group in enumerate(self.group))]
         for section, payload in sections:
             if payload is not None:
-                yield f"{section}.feedback_identifier", payload.feedback_identifier
-                yield f"{section}.command_identifier", payload.command_identifier
-        yield from ((f"message.{place}.identifier", message.identifier) for place, message in enumerate(self.message))
+                yield f"{section}.feedback_identifier", payload.feedback_identifier, bits
+                yield f"{section}.command_identifier", payload.command_identifier, bits
+        for place, message in enumerate(self.message):
+            yield f"message.{place}.identifier", message.identifier, message.identifier_bits or bits
 
 
 PROFILE: Final = CanProfile

@@ -1,8 +1,6 @@
 """Settings of a CAN bus that a plan may change without new parts."""
 
-from typing import get_args
-
-from busplan.buses.can.constants import BASE_BITS, MAX_IDENTIFIER, BitRate
+from busplan.buses.can.constants import BASE_BITS, BIT_RATES, MAX_IDENTIFIER
 from busplan.buses.can.streams import streams
 from busplan.buses.can.traffic import traffic_of
 from busplan.buses.network import Network
@@ -36,7 +34,7 @@ def _pdo_per(network: Network) -> Setting:
 def _bit_rate(network: Network) -> Setting:
     """Higher bit rates, the next higher first: the cable must be short enough."""
     key = "bus.bit_rate_kbit_s"
-    higher = tuple({key: rate} for rate in get_args(BitRate) if rate > network.profile.bus.bit_rate_kbit_s)
+    higher = tuple({key: rate} for rate in BIT_RATES if rate > network.profile.bus.bit_rate_kbit_s)
     return Setting("bit_rate", "bit rate", Cost.SCHEDULE, (key,), higher, "" if higher else "it is the highest")
 
 
@@ -46,6 +44,7 @@ def _identifier_bits(network: Network) -> Setting:
     empty = Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), ())
     if plain(traffic.identifier_bits) == BASE_BITS:
         return empty._replace(reason=f"they have {BASE_BITS} bits")
-    if max(stream.last for stream in streams(traffic, is_stuffed=True)) > MAX_IDENTIFIER[BASE_BITS]:
+    own = (stream for stream in streams(traffic, is_stuffed=True) if stream.identifier_bits == traffic.identifier_bits)
+    if max(stream.last for stream in own) > MAX_IDENTIFIER[BASE_BITS]:
         return empty._replace(reason=f"some are over {MAX_IDENTIFIER[BASE_BITS]:#x}")
     return empty._replace(values=({key: BASE_BITS},))

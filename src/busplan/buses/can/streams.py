@@ -3,16 +3,31 @@
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache, reduce
-from itertools import chain, combinations, repeat
+from itertools import accumulate, chain, combinations, islice, repeat
 from typing import Any, Final, NamedTuple, TypeVar
 
-from busplan.buses.can.constants import FRAME_BYTES, MOST_PDOS, PDO_STEP
+from busplan.buses.can.constants import BASE_BITS, MAX_IDENTIFIER, MOST_PDOS, PDO_STEP
 from busplan.buses.can.equations import frame_us
 from busplan.buses.can.response import Points, Sender
 from busplan.buses.can.traffic import FOLLOWS, SYNC, Pdos, Traffic
-from busplan.elementwise import choose, larger, plain, rounded_up, smaller, total
+from busplan.elementwise import choose, larger, plain, smaller, total
 
 Found = TypeVar("Found")
+
+
+def place(identifier: Points, identifier_bits: Points) -> Points:
+    """Place of an identifier in the arbitration, which the smallest wins.
+
+    The first 11 bits decide; of equal ones the base frame goes before all extended ones. Formats that vary from point
+    to point are alike for all frames: then the identifiers are their own places.
+    """
+    if not isinstance(identifier_bits, int | float):
+        return identifier
+    return identifier * _BEHIND if identifier_bits == BASE_BITS else 2 * identifier + 1
+
+
+_BEHIND: Final = 2 * (MAX_IDENTIFIER[29] + 1) // (MAX_IDENTIFIER[BASE_BITS] + 1)
+"""Places of extended identifiers with the same first 11 bits, and between them."""
 
 
 class Stream(NamedTuple):
@@ -21,7 +36,7 @@ class Stream(NamedTuple):
     name: str
     group: str
     block: int
-    """Identifier from which on the first group has them: a message in a block that grows stays behind it."""
+    """Place from which on the first group has them: a message in a block that grows stays behind it."""
     first: Points
     identifiers: Points
     """Number of identifiers; each sends once in a period [1]."""
@@ -30,6 +45,7 @@ class Stream(NamedTuple):
     period_us: Points
     jitter_us: Points
     deadline_us: Points
+    identifier_bits: Points
     is_message: bool = False
     is_end: bool = True
     """Whether the PDO, or the message, is complete with it."""
@@ -38,6 +54,16 @@ class Stream(NamedTuple):
     def last(self) -> Points:
         """The last identifier."""
         return self.first + self.identifiers - 1
+
+    @property
+    def first_place(self) -> Points:
+        """Place of the first identifier in the arbitration."""
+        return place(self.first, self.identifier_bits)
+
+    @property
+    def last_place(self) -> Points:
+        """Place of the last identifier in the arbitration."""
+        return place(self.last, self.identifier_bits)
 
     @property
     def label(self) -> str:
@@ -50,7 +76,7 @@ class Stream(NamedTuple):
 
     def goes_before(self, stream: "Stream") -> bool:
         """Whether its frames win the arbitration against the last frame of another; of plain numbers."""
-        return bool((self.block if stream.is_message else self.first) <= stream.last)
+        return bool((self.block if stream.is_message else self.first_place) <= stream.last_place)
 
 
 def remembered(*, maxsize: int) -> "Callable[[Callable[..., Found]], Callable[..., Found]]":
@@ -87,20 +113,23 @@ def streams(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
 
 def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
     def sent(name: str, block: int, size: Points, **more: Any) -> Stream:
+        own: dict[str, Any] = {
+            "group": "",
+            "first": block,
+            "identifiers": 1,
+            "identifier_bits": traffic.identifier_bits,
+            "period_us": traffic.period_us,
+            "jitter_us": 0.0,
+            "deadline_us": traffic.period_us,
+            **more,
+        }
         us = frame_us(
             size,
-            identifier_bits=traffic.identifier_bits,
+            identifier_bits=own["identifier_bits"],
             bit_rate_kbit_s=traffic.bit_rate_kbit_s,
             is_stuffed=is_stuffed,
         )
-        own: dict[str, Any] = {"period_us": traffic.period_us, "jitter_us": 0.0, "deadline_us": traffic.period_us}
-        return Stream(
-            name,
-            **{"group": "", "first": block, "identifiers": 1, **own, **more},
-            block=block,
-            data_bytes=size,
-            frame_us=us,
-        )
+        return Stream(name, **own, block=place(block, own["identifier_bits"]), data_bytes=size, frame_us=us)
 
     yield sent(SYNC, int(plain(traffic.sync_identifier)), _whole(traffic.sync_bytes))
     block = {"read": FOLLOWS, "write": FOLLOWS}
@@ -111,14 +140,13 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
         if said != FOLLOWS:
             block[pdos.kind] = said
         free[pdos.kind] = first + count
-        frames = _most_frames(pdos)
-        for number in range(frames):
+        frames, left_bytes = _most_frames(pdos), _whole(pdos.payload_bytes)
+        for number, most_bytes in enumerate(islice(_most_bytes(pdos), frames)):
             step = number * int(PDO_STEP)
-            left_bytes = _whole(pdos.payload_bytes) - number * int(FRAME_BYTES)
             own = sent(
                 pdos.name,
                 block[pdos.kind] + step,
-                larger(smaller(left_bytes, int(FRAME_BYTES)), 0),
+                larger(smaller(left_bytes, most_bytes), 0),
                 group=pdos.group,
                 first=first + step,
                 identifiers=count,
@@ -126,23 +154,39 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
             )
             is_there = left_bytes > 0  # not at every point of an array
             yield own._replace(identifiers=choose(is_there, count, 0), frame_us=choose(is_there, own.frame_us, 0.0))
+            left_bytes = left_bytes - most_bytes
     for message in traffic.messages:
-        times = {key: getattr(message, key) for key in ("period_us", "jitter_us", "deadline_us")}
+        more = {key: getattr(message, key) for key in ("period_us", "jitter_us", "deadline_us", "identifier_bits")}
         yield sent(
-            message.name, int(plain(message.identifier)), int(plain(message.payload_bytes)), is_message=True, **times
+            message.name,
+            int(plain(message.identifier)),
+            int(plain(message.payload_bytes)),
+            is_message=True,
+            identifiers=_whole(message.senders),
+            **more,
         )
+
+
+def _most_bytes(pdos: Pdos) -> Iterator[int]:
+    """The most data of each frame of a PDO, without end [bytes]."""
+    return map(int, chain(pdos.frame_bytes, repeat(pdos.frame_bytes[-1])))
 
 
 def _most_frames(pdos: Pdos) -> int:
     """Frames of a PDO that have streams, the most at any point."""
-    frames: Any = rounded_up(pdos.payload_bytes / FRAME_BYTES)
-    return min(int(frames.max() if hasattr(frames, "max") else frames), _MOST_FRAMES)
+    payload: Any = pdos.payload_bytes
+    most_bytes = int(payload.max() if hasattr(payload, "max") else payload)
+    return sum(1 for before in islice(accumulate(_most_bytes(pdos), initial=0), _MOST_FRAMES) if before < most_bytes)
 
 
 def frame_sizes(pdos: Pdos) -> Iterator[int]:
     """Data of each frame of a PDO of plain numbers, of which there may be billions [bytes]."""
-    full, rest = divmod(int(plain(pdos.payload_bytes)), int(FRAME_BYTES))
-    return chain(repeat(int(FRAME_BYTES), full), repeat(rest, int(rest > 0)))
+    left_bytes = int(plain(pdos.payload_bytes))
+    for most_bytes in _most_bytes(pdos):
+        if left_bytes <= 0:
+            return
+        yield min(left_bytes, most_bytes)
+        left_bytes -= most_bytes
 
 
 _MOST_FRAMES: Final = int(MOST_PDOS) + 1
@@ -159,6 +203,11 @@ def last_identifier(each: Iterable[Stream]) -> Points:
     return reduce(larger, (choose(stream.identifiers > 0, stream.last, 0) for stream in each))
 
 
+def last_place(each: Iterable[Stream]) -> Points:
+    """Place of the last identifier of some streams in the arbitration."""
+    return reduce(larger, (choose(stream.identifiers > 0, stream.last_place, 0) for stream in each))
+
+
 def identifiers_twice(each: Sequence[Stream]) -> Points:
     """Number of identifiers that stand twice or more often [1]."""
     if all(isinstance(stream.last, int) for stream in each):
@@ -166,7 +215,14 @@ def identifiers_twice(each: Sequence[Stream]) -> Points:
     return total(
         larger(smaller(early.last, late.last) - larger(early.first, late.first) + 1, 0)
         for early, late in combinations(each, 2)
+        if has_format_of(early, late)
     )
+
+
+def has_format_of(early: Stream, late: Stream) -> bool:
+    """Whether two streams have identifiers of one length; lengths that vary from point to point are alike."""
+    bits = early.identifier_bits, late.identifier_bits
+    return not all(isinstance(length, int | float) for length in bits) or bits[0] == bits[1]
 
 
 def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, int]]:
@@ -178,6 +234,6 @@ def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, in
         for number, place in enumerate(ordered)
         for behind in ordered[number + 1 : bisect_right(firsts, each[place].last)]
     )
-    for early, late in sorted(pairs):
+    for early, late in sorted(pair for pair in pairs if has_format_of(*(each[place] for place in pair))):
         first = max(each[early].first, each[late].first)
         yield each[early], each[late], first, min(each[early].last, each[late].last) - first + 1

@@ -5,7 +5,7 @@ from functools import cached_property, lru_cache, reduce
 from itertools import islice
 from typing import Any, Final, NamedTuple
 
-from busplan.buses.can.constants import COMMAND_IDENTIFIER, FEEDBACK_IDENTIFIER
+from busplan.buses.can.constants import BASE_BITS, COMMAND_IDENTIFIER, FEEDBACK_IDENTIFIER, FRAME_BYTES, MOST_PDOS
 from busplan.buses.can.equations import share_bytes
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, choose, larger, pointwise
@@ -32,6 +32,10 @@ class Pdos(NamedTuple):
     """PDOs of all its nodes [1]."""
     payload_bytes: Number
     """Of each PDO [bytes]."""
+    frame_bytes: tuple[float, ...] = (FRAME_BYTES,)
+    """Most data of each of its frames in their order; further ones are as the last [bytes]."""
+    most_bytes: int = int(MOST_PDOS * FRAME_BYTES)
+    """The most that its frames may carry [bytes]."""
 
     @property
     def name(self) -> str:
@@ -48,6 +52,9 @@ class Message(NamedTuple):
     period_us: Number
     jitter_us: Number
     deadline_us: Number
+    identifier_bits: Number = BASE_BITS
+    senders: Number = 1
+    """Nodes that send it, each with the identifier behind that of the node before [1]."""
 
 
 class Traffic(NamedTuple):
@@ -67,7 +74,7 @@ class Traffic(NamedTuple):
 
     def numbers(self) -> tuple[Number, ...]:
         """All its numbers in a row, as `with_numbers` takes them."""
-        pdos = (number for pdos in self.pdos for number in pdos[_PDO_WORDS:])
+        pdos = (number for pdos in self.pdos for number in (pdos.identifier, pdos.pdos, pdos.payload_bytes))
         own: tuple[Any, ...] = self[:_OWN_NUMBERS]
         return (*own, *pdos, *(number for message in self.messages for number in message[_MESSAGE_WORDS:]))
 
@@ -75,7 +82,9 @@ class Traffic(NamedTuple):
         """The same senders with other numbers, in the order of `numbers`."""
         rest: Iterator[Any] = iter(numbers)
         own = tuple(islice(rest, _OWN_NUMBERS))
-        pdos = tuple(Pdos(pdos.kind, pdos.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for pdos in self.pdos)
+        pdos = tuple(
+            pdos._replace(identifier=next(rest), pdos=next(rest), payload_bytes=next(rest)) for pdos in self.pdos
+        )
         count = len(Message._fields) - _MESSAGE_WORDS
         messages = tuple(Message(message.name, *islice(rest, count)) for message in self.messages)
         return Traffic._make((*own, pdos, messages))
@@ -83,7 +92,6 @@ class Traffic(NamedTuple):
 
 _OWN_NUMBERS: Final = len(Traffic._fields) - 2
 """Fields before the PDOs and the messages."""
-_PDO_WORDS: Final = 2
 _MESSAGE_WORDS: Final = 1
 """Fields of words, which stand before the numbers."""
 
@@ -129,10 +137,12 @@ class Sent:
 
     @cached_property
     def is_ordered(self) -> bool:
-        """Whether identifiers and sizes of messages are plain, and no number is traced."""
+        """Whether identifiers and sizes of messages are plain, formats alike or plain, and no number is traced."""
         traffic = self.traffic
         messages = (number for message in traffic.messages for number in (message.identifier, message.payload_bytes))
-        order = (traffic.sync_identifier, *(pdos.identifier for pdos in traffic.pdos), *messages)
+        order = [traffic.sync_identifier, *(pdos.identifier for pdos in traffic.pdos), *messages]
+        if not all(message.identifier_bits is traffic.identifier_bits for message in traffic.messages):
+            order += (traffic.identifier_bits, *(message.identifier_bits for message in traffic.messages))
         return all(isinstance(number, int | float) for number in order) and not any(
             isinstance(number, Traced) for number in traffic.numbers()
         )
@@ -192,7 +202,7 @@ def traffic_of(network: Network) -> Traffic:
             )
             for group in network.groups
         ]
-        _last = network, _traffic(network.profile, senders, network.period_us)
+        _last = network, _traffic(network.profile, senders, network.period_us, network.nodes)
     return _last[1]
 
 
@@ -204,7 +214,7 @@ def traffic_of_profile(profile: Any) -> Traffic:
         each, execution = _pdos_each(nodes.payload, nodes.node.axes), nodes.node.execution
         read_us = execution.execution_us(payloads_bytes[0]) + execution.worst_extra_us
         senders.append(_Senders(nodes.name, nodes.payload, nodes.nodes * each, each, payloads_bytes, read_us))
-    return _traffic(profile, senders, profile.cycle.period_us)
+    return _traffic(profile, senders, profile.cycle.period_us, sum(alike.nodes for alike in profile.alike_nodes))
 
 
 def without_times(traffic: Traffic) -> Traffic:
@@ -224,7 +234,7 @@ def host_us(bus: Any) -> Number:
     return choose(bus.pipeline_cycles > 0, 0.0, bus.host_us)
 
 
-def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number) -> Traffic:
+def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes: Number) -> Traffic:
     bus = profile.bus
     return Traffic(
         period_us=period_us,
@@ -239,7 +249,7 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number) -> Tr
             for number, kind in enumerate(TRANSACTION_KINDS)
             for place, sender in enumerate(senders)
         ),
-        messages=tuple(map(_message, profile.message)),
+        messages=tuple(_message(message, bus, nodes) for message in profile.message),
     )
 
 
@@ -248,9 +258,22 @@ def _pdos(sender: _Senders, kind: TransactionKind, number: int, *, is_first: boo
     if identifier is None:
         identifier = int(_FIRST[kind]) if is_first else FOLLOWS
     payload_bytes = share_bytes(sender.payloads_bytes[number], pdos=sender.pdos_each)
-    return Pdos(kind, sender.name, identifier, sender.pdos, payload_bytes)
+    pdos = Pdos(kind, sender.name, identifier, sender.pdos, payload_bytes)
+    lengths = getattr(sender.payload, f"{NAMES[kind]}_pdos")
+    if lengths is None:
+        return pdos
+    return pdos._replace(frame_bytes=lengths, most_bytes=sum(lengths))
 
 
-def _message(said: Any) -> Message:
+def _message(said: Any, bus: Any, nodes: Number) -> Message:
     deadline_us = said.period_us if said.deadline_us is None else said.deadline_us
-    return Message(said.name, said.identifier, said.payload_bytes, said.period_us, said.jitter_us, deadline_us)
+    return Message(
+        said.name,
+        said.identifier + 1 if said.per_node else said.identifier,
+        said.payload_bytes,
+        said.period_us,
+        said.jitter_us,
+        deadline_us,
+        bus.identifier_bits if said.identifier_bits is None else said.identifier_bits,
+        nodes if said.per_node else 1,
+    )

@@ -1,15 +1,15 @@
 """Waits of a cycle for other messages, and the worst-case response of each stream."""
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import reduce
 from itertools import accumulate, chain, islice, repeat
 from math import inf
 from operator import add
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from busplan.buses.can.constants import MOST_BLOCKS, SATURATED
-from busplan.buses.can.equations import bit_us
+from busplan.buses.can.constants import BASE_BITS, MOST_BLOCKS, SATURATED
+from busplan.buses.can.equations import bit_us, frame_bits
 from busplan.buses.can.response import (
     BELOW,
     Points,
@@ -20,7 +20,7 @@ from busplan.buses.can.response import (
     worst_instance,
     worst_response,
 )
-from busplan.buses.can.streams import Stream, last_identifier, remembered, streams
+from busplan.buses.can.streams import Stream, last_place, remembered, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic
 from busplan.elementwise import choose, is_everywhere, larger, plain, rounded_up, smaller, total
 
@@ -45,16 +45,6 @@ class Waits(NamedTuple):
         return islice(chain.from_iterable(each), int(MOST_BLOCKS))
 
 
-def is_higher(message: Points, last: Points) -> Points:
-    """Whether an identifier goes before the last identifier of SYNC and all PDOs; of any sort."""
-    return message <= last
-
-
-def last_cyclic(each: Iterable[Stream]) -> Points:
-    """The largest identifier of SYNC and all PDOs."""
-    return last_identifier(stream for stream in each if not stream.is_message)
-
-
 @remembered(maxsize=256)
 def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     """Find how long a cycle lasts with the frames of other messages.
@@ -77,22 +67,21 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     before, too: the last frame of that cycle started as long before its end as the last frame of this cycle does.
     """
     each = streams(traffic, is_stuffed=is_stuffed)
-    last, bit = last_cyclic(each), bit_us(traffic.bit_rate_kbit_s)
+    last, bit = last_place(stream for stream in each if not stream.is_message), bit_us(traffic.bit_rate_kbit_s)
     messages = [stream for stream in each if stream.is_message]
     higher = [
-        Sender(choose(is_higher(stream.first, last), stream.frame_us, 0.0), stream.period_us, stream.jitter_us + bit)
+        Sender(choose(is_higher, stream.sender().frames_us, 0.0), stream.period_us, stream.jitter_us + bit)
         for stream in messages
-        if is_higher(stream.first, last) is not False
+        if (is_higher := stream.first_place <= last) is not False
     ]
-    # Every frame has the same bit rate and format: the frame with the most data is the longest.
-    by_length = sorted(messages, key=lambda stream: -plain(stream.data_bytes))
-    lower = tuple(stream for stream in by_length if is_higher(stream.first, last) is not True)
+    by_length = sorted(messages, key=lambda stream: -_length(stream, is_stuffed=is_stuffed))
+    lower = tuple(stream for stream in by_length if (stream.last_place > last) is not False)
 
     def blocking_us(span_us: Points) -> Points:
         blocked: Points = 0.0
         left: Points = int(MOST_BLOCKS)
         for stream in lower:
-            count = choose(is_higher(stream.first, last), 0, smaller(_frames_within(stream, span_us), left))
+            count = choose(stream.last_place > last, smaller(_frames_within(stream, span_us), left), 0)
             for number in range(int(MOST_BLOCKS)):
                 blocked = blocked + choose(count > number, stream.frame_us, 0.0)
             left = left - count
@@ -104,9 +93,25 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     return Waits(lasts_us, blocking_us(lasts_us), lower)
 
 
+def _length(stream: Stream, *, is_stuffed: bool) -> float:
+    """Number by which the frames of messages are in order of their length, at every point of arrays."""
+    if isinstance(stream.frame_us, float):
+        return stream.frame_us
+    # Bit rates, and formats that are no plain numbers, are the same for all messages.
+    bits = stream.identifier_bits
+    return plain(
+        frame_bits(
+            stream.data_bytes,
+            identifier_bits=bits if isinstance(bits, int | float) else BASE_BITS,
+            is_stuffed=is_stuffed,
+        )
+    )
+
+
 def _frames_within(stream: Stream, span_us: Points) -> Points:
     """Frames of a message of a lower priority that go within a span of time, of which three are enough [1]."""
-    return rounded_up(smaller((span_us + stream.deadline_us) / stream.period_us, int(MOST_BLOCKS)))
+    each = rounded_up(smaller((span_us + stream.deadline_us) / stream.period_us, int(MOST_BLOCKS)))
+    return smaller(stream.identifiers * each, int(MOST_BLOCKS))
 
 
 def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> dict[str, Points]:
@@ -209,10 +214,12 @@ class Messages:
         """The worst instance of a message from each start of a busy period."""
         behind = self._behind(own)
         at = next(place for place, stream in enumerate(self._ranked) if stream.is_message and stream.name == own.name)
+        is_single = isinstance(own.identifiers, int) and own.identifiers == 1
+        siblings = [] if is_single else [own.sender(own.identifiers - 1)]
         for start in self._starts:
             yield worst_instance(
-                own.sender(),
-                start.senders[:at] + start.senders[at + 1 : behind],
+                own.sender(1),
+                start.senders[:at] + siblings + start.senders[at + 1 : behind],
                 blocking_us=self._longest_us[behind],
                 bit_us=self._bit_us,
                 first_us=start.first_us[behind],
@@ -234,7 +241,7 @@ class Messages:
 
     def bound_share(self, own: Stream) -> Points:
         """A bound of the response over the deadline; infinite where the load of the bus leaves no response [1]."""
-        behind, sender = self._behind(own), own.sender()
+        behind, sender = self._behind(own), own.sender(1)
         load, own_most_us = self._loads[behind], sender.frames_us + sender.load * (sender.jitter_us + self._bit_us)
         starts_us = (start.first_us[behind] + start.most_us[behind] for start in self._starts)
         most_us = reduce(larger, starts_us) - own_most_us + self._longest_us[behind]
@@ -244,7 +251,7 @@ class Messages:
 
     def least_share(self, own: Stream) -> Points:
         """Lower bound of the response over the deadline, of a busy period that begins with SYNC [1]."""
-        behind, sender = self._behind(own), own.sender()
+        behind, sender = self._behind(own), own.sender(1)
         load, waits_us = self._loads[behind], self._starts[0].least_us[behind] + self._longest_us[behind]
         waits_us = waits_us - sender.load * (sender.jitter_us + self._bit_us)
         has_response = load < SATURATED
@@ -272,7 +279,8 @@ class Messages:
 
     def _behind(self, own: Stream) -> int:
         """The first rank behind a message."""
-        return bisect_right(self._ranks, plain(own.first))
+        last: Any = own.last_place
+        return bisect_right(self._ranks, last.max() if hasattr(last, "max") else last)
 
 
 @remembered(maxsize=16)

@@ -14,6 +14,7 @@ from busplan.questions.import_.text import ProfileLine, group_name, time_us
 _DIRECTIONS: Final = {"feedback": "read_bytes", "command": "write_bytes"}
 _FRAME_BYTES: Final = 8
 _PDO_STEP: Final = 0x100
+_MOST_PDOS: Final = 4
 _HEARTBEAT_ID: Final = 0x700
 _BIT_RATE: Final = "bit_rate_kbit_s"
 _LISTED: Final = 8
@@ -83,10 +84,10 @@ def _nodes(machine: Reading) -> Iterator[_Node]:
 
 
 def _together(pdos: list[Pdo]) -> list[Pdo]:
-    """The first PDOs that a profile's payload makes again: full frames but the last, identifiers 256 apart."""
+    """The first PDOs that are those of one payload: no more than four, identifiers 256 apart."""
     found = pdos[:1]
     for pdo in pdos[1:]:
-        if found[-1].payload_bytes != _FRAME_BYTES or pdo.identifier != found[-1].identifier + _PDO_STEP:
+        if len(found) == _MOST_PDOS or pdo.identifier != found[-1].identifier + _PDO_STEP:
             break
         found.append(pdo)
     return found
@@ -94,7 +95,7 @@ def _together(pdos: list[Pdo]) -> list[Pdo]:
 
 def _alike(place: int, node: _Node) -> tuple[Any, ...]:
     """What neighbours of one group share: sizes, axes, and identifiers that go up by one."""
-    sizes = (sum(pdo.payload_bytes for pdo in node.sent[key]) for key in _DIRECTIONS)
+    sizes = (tuple(pdo.payload_bytes for pdo in node.sent[key]) for key in _DIRECTIONS)
     starts = (node.sent[key][0].identifier - place for key in _DIRECTIONS)
     return (*sizes, *starts, node.facts["axes"].value)
 
@@ -111,7 +112,11 @@ def _group(nodes: list[_Node], taken: set[str]) -> Iterator[ProfileLine]:
     for key, size in _DIRECTIONS.items():
         pdos = first.sent[key]
         names = ", ".join(pdo.name for pdo in pdos)
-        yield ProfileLine(section, size, Fact(sum(pdo.payload_bytes for pdo in pdos), pdos[0].place, note=names))
+        lengths = [pdo.payload_bytes for pdo in pdos]
+        if all(length == _FRAME_BYTES for length in lengths[:-1]):
+            yield ProfileLine(section, size, Fact(sum(lengths), pdos[0].place, note=names))
+        else:
+            yield ProfileLine(section, f"{key}_pdos", Fact(lengths, pdos[0].place, note=names))
         yield ProfileLine(
             section, f"{key}_identifier", Fact(pdos[0].identifier, pdos[0].place, note=f"0x{pdos[0].identifier:x}")
         )
@@ -183,9 +188,7 @@ def _message(found: Facts, used: set[int], taken: set[str], left_out: dict[str, 
     reason = ""
     if identifier.value in used:
         return
-    if identifier.value >= EXTENDED:
-        reason = "an identifier of 29 bits beside those of 11, which a profile cannot say yet"
-    elif ("is_fd" in found and found["is_fd"].value) or found["payload_bytes"].value > _FRAME_BYTES:
+    if ("is_fd" in found and found["is_fd"].value) or found["payload_bytes"].value > _FRAME_BYTES:
         reason = "CAN FD, which a profile cannot say yet"
     elif "period_us" not in found:
         reason = "no file says its period; give one that does, or add it by hand"
@@ -194,7 +197,10 @@ def _message(found: Facts, used: set[int], taken: set[str], left_out: dict[str, 
         return
     used.add(identifier.value)
     section = f"message.{group_name(name, taken)}"
-    note = ", ".join(filter(None, (f"0x{identifier.value:x}", identifier.note)))
-    yield ProfileLine(section, "identifier", identifier._replace(note=note))
+    number = identifier.value % EXTENDED
+    note = ", ".join(filter(None, (f"0x{number:x}", identifier.note)))
+    yield ProfileLine(section, "identifier", identifier._replace(value=number, note=note))
+    if identifier.value >= EXTENDED:
+        yield ProfileLine(section, "identifier_bits", Fact(29, identifier.place))
     yield ProfileLine(section, "payload_bytes", found["payload_bytes"])
     yield ProfileLine(section, "period_us", found["period_us"])

@@ -18,6 +18,7 @@ from busplan.sections.profile import Profile
 _OURS: Final = re.compile(r"# was (?:published|measured|derived|assumed): .*:\d+$")
 """A comment that an import wrote, once its value has changed."""
 _ALIKE: Final = {"nodes": "bus", "axes": "node", "read_bytes": "payload", "write_bytes": "payload"}
+_BASE_BITS: Final = 11
 """Section of a group's key in a profile whose nodes are alike; of all others it is node."""
 
 
@@ -103,8 +104,17 @@ def _renamed(rows: Sequence[ProfileLine], data: Mapping[str, Any], name: str) ->
         )
     elif groups:
         names = dict(zip(groups, own, strict=True))
-    identifiers = {table.get("identifier"): key for key, table in (named_tables(data.get("message")) or {}).items()}
-    messages = {row.section: identifiers.get(row.plain) for row in rows if row.key == "identifier"}
+    tables = named_tables(data.get("message")) or {}
+    usual_bits = data.get("bus", {}).get("identifier_bits", _BASE_BITS)
+    identifiers = {
+        (table.get("identifier"), table.get("identifier_bits", usual_bits)): key for key, table in tables.items()
+    }
+    bits = {row.section: row.plain for row in rows if row.key == "identifier_bits"}
+    messages = {
+        row.section: identifiers.get((row.plain, bits.get(row.section, _BASE_BITS)))
+        for row in rows
+        if row.key == "identifier"
+    }
     for row in rows:
         first, _, rest = row.section.partition(".")
         group, _, inner = rest.partition(".")

@@ -1,0 +1,225 @@
+"""Networks as they are: identifiers of both lengths, messages of each node, PDOs by their lengths, any bit rate."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import busplan
+from busplan.buses.can.cycle import WORST, CanCycle
+from busplan.buses.can.limits import LIMITS
+from busplan.buses.can.section import CanProfile
+from busplan.buses.can.streams import streams
+from busplan.buses.can.traffic import traffic_of_profile
+from busplan.elementwise import plain
+from busplan.profile.conversion import converted
+from busplan.profile.toml import override
+from busplan.profile.write import profile_text
+from busplan.questions.fit.network import network_of
+from busplan.sections.base import with_unchecked
+from busplan.sections.profile import Profile
+
+Run = Callable[..., Any]
+BASE: dict[str, Any] = {
+    "schema_version": 1,
+    "name": "arm",
+    "bus": {"kind": "can", "bit_rate_kbit_s": 1000, "nodes": 3},
+    "cycle": {"period_us": 8000.0},
+    "payload": {"read_bytes": 8, "write_bytes": 8},
+    "node": {"axes": 2, "execution": {"kind": "linear", "grade": "measured", "base_us": 40.0, "per_byte_us": 1.0}},
+}
+
+
+def message(name: str, identifier: int, **keys: Any) -> dict[str, Any]:
+    return {"name": name, "identifier": identifier, "payload_bytes": 8, "period_us": 1e5, **keys}
+
+
+def profile(*messages: dict[str, Any], **sections: Any) -> CanProfile:
+    return CanProfile.model_validate({**BASE, "message": messages, **sections})
+
+
+def responses(own: Profile) -> dict[str, float | None]:
+    answers = busplan.latency(own, timing_model=[WORST]).transactions
+    return {answer.transaction: answer.worst_response_us for answer in answers}
+
+
+def wins(*names_in_order: str, own: Profile) -> bool:
+    """Whether messages go in an order: one waits for all before it, whose frames are alike."""
+    us = responses(own)
+    each = [us[name] or 0.0 for name in names_in_order]
+    return each == sorted(set(each))
+
+
+def test_the_base_frame_goes_before_extended_ones_with_its_first_eleven_bits() -> None:
+    own = profile(
+        message("behind", 0x301),
+        message("extended-last", (0x300 << 18) + 0x3FFFF, identifier_bits=29),
+        message("extended", 0x300 << 18, identifier_bits=29),
+        message("base", 0x300),
+        message("lowest", 0x1FFFFFFF, identifier_bits=29),  # blocks each of them
+    )
+    # A small number of 29 bits goes before everything of 11 bits but the smallest.
+    assert wins("base", "extended", "extended-last", "behind", own=own)
+    first = profile(message("small", 0x90), message("extended", 0x90, identifier_bits=29))
+    assert wins("extended", "small", own=first)
+    assert plain(busplan.capacity(first).results[0].terms[-2].us) == 135 + 160  # both go before the PDOs
+    assert {plain(stream.frame_us) for stream in _messages(first)} == {135, 160}
+
+
+def _messages(own: Profile) -> list[Any]:
+    return [stream for stream in streams(traffic_of_profile(own), is_stuffed=True) if stream.is_message]
+
+
+def test_identifiers_of_unlike_length_do_not_collide(run: Run, tmp_path: Path) -> None:
+    own = profile(message("base", 0x90), message("extended", 0x90, identifier_bits=29))
+    assert busplan.capacity(own).results[0].exceeded == ()
+    same = override(own, {"message.base.identifier_bits": 29})
+    assert busplan.capacity(same).results[0].exceeded == ("identifiers",)
+    (tmp_path / "arm.toml").write_text(profile_text(same), encoding="utf-8")
+    said = run("check", "arm.toml", cwd=tmp_path).stdout
+    assert "message.extended.identifier: base and extended share the identifier 0x90" in said
+
+
+@pytest.mark.parametrize(
+    ("messages", "words"),
+    [
+        ([message("long", 0x800)], "is over 2047, the largest of 11 bits"),
+        ([message("long", 1 << 29, identifier_bits=29)], "less than or equal to 536870911"),
+        ([message("beat", 0x790, per_node=True)], "leaves no room for 127 nodes below 2047"),
+    ],
+)
+def test_identifiers_keep_their_range(messages: list[dict[str, Any]], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        profile(*messages)
+
+
+@pytest.mark.parametrize("rate", [5, 33.3, 83.333, 1000])
+def test_the_bit_rate_is_any_of_a_transceiver(rate: float) -> None:
+    own = profile(bus={**BASE["bus"], "bit_rate_kbit_s": rate}, cycle={"period_us": 1e6})
+    (found,) = busplan.capacity(own, timing_model=[WORST]).results
+    assert {term.name: plain(term.us) for term in found.terms}["feedback"] == pytest.approx(3 * 135 * 1000 / rate)
+
+
+@pytest.mark.parametrize("nodes", [1, 3, 20])
+def test_a_message_of_each_node_is_that_many_messages(nodes: int) -> None:
+    bus, period = {**BASE["bus"], "nodes": nodes}, {"period_us": 20_000.0}
+    early, late = {"period_us": 9000.0, "jitter_us": 50.0}, {"payload_bytes": 1}
+    together = profile(
+        message("early", 0x80, **early, per_node=True),
+        message("beat", 0x700, **late, per_node=True),
+        bus=bus,
+        cycle=period,
+    )
+    numbers = range(1, nodes + 1)
+    alone = profile(
+        *(message(f"early-{number}", 0x80 + number, **early) for number in numbers),
+        *(message(f"beat-{number}", 0x700 + number, **late) for number in numbers),
+        bus=bus,
+        cycle=period,
+    )
+    one, other = (busplan.capacity(own).results[0] for own in (together, alone))
+    assert [term.us for term in one.terms] == pytest.approx([term.us for term in other.terms])
+    assert (one.bus_load, one.verdict) == (pytest.approx(other.bus_load), other.verdict)
+    us = responses(alone)
+    # The last of them waits longest.
+    assert responses(together)["beat"] == pytest.approx(us[f"beat-{nodes}"])
+    assert responses(together)["early"] == pytest.approx(us[f"early-{nodes}"])
+
+
+def test_more_nodes_send_more_of_a_message_of_each_node() -> None:
+    own = profile(message("sdo", 0x580, period_us=20_000.0, per_node=True))
+    most = busplan.capacity(own).results[0].safe_nodes
+    assert most is not None
+    for nodes, is_fit in ((most, True), (most + 1, False)):
+        found = busplan.capacity(override(own, {"bus.nodes": nodes})).results[0]
+        assert (found.verdict == "fits" and not found.exceeded) is is_fit
+
+
+def test_pdos_have_the_lengths_that_they_are_given() -> None:
+    own = profile(payload={"feedback_pdos": [6, 6], "command_pdos": [2, 8, 1]})
+    (found,) = busplan.capacity(own, timing_model=[WORST]).results
+    us = {term.name: plain(term.us) for term in found.terms}
+    assert us["feedback"] == 3 * 2 * (55 + 60)
+    assert us["command"] == 3 * (75 + 135 + 65)
+    each = streams(traffic_of_profile(own), is_stuffed=True)
+    assert [(stream.first, stream.data_bytes) for stream in each if stream.name == "command"] == [
+        (0x201, 2),
+        (0x301, 8),
+        (0x401, 1),
+    ]
+    assert own.alike_nodes[0].bytes_of("read") == 12
+
+
+@pytest.mark.parametrize(("size", "frames"), [(5, [5]), (6, [6]), (7, [6, 1]), (12, [6, 6])])
+def test_a_payload_fills_pdos_in_their_order(size: int, frames: list[int]) -> None:
+    own = profile(payload={"feedback_pdos": [6, 6], "read_bytes": size, "write_bytes": 8})
+    each = streams(traffic_of_profile(own), is_stuffed=True)
+    assert [stream.data_bytes for stream in each if stream.name == "feedback"] == frames
+
+
+def test_a_payload_over_its_pdos_breaks_the_limit(run: Run, tmp_path: Path) -> None:
+    own = profile(payload={"feedback_pdos": [6, 6], "read_bytes": 13, "write_bytes": 8})
+    (found,) = busplan.capacity(own, timing_model=[WORST]).results
+    assert found.exceeded == ("payload",)
+    (tmp_path / "arm.toml").write_text(profile_text(own), encoding="utf-8")
+    said = run("capacity", "arm.toml", cwd=tmp_path).stdout
+    assert "a PDO of 13 bytes is over the 12 bytes of feedback_pdos" in said
+
+
+def test_pdos_of_each_axis_have_those_lengths_each() -> None:
+    own = profile(payload={"feedback_pdos": [4, 2], "command_pdos": [4], "pdo_per": "axis"})
+    assert own.alike_nodes[0].bytes_of("read") == 2 * 6
+    each = streams(traffic_of_profile(own), is_stuffed=True)
+    assert [(stream.identifiers, stream.data_bytes) for stream in each if stream.name == "feedback"] == [(6, 4), (6, 2)]
+
+
+def test_full_pdos_are_those_of_a_payload() -> None:
+    old = profile(payload={"read_bytes": 12, "write_bytes": 8})
+    new = profile(payload={"feedback_pdos": [8, 4], "command_pdos": [8]})
+    assert [found.margin_us for found in busplan.capacity(old).results] == [
+        found.margin_us for found in busplan.capacity(new).results
+    ]
+    assert responses(old) == responses(new)
+
+
+def test_arrays_of_points_give_what_each_point_gives() -> None:
+    own = profile(
+        message("sdo", 0x580, period_us=20_000.0, per_node=True),
+        message("early", 0x10, period_us=5_000.0, identifier_bits=29),
+        message("late", 0x1FFFFFFF, period_us=30_000.0, identifier_bits=29),
+        payload={"feedback_pdos": [6, 6], "command_pdos": [6, 2], "read_bytes": 12, "write_bytes": 8},
+    )
+    keys = {
+        "bus.nodes": np.array([1, 4, 40]).reshape(-1, 1, 1),
+        "payload.read_bytes": np.array([3, 7, 14]).reshape(-1, 1),
+        "bus.bit_rate_kbit_s": np.array([125.0, 400.0]),
+    }
+    varied = own
+    for key, values in keys.items():
+        varied = with_unchecked(varied, key, values.astype(float))
+    together, shape = network_of(varied), (3, 3, 2)
+    answers: dict[str, Any] = {limit.key: limit.is_broken(together) for limit in LIMITS}
+    answers["required"] = CanCycle(together, WORST).required_us
+    told = {key: np.broadcast_to(each, shape) for key, each in answers.items()}
+    for place in np.ndindex(shape):
+        at = {key: np.broadcast_to(values, shape)[place].item() for key, values in keys.items()}
+        alone = network_of(override(own, at))
+        expected: dict[str, Any] = {limit.key: limit.is_broken(alone) for limit in LIMITS}
+        expected["required"] = CanCycle(alone, WORST).required_us
+        assert {key: each[place] for key, each in told.items()} == expected, at
+
+
+def test_a_machine_on_another_bus_keeps_its_payload() -> None:
+    own = profile(payload={"feedback_pdos": [6, 6], "command_pdos": [6, 2]})
+    same = profile(payload={"read_bytes": 12, "write_bytes": 8})
+    for kind in ("ethercat", "sercos3"):
+        one, other = (converted(machine, kind).profile for machine in (own, same))
+        assert one.alike_nodes == other.alike_nodes
+
+
+def test_no_pdo_is_empty_or_too_long() -> None:
+    for lengths in ([], [0], [9], [1, 1, 1, 1, 1]):
+        with pytest.raises(ValueError, match="feedback_pdos"):
+            profile(payload={"feedback_pdos": lengths, "write_bytes": 8})
