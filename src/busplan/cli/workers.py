@@ -68,7 +68,14 @@ class _Workers(ProcessPoolExecutor):
     def submit(self, fn: Callable[..., Result], /, *args: object, **kwargs: object) -> "Future[Result]":
         """Let a worker call a function; workers and threads are started when they are needed first."""
         with _signals_blocked():
-            return super().submit(fn, *args, **kwargs)
+            future = super().submit(fn, *args, **kwargs)
+        # Calls end with their workers. The executor's thread stumbles over a cancelled one when it sees them killed.
+        future.cancel = _refuse  # type: ignore[method-assign]
+        return future
+
+
+def _refuse() -> bool:
+    return False
 
 
 @contextmanager

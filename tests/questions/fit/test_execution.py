@@ -2,6 +2,7 @@
 
 import os
 import random
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import closing
@@ -146,8 +147,10 @@ def test_what_the_executor_cancels_ends_the_run() -> None:
 # --- worker processes --------------------------------------------------------------------------
 
 
-def test_a_worker_that_is_lost_is_said_and_none_is_left() -> None:
+def test_a_worker_that_is_lost_is_said_and_none_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     before = active_children()
+    stumbles: list[object] = []
+    monkeypatch.setattr("threading.excepthook", stumbles.append)
     with workers(2) as crew:
         assert list(run_in_order(crew, abs, range(-50, 0), most=9)) == list(range(50, 0, -1))
         assert len(active_children()) == len(before) + 2
@@ -157,6 +160,16 @@ def test_a_worker_that_is_lost_is_said_and_none_is_left() -> None:
     with pytest.raises(WorkerLostError, match="a worker was killed"), workers(1) as crew:
         list(run_in_order(crew, os._exit, range(100)))
     assert active_children() == before
+    with workers(1) as crew:
+        calls = [crew.submit(time.sleep, 0.1) for _ in range(9)]
+        calls[0].result()
+        for call in calls:
+            call.cancel()
+        for process in set(active_children()) - set(before):
+            process.kill()
+        assert calls[1].exception(timeout=20)
+    assert active_children() == before
+    assert not stumbles
 
 
 # --- a sweep ----------------------------------------------------------------------------------------------
