@@ -109,6 +109,7 @@ def traffic(random: Random, *, nodes: int) -> Traffic:
     return Traffic(
         period_us=1.0,
         bit_rate_kbit_s=1000,
+        data_bit_rate_kbit_s=0.0,
         identifier_bits=11,
         sync_identifier=random.choice([0x80, 0x80, 0x80, 0x15, 0x650]),
         sync_bytes=random.randint(0, 1),
@@ -296,7 +297,7 @@ def test_no_simulated_run_of_both_formats_takes_longer_than_the_model() -> None:
 def drives(nodes: int, *low: Message, read_us: int = 150, host_us: int = 0) -> Traffic:
     """Nodes with full PDOs, and messages of lower priorities."""
     pdos = (Pdos("read", "", 0x181, nodes, 8), Pdos("write", "", 0x201, nodes, 8))
-    return Traffic(1.0, 1000, 11, 0x80, 0, read_us, host_us, pdos, low)
+    return Traffic(1.0, 1000, 0.0, 11, 0x80, 0, read_us, host_us, pdos, low)
 
 
 LOW: Final = tuple(Message(f"low{number}", 0x7F0 + number, 8, 50_000, 0, 50_000) for number in range(3))
