@@ -49,8 +49,8 @@ FD_CLOSING_BITS: Final = _bits(
 )
 FD_CONTROL_BITS: Final = _bits(5, "bits before the data of an FD frame: ESI and DLC", source=_ISO)
 FD_COUNT_BITS: Final = _bits(4, "stuff count of an FD frame", source=_ISO)
-FD_CRC_BITS: Final = _bits(17, "CRC of an FD frame of up to 16 bytes", source=_ISO)
-FD_LONG_CRC_BITS: Final = _bits(21, "CRC of a longer FD frame", source=_ISO)
+FD_CRC_BITS: Final = _bits(17, "CRC of an FD frame of up to 16 bytes", symbol="crc", source=_ISO)
+FD_LONG_CRC_BITS: Final = _bits(21, "CRC of a longer FD frame", symbol="crc", source=_ISO)
 FD_SHORT_BYTES: Final = Sourced(
     16, unit="bytes", grade="published", source=_ISO, meaning="most data of an FD frame with the short CRC"
 )

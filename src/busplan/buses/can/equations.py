@@ -84,7 +84,8 @@ def fd_frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bo
     tuple
         Bits at the nominal bit rate, a + 12 with a = 17 or 36, and with stuffing floor((a - 1) / 4) more; bits at the
         data bit rate, d + t + ceil(t / 4) + 1 with d = 5 + 8 p and t = 4 + 17, or 4 + 21 over 16 bytes, and with
-        stuffing floor((d + 3) / 4) more [bits]. No frame has more; for the header has fixed bits, none has as many.
+        stuffing floor((d + 3) / 4) more [bits]. The longest frames have 1 nominal and 1 to 3 data bits less, for some
+        bits of the header are fixed.
 
     References
     ----------

@@ -237,8 +237,8 @@ def without_times(traffic: Traffic) -> Traffic:
         message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0, data_bit_rate_kbit_s=0.0)
         for message in traffic.messages
     )
-    times = {"period_us": 1.0, "bit_rate_kbit_s": 1.0, "data_bit_rate_kbit_s": 0.0, "read_us": 0.0, "host_us": 0.0}
-    return traffic._replace(**times, messages=messages)
+    own = traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, data_bit_rate_kbit_s=0.0, read_us=0.0, host_us=0.0)
+    return own._replace(messages=messages)
 
 
 def host_us(bus: Any) -> Number:
