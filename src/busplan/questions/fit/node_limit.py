@@ -116,7 +116,9 @@ def _most_within(limit: Limit, network: Network, full: Callable[[int], Network],
     if not _any(over):
         return ceiling
     if whole > 1:
-        counted = ceiling * (_size(limit.least_value(network.with_nodes(1))) * _VALUE_COST + whole)
+        # A limit that tells without its value is asked everywhere.
+        asked = whole if limit.breaks else _size(limit.least_value(network.with_nodes(1)))
+        counted = ceiling * (asked * _VALUE_COST + whole)
         if counted <= ceiling.bit_length() * whole * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))
             return total(choose(is_over, 0, 1) for is_over in broken)
