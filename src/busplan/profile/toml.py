@@ -18,7 +18,7 @@ from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
 from busplan.sourced import Grade
 
-MAX_FILE_BYTES: Final = 100_000
+MAX_FILE_BYTES: Final = 2_000_000
 """A profile is a page of text; a larger file is something else."""
 _OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
 """Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
