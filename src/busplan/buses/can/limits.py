@@ -131,9 +131,7 @@ _POINTS_AT_ONCE: Final = 4096
 def _has_late(traffic: Traffic) -> Number:
     each, late = _messages(traffic), False
     if traffic.is_plain:
-        # Those whose bounds are the largest are late if any is.
-        waiting = sorted(((bound, own) for own, bound in each.bounds() if bound > 1), key=lambda pair: -plain(pair[0]))
-        return any(plain(each.deadline_share(own, bound)) > 1 for bound, own in waiting)
+        return any(plain(each.deadline_share(own, bound)) > 1 for own, bound in each.may_be_late())
     for _, share in each.deadline_shares():
         late = late | (share > 1)
         if is_everywhere(late):

@@ -311,17 +311,21 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes
     )
 
 
-_known: tuple[tuple[Any, ...], MessageList] | None = None
+_known: tuple[tuple[Any, ...], MessageList, bool] | None = None
+"""What messages rest on, the messages, and whether they rest on the number of nodes."""
 
 
 def _messages(said: tuple[Any, ...], bus: Any, nodes: Number) -> MessageList:
     """Messages of a profile. The last result is remembered: searches change the nodes and times of a network."""
     global _known  # noqa: PLW0603 - a profile may hold arrays, and is told apart by identity alone
-    senders = nodes if any(message.per_node for message in said) else None
-    key = said, bus.identifier_bits, bus.data_bit_rate_kbit_s, senders
-    if _known is None or not all(new is old for new, old in zip(key, _known[0], strict=True)):
-        _known = key, MessageList(_message(message, bus, nodes) for message in said)
-    return _known[1]
+    key = said, bus.identifier_bits, bus.data_bit_rate_kbit_s, nodes
+    if _known is not None:
+        *rest_same, has_same_nodes = (new is old for new, old in zip(key, _known[0], strict=True))
+        if all(rest_same) and (has_same_nodes or not _known[2]):
+            return _known[1]
+    messages = MessageList(_message(message, bus, nodes) for message in said)
+    _known = key, messages, any(message.per_node for message in said)
+    return messages
 
 
 def _pdos(sender: _Senders, bus: Any, kind: TransactionKind, number: int, *, is_first: bool) -> Pdos:

@@ -24,7 +24,7 @@ from busplan.buses.can.response import (
 )
 from busplan.buses.can.streams import Stream, columns_of, last_place, message_streams, remembered, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic
-from busplan.elementwise import choose, is_everywhere, is_off, larger, plain, rounded_up, smaller, total
+from busplan.elementwise import choose, is_everywhere, larger, plain, rounded_up, smaller, total
 
 _CYCLIC: Final = (SYNC, *NAMES.values())
 _FRAME, _BLOCK = 3, 5
@@ -131,7 +131,6 @@ class _Start:
         self, senders: Sequence[Sender] | Sender, is_late: Sequence[bool], bit_us: Points, groups: Points = None
     ) -> None:
         self.senders = senders
-        self._groups = groups
 
         def least_us(sender: Sender) -> Points:
             # ceil(x) is no less than x.
@@ -145,24 +144,13 @@ class _Start:
             import numpy as np
 
             _, first = np.unique(groups, return_index=True)
-            self._times_us = senders.period_us[first], senders.jitter_us[first]
+            self.times_us = senders.period_us[first], senders.jitter_us[first]
+            """Period and jitter of each group [us]."""
             self.first_us = _sums_of_array(senders.frames_us * is_late)
             self.least_us, self.most_us = _sums_of_array(least_us(senders)), _sums_of_array(most_us(senders))
         else:
             self.first_us = _sums(sender.frames_us * late for sender, late in zip(senders, is_late, strict=True))
             self.least_us, self.most_us = _sums(map(least_us, senders)), _sums(map(most_us, senders))
-
-    def before(self, at: int, behind: int, siblings: Sender) -> Demand:
-        """What goes before a message at a rank, with other nodes' messages of its name."""
-        if isinstance(self.senders, Sender):
-            import numpy as np
-
-            frames_us = self.senders.frames_us[:behind].copy()
-            frames_us[at] = siblings.frames_us
-            of_groups_us = np.bincount(self._groups[:behind], frames_us, minlength=len(self._times_us[0]))
-            return Demand.of_many(Sender(of_groups_us, *self._times_us))
-        others = [] if is_off(siblings.frames_us) else [siblings]
-        return Demand([*self.senders[:at], *others, *self.senders[at + 1 : behind]])
 
 
 def _sums(numbers: Iterable[Points]) -> Points:
@@ -262,7 +250,18 @@ class Messages:
 
     def largest_bound(self) -> Points:
         """The largest `bound_share` of any message."""
-        return reduce(larger, (share for _, share in self.bounds()))
+        if self._columns is None:
+            return reduce(larger, (share for _, share in self.bounds()))
+        return float(self._bound(*self._all).max())
+
+    def may_be_late(self) -> list[tuple[Stream, float]]:
+        """Plain messages that bounds do not show to be in time, the largest bound first, with their bounds."""
+        if self._columns is None:
+            over = [(own, plain(bound)) for own, bound in self.bounds() if bound > 1]
+        else:
+            bounds, each = self._bound(*self._all), [*self.by_priority()]
+            over = [(each[place], float(bounds[place])) for place in (bounds > 1).nonzero()[0].tolist()]
+        return sorted(over, key=lambda pair: -pair[1])
 
     def largest_least(self) -> Points:
         """The largest `least_share` of any message."""
@@ -295,18 +294,29 @@ class Messages:
 
     def _responses(self, own: Stream) -> Iterator[Response | None]:
         """The worst instance of a message from each start of a busy period."""
-        behind, at = self._behind(own), self._ranks_by_name[own.name]
-        for start in self._starts:
+        behind = self._behind(own)
+        for start, before in zip(self._starts, self._before(own, behind), strict=True):
             blocking_us, first_us = self._longest_us[behind], start.first_us[behind]
             if self._columns is not None:
                 blocking_us, first_us = float(blocking_us), float(first_us)
-            yield worst_instance(
-                own.sender(1),
-                start.before(at, behind, own.sender(own.identifiers - 1)),
-                blocking_us=blocking_us,
-                bit_us=self._bit_us,
-                first_us=first_us,
-            )
+            yield worst_instance(own.sender(1), before, blocking_us=blocking_us, bit_us=self._bit_us, first_us=first_us)
+
+    def _before(self, own: Stream, behind: int) -> Iterator[Demand]:
+        """What goes before a message, other nodes' of its name among them, from each start of a busy period."""
+        at = self._ranks_by_name[own.name]
+        is_single = isinstance(own.identifiers, int) and own.identifiers == 1
+        siblings = [] if is_single else [own.sender(own.identifiers - 1)]
+        if self._columns is None:
+            for start in self._starts:
+                yield Demand([*start.senders[:at], *siblings, *start.senders[at + 1 : behind]])
+            return
+        import numpy as np
+
+        frames_us = self._columns[0, :behind].copy()
+        frames_us[at] = sum(sender.frames_us for sender in siblings)
+        of_groups_us = np.bincount(self._groups[:behind], frames_us)
+        for start in self._starts:
+            yield Demand.of_many(Sender(of_groups_us, *(each[: len(of_groups_us)] for each in start.times_us)))
 
     def latest(self) -> tuple[Stream, Response | None]:
         """The message of plain numbers with the largest response over its deadline, and its response."""
