@@ -72,6 +72,19 @@ def test_what_is_left_out_is_said_without_an_option() -> None:
         assert "to_dict() has all figures." in shown
 
 
+def test_a_notebooks_own_styles_of_lists_and_tables_are_undone() -> None:
+    # JupyterLab floats each dt at a fifth of the width and fixes the columns of tables, which breaks words.
+    shown = busplan.capacity("paper-4ms")._repr_html_()
+    for rule in ("dt { float: none; width: auto; font-weight: inherit; }", "table-layout: auto;"):
+        assert rule in shown
+
+
+def test_the_name_of_a_question_that_python_has_taken_is_said() -> None:
+    with pytest.raises(AttributeError, match=r"no attribute 'map'; did you mean map_\?$"):
+        busplan.map  # type: ignore[attr-defined]  # noqa: B018
+    assert not hasattr(busplan, "qqq")
+
+
 def test_an_answer_without_a_picture_gives_none() -> None:
     assert busplan.capacity("paper-4ms")._repr_svg_() is None
     assert busplan.diff("paper-4ms", "paper-1ms", circle=False)._repr_svg_() is None
