@@ -75,6 +75,14 @@ def test_messages_on_a_terminal_break_at_words(run: Run, on_terminal: OnTerminal
     assert shown.split() == run("capacity", "nope").stderr.split()
 
 
+def test_what_to_ask_next_is_of_the_period_that_was_asked_for(on_terminal: OnTerminal, tmp_path: Path) -> None:
+    _, shown = on_terminal("capacity", "paper-4ms", "--period", "300us", cwd=tmp_path, env={"TERM": "dumb"})
+    for words in ("capacity paper-4ms --period 300us --sensitivity", "plan paper-4ms --period 300us"):
+        assert f"busplan {words}" in shown
+    _, shown = on_terminal("capacity", "paper-4ms", "--period", "4ms", cwd=tmp_path, env={"TERM": "dumb"})
+    assert "busplan circle-test paper-4ms\n" in shown
+
+
 def test_the_card_of_a_new_profile_keeps_its_columns(on_terminal: OnTerminal, tmp_path: Path) -> None:
     _, shown = on_terminal("init", "new", "--bus", "can", cwd=tmp_path, env={"COLUMNS": "80"})
     lines = shown.splitlines()

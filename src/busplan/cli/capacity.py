@@ -65,9 +65,11 @@ def capacity_command(
 def _next(argument: str, result: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
     """What to ask next of the same profile."""
     from busplan.forms.blocks import Command
-    from busplan.questions.base.shell import change_options, shell_word
+    from busplan.questions.base.shell import change_options, period_option, shell_word
 
-    changed = " ".join((shell_word(argument), *change_options(changes, period_us=result.profile.cycle.period_us)))
+    own_us, asked_us = result.profile.cycle.period_us, [verdict.period_us for verdict in result.verdicts]
+    tried = period_option(asked_us[0]) if len(asked_us) == 1 and asked_us[0] != own_us else ()
+    changed = " ".join((shell_word(argument), *change_options(changes, period_us=own_us), *tried))
     all_well = all(verdict.all_well for verdict in result.verdicts)
     second = "circle-test" if all_well else "plan"
     asked = (f"capacity {changed} --sensitivity", f"{second} {changed}", f"report {changed}")

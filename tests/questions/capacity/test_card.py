@@ -45,6 +45,19 @@ def test_used_and_free_are_the_figures_of_the_verdict() -> None:
     assert lines["assumed"] == "bus.master_us: measure it first"
 
 
+def test_a_period_mends_no_limit_that_it_plays_no_part_in() -> None:
+    _, lines = card_of(busplan.capacity(busplan.load_profile("dvrk", changes={"group.full.nodes": 12})))
+    assert lines["limit"].startswith("the hub's block of 2116 bytes")
+    assert lines["fastest period"] == "none: no period keeps the limit"
+    _, lines = card_of(busplan.capacity("can-servo-8", period_us=1000))
+    assert lines["fastest period"] == "3.345 ms"
+    _, lines = card_of(busplan.capacity("sercos3-servo-8", period_us=300))
+    assert (lines["limit"], lines["fastest period"]) == (
+        "the bus knows no period of 300 us; the next are 250 and 500 us",
+        "250 us",
+    )
+
+
 def test_the_cure_stands_where_there_is_something_to_cure() -> None:
     verdict, lines = card_of(busplan.capacity("ethercat-servo-8", period_us=500))
     assert verdict == "NOT SHOWN TO FIT"

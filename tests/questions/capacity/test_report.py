@@ -75,6 +75,12 @@ def test_the_verdict_names_margin_term_limit_and_change(profile: Profile) -> Non
     assert "Cheapest way to make it fit: bus.gap_count = 7, which leaves a margin of " in text
 
 
+def test_a_way_to_more_nodes_is_advised_only_where_none_is_spare(profile: Profile) -> None:
+    assert "Cheapest way to" not in words(profile)
+    assert "Shown to fit: 3 nodes" in words(profile)
+    assert "Cheapest way to 1 more node: " in words(override(profile, {"bus.nodes": 3}))
+
+
 def test_a_verdict_that_is_not_shown_says_so_with_its_reserve(profile: Profile) -> None:
     narrow = override(profile, {"cycle.period_us": 550, "servo.step_us": 50})
     assert words(narrow).startswith("paper-1ms at 550 us: not shown to fit. Margin 5.064 us +/- 6.311 us of 275.000 us")

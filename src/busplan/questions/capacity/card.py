@@ -13,7 +13,7 @@ from busplan.forms.numbers import listed, period, plural
 from busplan.profile.toml import override
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.assumed import heavy_assumptions
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
 from busplan.questions.fit.circle_refusal import circle_refusals
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import bus_of, network_of
@@ -103,7 +103,10 @@ def _times(figures: CapacityFigures, profile: Profile) -> Iterator[_Line]:
     kept = f"; {_us(kept_us, doubt_us)} must stay free" if kept_us else ""
     yield ("short by" if margin_us < 0 else "free"), Sentence((f"{_us(abs(margin_us), doubt_us)} us{doubt}{kept}",))
     fastest_us = figures.safe_min_period_us
-    if fastest_us is None:
+    broken = filter(None, map(bus_of(profile).limit, limits_behind(figures)))
+    if not all(limit.is_of_period or limit.period or limit.kept_from_us for limit in broken):
+        yield "fastest period", Sentence(("none: no period keeps the limit",), "fails")
+    elif fastest_us is None:
         yield "fastest period", Sentence(("none that the bus knows is long enough",), "fails")
     else:
         yield "fastest period", Sentence((f"{period(_up(fastest_us, doubt_us))}{_kept_by(figures, profile)}",))
@@ -146,7 +149,7 @@ def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
     after = change.figures
     left = f", which leaves {_us(after.margin_corrected_us or 0.0, after.uncertainty_us)} us"
-    untested = "; the circle is another one then" if change.circle_is_untested else ""
+    untested = "; test the circle again then" if change.circle_is_untested else ""
     yield label, joined(settings, Sentence((f"{left}{untested}",)), by="")
 
 

@@ -83,7 +83,8 @@ def verdict_sentences(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
             attribute_value(REQUIRED, figures),
         )
     yield _carries(figures)
-    if verdict.change is not None or not (verdict.all_well and profile.group):
+    has_room = verdict.all_well and any((count.safe_nodes or 0) > count.nodes for count in figures.counts)
+    if not has_room and (verdict.change is not None or not (verdict.all_well and profile.group)):
         yield _advice(verdict, profile)
     yield from _assumed(figures, profile)
     yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
