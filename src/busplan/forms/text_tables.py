@@ -151,7 +151,7 @@ def shared_widths(columns: Sequence[int], extents: dict[int, Extent], *, width: 
 
 
 _FAILS: Final = " !"
-"""Behind a figure that fails, for those who see no colours."""
+"""After a figure that fails, for those who see no colours."""
 _INDENT: Final = 4
 """Blanks before what stands below its row."""
 

@@ -80,7 +80,7 @@ def suppress(
             way_out = "write # busplan: ignore[CODE] reason"
             own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, "the comment suppresses nothing", way_out))
         elif not comment.reason:
-            way_out = "add why behind the bracket"
+            way_out = "add the reason after the bracket"
             own.append(_finding(SUPPRESSION_WITHOUT_REASON, comment, "the suppression says no reason", way_out))
         for code in comment.codes:
             hit = [placed for placed in left if placed.rule.code == code and placed.spot.line == comment.of_line]

@@ -64,7 +64,7 @@ class EthercatBus(BusSection):
     )
     sync_shift: Annotated[float, Field(ge=0, le=0.999, allow_inf_nan=False)] = Field(
         default=float(SYNC_SHIFT),
-        description="Where SYNC0 lies behind the master's task, a share of the period, 0..0.999; 0 is the SYNC0 at the "
+        description="Where SYNC0 lies after the master's task, a share of the period, 0..0.999; 0 is the SYNC0 at the "
         "next task; read with distributed clocks",
         examples=[0.5],
     )
@@ -76,7 +76,7 @@ class EthercatBus(BusSection):
     )
     master_us: TimeUs = Field(
         default=0.0,
-        description="The master's own time in each cycle: from its task to the wire, and back behind the last byte "
+        description="The master's own time in each cycle: from its task to the wire, and after the last byte back to it "
         "[us]",
         examples=[30],
     )
@@ -90,7 +90,7 @@ class EthercatBus(BusSection):
         examples=[5],
     )
     master_jitter_us: TimeUs = Field(
-        default=0.0, description="Latest start of the frames behind the planned one [us]", examples=[20]
+        default=0.0, description="Latest start of the frames after the planned one [us]", examples=[20]
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default=int(PIPELINE_CYCLES),

@@ -242,7 +242,7 @@ FIRST_BROADCAST_CLOCKS: Final = Sourced(
     unit="clocks",
     grade="published",
     source=_JHU_FIRMWARE,
-    meaning="how long the first node waits behind the query",
+    meaning="how long the first node waits after the query",
 )
 BROADCAST_SLOT_CLOCKS: Final = Sourced(
     256,
@@ -256,14 +256,14 @@ HUB_WAIT_US: Final = Sourced(
     unit="us",
     grade="published",
     source=f"{_JHU_SOFTWARE}: 10 + 5 N",
-    meaning="what the host waits behind the query, whatever the number of nodes",
+    meaning="what the host waits after the query, whatever the number of nodes",
 )
 HUB_WAIT_PER_NODE_US: Final = Sourced(
     5,
     unit="us",
     grade="published",
     source=f"{_JHU_SOFTWARE}: 10 + 5 N",
-    meaning="what the host waits behind the query for each node",
+    meaning="what the host waits after the query for each node",
 )
 BROADCAST_NODE_BYTES: Final = Sourced(
     4,

@@ -100,7 +100,7 @@ class Ieee1394Bus(BusSection):
     )
     isochronous_us: Annotated[float, Field(ge=0, le=float(CYCLE_US), allow_inf_nan=False)] = Field(
         default=0.0,
-        description="Isochronous traffic behind each cycle start; 100 us at most (Linux, core.h: 80 % of a cycle) [us]",
+        description="Isochronous traffic after each cycle start; 100 us at most (Linux, core.h: 80 % of a cycle) [us]",
         examples=[20],
     )
     phy_delay_us: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = Field(
