@@ -31,7 +31,13 @@ def _delay(spread: Spread, port: str, source: str) -> tuple[Sourced, Sourced]:
     """The mean delay of the devices of a port, and the standard uncertainty of one more kind of device."""
     of_mean, of_doubt = f"{source}, their mean", f"{source}, their sd sqrt(1 + 1/n)"
     return (
-        Sourced(spread.mean, unit="us", grade="measured", source=of_mean, meaning=f"delay of a {port} device, one way"),
+        Sourced(
+            spread.mean,
+            unit="us",
+            grade="measured",
+            source=of_mean,
+            meaning=f"one-way delay of a device with {port} ports",
+        ),
         Sourced(
             spread.uncertainty,
             unit="us",

@@ -28,7 +28,7 @@ TERMS: Final = (
         "cycle_jitter_us",
         "J",
         "profile",
-        "latest start of the frames after the planned one",
+        "how late the frames may start",
         "master's jitter",
         ink="contention",
         letter="J",
@@ -72,7 +72,7 @@ LATENCY_TABLE: Final = (
     Figure("frame_wait_us", "wait", "profile", "wait of feedback for the next frame", "wait for a frame"),
     Figure("pipeline_us", "n T_s", "profile", "cycles that the master computes in", "master's pipeline"),
     Figure("master_us", "T_master", "profile", "the master's own time for a frame", "master"),
-    Figure("jitter_us", "J", "profile", "latest start of the frame after the planned one", "jitter"),
+    Figure("jitter_us", "J", "profile", "how late the frame may start", "jitter"),
     Figure("sending_us", "sending", FRAME, "all frames of process data on the wire", "sending"),
     Figure("path_us", "path", "DC time stamps", "delay of devices and cables on the way", "devices and cables"),
     Figure(

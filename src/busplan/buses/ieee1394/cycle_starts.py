@@ -204,7 +204,7 @@ class CycleWithStarts(BusCycle):
 
     @property
     def is_known(self) -> bool:
-        """Whether the model's error is known: only of the model that decides."""
+        """Whether bias and doubts of the model are known: those of `standard`, which decides, are."""
         return self.model == "standard"
 
     def left_out(self) -> tuple[LeftOut, ...]:
