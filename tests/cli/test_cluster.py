@@ -95,16 +95,26 @@ def test_a_worker_that_is_killed_loses_nothing_and_is_said(
     cluster: Cluster, environment: dict[str, str], run: Run, tmp_path: Path
 ) -> None:
     gains = (*SWEEP[:-1], f"{SWEEP[-1]}129")
-    with subprocess.Popen(
-        [sys.executable, "-m", "busplan", *gains, "--cluster", cluster.address, "-o", "there.jsonl"],
-        cwd=tmp_path,
-        env=environment,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+    told = tmp_path / "told.txt"
+    with (
+        told.open("w") as standard_error,
+        subprocess.Popen(
+            [sys.executable, "-m", "busplan", *gains, "--cluster", cluster.address, "-o", "there.jsonl"],
+            cwd=tmp_path,
+            env=environment,
+            stderr=standard_error,
+        ) as process,
+    ):
         assert until(lambda: list(tmp_path.glob("there.jsonl.parts/*.npy")))
+        # The second worker stands still until it is known that the first is gone: it could have done everything.
+        os.kill(cluster.workers[1], signal.SIGSTOP)
         os.kill(cluster.workers[0], signal.SIGKILL)
-        _, said = process.communicate(timeout=60)
+        is_said = until(lambda: "left the cluster" in told.read_text())
+        os.kill(cluster.workers[1], signal.SIGCONT)
+        assert is_said
+        process.wait(60)
+    said = told.read_text()
+    told.unlink()
     assert process.returncode == 0, said
     assert said.count(" left the cluster, which has 1 worker; its tests are run again by another\n") == 1
     assert "Warning" not in said

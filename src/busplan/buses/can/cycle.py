@@ -70,13 +70,18 @@ class CanCycle(BusCycle):
 
     @cached_property
     def _wire(self) -> dict[str, Number]:
-        return {"identifier_bits": self.traffic.identifier_bits, "bit_rate_kbit_s": self.traffic.bit_rate_kbit_s}
+        keys = ("identifier_bits", "bit_rate_kbit_s", "data_bit_rate_kbit_s")
+        return {key: getattr(self.traffic, key) for key in keys}
 
     def _frame_us(self, data_bytes: Number, **wire: Number) -> Number:
         return frame_us(data_bytes, **(self._wire | wire), is_stuffed=self.is_stuffed)
 
     def _message_us(self, message: Message) -> Number:
-        us = self._frame_us(message.payload_bytes, identifier_bits=message.identifier_bits)
+        us = self._frame_us(
+            message.payload_bytes,
+            identifier_bits=message.identifier_bits,
+            data_bit_rate_kbit_s=message.data_bit_rate_kbit_s,
+        )
         return named(us, f"{message.name}_us", f"C,{message.name}")
 
     def _pdo_us(self, pdos: Pdos) -> Number:

@@ -116,7 +116,9 @@ def _most_within(limit: Limit, network: Network, cached_network: Callable[[int],
     if not _any(over):
         return ceiling
     if elements > 1:
-        counted = ceiling * (_size(limit.least_value(network.with_nodes(1))) * _VALUE_COST + elements)
+        # A limit that tells without its value is computed for every element.
+        asked = elements if limit.breaks else _size(limit.least_value(network.with_nodes(1)))
+        counted = ceiling * (asked * _VALUE_COST + elements)
         if counted <= ceiling.bit_length() * elements * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))
             return total(choose(is_over, 0, 1) for is_over in broken)
