@@ -182,7 +182,7 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
     bus = bus_of(profile)
     left = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
     if left:
-        yield Sentence((f"Not in it: {', '.join(f'{missing.label} ({missing.key})' for missing in left)}.",))
+        yield Sentence((f"Not included: {', '.join(f'{missing.label} ({missing.key})' for missing in left)}.",))
 
 
 def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
