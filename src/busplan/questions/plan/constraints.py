@@ -48,8 +48,17 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
         Nodes differ, so that axes do not say how many of which.
     """
     if profile.group:
-        keys = ", ".join(alike.nodes_key for alike in profile.alike_nodes)
-        raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; set the nodes of a group instead: {keys}")
+        own = {alike: int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes}
+        needed = {alike: axes - sum(own.values()) + own[alike] for alike in own if alike.node.axes}
+        each = " or ".join(
+            f"{alike.nodes_key}={ceil(of_group / int(alike.node.axes))}"
+            for alike, of_group in needed.items()
+            if of_group > 0
+        )
+        raise BusplanError(
+            f"axes {axes}: the nodes of {profile.name} differ; set the nodes of a group instead"
+            f"{f', as {each}' if each else ''}"
+        )
     (alike,) = profile.alike_nodes
     return ceil(axes / int(alike.node.axes))
 
