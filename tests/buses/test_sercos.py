@@ -211,5 +211,5 @@ def test_a_margin_without_doubts_says_that_no_uncertainty_is_known(
     run: Run, name: str, nodes: int, has_doubts: bool
 ) -> None:
     said = run("capacity", name, "--set", f"bus.nodes={nodes}", "--all").stdout
-    assert ("so no bias and no uncertainty are in it" in said) == (not has_doubts)
+    assert ("so no bias is corrected and no uncertainty given" in said) == (not has_doubts)
     assert ("+/-" in said) == has_doubts

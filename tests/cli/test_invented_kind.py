@@ -505,7 +505,7 @@ def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> Non
     said = run("capacity", ring.name, "--all", cwd=ring.parent).stdout
     assert (
         "\nring at 1.5 ms: fits. Margin 100.000 us of 750.000 us; how far the bus is from this timing model is not "
-        "known, so no bias and no uncertainty are in it.\n"
+        "known, so no bias is corrected and no uncertainty given.\n"
     ) in said
     assert "\n  free            100 us\n" in said
     assert "Not included" not in said
@@ -656,7 +656,9 @@ def test_one_of_its_timing_models_decides_whatever_leads_and_whatever_is_asked_f
         for asked in ((), ("--timing", "hasty"), ("--timing", "plain")):
             done = run("capacity", ring_file.name, *asked, "--all", cwd=ring_file.parent)
             assert "\nring at 1.29 ms: not shown to fit. Margin -5.000 us +/- 12.955 us of" in done.stdout
-            says_otherwise = "The hasty model says otherwise: 640.000 us needed of 645.000 us. It decides nothing."
+            says_otherwise = (
+                "The hasty model says otherwise: 640.000 us needed of 645.000 us. It does not affect the verdict."
+            )
             assert (says_otherwise in done.stdout) == (asked != ("--timing", "plain"))
         assert run("check", ring_file.name, "--no-circle", cwd=ring_file.parent).returncode == 1
 

@@ -279,7 +279,7 @@ class BusCycle(ABC):
         return now_us + self.added_before_us(now_us) if arrived_us is None else arrived_us
 
     def added_before_us(self, sent_us: float) -> float:  # noqa: ARG002 - most runs follow each other at once
-        """Time of events that come between rounds, up to some time of the runs, in plain numbers [us].
+        """Time of events between rounds, as cycle starts, up to a point of the runs; in plain numbers [us].
 
         Parameters
         ----------

@@ -34,7 +34,7 @@ slice_ratio = {ratio}
 
 {parts}
 [limits]
-reserve = 0.15             # share of the slice that must stay free for a plan to fit
+reserve = 0.15             # share of the slice that must stay free for the cycle to fit
 
 [servo]                    # take the values from the drives' commissioning, then grade them "measured"
 grade = "assumed"

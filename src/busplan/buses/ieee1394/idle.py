@@ -4,7 +4,7 @@ A gap is a threshold of an idle period: the time for which the bus has been idle
 added to each other, and the time in which a node executes is idle bus, too. Fairness lets a node start one asynchronous
 packet in a fairness interval, which an idle period of the arbitration reset gap ends.
 
-The execution time is an upper bound, and a faster node must not make a plan worse: each time is the largest over all
+The execution time is an upper bound, and a faster node must not lengthen the cycle: each time is the largest over all
 faster nodes.
 
 References

@@ -185,7 +185,7 @@ class CircleFigures(NamedTuple):
     timing_model: str
     """Timing model that decided whether the bus fits."""
     bus_fits: bool
-    """Whether required <= available and no limit is broken."""
+    """Whether no limit is broken, time among them: required <= available."""
     verdict: str
     """fits, not shown to fit, or does not fit: a circle passes only on a bus that is shown to carry it."""
     required_us: float

@@ -132,7 +132,7 @@ class CapacityFigures(NamedTuple):
     exceeded: tuple[str, ...]
     """Keys of the limits that are broken."""
     fits: bool
-    """Whether required <= available and no limit is broken, bias and uncertainty left out."""
+    """Whether no limit is broken, time among them: required <= available, without bias and uncertainty."""
     circle_refused_by: tuple[str, ...]
     """Keys that prevent the profile's circle test from running."""
     bias_us: float | None

@@ -64,7 +64,7 @@ def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
 def refused_circle(profile: Profile) -> Iterator[Sentence]:
     """Say why the circle that a profile asks for cannot be run; nothing where it can.
 
-    It stands first in every answer with a verdict: a plan whose circle nobody can run is none.
+    It stands first in every answer with a verdict: a circle that cannot be run is said before the verdict.
     """
     causes = circle_refusals(profile)
     if causes:
