@@ -68,6 +68,10 @@ def test_the_cure_stands_where_there_is_something_to_cure() -> None:
     assert lines["short by"] == "20 us, +/- 6"
     assert lines["paper model"] == "says otherwise, 207 us needed of 250, but does not decide"
     assert "room for" not in lines
+    # Where nodes differ, nobody said which of them are to be more: no change is looked for, and none is spoken of.
+    verdict, lines = card_of(busplan.capacity("gantry-24", period_us=800))
+    assert (verdict, lines["room for"]) == ("FITS", "no more nodes")
+    assert "one more" not in lines
     verdict, lines = card_of(busplan.capacity(busplan.load_profile("paper-1ms", changes={"bus.gap_count": 3})))
     assert verdict == "FITS, BUT"
     assert lines["unsafe"] == "gap count"

@@ -174,16 +174,16 @@ def _margin(figures: CapacityFigures, bus: "Bus") -> Sentence:
     (model,) = (model for model in bus.timing_models if model.name == bus.deciding_model)
     unknown = f"{model.error}, so no bias"
     if figures.uncertainty_us is not None:
-        return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown} is in it.", margin, uncertainty, of)
-    return sentence(f"Margin {{}} of {{}}; {unknown} and no uncertainty are in it.", margin, of)
+        return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown} is corrected.", margin, uncertainty, of)
+    return sentence(f"Margin {{}} of {{}}; {unknown} is corrected and no uncertainty given.", margin, of)
 
 
 def not_in_it(profile: Profile) -> Iterator[Sentence]:
-    """Say what the verdict leaves out, with the key that would say it; nothing if it leaves nothing out."""
+    """Say what the verdict leaves out, with the key that would give it; nothing if it leaves nothing out."""
     bus = bus_of(profile)
     left = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
     if left:
-        yield Sentence((f"Not in it: {', '.join(f'{missing.label} ({missing.key})' for missing in left)}.",))
+        yield Sentence((f"Not included: {', '.join(f'{missing.label} ({missing.key})' for missing in left)}.",))
 
 
 def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
@@ -193,7 +193,9 @@ def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
         if contradicts(model.fits, figures):
             needed = attribute_value(REQUIRED, model)
             available = attribute_value(AVAILABLE, model)
-            text = f"The {model.timing_model} model says otherwise: {{}} needed of {{}}. It decides nothing."
+            text = (
+                f"The {model.timing_model} model says otherwise: {{}} needed of {{}}. It does not affect the verdict."
+            )
             yield sentence(text, needed, available, state="warns")
     yield from not_applicable(profile)
 
