@@ -53,7 +53,7 @@ def test_a_period_mends_no_limit_that_it_plays_no_part_in() -> None:
     assert lines["fastest period"] == "3.345 ms"
     _, lines = card_of(busplan.capacity("sercos3-servo-8", period_us=300))
     assert (lines["limit"], lines["fastest period"]) == (
-        "the bus knows no period of 300 us; the next are 250 and 500 us",
+        "the bus allows no period of 300 us; the next are 250 and 500 us",
         "250 us",
     )
 
