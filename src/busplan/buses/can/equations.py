@@ -151,7 +151,7 @@ def frame_us(
     >>> frame_us(8, identifier_bits=11, bit_rate_kbit_s=500, is_stuffed=True)
     270.0
     >>> frame_us(8, identifier_bits=11, bit_rate_kbit_s=500, data_bit_rate_kbit_s=2000, is_stuffed=True)
-    124.0
+    123.5
     """
     if not is_off(data_bit_rate_kbit_s):
         nominal, data = fd_frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
