@@ -107,7 +107,7 @@ def naming(changes: KeyChanges) -> Iterator[None]:
 
 @contextmanager
 def naming_option(*arguments: str) -> Iterator[None]:
-    """Name arguments of a public function as options in its errors: buses, --buses; circle=True, --circle.
+    """Name arguments of a public function as options in its errors: buses, --buses; set a.key=1, --set a.key=1.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def naming_option(*arguments: str) -> Iterator[None]:
         Names of arguments.
     """
     names = "|".join(arguments)
-    argument = re.compile(rf"^(?P<name>{names})(?=[ :])|\b(?P<flag>{names})=True\b")
+    argument = re.compile(rf"^(?P<name>{names})(?=[ :])|\b(?P<flag>{names})=True\b|(?<!-)\bset(?= \w+(\.[\w-]+)+=)")
     try:
         yield
     except BusplanError as error:
@@ -126,7 +126,7 @@ def naming_option(*arguments: str) -> Iterator[None]:
 
 
 def _option(argument: re.Match[str]) -> str:
-    name = argument["name"] or argument["flag"]
+    name = argument["name"] or argument["flag"] or argument[0]
     return f"--{_OPTIONS.get(name, name)}"
 
 

@@ -40,7 +40,7 @@ def test_used_and_free_are_the_figures_of_the_verdict() -> None:
     assert lines["used"] == "105 us of 1000, 10 %"
     assert lines["free"] == "895 us, +/- 40; 100 must stay free"
     # 209.79 us + 44.76 us before SYNC0 at half of the period: 509.1 us, and up.
-    assert lines["fastest period"] == "510 us, for sync0"
+    assert lines["fastest period"] == "510 us, limited by sync0"
     assert lines["room for"] == "98 more nodes"
     assert lines["assumed"] == "bus.master_us: measure it first"
 

@@ -128,7 +128,7 @@ def _kept_by(figures: CapacityFigures, profile: Profile) -> str:
         return ""
     limits = (limit for limit in bus.limits if limit.period is not None)
     holding = (limit for limit in limits if plain(limit.shown.period_us(network)) >= fastest_us * _ALMOST)
-    return "".join(f", for {limit.key}" for limit in islice(holding, 1))
+    return "".join(f", limited by {limit.key}" for limit in islice(holding, 1))
 
 
 def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
