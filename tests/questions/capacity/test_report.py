@@ -171,7 +171,7 @@ def test_what_fails_is_marked_where_it_stands_and_the_rest_is_detail(profile: Pr
     assert "does not fit" in row["verdict"]
     assert "!" not in row["verdict"]
     assert lines[-1].startswith("! fails. Not shown: ")
-    # What takes no time and what decides nothing is detail.
+    # What takes no time and what does not decide is detail.
     assert not {"hold", "host", "utilisation", "smallest period"} & set(row)
     whole = render(report._replace(is_whole=True), "table")
     assert all(f"\n{name}  " in whole for name in ("  hold", "  host", "utilisation", "smallest period"))

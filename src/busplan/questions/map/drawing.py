@@ -139,8 +139,8 @@ def _along(direction: Direction, value: Value, profile: Profile) -> str:
 
 
 def map_title(trade_off: TradeOff) -> str:
-    """Say what lies along which direction."""
-    return f"{title_of(trade_off.y, trade_off.profile)} up, {title_of(trade_off.x, trade_off.profile)} across"
+    """Quantities on the y and x axis: "period against axes"."""
+    return f"{title_of(trade_off.y, trade_off.profile)} against {title_of(trade_off.x, trade_off.profile)}"
 
 
 def cell_words(trade_off: TradeOff, cell: Cell) -> str:

@@ -337,7 +337,7 @@ def trade_off(
         y = default_direction(AXES if x.key == PERIOD else PERIOD, profile, with_circle=with_circle)
     key_x, key_y = (profile_key(direction.key, profile) for direction in (x, y))
     if key_x == key_y:
-        raise BusplanError(f"{x.key} across and {y.key} up both vary {key_x}; give two keys")
+        raise BusplanError(f"x = {x.key} and y = {y.key} both vary {key_x}; give two keys")
     settings = {
         (row, column): _setting(profile, (x.key, value_x), (y.key, value_y))
         for row, value_y in enumerate(y.values)
