@@ -568,7 +568,7 @@ def test_doubts_without_a_bias_make_three_verdicts(
     said = run("capacity", doubted.name, "--all", cwd=doubted.parent).stdout
     margin = f"Margin {slice_us - NEEDED_US:.3f} us +/- {DOUBT_US:.3f} us of {slice_us:.3f} us; how far the bus is from"
     assert f"\nring at {2 * slice_us / 1000:.12g} ms: {verdict}. {margin}".replace("-0.000", "0.000") in said
-    assert "Largest doubt: rate, 98% of U squared." in said  # 6.4 squared of 41.96
+    assert "Largest doubt: rate, 98% of the variance." in said  # 6.4 squared of 41.96
     assert "Not included: guard time (guard.guard_us)." in said
     done = run("check", doubted.name, "--no-circle", cwd=doubted.parent)
     assert done.returncode == code

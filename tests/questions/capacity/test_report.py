@@ -67,7 +67,7 @@ def test_the_verdict_names_margin_term_limit_and_change(profile: Profile) -> Non
     _, one = capacity(override(profile, {"cycle.period_us": 500})).results
     margin = f"Margin {one.margin_corrected_us:.3f} us +/- {one.uncertainty_us:.3f} us of 250.000 us"
     assert text.startswith(f"paper-1ms at 500 us: does not fit. {margin}, less a bias of {one.bias_us:.3f} us. ")
-    assert "Largest doubt: execution time, 54% of U squared." in text
+    assert "Largest doubt: execution time, 54% of the variance." in text
     assert (
         "Not included: host time (host.transaction_us), the slowest execution (node.execution.worst_extra_us)." in text
     )

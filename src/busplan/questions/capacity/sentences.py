@@ -142,7 +142,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
     largest = next(iter(uncertainty_parts(figures)), None)
     if largest is not None and largest["share"]:
         share = ShownValue(largest["share"], "share", "%", 0)
-        sentences.append(sentence(f"Largest doubt: {largest['label']}, {{}} of U squared.", share))
+        sentences.append(sentence(f"Largest doubt: {largest['label']}, {{}} of the variance.", share))
     if profile.limits.reserve:
         reserve = ShownValue(profile.limits.reserve, "reserve", "%", 0)
         sentences.append(sentence("{} of the slice must stay free (limits.reserve).", reserve))
