@@ -28,6 +28,7 @@ __all__ = [
     "ImportAnswer",
     "LatencyAnswer",
     "MapAnswer",
+    "MeasuredAnswer",
     "PlanAnswer",
     "Profile",
     "ReportAnswer",
@@ -46,6 +47,7 @@ __all__ = [
     "latency",
     "load_profile",
     "map_",
+    "measured",
     "plan",
     "report",
     "sweep",
@@ -66,6 +68,7 @@ if TYPE_CHECKING:
     from busplan.questions.import_ import ImportAnswer, import_profile
     from busplan.questions.latency import LatencyAnswer, latency
     from busplan.questions.map import MapAnswer, map_
+    from busplan.questions.measured import MeasuredAnswer, measured
     from busplan.questions.plan import PlanAnswer, plan
     from busplan.questions.report import ReportAnswer, report
     from busplan.questions.sweep import SweepAnswer, sweep

@@ -14,7 +14,7 @@ Refused = Callable[..., str]
 
 TOPICS = [
     *("can", "circle", "commands", "ethercat", "gate", "import"),
-    *("json", "limits", "models", "plan", "profile", "python", "sercos"),
+    *("json", "limits", "measured", "models", "plan", "profile", "python", "sercos"),
 ]
 
 

@@ -29,10 +29,15 @@ from busplan.buses.parts import (
     TimingModel,
     Value,
 )
+from busplan.buses.recorded import Recorded
 from busplan.buses.rule import Rule
+from busplan.errors import BusplanError
+from busplan.progress import Progress
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from busplan.sections.profile import Profile
 
 
@@ -67,6 +72,8 @@ class Bus(ABC):
     """Facts about keys of its profiles; a key of a group is here as `node.` or `payload.` has it."""
     calibration: ClassVar[MeasuredLatencies | None] = None
     """Calibration of execution times from latencies; None where no latency could be measured."""
+    recordings: ClassVar[str] = ""
+    """A recording of it that can be compared with a plan, in words; empty where none is read."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
     """Changes that each take one term out of the cycle, as new values by dotted key."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
@@ -125,6 +132,28 @@ class Bus(ABC):
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """Functions that rows of evidence name, beside its figures; each takes a cycle and the values of the row."""
         return {}
+
+    def recorded(self, network: Network, path: "Path", *, share: float, progress: Progress) -> Recorded:  # noqa: ARG002 - a kind may have none
+        """Compare a recording of the machine with the plan.
+
+        Parameters
+        ----------
+        network
+            The plan, of plain numbers.
+        path
+            The recording.
+        share
+            Share of the events that a worst case is to hold for, 0.5..1.
+        progress
+            Called with the bytes read and those of the file.
+
+        Raises
+        ------
+        BusplanError
+            The file is no recording of the kind, or no recording of the kind is read.
+        """
+        latencies = "; latencies in a CSV file are for busplan calibrate" if self.calibration else ""
+        raise BusplanError(f"{path}: no recording of bus.kind {self.kind} is read{latencies}")
 
     def limit(self, key: str) -> Limit | None:
         """The limit of a key; None for time, which is no limit of the bus."""
