@@ -28,6 +28,7 @@ __all__ = [
     "ImportAnswer",
     "LatencyAnswer",
     "MapAnswer",
+    "MeasuredAnswer",
     "PlanAnswer",
     "Profile",
     "ReportAnswer",
@@ -46,6 +47,7 @@ __all__ = [
     "latency",
     "load_profile",
     "map_",
+    "measured",
     "plan",
     "report",
     "sweep",
@@ -66,6 +68,7 @@ if TYPE_CHECKING:
     from busplan.questions.import_ import ImportAnswer, import_profile
     from busplan.questions.latency import LatencyAnswer, latency
     from busplan.questions.map import MapAnswer, map_
+    from busplan.questions.measured import MeasuredAnswer, measured
     from busplan.questions.plan import PlanAnswer, plan
     from busplan.questions.report import ReportAnswer, report
     from busplan.questions.sweep import SweepAnswer, sweep
@@ -87,7 +90,9 @@ else:
 
     def __getattr__(name: str) -> object:
         if name not in __all__:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+            did_you_mean = import_module("busplan.nearest").did_you_mean
+            words = filter(None, (f"module {__name__!r} has no attribute {name!r}", did_you_mean(name, __all__)))
+            raise AttributeError("; ".join(words))
         # `circle_test` and `CircleTestAnswer` are in module `circle`, `map_` and `MapAnswer` in `map`.
         question = name.removesuffix("Answer").lower().replace("_", "").removesuffix("test")
         home = _HOMES.get(name, f"busplan.questions.{question}")

@@ -23,8 +23,8 @@ Run = Callable[..., CompletedProcess[str]]
 ROOT: Any = get_command(app)
 TOP: Any = ROOT.context_class(ROOT, info_name="busplan", **ROOT.context_settings)
 UNIT = re.compile(r"\[(us|ms|s|mm|um|mm/min|mm/s|bytes|axes|nodes|deg|dB|%|1)\]|with its unit")
-IMPORTED = Path(__file__).parents[1] / "questions" / "import_" / "files"
-"""Files of a machine."""
+OF_MACHINES = tuple(Path(__file__).parents[1] / "questions" / name / "files" for name in ("import_", "measured"))
+"""Folders with files of a machine."""
 GATE = re.compile(r"[Ee]xits 0 [^.]*\b1\b")
 
 
@@ -98,8 +98,9 @@ def test_its_example_runs_as_it_stands(shell: Run, name: str, example: str, tmp_
         # A profile that a user must have; what follows -o is written.
         if word.endswith(".toml") and before not in {"-o", "--output", ">"}:
             (tmp_path / word).write_bytes((shipped_folder() / "paper-4ms.toml").read_bytes())
-        elif (IMPORTED / word).is_file():
-            (tmp_path / word).write_bytes((IMPORTED / word).read_bytes())
+        for folder in OF_MACHINES:
+            if (folder / word).is_file():
+                (tmp_path / word).write_bytes((folder / word).read_bytes())
     run = shell(example, cwd=tmp_path)
     is_gate = GATE.search(" ".join(paragraphs(name))) is not None
     assert run.returncode in ({0, 1} if is_gate else {0}), run.stderr

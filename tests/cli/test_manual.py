@@ -14,7 +14,7 @@ Refused = Callable[..., str]
 
 TOPICS = [
     *("can", "circle", "commands", "ethercat", "gate", "import"),
-    *("json", "limits", "models", "plan", "profile", "python", "sercos"),
+    *("json", "limits", "measured", "models", "plan", "profile", "python", "sercos"),
 ]
 
 
@@ -60,6 +60,16 @@ def test_a_terminal_gets_the_page_set_for_reading_and_no_word_cut_off(
     # A file gets Markdown.
     code, _ = on_terminal("manual", "profile", "-o", "x.md", cwd=tmp_path)
     assert (tmp_path / "x.md").read_text(encoding="utf-8") == (FOLDER / "profile.md").read_text(encoding="utf-8")
+
+
+def test_a_card_of_80_columns_is_not_broken_on_a_terminal_of_80(
+    on_terminal: Callable[..., tuple[int, str]], tmp_path: Path
+) -> None:
+    _, shown = on_terminal("manual", "commands", cwd=tmp_path, env={"COLUMNS": "80", "NO_COLOR": "1"})
+    page = (FOLDER / "commands.md").read_text(encoding="utf-8").splitlines()
+    heads = [line for line in page if line.endswith("  FITS") and len(line) == 80]
+    assert heads
+    assert set(heads) <= set(re.sub("\x1b\\[[0-9;]*m", "", shown).splitlines())
 
 
 @pytest.mark.parametrize("topic", ["profiles", "", "Profile", "../manual/profile", "profile.md"])

@@ -13,6 +13,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "import": busplan.import_profile,
     "plan": busplan.plan,
     "calibrate": busplan.calibrate,
+    "measured": busplan.measured,
     "map": busplan.map_,
     "sweep": busplan.sweep,
     "compare": busplan.compare,

@@ -110,7 +110,7 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
             (group,) = models_of(field.annotation)
             owns = [one for one in ("name", "nodes", "axes", "hops") if one in group.model_fields]
             yield from (reference_row(group, own, f"group.NAME.{own}") for own in owns)
-            yield "| `group.NAME` | any other key of `[payload]` and `[node]` | none | What its nodes have |"
+            yield "| `group.NAME` | any other key of `[payload]` and `[node]` | none | As there, for its nodes |"
         elif inner == [AxisOverride]:
             yield f"| `{key}` | any key of one axis | none | {field.description} |"
         elif inner:
@@ -243,6 +243,7 @@ DOCUMENTS = {
     "plan": "paper-1ms --axes 400 --no-circle",
     "sweep": "paper-4ms --vary bus.nodes=1:2 --circle --jobs 1",
     "calibrate": "paper-two-node table-1.csv",
+    "measured": f"ethercat-servo-8 {ROOT}/tests/questions/measured/files/capture.pcapng --quantile 0.9",
     "timeline": "paper-4ms",
     "map": "paper-4ms --x axes=4,6",
     "compare": "paper-4ms --circle",
@@ -250,7 +251,7 @@ DOCUMENTS = {
     "paper": "",
     "profiles": "",
 }
-FREE = {"changes", "recommended_changes", "varied", "execution", "notes", "answers"}
+FREE = {"changes", "measured", "recommended_changes", "varied", "execution", "notes", "answers"}
 """What holds keys of a profile, or others that are not the document's own."""
 
 

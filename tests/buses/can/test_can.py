@@ -246,7 +246,10 @@ def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path
 
 def test_its_verdict_says_by_how_much_the_model_errs_to_the_safe_side(run: Run) -> None:
     said = run("capacity", "can-servo-8", "--all").stdout
-    assert "this timing model takes 8 to 15% more than classical frames that were measured, so no bias is in it" in said
+    assert (
+        "this timing model takes 8 to 15% more than classical frames that were measured, so no bias is corrected"
+        in said
+    )
 
 
 def test_a_cure_of_the_load_is_a_longer_period(run: Run, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """The SYNC cycle: SYNC, feedback, the host, commands, and the waits for other messages."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import islice
 from math import inf
@@ -9,7 +10,7 @@ from typing import Final, Literal
 from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
 from busplan.buses.can.figures import BUS_LOAD, TERMS
-from busplan.buses.can.response import Response
+from busplan.buses.can.response import Response, TooManyStepsError
 from busplan.buses.can.streams import (
     MessageStreams,
     Stream,
@@ -20,7 +21,7 @@ from busplan.buses.can.streams import (
     streams,
 )
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import messages, response, waits
+from busplan.buses.can.waiting import messages, response, sync_spread_us, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
@@ -353,6 +354,10 @@ class CanCycle(BusCycle):
     @cached_property
     def sync_spread_us(self) -> Number:
         """Delay of SYNC by other messages, B + I [us]; infinite where it has no end."""
+        if self._sent.is_ordered:
+            with suppress(TooManyStepsError):
+                us: Number = sync_spread_us(self.traffic, is_stuffed=self.is_stuffed)
+                return us
         phases = self._phases(0, SYNC)
         return named(phases["blocking_us"] + phases["interference_us"], "sync_spread_us", "B + I")
 

@@ -1,7 +1,7 @@
 """EtherCAT, as a kind of bus."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.bus import Bus
 from busplan.buses.ethercat.cycle import EVENTS, LAST_BYTE, STRETCHES, VENDORS, EthercatCycle
@@ -19,7 +19,12 @@ from busplan.buses.ethercat.rules import LIMITS, RULES
 from busplan.buses.ethercat.traffic import datagrams, layout
 from busplan.buses.network import Network
 from busplan.buses.parts import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.recorded import Recorded
 from busplan.elementwise import plain
+from busplan.progress import Progress
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 _PROCESS_DATA = "bus.process_data"
 _MASTER_STEP_US = 10.0
@@ -84,6 +89,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         {"bus.master_jitter_us": 0.0},
         {"bus.mailbox_polls": 0},
     )
+    recordings = "a capture of the master's port, pcap or pcapng,"
     evidence_data = ("ethercat",)
 
     def cycle(self, network: Network, *, model: str) -> EthercatCycle:
@@ -102,7 +108,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         return of_latency
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """SYNC0 later in the cycle, for commands that come behind it."""
+        """SYNC0 later in the cycle, for commands that come after it."""
         bus = network.profile.bus
         if not (bus.distributed_clocks and bus.sync_shift):
             return ()
@@ -147,6 +153,12 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         from busplan.buses.ethercat.evidence import FUNCTIONS  # a single command asks for them
 
         return FUNCTIONS
+
+    def recorded(self, network: Network, path: "Path", *, share: float, progress: Progress) -> Recorded:
+        """Compare a capture of the master's port with the plan."""
+        from busplan.buses.ethercat.recorded import recorded  # a single command asks for it, and numpy loads
+
+        return recorded(network, path, share=share, progress=progress)
 
 
 BUS = Ethercat()

@@ -167,6 +167,7 @@ def calibrate(
     network = load_profile(profile)
     if form not in (None, "table", "linear"):
         raise BusplanError(f"form {form!r}: expected 'table' or 'linear'")
+    analysis.latencies_of(network)  # refuses a kind without, before a recording of it is read as text
     read, name, shipped = _measured(measurements, name=source or _IN_MEMORY)
     result = analysis.calibrate(
         network,

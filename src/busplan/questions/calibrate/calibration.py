@@ -217,7 +217,7 @@ def calibrate(
         worst_extra_us=_worst_extra_us(outliers, residuals_us),
         unchecked_bytes=screening.unchecked_bytes,
         uncertainty_us=_uncertainty_us(residuals_us, fit),
-        fit_keys=_latencies(profile).fit_keys(network_of(profile), model if way == "timing-model" else None),
+        fit_keys=latencies_of(profile).fit_keys(network_of(profile), model if way == "timing-model" else None),
         at_most_us=max(half.shortest_us for half in halves.values()),
     )
 
@@ -240,7 +240,7 @@ def _nodes(profile: Profile, group: str | None) -> AlikeNodes:
 
 def _packets(profile: Profile, nodes: AlikeNodes, measurements: Sequence[Measurement], model: str) -> _Halves:
     """Time of the packets for every transaction and payload that was measured."""
-    halves, network = _latencies(profile).halves, network_of(profile)
+    halves, network = latencies_of(profile).halves, network_of(profile)
     return {
         (kind, size): halves(network, nodes.name, model, kind, size)
         for kind, size in dict.fromkeys(
@@ -249,7 +249,7 @@ def _packets(profile: Profile, nodes: AlikeNodes, measurements: Sequence[Measure
     }
 
 
-def _latencies(profile: Profile) -> MeasuredLatencies:
+def latencies_of(profile: Profile) -> MeasuredLatencies:
     """How the kind of bus finds execution times from latencies.
 
     Raises
@@ -259,7 +259,10 @@ def _latencies(profile: Profile) -> MeasuredLatencies:
     """
     bus = bus_of(profile)
     if bus.calibration is None:
-        raise BusplanError(f"bus.kind {bus.kind}: {bus.title} has no transactions to find an execution time from")
+        way_out = f"; {bus.recordings} is for busplan measured" if bus.recordings else ""
+        raise BusplanError(
+            f"bus.kind {bus.kind}: {bus.title} has no transactions to find an execution time from{way_out}"
+        )
     return bus.calibration
 
 

@@ -1,0 +1,123 @@
+"""Answer of `busplan measured`."""
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import PurePath
+from typing import Final
+
+from busplan.buses.recorded import RecordedFigure
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Code,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    ShownValue,
+    Snippet,
+    State,
+    Table,
+    TableColumn,
+    TableRow,
+    Words,
+)
+from busplan.forms.numbers import plural
+from busplan.profile.write import value_text
+from busplan.questions.measured import MeasuredAnswer
+from busplan.questions.words.documents import document, with_profile
+
+_COLUMNS: Final = (
+    TableColumn("figure", kind="words", wraps=True),
+    TableColumn("unit", kind="words"),
+    TableColumn("planned"),
+    TableColumn("recorded"),
+    TableColumn("residual", rank=1),
+    TableColumn("U"),
+    TableColumn("within", kind="words"),
+    TableColumn("n", rank=2),
+    TableColumn("note", kind="words", rank=3, leaves="below", wraps=True),
+)
+_DECIMALS: Final = {"us": 3, "1": 0, "bytes": 0, "bits": 1, "%": 2}
+_WITHIN: Final = {True: Words("yes", "passes"), False: Words("no", "fails")}
+_SMALL_US: Final = 1.0
+"""A time below it has more decimals."""
+
+
+def provenance(answer: MeasuredAnswer) -> str:
+    """Origin of measured values, as a one-line comment for the profile."""
+    count = max(figure.events for figure in answer.figures)
+    share = "the worst" if answer.quantile == 1 else f"{100 * answer.quantile:g} %"
+    day = f" of {answer.day}" if answer.day else ""
+    return f"busplan measured: {share} of {plural(count, 'event')} in {PurePath(answer.source).name}{day}"
+
+
+def measured_report(answer: MeasuredAnswer, *, applied_to: str | None) -> Report:
+    """Report of `measured`.
+
+    Parameters
+    ----------
+    answer
+        The answer.
+    applied_to
+        The profile that measured values were written into; None if none were.
+    """
+    return Report(
+        Sentence((Code(answer.profile.name), " beside the recording ", Code(answer.source))),
+        lambda: tuple(_blocks(answer)),
+        partial(_document, answer, applied_to=applied_to),
+        lambda: with_profile(answer.profile.name, list(map(_record, answer.figures))),
+    )
+
+
+def _blocks(answer: MeasuredAnswer) -> Iterator[Block]:
+    judged = [figure for figure in answer.figures if figure.within is not None]
+    outside = answer.outside
+    state: State = "fails" if outside else "passes"
+    inside = f"{len(judged) - len(outside)} of {plural(len(judged), 'figure')} within the plan"
+    names = f"; outside: {', '.join(figure.quantity for figure in outside)}" if outside else ""
+    yield Sentence(
+        (Code(answer.profile.name), " beside ", Code(answer.source), ": ", Words(inside, state), f"{names}.")
+    )
+    yield Table(_COLUMNS, tuple(map(_row, answer.figures)), stacks=True)
+    yield from (Sentence((remark,)) for remark in answer.remarks)
+    values = [f"{key} = {value_text(value)}" for key, value in answer.edits.items() if value is not None]
+    if values:
+        yield Sentence(("Measured (--apply writes it into the profile):",))
+        yield Snippet(tuple(values))
+
+
+def _row(figure: RecordedFigure) -> TableRow:
+    within: Cell = "" if figure.within is None else _WITHIN[figure.within]
+    shown = (_value(figure, name) for name in ("planned", "recorded", "residual", "uncertainty"))
+    unit = "" if figure.unit == "1" else figure.unit
+    return TableRow((figure.quantity, unit, *shown, within, ShownValue(figure.events, "events"), figure.note))
+
+
+def _value(figure: RecordedFigure, name: str) -> ShownValue:
+    value = getattr(figure, name)
+    decimals = _DECIMALS[figure.unit]
+    if figure.unit == "us" and max(map(abs, filter(None, (figure.planned, figure.recorded))), default=1) < _SMALL_US:
+        decimals = 5
+    return ShownValue(value, name, figure.unit, decimals, signed=name == "residual", fixed=True)
+
+
+def _record(figure: RecordedFigure) -> Record:
+    fields = figure._asdict()
+    key, note = fields.pop("key"), fields.pop("note")
+    return {**fields, "residual": figure.residual, "within": figure.within, "key": key or None, "note": note or None}
+
+
+def _document(answer: MeasuredAnswer, *, applied_to: str | None) -> JsonDocument:
+    return document(
+        "measured",
+        profile=answer.profile.name,
+        source=answer.source,
+        day=answer.day or None,
+        quantile=answer.quantile,
+        figures=list(map(_record, answer.figures)),
+        outside=[figure.quantity for figure in answer.outside],
+        remarks=list(answer.remarks),
+        measured=dict(answer.edits),
+        applied_to=applied_to,
+    )

@@ -1,0 +1,260 @@
+"""Packets of pcap and pcapng files, in pieces, with exact stamps.
+
+Libraries such as dpkt give stamps of pcapng as floats, whose steps are 240 ns by now: more than the jitter of a good
+master. So the few fields of a record are read here.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from struct import Struct
+from typing import Any, BinaryIO, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from busplan.errors import BusplanError
+from busplan.progress import Progress
+
+Numbers = npt.NDArray[np.int64]
+_PIECE_BYTES: Final = 4_000_000
+_MOST_RECORD_BYTES: Final = 1_000_000
+"""Longest record that is no damage; a packet has 262,144 bytes at most."""
+_ETHERNET: Final = 1
+_NS: Final = 1_000_000_000
+_PCAP: Final = {
+    b"\xd4\xc3\xb2\xa1": ("<", 1000),
+    b"\xa1\xb2\xc3\xd4": (">", 1000),
+    b"\x4d\x3c\xb2\xa1": ("<", 1),
+    b"\xa1\xb2\x3c\x4d": (">", 1),
+}
+"""Byte order, and the nanoseconds of a tick, by the first bytes of a pcap file."""
+_SECTION: Final = b"\x0a\x0d\x0d\x0a"
+_ORDER: Final = {b"\x4d\x3c\x2b\x1a": "<", b"\x1a\x2b\x3c\x4d": ">"}
+_INTERFACE, _OLD_PACKET, _SIMPLE_PACKET, _PACKET = 1, 2, 3, 6
+_RESOLUTION, _OFFSET = 9, 14
+"""Options of an interface: the tick of its stamps, and the seconds to add."""
+
+
+class Packets(NamedTuple):
+    """Some packets of a capture, in the order of the file."""
+
+    content: npt.NDArray[np.uint8]
+    starts: Numbers
+    """Where each begins in `content`."""
+    sizes: Numbers
+    """Recorded bytes of each [bytes]."""
+    times_ns: Numbers
+    """Stamps since 1970 [ns]."""
+
+
+@dataclass
+class CaptureNotes:
+    """What a reader has to say of a file."""
+
+    packets: int = 0
+    other_links: int = 0
+    """Packets of interfaces that are no Ethernet."""
+    without_time: int = 0
+    """Packets in records that have no stamp."""
+    broken_at: int | None = None
+    """Byte of the file from which on nothing can be read; None of a whole file."""
+
+
+def is_capture(head: bytes) -> bool:
+    """Whether a file with these first four bytes is a pcap or a pcapng file."""
+    return head[:4] in _PCAP or head[:4] == _SECTION
+
+
+def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[Packets]:
+    """Packets of a capture of Ethernet, in pieces.
+
+    Parameters
+    ----------
+    path
+        A pcap or pcapng file.
+    notes
+        Is filled in.
+    progress
+        Called with the bytes read and those of the file.
+
+    Raises
+    ------
+    BusplanError
+        The file cannot be read, or is no such file.
+    """
+    try:
+        with path.open("rb") as file:
+            yield from _pieces(file, path, notes, progress)
+    except OSError as error:
+        raise BusplanError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress) -> Iterator[Packets]:
+    total = path.stat().st_size
+    head = file.read(24)
+    walker: _Walker
+    if head[:4] in _PCAP:
+        walker, held, at = _Pcap(head, path, notes), b"", len(head)
+    elif head[:4] == _SECTION:
+        walker, held, at = _PcapNg(notes), head, 0
+    else:
+        raise BusplanError(f"{path}: is no pcap or pcapng file")
+    while True:
+        content = held + file.read(_PIECE_BYTES)
+        rows, used = walker.walk(content)
+        if rows:
+            notes.packets += len(rows)
+            starts, sizes, times = np.array(rows, dtype=np.int64).T
+            yield Packets(np.frombuffer(content, dtype=np.uint8), starts, sizes, times)
+        at += used
+        is_last = len(content) - len(held) < _PIECE_BYTES
+        held = content[used:]
+        progress(min(at, total), total)
+        if walker.is_broken or (is_last and held) or len(held) > _MOST_RECORD_BYTES:
+            notes.broken_at = at
+            return
+        if is_last:
+            return
+
+
+class _Walker:
+    """Reader of records one behind the other."""
+
+    is_broken = False
+    """Whether a record cannot be: no further one can be found."""
+
+    def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
+        """Start, size and stamp of each whole packet, and the bytes used."""
+        raise NotImplementedError
+
+
+class _Pcap(_Walker):
+    def __init__(self, head: bytes, path: Path, notes: CaptureNotes) -> None:
+        order, self._tick_ns = _PCAP[head[:4]]
+        if len(head) < 24:  # noqa: PLR2004 - the header of the file
+            raise BusplanError(f"{path}: ends within the header of a pcap file")
+        link = Struct(f"{order}I").unpack_from(head, 20)[0] & 0xFFFF
+        if link != _ETHERNET:
+            raise BusplanError(f"{path}: is a capture of link type {link}, expected 1, Ethernet")
+        self._header = Struct(f"{order}IIII")
+        self._notes = notes
+
+    def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
+        rows, at, end = [], 0, len(content) - self._header.size
+        unpack, tick_ns = self._header.unpack_from, self._tick_ns
+        while at <= end:
+            seconds, ticks, size, _ = unpack(content, at)
+            if size > _MOST_RECORD_BYTES:
+                self.is_broken = True
+                break
+            if at + 16 + size > len(content):
+                break
+            rows.append((at + 16, size, seconds * _NS + ticks * tick_ns))
+            at += 16 + size
+        return rows, at
+
+
+class _Interface(NamedTuple):
+    link: int
+    ticks: int
+    """Of its stamps in a second."""
+    offset_ns: int
+
+
+class _PcapNg(_Walker):
+    def __init__(self, notes: CaptureNotes) -> None:
+        self._notes = notes
+        self._order = "<"
+        self._interfaces: list[_Interface] = []
+
+    def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
+        rows: list[tuple[int, int, int]] = []
+        at = 0
+        head, packet = self._structs()
+        while at + 12 <= len(content):
+            if content[at : at + 4] == _SECTION:
+                if content[at + 8 : at + 12] not in _ORDER:
+                    self.is_broken = True
+                    break
+                self._order = _ORDER[content[at + 8 : at + 12]]
+                head, packet = self._structs()
+            kind, size = head.unpack_from(content, at)
+            if size < 12 or size % 4 or size > _MOST_RECORD_BYTES:  # noqa: PLR2004 - the shortest block
+                self.is_broken = True
+                break
+            if at + size > len(content):
+                break
+            if kind == _PACKET and size >= 32:  # noqa: PLR2004 - the fields of a packet
+                number, high, low, kept = packet.unpack_from(content, at + 8)
+                self._packet(rows, number, high << 32 | low, at + 28, min(kept, size - 32))
+            else:
+                self._other(content, at, kind, size, rows)
+            at += size
+        return rows, at
+
+    def _structs(self) -> tuple[Struct, Struct]:
+        return Struct(f"{self._order}II"), Struct(f"{self._order}IIII")
+
+    def _packet(self, rows: list[tuple[int, int, int]], number: int, ticks: int, at: int, size: int) -> None:
+        if number >= len(self._interfaces):
+            self._notes.other_links += 1
+            return
+        interface = self._interfaces[number]
+        time_ns = ticks * _NS // interface.ticks + interface.offset_ns
+        if interface.link != _ETHERNET:
+            self._notes.other_links += 1
+        elif not -(2**63) <= time_ns < 2**63:
+            self._notes.without_time += 1
+        else:
+            rows.append((at, size, time_ns))
+
+    def _other(self, content: bytes, at: int, kind: int, size: int, rows: list[tuple[int, int, int]]) -> None:
+        order = self._order
+        if content[at : at + 4] == _SECTION:
+            self._interfaces = []
+        elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
+            self._interfaces.append(self._interface(content[at + 8 : at + size - 4]))
+        elif kind == _OLD_PACKET and size >= 32:  # noqa: PLR2004 - its fields
+            number, _, high, low, kept = Struct(f"{order}HHIII").unpack_from(content, at + 8)
+            self._packet(rows, number, high << 32 | low, at + 28, min(kept, size - 32))
+        elif kind == _SIMPLE_PACKET:
+            self._notes.without_time += 1
+
+    def _interface(self, body: bytes) -> _Interface:
+        (link,) = Struct(f"{self._order}H").unpack_from(body)
+        ticks, offset_ns, at = 1_000_000, 0, 8
+        field = Struct(f"{self._order}HH")
+        while at + 4 <= len(body):
+            code, size = field.unpack_from(body, at)
+            value = body[at + 4 : at + 4 + size]
+            if code == _RESOLUTION and value:
+                ticks = 2 ** (value[0] & 0x7F) if value[0] & 0x80 else 10 ** min(value[0], 18)
+            elif code == _OFFSET and len(value) == 8:  # noqa: PLR2004 - a number of 64 bits
+                offset_ns = Struct(f"{self._order}q").unpack(value)[0] * _NS
+            at += 4 + (size + 3) // 4 * 4
+        return _Interface(link, ticks, offset_ns)
+
+
+def interned(rows: npt.NDArray[Any], known: dict[bytes, int], made: Callable[[bytes], None]) -> Numbers:
+    """Number of each row of bytes, those alike with the same; new ones are made known.
+
+    Parameters
+    ----------
+    rows
+        Bytes of each thing, of shape (n, width).
+    known
+        Numbers by bytes, of all pieces.
+    made
+        Called with the bytes of each new one, in the order of their numbers.
+    """
+    flat = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.shape[1]))).ravel()
+    unique, inverse = np.unique(flat, return_inverse=True)
+    numbers = np.empty(len(unique), dtype=np.int64)
+    for place, row in enumerate(unique):
+        content = row.tobytes().rstrip(b"\0")
+        if content not in known:
+            known[content] = len(known)
+            made(content)
+        numbers[place] = known[content]
+    return numbers[inverse.ravel()]

@@ -1,0 +1,209 @@
+"""EtherCAT frames of a capture: their stamps, datagrams and working counters, as arrays."""
+
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from busplan.errors import BusplanError
+from busplan.progress import Progress
+from busplan.recordings.capture import CaptureNotes, Numbers, Packets, interned, packets
+
+_TYPE: Final = 0x88A4
+_VLAN: Final = (0x8100, 0x88A8)
+_DATAGRAMS: Final = 1
+"""Type of an EtherCAT header before datagrams."""
+_DEVICES_BIT: Final = 0x02
+"""Bit of the source address that devices set in a frame that returns."""
+LOGICAL: Final = {10: "LRD", 11: "LWR", 12: "LRW"}
+COMMANDS: Final = {
+    **LOGICAL,
+    **dict(enumerate(("NOP", "APRD", "APWR", "APRW", "FPRD", "FPWR", "FPRW", "BRD", "BWR", "BRW"))),
+    13: "ARMW",
+    14: "FRMW",
+}
+_FIELDS: Final = 7
+"""Bytes that say what a datagram is: command + 1, logical address, size."""
+_HEADER_BYTES: Final = 12
+
+
+class Datagram(NamedTuple):
+    """What tells datagrams apart."""
+
+    command: int
+    address: int
+    """Logical address; 0 of other commands."""
+    data_bytes: int
+
+    @property
+    def is_process_data(self) -> bool:
+        """Whether it is addressed to the process image."""
+        return self.command in LOGICAL
+
+
+class EthercatFrames(NamedTuple):
+    """Frames of one master, n of them in the order of the file."""
+
+    times_ns: Numbers
+    returned: npt.NDArray[np.bool_]
+    """Whether a device has had it."""
+    layout: Numbers
+    """Number of its datagrams in `layouts`."""
+    key: Numbers
+    """Number of its datagrams and their indexes: a frame returns with that it was sent with."""
+    counters: Numbers
+    """Number of its working counters, alike where all of them are."""
+    layouts: tuple[tuple[Datagram, ...], ...]
+    notes: CaptureNotes
+    others: int
+    """Packets that are no EtherCAT frame of datagrams."""
+    cut: int
+    """EtherCAT frames that are not whole."""
+
+
+def read_ethercat(path: Path, *, progress: Progress) -> EthercatFrames:
+    """Read the EtherCAT frames of a capture.
+
+    Parameters
+    ----------
+    path
+        A pcap or pcapng file.
+    progress
+        Called with the bytes read and those of the file.
+
+    Raises
+    ------
+    BusplanError
+        The file cannot be read, has no EtherCAT frame, has frames of several masters, or does not say which are sent.
+    """
+    notes, reader = CaptureNotes(), _Reader()
+    for piece in packets(path, notes, progress=progress):
+        reader.read(piece)
+    return reader.frames(path, notes)
+
+
+class _Reader:
+    """Frames of all pieces so far."""
+
+    def __init__(self) -> None:
+        self._parts: list[tuple[npt.NDArray[np.generic], ...]] = []
+        self._keys: dict[bytes, int] = {}
+        self._layouts: dict[bytes, int] = {}
+        self._layout_of_key: list[int] = []
+        self._counters: dict[bytes, int] = {}
+        self._masters: dict[int, int] = {}
+        self._others = self._cut = 0
+
+    def read(self, piece: Packets) -> None:
+        """Take a piece in."""
+        content, ends = piece.content, piece.starts + piece.sizes
+        # Zeros behind the end, so that a header may be looked at before it is known to be whole.
+        content = np.concatenate((content, np.zeros(64, dtype=np.uint8)))
+        at = piece.starts + 12
+        kind = _word(content, at)
+        for _ in range(2):
+            tagged = np.isin(kind, _VLAN) & (at + 6 <= ends)
+            at = at + 4 * tagged
+            kind = _word(content, at)
+        fits = (at + 4 <= ends) & (kind == _TYPE)
+        fits[fits] &= content[at[fits] + 3] >> 4 == _DATAGRAMS
+        self._others += int(np.count_nonzero(~fits))
+        if not fits.any():
+            return
+        starts, at, ends, times = piece.starts[fits], at[fits] + 4, ends[fits], piece.times_ns[fits]
+        whole, key_rows, counter_rows = _datagrams(content, at, ends)
+        self._cut += int(np.count_nonzero(~whole))
+        starts, times, key_rows, counter_rows = starts[whole], times[whole], key_rows[whole], counter_rows[whole]
+        if not len(starts):
+            return
+        returned = content[starts + 6] & _DEVICES_BIT != 0
+        keys = interned(key_rows, self._keys, self._new_key)
+        counters = interned(counter_rows, self._counters, lambda _: None)
+        self._count_masters(content, starts[~returned])
+        self._parts.append((times, returned, keys.astype(np.int32), counters.astype(np.int32)))
+
+    def _count_masters(self, content: npt.NDArray[np.uint8], starts: Numbers) -> None:
+        address = np.zeros(len(starts), dtype=np.int64)
+        for byte in range(6):
+            address = address << 8 | content[starts + 6 + byte]
+        for value, count in zip(*np.unique(address, return_counts=True), strict=True):
+            self._masters[int(value)] = self._masters.get(int(value), 0) + int(count)
+
+    def _new_key(self, key: bytes) -> None:
+        """Number the datagrams without their indexes."""
+        size = _FIELDS + 1
+        key += bytes(-len(key) % size)
+        layout = b"".join(key[at + 1 : at + size] for at in range(0, len(key), size))
+        self._layout_of_key.append(self._layouts.setdefault(layout, len(self._layouts)))
+
+    def frames(self, path: Path, notes: CaptureNotes) -> EthercatFrames:
+        """All frames."""
+        if not self._parts:
+            cut = f", {self._cut:,} of them cut: record whole packets" if self._cut else ""
+            raise BusplanError(
+                f"{path}: has no whole EtherCAT frame (type 0x88A4) among {notes.packets:,} Ethernet packets{cut}"
+            )
+        if not self._masters:
+            raise BusplanError(
+                f"{path}: all frames have a source address with the bit 0x02 of its first byte, which devices set in "
+                "frames that return: sent and returned frames cannot be told apart; give the master's port an address "
+                "without it, and record again"
+            )
+        if len(self._masters) > 1:
+            named = ", ".join(f"{_address(value)} ({count:,} frames)" for value, count in self._masters.items())
+            raise BusplanError(
+                f"{path}: has frames of {len(self._masters)} masters: {named}; keep the frames of one, as in Wireshark "
+                "with the filter eth.src"
+            )
+        times, returned, keys, counters = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        layouts = tuple(map(_datagrams_of, self._layouts))
+        layout = np.array(self._layout_of_key, dtype=np.int64)[keys]
+        return EthercatFrames(times, returned, layout, keys, counters, layouts, notes, self._others, self._cut)
+
+
+def _word(content: npt.NDArray[np.uint8], at: Numbers) -> Numbers:
+    return content[at].astype(np.int64) << 8 | content[at + 1]
+
+
+def _datagrams(
+    content: npt.NDArray[np.uint8], at: Numbers, ends: Numbers
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.uint8], npt.NDArray[np.uint8]]:
+    """Whether each frame is whole; index, command, address and size of its datagrams, and their working counters."""
+    whole, walking = np.ones(len(at), dtype=np.bool_), np.ones(len(at), dtype=np.bool_)
+    last = len(content) - 16
+    keys, counters = [], []
+    while walking.any():
+        header = np.minimum(at, last)
+        command = content[header]
+        size = content[header + 6].astype(np.int64) | (content[header + 7].astype(np.int64) & 7) << 8
+        counter_at = at + size + 10
+        fits = walking & (counter_at + 2 <= ends)
+        whole &= fits | ~walking
+        is_logical = fits & np.isin(command, tuple(LOGICAL))
+        key = np.zeros((len(at), _FIELDS + 1), dtype=np.uint8)
+        key[:, 0] = content[header + 1]
+        key[:, 1] = command + 1
+        for byte in range(4):
+            key[:, 2 + byte] = np.where(is_logical, content[header + 2 + byte], 0)
+        key[:, 6], key[:, 7] = size & 255, size >> 8
+        counter_at = np.minimum(counter_at, last)
+        counter = np.stack((content[counter_at], content[counter_at + 1]), axis=1)
+        key[~fits], counter[~fits] = 0, 0
+        keys.append(key)
+        counters.append(counter)
+        walking = fits & (content[header + 7] & 0x80 != 0)
+        at = at + size + _HEADER_BYTES
+    return whole, np.concatenate(keys, axis=1), np.concatenate(counters, axis=1)
+
+
+def _datagrams_of(layout: bytes) -> tuple[Datagram, ...]:
+    parts = (layout[at : at + _FIELDS] for at in range(0, len(layout), _FIELDS))
+    return tuple(
+        Datagram(part[0] - 1, int.from_bytes(part[1:5], "little"), int.from_bytes(part[5:7], "little"))
+        for part in parts
+    )
+
+
+def _address(value: int) -> str:
+    return value.to_bytes(6, "big").hex(":")

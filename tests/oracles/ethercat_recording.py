@@ -1,0 +1,117 @@
+"""Captures of an EtherCAT master's port, simulated event by event with known truth, and written bit for bit.
+
+A frame starts when the master's task is done, and its stamp is taken there; it returns when its bytes have been sent
+and have passed all devices and back, and the host has taken the rest of its time.
+"""
+
+import struct
+from dataclasses import dataclass, field
+from random import Random
+
+MASTER = bytes.fromhex("001122334455")
+BYTE_US = 0.08
+COPY_US = 0.0035
+HOP_US = 0.698
+LRW, BRD, FRMW, FPRD = 12, 7, 14, 4
+
+
+@dataclass
+class Machine:
+    """What the machine does."""
+
+    period_us: float = 1000.0
+    jitter_us: float = 20.0
+    """Start of a frame behind the planned one, evenly 0..jitter."""
+    host_us: float = 30.0
+    host_spread_us: float = 10.0
+    """The host takes host_us, and evenly 0..spread more."""
+    devices: int = 4
+    datagrams: tuple[tuple[int, int, int], ...] = ((LRW, 0x10000, 80), (FRMW, 0, 8))
+    """Command, address and data bytes."""
+    counters: tuple[int, ...] = (12, 4)
+    lost: frozenset[int] = frozenset()
+    wrong: frozenset[int] = frozenset()
+    skipped: frozenset[int] = frozenset()
+    """Cycles in which the master sends nothing."""
+    late: dict[int, float] = field(default_factory=dict)
+    """Starts that are so much later [us]."""
+    has_index: bool = True
+    hop_us: float = HOP_US
+
+
+def wire_us(data_bytes: tuple[int, ...]) -> float:
+    """A frame on the wire, gap included [us]."""
+    return float(max(8 + 14 + 2 + sum(size + 12 for size in data_bytes) + 4 + 12, 84) * BYTE_US)
+
+
+def ethernet(
+    datagrams: tuple[tuple[int, int, int], ...],
+    *,
+    index: int,
+    counters: tuple[int, ...],
+    master: bytes = MASTER,
+    returned: bool = False,
+    tag: bytes = b"",
+) -> bytes:
+    """A frame as it stands in a capture, without check sequence."""
+    body = b""
+    for number, (command, address, size) in enumerate(datagrams):
+        more = 0x8000 if number + 1 < len(datagrams) else 0
+        counter = counters[number] if returned else 0
+        body += struct.pack("<BBIHH", command, index, address, size | more, 0) + bytes(size)
+        body += struct.pack("<H", counter)
+    source = bytes([master[0] | 2 * returned]) + master[1:]
+    return b"\xff" * 6 + source + tag + b"\x88\xa4" + struct.pack("<H", len(body) | 0x1000) + body
+
+
+def simulated(machine: Machine, cycles: int, *, seed: int = 1) -> list[tuple[float, bytes]]:
+    """Stamps [us] and packets of a number of cycles, in the order of time."""
+    random = Random(seed)
+    sizes = tuple(size for *_, size in machine.datagrams)
+    process = sum(size for command, _, size in machine.datagrams if command in (10, 11, 12))
+    way = wire_us(sizes) + 2 * machine.devices * machine.hop_us + process * COPY_US
+    packets = []
+    for cycle in range(cycles):
+        late = random.uniform(0, machine.jitter_us) + machine.late.get(cycle, 0.0)
+        host = machine.host_us + random.uniform(0, machine.host_spread_us)
+        if cycle in machine.skipped:
+            continue
+        start = cycle * machine.period_us + late
+        index = cycle % 256 if machine.has_index else 0
+        packets.append((start, ethernet(machine.datagrams, index=index, counters=machine.counters)))
+        if cycle not in machine.lost:
+            counters = (0,) * len(sizes) if cycle in machine.wrong else machine.counters
+            back = ethernet(machine.datagrams, index=index, counters=counters, returned=True)
+            packets.append((start + way + host, back))
+    return sorted(packets, key=lambda packet: packet[0])
+
+
+def pcap(
+    packets: list[tuple[float, bytes]], *, order: str = "<", nano: bool = True, start_s: int = 1_700_000_000
+) -> bytes:
+    """A pcap file."""
+    written = struct.pack(f"{order}IHHiIII", 0xA1B23C4D if nano else 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)
+    for time_us, packet in packets:
+        time_ns = start_s * 10**9 + round(time_us * 1000)
+        part = time_ns % 10**9 // (1 if nano else 1000)
+        written += struct.pack(f"{order}IIII", time_ns // 10**9, part, len(packet), len(packet)) + packet
+    return written
+
+
+def pcapng(
+    packets: list[tuple[float, bytes]], *, order: str = "<", resolution: int | None = 9, start_s: int = 1_700_000_000
+) -> bytes:
+    """A pcapng file of an interface with a resolution of its stamps, 10^-n s; None for the default, 1 us."""
+    options = b"" if resolution is None else struct.pack(f"{order}HHB3xHH", 9, 1, resolution, 0, 0)
+    written = struct.pack(f"{order}IIIHHqI", 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, 0, -1, 28)
+    size = 20 + len(options)
+    written += struct.pack(f"{order}IIHHI", 1, size, 1, 0, 65535) + options + struct.pack(f"{order}I", size)
+    parts = [written]
+    for time_us, packet in packets:
+        time_ns = start_s * 10**9 + round(time_us * 1000)
+        ticks = time_ns * 10 ** (6 if resolution is None else resolution) // 10**9
+        filled = packet + bytes(-len(packet) % 4)
+        size = 32 + len(filled)
+        head = struct.pack(f"{order}IIIIIII", 6, size, 0, ticks >> 32, ticks & 0xFFFFFFFF, len(packet), len(packet))
+        parts.append(head + filled + struct.pack(f"{order}I", size))
+    return b"".join(parts)

@@ -1,0 +1,292 @@
+"""Captures of simulated machines: what they do is found again within its own U; what they hide is said."""
+
+import csv
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import busplan
+from busplan.buses.recorded import RecordedFigure
+from busplan.errors import BusplanError
+from busplan.questions.measured import MeasuredAnswer
+from tests.oracles.ethercat_recording import FPRD, FRMW, LRW, Machine, ethernet, pcapng, simulated
+
+if TYPE_CHECKING:
+    from subprocess import CompletedProcess
+
+Run = Callable[..., "CompletedProcess[str]"]
+Refused = Callable[..., str]
+FILES = Path(__file__).parent / "files"
+OF_THE_EXAMPLE = Machine(devices=8, datagrams=((LRW, 0x10000, 160), (FRMW, 0, 8)))
+"""As ethercat-servo-8, but faster than planned."""
+PLAN = busplan.load_profile(
+    "ethercat-servo-8",
+    changes={"bus.nodes": 4, "payload.read_bytes": 10, "payload.write_bytes": 10, "node.cable_m": 0},
+)
+
+
+def of_packets(
+    packets: list[tuple[float, bytes]], tmp_path: Path, *, plan: Any = PLAN, **options: Any
+) -> MeasuredAnswer:
+    path = tmp_path / "capture.pcapng"
+    path.write_bytes(pcapng(packets))
+    return busplan.measured(plan, path, **options)
+
+
+def of_machine(
+    machine: Machine, tmp_path: Path, *, cycles: int = 1200, seed: int = 1, **options: Any
+) -> MeasuredAnswer:
+    return of_packets(simulated(machine, cycles, seed=seed), tmp_path, **options)
+
+
+def figure(answer: MeasuredAnswer, start: str) -> RecordedFigure:
+    (found,) = (figure for figure in answer.figures if figure.quantity.startswith(start))
+    return found
+
+
+def test_the_shipped_recording_is_what_the_simulation_writes() -> None:
+    assert (FILES / "capture.pcapng").read_bytes() == pcapng(simulated(OF_THE_EXAMPLE, 60))
+
+
+@given(
+    st.sampled_from([250.0, 500.0, 1000.0, 4000.0]),
+    st.floats(0.5, 60.0),
+    st.floats(2.0, 80.0),
+    st.floats(0.1, 40.0),
+    st.integers(1, 10**6),
+)
+def test_period_jitter_and_masters_time_are_found_again_within_u(
+    tmp_path_factory: pytest.TempPathFactory,
+    period_us: float,
+    jitter_us: float,
+    host_us: float,
+    spread_us: float,
+    seed: int,
+) -> None:
+    machine = Machine(period_us=period_us, jitter_us=jitter_us, host_us=host_us, host_spread_us=spread_us)
+    answer = of_machine(machine, tmp_path_factory.mktemp("found"), seed=seed, quantile=0.9)
+    period, jitter, master = (figure(answer, start) for start in ("period", "latest start", "master's time"))
+    assert period.recorded == pytest.approx(period_us, abs=5 * jitter_us / 1200**1.5 + 1e-4)
+    assert jitter.recorded is not None
+    assert jitter.uncertainty is not None
+    # Twice U: one of twenty examples lies beyond U.
+    assert jitter.recorded == pytest.approx(0.9 * jitter_us, abs=2 * jitter.uncertainty)
+    edits = answer.edits
+    doubt: Any = edits["bus.master_uncertainty_us"]
+    assert edits["bus.master_us"] == pytest.approx(host_us + 0.9 * spread_us, abs=4 * doubt + 0.002)
+    assert edits["bus.master_us"] == pytest.approx(master.recorded, abs=0.001)
+    assert doubt < max(spread_us, 0.1)
+
+
+def test_an_applied_profile_takes_as_long_as_the_machine_did(tmp_path: Path) -> None:
+    # Neither the copy of the bytes nor the doubt of the delays is counted twice.
+    machine = Machine(jitter_us=0.001, host_spread_us=0.001)
+    answer = of_machine(machine, tmp_path)
+    trip = figure(answer, "round trip of").recorded
+    keys = {key: value for key, value in answer.edits.items() if value is not None}
+    applied = busplan.load_profile(PLAN, changes={**keys, "bus.mailbox_polls": 0})
+    (deciding,) = (found for found in busplan.capacity(applied).results if found.timing_model == "last-byte")
+    assert deciding.bias_us is not None
+    assert trip == pytest.approx(deciding.required_us + deciding.bias_us, abs=0.01)
+
+
+def test_a_slow_outlier_is_the_worst_case(tmp_path: Path) -> None:
+    answer = of_machine(Machine(late={600: 700.0}), tmp_path)
+    jitter = figure(answer, "latest start of all cycles")
+    assert jitter.recorded == pytest.approx(710, abs=11)
+    assert jitter.within is False
+    assert figure(answer, "period").recorded == pytest.approx(1000, abs=0.01)
+    assert answer.edits["bus.master_uncertainty_us"] is None
+    assert figure(of_machine(Machine(late={600: 700.0}), tmp_path, quantile=0.99), "latest start").within is True
+
+
+def test_what_is_lost_wrong_or_not_sent_is_counted(tmp_path: Path) -> None:
+    machine = Machine(
+        lost=frozenset({50, 51, 700}), wrong=frozenset({70, 900}), skipped=frozenset({100, 101, 500}), has_index=False
+    )
+    for has_index in (True, False):
+        machine.has_index = has_index
+        answer = of_machine(machine, tmp_path)
+        assert figure(answer, "lost frames").recorded == 3
+        assert figure(answer, "wrong working counters").recorded == 2
+        assert figure(answer, "period").note == "3 periods without a frame"
+        assert figure(answer, "master's time").recorded == pytest.approx(40, abs=0.2)
+        assert [found.quantity for found in answer.outside] == ["lost frames", "wrong working counters"]
+
+
+def test_the_frame_that_is_still_on_its_way_is_not_lost(tmp_path: Path) -> None:
+    packets = simulated(Machine(), 100)
+    assert figure(of_packets(packets[:-1], tmp_path), "lost frames").recorded == 0
+    answer = of_packets(packets[1:], tmp_path)
+    assert figure(answer, "lost frames").recorded == 0
+    assert "1 frame returned without having been seen to be sent." in answer.remarks
+
+
+def test_the_drift_of_the_recorders_clock_is_no_jitter(tmp_path: Path) -> None:
+    # 40 ppm more at the end than at the beginning, as a crystal that warms up: 0.2 ms over 6 s.
+    packets = [(time + 40e-6 * time**2 / 12e6, packet) for time, packet in simulated(Machine(), 6000)]
+    answer = of_packets(packets, tmp_path, quantile=0.99)
+    assert figure(answer, "latest start").recorded == pytest.approx(19.8, abs=1.5)
+    assert figure(answer, "period").within is True
+
+
+def test_a_clock_that_is_set_back_is_said(tmp_path: Path) -> None:
+    packets = simulated(Machine(), 1000)
+    back = [(time - 5_000.3 * (time > 600_000), packet) for time, packet in packets]
+    answer = of_packets(back, tmp_path)
+    assert any("set back 1 time" in remark for remark in answer.remarks)
+    assert figure(answer, "latest start").recorded == pytest.approx(20, abs=0.5)
+    assert figure(answer, "latest start").events in {600, 601}
+    assert figure(answer, "lost frames").recorded == 0
+
+
+def test_frames_of_a_cycle_are_those_that_come_as_often(tmp_path: Path) -> None:
+    packets = []
+    for cycle in range(100):
+        for place, (address, size) in enumerate(((0x10000, 1000), (0x20000, 600))):
+            datagrams = ((LRW, address, size), *(((FRMW, 0, 8),) if not place else ()))
+            sent = cycle * 1000 + place * 100.0
+            counters = (3,) * len(datagrams)
+            packets += [
+                (sent, ethernet(datagrams, index=place, counters=counters)),
+                (sent + 130, ethernet(datagrams, index=place, counters=counters, returned=True)),
+            ]
+        mailbox = ((FPRD, 0, 128),)
+        packets += [
+            (cycle * 1000 + 400.0, ethernet(mailbox, index=9, counters=(1,))),
+            (cycle * 1000 + 430.0, ethernet(mailbox, index=9, counters=(1,), returned=True)),
+        ]
+    # The recording begins within a cycle.
+    answer = of_packets(sorted(packets)[2:], tmp_path, plan="ethercat-servo-8")
+    assert figure(answer, "frames in a cycle").recorded == 2
+    assert figure(answer, "frames in a cycle").within is False
+    assert figure(answer, "datagrams").recorded == 1600 + 12 + 12 + 20
+    assert figure(answer, "datagrams").note == "LRW 1000 FRMW 8 | LRW 600"
+    assert figure(answer, "round trip of").recorded == pytest.approx(230, abs=0.01)
+    assert figure(answer, "period").recorded == pytest.approx(1000, abs=0.01)
+
+
+def test_other_datagrams_than_planned_are_measured(tmp_path: Path) -> None:
+    machine = Machine(datagrams=((LRW, 0x10000, 80), (FPRD, 0, 2), (FRMW, 0, 8)), counters=(12, 1, 4))
+    answer = of_machine(machine, tmp_path, cycles=100)
+    assert answer.edits["bus.housekeeping_bytes"] == [2, 8]
+    assert figure(answer, "datagrams").within is False
+    assert "bus.housekeeping_bytes" not in of_machine(Machine(), tmp_path, cycles=100).edits
+
+
+def test_the_time_of_a_byte_is_found_from_frames_of_several_sizes(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1)
+    packets = []
+    for number in range(400):
+        size = (72, 300, 1064)[number % 3]
+        datagrams = ((FPRD, 0, size),)
+        back = number * 1000 + 40 + (size + 12 + 40) * 0.0841 + float(noise.normal(0, 0.5))
+        packets += [
+            (number * 1000.0, ethernet(datagrams, index=number % 256, counters=(1,))),
+            (back, ethernet(datagrams, index=number % 256, counters=(1,), returned=True)),
+        ]
+    answer = of_packets(packets, tmp_path)
+    found = figure(answer, "time of a byte")
+    assert found.recorded == pytest.approx(0.0841, abs=0.0003)
+    assert found.planned == pytest.approx(0.0835, abs=0.0002)
+    assert any("no frame of process data" in remark for remark in answer.remarks)
+    assert answer.edits == {}
+
+
+def test_stamps_that_were_not_taken_at_the_port_are_said(tmp_path: Path) -> None:
+    packets = simulated(Machine(), 100)
+    quick = [(time - 44.0 * (place % 2), packet) for place, (time, packet) in enumerate(packets)]
+    answer = of_packets(quick, tmp_path)
+    assert any("sooner than it takes to send them" in remark for remark in answer.remarks)
+    assert "bus.master_us" not in answer.edits or answer.edits["bus.master_us"] != 0
+
+
+@contextmanager
+def refusal(words: str) -> Iterator[None]:
+    with pytest.raises(BusplanError, match=words):
+        yield
+
+
+def test_what_cannot_be_told_is_refused(tmp_path: Path) -> None:
+    packets = simulated(Machine(), 50)
+    other = [(time + 300, packet[:7] + b"\x99" + packet[8:]) for time, packet in packets]
+    with refusal("frames of 2 masters: 00:11:22:33:44:55 .50 frames., 00:99:22:33:44:55 .50 frames.; keep the frames"):
+        of_packets(sorted(packets + other), tmp_path)
+    local = [(time, packet[:6] + b"\x02" + packet[7:]) for time, packet in packets]
+    with refusal("cannot be told apart"):
+        of_packets(local, tmp_path)
+    with refusal("none of its 50 EtherCAT frames returned; record both ways"):
+        of_packets([packet for packet in packets if not packet[1][6] & 2], tmp_path)
+    with refusal("has no whole EtherCAT frame .type 0x88A4. among 0 Ethernet packets"):
+        of_packets([], tmp_path)
+    with refusal("100 of them cut: record whole packets"):
+        of_packets([(time, packet[:40]) for time, packet in packets], tmp_path)
+    with refusal("no recording of bus.kind ieee1394 is read; latencies in a CSV file are for busplan calibrate"):
+        of_packets(packets, tmp_path, plan="paper-4ms")
+    with refusal("no recording of bus.kind sercos3 is read$"):
+        of_packets(packets, tmp_path, plan="sercos3-servo-8")
+    with refusal("quantile 0.3: expected a share of 0.5 to 1"):
+        of_packets(packets, tmp_path, quantile=0.3)
+    with refusal("cannot be read: No such file"):
+        busplan.measured(PLAN, tmp_path / "nowhere.pcap")
+    (tmp_path / "text.pcap").write_text("a,b\n1,2\n")
+    with refusal("text.pcap: is no pcap or pcapng file"):
+        busplan.measured(PLAN, tmp_path / "text.pcap")
+
+
+def test_few_cycles_have_no_period(tmp_path: Path) -> None:
+    answer = of_machine(Machine(), tmp_path, cycles=5)
+    assert "It has 5 cycles, too few for a period." in answer.remarks
+    assert figure(answer, "master's time").events == 5
+
+
+# --- the command ----------------------------------------------------------------------------------------
+
+
+def test_every_form_has_the_same_figures(run: Run) -> None:
+    words = ("measured", "ethercat-servo-8", str(FILES / "capture.pcapng"), "--quantile", "0.9")
+    document = json.loads(run(*words, "--format", "json").stdout)
+    assert document == busplan.measured("ethercat-servo-8", FILES / "capture.pcapng", quantile=0.9).to_dict()
+    rows = list(csv.DictReader(run(*words, "--format", "csv").stdout.splitlines()))
+    assert [row["quantity"] for row in rows] == [found["quantity"] for found in document["figures"]]
+    assert document["day"] == "2023-11-14"
+    assert document["outside"] == []
+    text = run(*words).stdout
+    assert "capture.pcapng: 8 of 8 figures within the plan." in text
+    assert "bus.master_us = " in text
+
+
+def test_set_changes_the_plan_that_is_compared(run: Run) -> None:
+    words = ("measured", "ethercat-servo-8", str(FILES / "capture.pcapng"), "--set", "bus.master_jitter_us=3")
+    document = json.loads(run(*words, "--format", "json").stdout)
+    assert document["changes"] == {"bus.master_jitter_us": 3}
+    assert document["outside"] == ["latest start of all cycles"]
+
+
+def test_apply_writes_what_was_measured_with_its_origin(run: Run, refused: Refused, tmp_path: Path) -> None:
+    run("init", "press", "--from", "ethercat-servo-8", cwd=tmp_path)
+    path = tmp_path / "press.toml"
+    words = ("measured", "press.toml", str(FILES / "capture.pcapng"))
+    applied = run(*words, "--quantile", "0.9", "--apply", cwd=tmp_path)
+    assert applied.returncode == 0, applied.stderr
+    new = path.read_text()
+    assert "# busplan measured: 90 % of 60 events in capture.pcapng of 2023-11-14\n[bus]" in new
+    profile: Any = busplan.load_profile(path)
+    assert (profile.bus.master_grade, profile.bus.master_us) == ("measured", pytest.approx(39, abs=1))
+    assert profile.bus.master_uncertainty_us is not None
+    assert "# was assumed: a tuned Linux" in new
+    # The worst case has no uncertainty of its own, and the old comment is replaced.
+    assert run(*words, "--apply", "--format", "json", cwd=tmp_path).returncode == 0
+    newest = path.read_text()
+    assert newest.count("# busplan measured: ") == 1
+    assert "the worst of 60 events" in newest
+    assert "master_uncertainty_us" not in newest
+    assert "shipped profile" in refused("measured", "ethercat-servo-8", words[2], "--apply")
+    assert "--set bus.master_us=1" in refused(*words, "--apply", "--set", "bus.master_us=1", cwd=tmp_path)
