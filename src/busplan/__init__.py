@@ -90,7 +90,9 @@ else:
 
     def __getattr__(name: str) -> object:
         if name not in __all__:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+            did_you_mean = import_module("busplan.nearest").did_you_mean
+            words = filter(None, (f"module {__name__!r} has no attribute {name!r}", did_you_mean(name, __all__)))
+            raise AttributeError("; ".join(words))
         # `circle_test` and `CircleTestAnswer` are in module `circle`, `map_` and `MapAnswer` in `map`.
         question = name.removesuffix("Answer").lower().replace("_", "").removesuffix("test")
         home = _HOMES.get(name, f"busplan.questions.{question}")

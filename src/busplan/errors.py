@@ -42,7 +42,7 @@ class PlacedProblem(NamedTuple):
     key: str = ""
     """Dotted key; empty if the problem has none."""
     marked: tuple[int, int] | None = None
-    """First column of what is wrong, and the column behind its last; None if it has no end."""
+    """First column of what is wrong, and the column after its last; None if it has no end."""
 
 
 class PlacedError(BusplanError):

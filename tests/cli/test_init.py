@@ -211,7 +211,10 @@ def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: P
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("init", "x", "--from", "nope"), "--from nope: no shipped profile; shipped are can-servo-8, dvrk, "),
+        (
+            ("init", "x", "--from", "nope"),
+            "--from nope: no shipped profile; shipped are can-fd-arm-7, can-servo-8, canopen-6, dvrk, ",
+        ),
         (("init", "x", "--period", "0us"), "--period 0us: must be between 0.001 and 1e+09 us"),
         (("init", "x", "--period", "soon"), "--period soon: expected a time with its unit"),
         (("init", "x", "--from", "paper-1ms", "--axes", "8"), "--from: goes without --axes: a copy has the values"),

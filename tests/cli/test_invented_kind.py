@@ -485,14 +485,14 @@ def test_its_rule_and_its_limit_are_found_and_listed(run: Run, ring: Path) -> No
 
 
 def test_its_verdict_says_that_no_figure_of_others_tests_it(run: Run, ring: Path) -> None:
-    words = "No figure that others have published or measured tests the model of Token ring (kind ring)."
+    words = "No published or measured figure tests the model of Token ring (kind ring)."
     for command in (("capacity", "--all"), ("report",)):
         assert words in run(command[0], ring.name, *command[1:], cwd=ring.parent).stdout
     assert run("evidence", "ring", cwd=ring.parent).stdout == f"{words}\n"
     found = json.loads(run("evidence", "ring", "--format", "json", cwd=ring.parent).stdout)
     assert (found["without"], found["figures"]) == (["ring"], [])
-    assert "\n  tested          not against figures of others\n" in run("capacity", ring.name, cwd=ring.parent).stdout
-    assert "No figure that others" not in run("capacity", "paper-4ms", "--all", cwd=ring.parent).stdout
+    assert "\n  tested          not against published figures\n" in run("capacity", ring.name, cwd=ring.parent).stdout
+    assert "No published or measured figure" not in run("capacity", "paper-4ms", "--all", cwd=ring.parent).stdout
 
 
 def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> None:
@@ -505,10 +505,10 @@ def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> Non
     said = run("capacity", ring.name, "--all", cwd=ring.parent).stdout
     assert (
         "\nring at 1.5 ms: fits. Margin 100.000 us of 750.000 us; how far the bus is from this timing model is not "
-        "known, so no bias and no uncertainty are in it.\n"
+        "known, so no bias is corrected and no uncertainty given.\n"
     ) in said
     assert "\n  free            100 us\n" in said
-    assert "Not in it" not in said
+    assert "Not included" not in said
     ring.write_text(TEXT.replace("period_us = 1500", "period_us = 1200"), encoding="utf-8")
     assert "no bias or uncertainty known; cheapest cure" in run("check", ring.name, cwd=ring.parent).stdout
     document = json.loads(run("capacity", ring.name, "--format", "json", cwd=ring.parent).stdout)
@@ -568,8 +568,8 @@ def test_doubts_without_a_bias_make_three_verdicts(
     said = run("capacity", doubted.name, "--all", cwd=doubted.parent).stdout
     margin = f"Margin {slice_us - NEEDED_US:.3f} us +/- {DOUBT_US:.3f} us of {slice_us:.3f} us; how far the bus is from"
     assert f"\nring at {2 * slice_us / 1000:.12g} ms: {verdict}. {margin}".replace("-0.000", "0.000") in said
-    assert "Largest doubt: rate, 98% of U squared." in said  # 6.4 squared of 41.96
-    assert "Not in it: guard time (guard.guard_us)." in said
+    assert "Largest doubt: rate, 98% of the variance." in said  # 6.4 squared of 41.96
+    assert "Not included: guard time (guard.guard_us)." in said
     done = run("check", doubted.name, "--no-circle", cwd=doubted.parent)
     assert done.returncode == code
     codes = {"not shown to fit": {"BP114"}, "does not fit": {"BP101"}, "fits": set()}
@@ -656,7 +656,9 @@ def test_one_of_its_timing_models_decides_whatever_leads_and_whatever_is_asked_f
         for asked in ((), ("--timing", "hasty"), ("--timing", "plain")):
             done = run("capacity", ring_file.name, *asked, "--all", cwd=ring_file.parent)
             assert "\nring at 1.29 ms: not shown to fit. Margin -5.000 us +/- 12.955 us of" in done.stdout
-            says_otherwise = "The hasty model says otherwise: 640.000 us needed of 645.000 us. It decides nothing."
+            says_otherwise = (
+                "The hasty model says otherwise: 640.000 us needed of 645.000 us. It does not affect the verdict."
+            )
             assert (says_otherwise in done.stdout) == (asked != ("--timing", "plain"))
         assert run("check", ring_file.name, "--no-circle", cwd=ring_file.parent).returncode == 1
 

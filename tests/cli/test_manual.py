@@ -62,6 +62,16 @@ def test_a_terminal_gets_the_page_set_for_reading_and_no_word_cut_off(
     assert (tmp_path / "x.md").read_text(encoding="utf-8") == (FOLDER / "profile.md").read_text(encoding="utf-8")
 
 
+def test_a_card_of_80_columns_is_not_broken_on_a_terminal_of_80(
+    on_terminal: Callable[..., tuple[int, str]], tmp_path: Path
+) -> None:
+    _, shown = on_terminal("manual", "commands", cwd=tmp_path, env={"COLUMNS": "80", "NO_COLOR": "1"})
+    page = (FOLDER / "commands.md").read_text(encoding="utf-8").splitlines()
+    heads = [line for line in page if line.endswith("  FITS") and len(line) == 80]
+    assert heads
+    assert set(heads) <= set(re.sub("\x1b\\[[0-9;]*m", "", shown).splitlines())
+
+
 @pytest.mark.parametrize("topic", ["profiles", "", "Profile", "../manual/profile", "profile.md"])
 def test_an_unknown_topic_is_refused_with_the_known_ones(refused: Refused, topic: str, tmp_path: Path) -> None:
     said = refused("manual", topic, "-o", "x.md", cwd=tmp_path)

@@ -84,7 +84,7 @@ def test_circles_are_run_here_or_by_workers(busplan: Run, tmp_path: Path, monkey
         (("--x", "axes=1:3"), "no setting of this map can exist: axes = 1: no whole number of nodes, with 4 axes each"),
         (
             ("--x", "axes=4,8", "--y", "bus.nodes=1:3"),
-            "axes across and bus.nodes up both vary bus.nodes; give two keys",
+            "x = axes and y = bus.nodes both vary bus.nodes; give two keys",
         ),
         (("--x", "servo.step_us=10,20"), "--x servo.step_us: no figure of capacity depends on it; add --circle"),
         (("--x", "tolerance.max_contour_error_mm=1"), "add --circle to run circle tests"),

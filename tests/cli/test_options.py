@@ -209,4 +209,4 @@ def test_completion_offers_the_shipped_names_that_begin_so() -> None:
 def test_a_time_that_no_number_holds_is_refused(text: str) -> None:
     with pytest.raises(BusplanError) as caught:
         time_us(text, option="--from")
-    assert str(caught.value) == f"--from {text}: is longer than any time; expected one as 4ms, 250us or 0.001s"
+    assert str(caught.value) == f"--from {text}: is too long; expected a time with its unit, as 4ms, 250us or 0.001s"

@@ -170,6 +170,7 @@ def test_a_process_killed_while_writing_leaves_the_original_whole(
         (["mine.toml", "-o", "mine.toml", "--force"], "would overwrite mine.toml, which is read"),
         (["mine.toml", "--nodes", "0"], "--nodes 0"),
         (["mine.toml", "--axes", "0"], "--axes"),
+        (["gantry-24", "--axes", "30"], "instead: --set group.drives.nodes=6, or --set group.tool.nodes=3\n"),
         (["mine.toml", "--set", "bus.gap_count=64"], "--set bus.gap_count=64"),
         (["mine.toml", "--period", "1"], "--period 1"),
         (["mine.toml", "-o", "no/such/folder.toml"], "no folder"),

@@ -276,7 +276,7 @@ def test_capacity_as_a_table_begins_with_the_verdict(run: Run) -> None:
     whole = run("capacity", "paper-4ms", "--all").stdout
     assert (
         "\npaper-4ms at 4 ms: fits. Margin 1730.064 us +/- 6.311 us of 2000.000 us, less a bias of 6.616 us. Largest "
-        "doubt: execution time, 54% of U squared.\nNot in it: host time (host.transaction_us), "
+        "doubt: execution time, 54% of the variance.\nNot included: host time (host.transaction_us), "
     ) in whole
     assert "(4)" in whole
     assert "(4)" not in done.stdout

@@ -68,6 +68,29 @@ def test_a_terminal_and_a_pipe_get_the_same_figures(run: Run, on_terminal: OnTer
             assert here == there
 
 
+def test_messages_on_a_terminal_break_at_words(run: Run, on_terminal: OnTerminal, tmp_path: Path) -> None:
+    code, shown = on_terminal("capacity", "nope", cwd=tmp_path, env={"COLUMNS": "40"})
+    assert code == 2
+    assert all(len(line) <= 40 for line in shown.splitlines())
+    assert shown.split() == run("capacity", "nope").stderr.split()
+
+
+def test_what_to_ask_next_is_of_the_period_that_was_asked_for(on_terminal: OnTerminal, tmp_path: Path) -> None:
+    _, shown = on_terminal("capacity", "paper-4ms", "--period", "300us", cwd=tmp_path, env={"TERM": "dumb"})
+    for words in ("capacity paper-4ms --period 300us --sensitivity", "plan paper-4ms --period 300us"):
+        assert f"busplan {words}" in shown
+    _, shown = on_terminal("capacity", "paper-4ms", "--period", "4ms", cwd=tmp_path, env={"TERM": "dumb"})
+    assert "busplan circle-test paper-4ms\n" in shown
+
+
+def test_the_card_of_a_new_profile_keeps_its_columns(on_terminal: OnTerminal, tmp_path: Path) -> None:
+    _, shown = on_terminal("init", "new", "--bus", "can", cwd=tmp_path, env={"COLUMNS": "80"})
+    lines = shown.splitlines()
+    tested = next(row for row, line in enumerate(lines) if line.startswith("  tested"))
+    assert lines[tested + 1].startswith(" " * 18)
+    assert all(len(line) <= 80 for line in lines)
+
+
 def test_a_terminal_breaks_no_row_and_says_what_it_leaves_out(on_terminal: OnTerminal, tmp_path: Path) -> None:
     for columns in ("60", "80"):
         plan = ("plan", "paper-1ms", "--no-circle")

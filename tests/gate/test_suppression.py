@@ -72,9 +72,9 @@ def test_without_a_reason_it_suppresses_and_is_a_finding_itself(reason: str, cha
 @pytest.mark.parametrize(
     ("comment", "words"),
     [
-        ("# busplan: ignore[] why", "nothing is no code of a rule"),
-        ("# busplan: ignore[BP999] why", "BP999 is no code of a rule"),
-        ("# busplan: ignore[gap-count-wasteful] why", "gap-count-wasteful is no code of a rule"),
+        ("# busplan: ignore[] why", "nothing is not the code of a rule"),
+        ("# busplan: ignore[BP999] why", "BP999 is not the code of a rule"),
+        ("# busplan: ignore[gap-count-wasteful] why", "gap-count-wasteful is not the code of a rule"),
         ("# busplan: ignore[BP005] why", "BP005 cannot be suppressed"),
         ("# busplan: ignore[BP901] why", "BP901 cannot be suppressed"),
         ("# busplan: ignore BP110 why", "write # busplan: ignore[CODE] reason"),

@@ -4,9 +4,11 @@ import difflib
 import tomllib
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import busplan
 from busplan.buses.ieee1394.transactions import gap_count_of
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load, locate, locate_measurements, shipped_folder, shipped_names
@@ -190,7 +192,7 @@ def test_messages_of_a_file_call_it_as_it_was_called(work: Path) -> None:
 NEW_NAMES = ("mine", "[bold]x[/]", 'say "hi"', "back\\slash\\", "größe", "'", "x" * 100, "a # busplan: ignore[b")
 
 
-@pytest.mark.parametrize("source", ["paper-4ms", "gantry-24", "can-servo-8", "sercos3-servo-8"])
+@pytest.mark.parametrize("source", ["paper-4ms", "gantry-24", "can-servo-8", "can-fd-arm-7", "sercos3-servo-8"])
 def test_a_starter_differs_from_its_source_in_the_name_and_in_what_the_gate_was_told(source: str) -> None:
     for name in NEW_NAMES:
         text = starter_text(source, name=name)
@@ -228,7 +230,7 @@ def test_a_starter_comes_from_a_shipped_profile_only(source: str) -> None:
     with pytest.raises(BusplanError) as caught:
         starter_text(source, name="x")
     assert str(caught.value).startswith(
-        f"--from {source}: no shipped profile; shipped are can-servo-8, dvrk, ethercat-servo-8, gantry-24, "
+        f"--from {source}: no shipped profile; shipped are can-fd-arm-7, can-servo-8, canopen-6, dvrk, "
     )
 
 
@@ -237,3 +239,20 @@ def test_a_file_called_like_standard_input_is_a_file(tmp_path: Path, monkeypatch
     monkeypatch.chdir(tmp_path)
     assert load("./-").profile.name == "paper-1ms"
     assert locate_measurements("./-").path == tmp_path / "-"
+
+
+def test_the_shipped_can_networks_are_those_that_they_say() -> None:
+    arm: Any = load("can-fd-arm-7").profile
+    machine: Any = load("canopen-6").profile
+    assert (arm.bus.nodes, arm.bus.bit_rate_kbit_s, arm.bus.data_bit_rate_kbit_s) == (7, 1000, 5000)
+    (nodes,) = arm.alike_nodes
+    assert (nodes.bytes_of("read"), nodes.bytes_of("write")) == (16, 4)
+    assert all(message.fd for message in arm.message)
+    # Frames of 4 and 16 bytes: 33 nominal bits, and 75 and 195 data bits.
+    (found,) = busplan.capacity(arm, timing_model=["worst-stuffing"]).results
+    us = {term.name: term.us for term in found.terms}
+    assert (us["command"], us["feedback"]) == (7 * (33 + 75 / 5), 7 * (33 + 195 / 5))
+    assert (machine.bus.nodes, machine.bus.data_bit_rate_kbit_s) == (6, None)
+    assert [message.per_node for message in machine.message] == [True] * 3
+    for profile in (arm, machine):
+        assert busplan.capacity(profile).results[0].verdict == "fits"

@@ -467,7 +467,7 @@ def _sercos2_bus() -> st.SearchStrategy[dict[str, Any]]:
 
 @st.composite
 def sercos_profiles(draw: st.DrawFn, bus: st.SearchStrategy[dict[str, Any]]) -> Profile:
-    """Random profiles of a SERCOS bus, at periods that it knows and at one that it does not."""
+    """Random profiles of a SERCOS bus, at periods that it allows and at one that it does not."""
     own = draw(bus)
     data = {
         "schema_version": 1,

@@ -98,7 +98,7 @@ HEADLINES = {
     "plan": "<PlanAnswer: paper-1ms with 2 nodes (8 axes) at 1 ms: nothing to change; it fits with a margin of 230.064 "
     "us +/- 6.311 us and passes the circle.>",
     "timeline": "<TimelineAnswer: paper-1ms at 1 ms: 292.883 us to spare, 41.4% of 500.000 us used by the paper model, "
-    "which decides nothing.>",
+    "which does not affect the verdict.>",
     "check": "<CheckAnswer: checked 1 profile: 0 errors, 0 warnings>",
     "sweep": "<SweepAnswer: paper-1ms: 6 points; 6 fit by the closed form of the paper model, 6 shown to fit (standard "
     "model).>",

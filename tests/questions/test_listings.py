@@ -50,7 +50,7 @@ def test_each_profile_is_a_section() -> None:
     text = render(report, "table")
     assert "paper-two-node: 1 node at 4 ms, paper model leads\n" in text
     assert "\n\n\n" not in text
-    assert "### Shipped profiles\n\n#### `can-servo-8`" in render(report, "markdown")
+    assert "### Shipped profiles\n\n#### `can-fd-arm-7`" in render(report, "markdown")
 
 
 def test_the_rules_are_one_table() -> None:

@@ -72,6 +72,29 @@ def test_what_is_left_out_is_said_without_an_option() -> None:
         assert "to_dict() has all figures." in shown
 
 
+def test_a_notebooks_own_styles_of_lists_and_tables_are_undone() -> None:
+    # JupyterLab floats each dt at a fifth of the width and fixes the columns of tables, which breaks words.
+    shown = busplan.capacity("paper-4ms")._repr_html_()
+    for rule in (
+        "tbody tr { background: none; }",
+        "dt { float: none; width: auto; font-weight: inherit; }",
+        "table-layout: auto;",
+    ):
+        assert rule in shown
+
+
+def test_a_light_notebook_stays_light_on_a_dark_desktop() -> None:
+    shown = busplan.compare("paper-4ms")._repr_html_()
+    light, dark = '&:not([data-jp-theme-light="true"] *) {\n@media', "@media screen and (prefers-color-scheme"
+    assert shown.count(dark) == shown.count(f"{light}{dark.removeprefix('@media')}") >= 3
+
+
+def test_the_name_of_a_question_that_python_has_taken_is_said() -> None:
+    with pytest.raises(AttributeError, match=r"no attribute 'map'; did you mean map_\?$"):
+        busplan.map  # type: ignore[attr-defined]  # noqa: B018
+    assert not hasattr(busplan, "qqq")
+
+
 def test_an_answer_without_a_picture_gives_none() -> None:
     assert busplan.capacity("paper-4ms")._repr_svg_() is None
     assert busplan.diff("paper-4ms", "paper-1ms", circle=False)._repr_svg_() is None

@@ -37,7 +37,7 @@ from busplan.sections.profile import Profile
 
 FIGURE = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
 # One of each class of bus, the one of IEEE 1394 with the longest name, and one of groups.
-PROFILES = ("paper-optimal-gap", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8")
+PROFILES = ("paper-optimal-gap", "gantry-24", "can-servo-8", "can-fd-arm-7", "ethercat-servo-8", "sercos3-servo-8")
 
 
 def swept(profile: Profile) -> Report:

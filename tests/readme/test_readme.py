@@ -110,7 +110,7 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
             (group,) = models_of(field.annotation)
             owns = [one for one in ("name", "nodes", "axes", "hops") if one in group.model_fields]
             yield from (reference_row(group, own, f"group.NAME.{own}") for own in owns)
-            yield "| `group.NAME` | any other key of `[payload]` and `[node]` | none | What its nodes have |"
+            yield "| `group.NAME` | any other key of `[payload]` and `[node]` | none | As there, for its nodes |"
         elif inner == [AxisOverride]:
             yield f"| `{key}` | any key of one axis | none | {field.description} |"
         elif inner:

@@ -1,6 +1,6 @@
 """Questions that an analysis may ask of a kind of bus.
 
-An analysis asks a bus, never its keys. `terms`, `figures` and limits are written with operators and the functions of
+An analysis asks a bus, never its keys. Cycles, figures and limits are written with operators and the functions of
 `busplan.elementwise`, so that they serve floats, arrays and traced numbers alike. They branch on words, never on
 numbers.
 """
@@ -10,20 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import BusFigures
 from busplan.buses.limits import ANY_PERIOD, Periods
 from busplan.buses.network import Network
-from busplan.buses.recorded import Recorded
-from busplan.buses.rule import Rule
-from busplan.errors import BusplanError
-from busplan.progress import Progress
-from busplan.sourced import Sourced
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from busplan.sections.profile import Profile
-from busplan.buses.cycle import BusCycle
 from busplan.buses.parts import (
     IDLE,
     EventKind,
@@ -39,6 +29,16 @@ from busplan.buses.parts import (
     TimingModel,
     Value,
 )
+from busplan.buses.recorded import Recorded
+from busplan.buses.rule import Rule
+from busplan.errors import BusplanError
+from busplan.progress import Progress
+from busplan.sourced import Sourced
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from busplan.sections.profile import Profile
 
 
 class Bus(ABC):
@@ -58,7 +58,7 @@ class Bus(ABC):
     limits: ClassVar[tuple[Limit, ...]]
     """In the order in which they are reported; at least one grows with the nodes."""
     periods: ClassVar[Periods] = ANY_PERIOD
-    """Communication periods that it knows. One that knows some alone has a limit and a rule of `limits`."""
+    """Communication periods that it allows; if not all, it has the limit and the rule of `buses.limits`."""
     starter: ClassVar[Starter]
     """Defaults of a new profile."""
     rules: ClassVar[tuple[Rule, ...]] = ()
@@ -67,7 +67,7 @@ class Bus(ABC):
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
     """Stretches that several events make together."""
     constants: ClassVar[Mapping[str, Sourced]] = {}
-    """Its figures with a source, by name."""
+    """Its constants, each with its source, by name."""
     keys: ClassVar[Mapping[str, Key]] = {}
     """Facts about keys of its profiles; a key of a group is here as `node.` or `payload.` has it."""
     calibration: ClassVar[MeasuredLatencies | None] = None
@@ -75,7 +75,7 @@ class Bus(ABC):
     recordings: ClassVar[str] = ""
     """A recording of it that can be compared with a plan, in words; empty where none is read."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
-    """Changes that take a term of the kind out of the cycle, each new values by dotted key."""
+    """Changes that each take one term out of the cycle, as new values by dotted key."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
     """Data files, in busplan/data, with figures of it that others have published or measured."""
 
@@ -98,11 +98,11 @@ class Bus(ABC):
         return ()
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - most have
-        """Whether the cycle holds an execution time of the nodes, or a latency does."""
+        """Whether the cycle contains an execution time of the nodes; with `of_latency`, whether a latency does."""
         return True
 
     def key_of(self, role: KeyRole) -> str:
-        """The key that stands for a part of the machine; empty where the kind has none."""
+        """The key that gives a part of the machine; empty where the kind has none."""
         return next((name for name, key in self.keys.items() if key.role == role), "")
 
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
@@ -118,7 +118,7 @@ class Bus(ABC):
         """Payloads that a plan may choose from."""
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - most charge all alike
-        """Say which way on the wire each node is charged."""
+        """Say whose way on the wire the times of each node count."""
         return "every node alike"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none
@@ -130,7 +130,7 @@ class Bus(ABC):
         return []
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Functions that rows of evidence name beside its figures: of a cycle and what the row gives."""
+        """Functions that rows of evidence name, beside its figures; each takes a cycle and the values of the row."""
         return {}
 
     def recorded(self, network: Network, path: "Path", *, share: float, progress: Progress) -> Recorded:  # noqa: ARG002 - a kind may have none
@@ -160,7 +160,7 @@ class Bus(ABC):
         return next((limit for limit in self.limits if limit.key == key), None)
 
     def broken(self, network: Network) -> tuple[Limit, ...]:
-        """The limits that plain numbers break, but for safety."""
+        """The limits that plain numbers break, those of safety left out."""
         return tuple(limit for limit in self.limits if not limit.is_safety and limit.is_broken(network))
 
     def is_safe(self, network: Network) -> bool:

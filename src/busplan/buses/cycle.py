@@ -79,7 +79,7 @@ class Run(NamedTuple):
         return ((event.term, event.us) for event in self.events if not is_off(event.us))
 
     def counted_us(self, times: Number) -> Iterator[tuple[str, Number]]:
-        """The same of several rounds, with the events of a term together."""
+        """The same for several rounds: the events of a term and the same rounds as a single sum."""
         parts: dict[tuple[str, Rounds], list[Number]] = {}
         for event in self.events:
             if not is_off(event.us):
@@ -111,21 +111,21 @@ def summed(runs: Iterable[Run], keys: Iterable[str]) -> dict[str, Number]:
 
 
 class Doubt(NamedTuple):
-    """Something that a cycle rests on and that is not known exactly."""
+    """An input of a cycle that is not known exactly."""
 
     key: str
     """Dotted key of the profile, or a name of its own."""
     label: str
     us: Number
-    """Standard uncertainty that it gives the cycle: its own, times the sensitivity [us]."""
+    """Standard uncertainty of the cycle by this input: its own, times the sensitivity [us]."""
 
 
 class LeftOut(NamedTuple):
-    """A part that a cycle could have and a profile does not say: no verdict has it."""
+    """A part of the cycle that the profile does not give, so that no verdict counts it."""
 
     label: str
     key: str
-    """The key that would say it."""
+    """The key that would give it."""
 
 
 class BusLatency(NamedTuple):
@@ -136,7 +136,7 @@ class BusLatency(NamedTuple):
     phases: Mapping[str, Number]
     """Figures by key, which are among the kind's `latency_figures`; infinite where the phase does not exist."""
     group: str = ""
-    """Of which group of nodes; empty where all are alike."""
+    """Name of its group of nodes; empty where all nodes are alike."""
 
     @property
     def label(self) -> str:
@@ -147,8 +147,8 @@ class BusLatency(NamedTuple):
 class BusCycle(ABC):
     """One communication cycle of a network under a timing model.
 
-    What it needs rests on neither the period nor the slice ratio: these say what it is given. The smallest period and
-    ratio are computed from that.
+    The time that it needs depends on neither the period nor the slice ratio, which say what it is given. So the
+    smallest period and ratio follow from it.
     """
 
     network: Network
@@ -204,7 +204,7 @@ class BusCycle(ABC):
         return extra_us
 
     def bias_us(self) -> Number | None:
-        """Time of the bus beyond the timing model, on the mean [us]; None where nobody has measured it."""
+        """Mean time that the bus takes beyond the timing model [us]; None where it is unknown."""
         return None
 
     def sync_jitter_us(self) -> Number:
@@ -235,7 +235,7 @@ class BusCycle(ABC):
         return ()
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """Parts that the cycle could have and the profile does not say."""
+        """Parts of the cycle that the profile does not give."""
         return ()
 
     def events(self) -> Iterator[BusEvent]:
@@ -269,17 +269,17 @@ class BusCycle(ABC):
         for run in self.runs:
             first, each = self._turns(run)
             count = 1 if run.times is None else int(plain(run.times))
-            before = (node - first + 1) * each - 1 if run.group is not None else count - 1
-            if 0 <= before < count:
-                until_us = _until_us(run, before, self.command_events)
+            last = (node - first + 1) * each - 1 if run.group is not None else count - 1
+            if 0 <= last < count:
+                until_us = _until_us(run, last, self.command_events)
                 if until_us is not None:
-                    begins_us = now_us + _rounds_us(run, before)
+                    begins_us = now_us + _rounds_us(run, last)
                     arrived_us = begins_us + self.added_before_us(begins_us) + until_us
             now_us += _rounds_us(run, count)
         return now_us + self.added_before_us(now_us) if arrived_us is None else arrived_us
 
     def added_before_us(self, sent_us: float) -> float:  # noqa: ARG002 - most runs follow each other at once
-        """Time of events between the rounds, before the runs have taken some time, in plain numbers [us].
+        """Time of events between rounds, as cycle starts, up to a point of the runs; in plain numbers [us].
 
         Parameters
         ----------
@@ -293,7 +293,7 @@ class BusCycle(ABC):
         return {}
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """Lines of this kind alone on the card of a verdict: labels and words, of plain numbers."""
+        """Lines that only this kind has on the card of a verdict: labels and words; of plain numbers."""
         return ()
 
     def latencies(self) -> tuple[BusLatency, ...]:

@@ -193,7 +193,7 @@ MIN_PERIOD: Final = Figure(
     "min_period_us",
     "T_s,min",
     _CYCLE,
-    "smallest period that gives these nodes their time; a limit of the bus may allow none",
+    "smallest period with enough time for these nodes, null without one; other limits may still be broken",
     "smallest period",
     better="less",
 )
@@ -210,15 +210,15 @@ EXCEEDED: Final = Figure(
     "exceeded",
     "broken",
     _CYCLE,
-    "limits that the profile breaks: time as it is counted, one with a doubt beyond it",
+    "limits that are broken: time without bias and U, each other limit by more than its U",
     sort="words",
 )
 FITS: Final = Figure(
     "fits",
     "fits",
     _CYCLE,
-    "whether required <= available, and no limit is broken",
-    "required <= available",
+    "whether no limit is broken, time among them: required <= available",
+    "no limit broken",
     sort="truth",
     better="more",
 )
@@ -226,11 +226,11 @@ CIRCLE_REFUSED_BY: Final = Figure(
     "circle_refused_by",
     "refused",
     "profile",
-    "keys for which the circle that the profile asks for cannot be run",
+    "keys that prevent the profile's circle test from running",
     sort="words",
 )
 _CERTAINTY: Final = "JCGM 100"
-BIAS: Final = Figure("bias_us", "bias", "residual", "what the bus takes beyond the timing model, on the mean", "bias")
+BIAS: Final = Figure("bias_us", "bias", "residual", "mean time that the bus takes beyond the timing model", "bias")
 MARGIN_CORRECTED: Final = Figure(
     "margin_corrected_us",
     "margin_c",
@@ -241,13 +241,17 @@ MARGIN_CORRECTED: Final = Figure(
     scale="available_us",
 )
 UNCERTAINTY: Final = Figure(
-    "uncertainty_us", "U", _CERTAINTY, "expanded uncertainty of that, two standard uncertainties", "uncertainty U"
+    "uncertainty_us",
+    "U",
+    _CERTAINTY,
+    "expanded uncertainty of the corrected margin, two standard uncertainties",
+    "uncertainty U",
 )
 SAFE_REQUIRED: Final = Figure(
     "safe_required_us",
     "T_safe",
     _CERTAINTY,
-    "what the slice must give for the cycle to be shown to fit, with the reserve",
+    "slice in which the cycle is shown to fit, reserve included",
     "needed to be shown to fit",
     better="less",
 )
@@ -276,7 +280,7 @@ SAFE_MIN_PERIOD: Final = Figure(
     "safe_min_period_us",
     "T_s,safe",
     _CERTAINTY,
-    "smallest period that is shown to give these nodes their time; a limit of the bus may allow none",
+    "smallest period shown to have enough time for these nodes, null without one; other limits may be broken",
     "smallest safe period",
     better="less",
 )
@@ -296,12 +300,12 @@ CERTAINTY: Final = (
 )
 """Figures of the timing model that decides; under another they do not exist."""
 VERDICT_FIGURES: Final = (
-    Figure("missed_limits", "missed", _CYCLE, "keys of [limits] that ask for more than the slice gives", sort="words"),
+    Figure("missed_limits", "missed", _CYCLE, "keys of [limits] that are not kept", sort="words"),
     Figure(
         "models_agree",
         "models agree",
         _CYCLE,
-        "whether required <= available is the same under every timing model",
+        "whether `fits` is the same under every timing model; null with a single model",
         sort="truth",
     ),
     Figure(
@@ -312,11 +316,17 @@ VERDICT_FIGURES: Final = (
         sort="word",
     ),
     Figure("uncertainty_parts", "parts of U", _CERTAINTY, "what the uncertainty is made of, the largest first"),
-    Figure("reserve", "reserve", "profile", "share of the slice that must be free for a plan to fit", sort="number"),
-    Figure("not_in_it", "not in it", "profile", "keys that could be in the cycle and are not said", sort="words"),
+    Figure(
+        "reserve",
+        "reserve",
+        "profile",
+        "share of the slice that must be free for a cycle to be shown to fit",
+        sort="number",
+    ),
+    Figure("not_in_it", "not in it", "profile", "keys that could add time to the cycle and are not set", sort="words"),
     Figure("not_applicable", "not applicable", "profile", "timing models with the keys that they cannot express"),
     Figure("cheapest_change", "change", _CYCLE, "cheapest change that makes it fit, or carries more nodes"),
-    Figure("warnings", "warnings", "table", "what to beware of, whatever the verdict", sort="words"),
+    Figure("warnings", "warnings", "table", "warnings that hold whatever the verdict", sort="words"),
     Figure("text", "text", _CYCLE, "the verdict in words", sort="word"),
     Figure("sensitivity", "sensitivity", _CERTAINTY, "how small changes move the corrected margin, the largest first"),
     Figure("next_bottleneck", "next bottleneck", _CERTAINTY, "what binds once the largest term or the limit is gone"),

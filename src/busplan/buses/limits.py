@@ -1,4 +1,4 @@
-"""Limits that several kinds of bus have: a period that the bus knows, and nodes that are done once a cycle."""
+"""Limits that several kinds of bus have: a period that the bus allows, and nodes that finish within the period."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry
 
 
 class Periods(NamedTuple):
-    """Communication periods that a kind of bus knows, ascending; without any it takes every period [us]."""
+    """Communication periods that a kind of bus allows, ascending; empty if it allows every period [us]."""
 
     us: tuple[float, ...] = ()
 
@@ -22,18 +22,18 @@ class Periods(NamedTuple):
         """The longest of them; infinite where every period will do [us]."""
         return self.us[-1] if self.us else inf
 
-    def knows(self, period_us: float) -> bool:
+    def allows(self, period_us: float) -> bool:
         """Whether a period is one of them.
 
         Examples
         --------
-        >>> Periods((250.0, 500.0)).knows(300.0), Periods().knows(300.0)
+        >>> Periods((250.0, 500.0)).allows(300.0), Periods().allows(300.0)
         (False, True)
         """
         return not self.us or period_us in self.us
 
     def from_us(self, least_us: Number) -> Number:
-        """The shortest of them that is no shorter than a time, but for float rounding; infinite where none is [us].
+        """The shortest of them that is at least a time, float rounding aside; infinite where none is [us].
 
         Parameters
         ----------
@@ -47,10 +47,10 @@ class Periods(NamedTuple):
         """
         if not self.us:
             return least_us
-        return next_entry(self.us, least_us * (1 - FIT_ROUNDING), words="the next period that the bus knows")
+        return next_entry(self.us, least_us * (1 - FIT_ROUNDING), words="the next period that the bus allows")
 
     def neighbours(self, period_us: float) -> tuple[float, ...]:
-        """The next shorter and the next longer period that the bus knows, where they exist [us].
+        """The next shorter and the next longer period that the bus allows, where they exist [us].
 
         Examples
         --------
@@ -66,11 +66,11 @@ class Periods(NamedTuple):
         Examples
         --------
         >>> Periods((250.0, 500.0)).refusal(300.0)
-        'the bus knows no period of 300 us; the next are 250 and 500 us'
+        'the bus allows no period of 300 us; the next are 250 and 500 us'
         """
         near = " and ".join(f"{us:g}" for us in self.neighbours(period_us))
         are = "are" if len(self.neighbours(period_us)) > 1 else "is"
-        return f"the bus knows no period of {period_us:g} us; the next {are} {near} us"
+        return f"the bus allows no period of {period_us:g} us; the next {are} {near} us"
 
 
 ANY_PERIOD: Final = Periods()
@@ -81,19 +81,19 @@ PERIOD_LIMIT: Final = "period"
 
 
 def period_limit(periods: Periods) -> Limit:
-    """The limit that the bus must know the period.
+    """The limit that the bus must allow the period.
 
     Parameters
     ----------
     periods
-        Those that it knows.
+        The periods that it allows.
     """
     return Limit(
         PERIOD_LIMIT,
-        "the bus knows no such period",
+        "the bus does not allow this period",
         lambda network: choose(periods.from_us(network.period_us) > network.period_us, 1, 0),
         lambda _network: 0,
-        way_out="a period that the bus knows will do",
+        way_out="a period that the bus allows will do",
         has_rule=True,
         is_of_period=True,
         says=lambda network: periods.refusal(plain(network.period_us)),
@@ -101,32 +101,32 @@ def period_limit(periods: Periods) -> Limit:
 
 
 def period_rule(code: str, periods: Periods, *, kind: str, source: str) -> Rule:
-    """The rule that reports a period that the bus does not know, with its neighbours.
+    """The rule that reports a period that the bus does not allow, with its neighbours.
 
     Parameters
     ----------
     code
         Its code.
     periods
-        Those that it knows.
+        The periods that it allows.
     kind
         Name of the kind of bus.
     source
-        Which these are, and who says so.
+        The periods in words, with their source.
     """
 
     def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
         period_us = subject.profile.cycle.period_us
-        if not periods.knows(period_us):
+        if not periods.allows(period_us):
             yield RuleProblem("cycle.period_us", periods.refusal(period_us), *subject.cure())
 
     return Rule(
         code,
         f"{kind}-unknown-period",
         "error",
-        "the bus knows no such period",
-        f"The bus runs at some communication periods alone: {source}. A profile with another one loads, and capacity "
-        "gives its figures, but it does not fit. The message names the next shorter and the next longer one.",
+        "the bus does not allow this period",
+        f"The bus runs only at some communication periods: {source}. A profile with another period loads, and capacity "
+        "gives its figures, but it does not fit. The message names the next shorter and the next longer period.",
         unknown_period,
     )
 
@@ -146,7 +146,7 @@ def busy_doubt_us(group: Group) -> Number:
 
 
 def slow_groups(network: Network) -> Iterator[Group]:
-    """Groups of plain numbers whose nodes are not shown to be done within the period."""
+    """Groups of plain numbers whose nodes are not shown to finish within the period."""
     for group in network.groups:
         if _shown_us(group) > network.period_us:
             yield group
@@ -170,7 +170,7 @@ def _shown_us(group: Group) -> Number:
 
 
 def _ends_us(network: Network) -> tuple[Number, Number]:
-    """Execution time of the slowest nodes: at least, and at most as far as it is shown [us]."""
+    """Execution time of the slowest nodes, less and plus its expanded uncertainty [us]."""
     least_us = (busy_us(group) - COVERAGE * busy_doubt_us(group) for group in network.groups)
     return reduce(larger, least_us), reduce(larger, map(_shown_us, network.groups))
 

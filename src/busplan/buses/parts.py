@@ -128,7 +128,7 @@ class Limit(NamedTuple):
 
     @property
     def nominal(self) -> "Limit":
-        """The limit of the value as it is, whatever is not known of it: that of closed forms."""
+        """The limit of the value as it is, its uncertainty left out."""
         return self if self.doubt is None else self._replace(doubt=None, perhaps=None)
 
     @property

@@ -63,7 +63,7 @@ class Spread(NamedTuple):
 
 
 class Tested(NamedTuple):
-    """Which parts of a kind of bus figures of others set, and which they test."""
+    """Parts of a kind's model that published figures set, and parts that independent figures test."""
 
     set_by: Mapping[str, str]
     """Source of the constants, bias or U of each part, in a few words: it tests none of them."""

@@ -78,7 +78,7 @@ class Rule(NamedTuple):
 def contradicts(fits: bool, figures: RuleFigures) -> bool:
     """Tell whether a timing model that does not decide contradicts the verdict.
 
-    A plan that lacks its reserve alone contradicts nothing, and a broken limit is no question of timing.
+    A cycle that lacks only its reserve contradicts nothing, and a broken limit is no question of timing.
 
     Parameters
     ----------

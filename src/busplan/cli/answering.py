@@ -23,7 +23,7 @@ _KEY_AND_VALUE: Final = re.compile(r"\b[a-z][a-z_.]* = \S")
 _NARROWEST: Final = 40
 """Least width to lay out for; a narrower terminal breaks the lines itself."""
 _OPTIONS: Final = {"timing_model": "timing"}
-"""Names of options that are not those of their arguments."""
+"""Option of each argument that has another name."""
 NOTHING_REFUSED: Final[Mapping[Form, str]] = MappingProxyType({})
 
 
@@ -49,13 +49,18 @@ def answer(
     inputs
         Files that the command reads.
     changes
-        KeyChanges of the profile; the answer names those by --set.
+        Changes of the profile; the answer names those made by --set.
     is_whole
         Value of --all.
     default
         Form on standard output without --format.
     refused
         Forms that this command does not have, with the reason.
+
+    Yields
+    ------
+    Callable
+        Writes a report to the destination, in the chosen form.
 
     Raises
     ------
@@ -67,15 +72,16 @@ def answer(
         raise BusplanError(f"--format {chosen}: {refused[chosen]}")
     if output is None:
         with naming(changes):
-            yield lambda report: give(_asked(report, changes, is_whole=is_whole), chosen)
+            yield lambda report: give(_completed(report, changes, is_whole=is_whole), chosen)
         return
     require_apart({"--output": output}, inputs=inputs)
     with new_file(output, overwrite=True) as file, naming(changes):
-        yield lambda report: _write(file.write, _asked(report, changes, is_whole=is_whole), chosen)
+        yield lambda report: _write(file.write, _completed(report, changes, is_whole=is_whole), chosen)
     say(f"wrote {output}")
 
 
-def _asked(report: "Report", changes: KeyChanges, *, is_whole: bool) -> "Report":
+def _completed(report: "Report", changes: KeyChanges, *, is_whole: bool) -> "Report":
+    """The report with the --set options named, whole where --all asks for it."""
     return report_with(changes, report)._replace(is_whole=is_whole or report.is_whole)
 
 
@@ -96,12 +102,12 @@ def naming(changes: KeyChanges) -> Iterator[None]:
     except BusplanError as error:
         if not changes.words or isinstance(error, PlacedError | WorkerLostError):
             raise
-        raise BusplanError(*(_naming(problem, changes) for problem in error.problems)) from None
+        raise BusplanError(*(_with_set_named(problem, changes) for problem in error.problems)) from None
 
 
 @contextmanager
 def naming_option(*arguments: str) -> Iterator[None]:
-    """Name arguments of a public function as options in its errors: buses, --buses; circle=True, --circle.
+    """Name arguments of a public function as options in its errors: buses, --buses; set a.key=1, --set a.key=1.
 
     Parameters
     ----------
@@ -109,7 +115,7 @@ def naming_option(*arguments: str) -> Iterator[None]:
         Names of arguments.
     """
     names = "|".join(arguments)
-    argument = re.compile(rf"^(?P<name>{names})(?=[ :])|\b(?P<flag>{names})=True\b")
+    argument = re.compile(rf"^(?P<name>{names})(?=[ :])|\b(?P<flag>{names})=True\b|(?<!-)\bset(?= \w+(\.[\w-]+)+=)")
     try:
         yield
     except BusplanError as error:
@@ -120,11 +126,11 @@ def naming_option(*arguments: str) -> Iterator[None]:
 
 
 def _option(argument: re.Match[str]) -> str:
-    name = argument["name"] or argument["flag"]
+    name = argument["name"] or argument["flag"] or argument[0]
     return f"--{_OPTIONS.get(name, name)}"
 
 
-def _naming(problem: str, changes: KeyChanges) -> str:
+def _with_set_named(problem: str, changes: KeyChanges) -> str:
     keys = (change.sections[-1] for change in changes.by_set)
     is_of_profile = _KEY_AND_VALUE.search(problem) or any(key in problem for key in keys if "_" in key)
     return f"{problem} (with {changes.words})" if is_of_profile and SET not in problem else problem
@@ -145,7 +151,7 @@ def give(report: "Report", form: Form) -> None:
 
 
 def terminal_width() -> int | None:
-    """Width of the terminal, by COLUMNS if that is set; None if standard output is none, so that it is reproducible."""
+    """Width of the terminal, by COLUMNS if set; None if standard output is no terminal."""
     if not sys.stdout.isatty():
         return None
     from shutil import get_terminal_size
@@ -154,7 +160,7 @@ def terminal_width() -> int | None:
 
 
 def terminal_height() -> int | None:
-    """Lines of the terminal, by LINES if that is set; None if standard output is none."""
+    """Lines of the terminal, by LINES if set; None if standard output is no terminal."""
     if not sys.stdout.isatty():
         return None
     from shutil import get_terminal_size

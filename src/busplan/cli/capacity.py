@@ -45,29 +45,31 @@ def capacity_command(
 
     It begins with a card: the verdict (fits, not shown to fit, or does not fit) by the timing model that decides on
     this bus; how much of the period is used and free, the fastest period, room for more nodes, and what to measure or
-    change. The figures follow; on a low terminal --all shows them. Times are in us. Exits 0 with any verdict.
+    change. The figures follow; a low terminal shows them with --all. Times are in us. Exits 0 with any verdict.
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.questions.capacity import capacity
 
-        plan = load_changed(profile, changes)
+        loaded = load_changed(profile, changes)
         result = capacity(
-            plan,
-            period_us=periods_us(period, plan),
-            timing_model=timing_models(timing, plan),
+            loaded,
+            period_us=periods_us(period, loaded),
+            timing_model=timing_models(timing, loaded),
             sensitivity=sensitivity,
         )
-        give(result.report()._replace(next_commands=_next(str(profile), result, changes)))
+        give(result.report()._replace(next_commands=_next_commands(str(profile), result, changes)))
 
 
-def _next(argument: str, result: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
-    """What to ask next of the same profile."""
+def _next_commands(argument: str, result: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
+    """Commands to run next for the same profile."""
     from busplan.forms.blocks import Command
-    from busplan.questions.base.shell import change_options, shell_word
+    from busplan.questions.base.shell import change_options, period_option, shell_word
 
-    changed = " ".join((shell_word(argument), *change_options(changes, period_us=result.profile.cycle.period_us)))
+    own_us, asked_us = result.profile.cycle.period_us, [verdict.period_us for verdict in result.verdicts]
+    tried = period_option(asked_us[0]) if len(asked_us) == 1 and asked_us[0] != own_us else ()
+    changed = " ".join((shell_word(argument), *change_options(changes, period_us=own_us), *tried))
     all_well = all(verdict.all_well for verdict in result.verdicts)
     second = "circle-test" if all_well else "plan"
     asked = (f"capacity {changed} --sensitivity", f"{second} {changed}", f"report {changed}")

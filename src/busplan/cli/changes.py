@@ -153,16 +153,16 @@ def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "li
     BusplanError
         Standard input more than once; or the problems of all profiles together.
     """
-    plans: list[Profile] = []
+    profiles: list[Profile] = []
     problems: list[str] = []
     asked = list(arguments)
     if asked.count("-") > 1:
         raise BusplanError("-: standard input can be read once; give files for the others")
     for argument in asked:
         try:
-            plans.append(load(argument))
+            profiles.append(load(argument))
         except BusplanError as error:
             problems.extend(error.problems)
     if problems:
         raise BusplanError(*dict.fromkeys(problems))
-    return plans
+    return profiles

@@ -79,14 +79,14 @@ def circle_test_command(
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.questions.circle import circle_test
 
-        plan = load_changed(profile, changes)
-        periods = periods_us(period, plan)
+        loaded = load_changed(profile, changes)
+        periods = periods_us(period, loaded)
         with ExitStack() as files:
             # Opened before the simulation, so that a path that cannot be written fails at once.
             trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
             plot_file = files.enter_context(new_file(plot, overwrite=True)) if plot else None
             with _naming(profile, period), progress_bar("circle test") as progress:
-                test = circle_test(plan, period_us=periods, contributions=contributions, progress=progress)
+                test = circle_test(loaded, period_us=periods, contributions=contributions, progress=progress)
             if trace_file is not None:
                 trace_file.writelines(block.encode() for block in test.trace_csv(every=every or 10))
             if plot_file is not None and form is not None:

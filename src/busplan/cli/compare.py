@@ -67,8 +67,8 @@ def compare_command(
         from busplan.questions.compare import compare
 
         kinds = None if buses is None else [kind.strip() for kind in buses.split(",")]
-        plan = load_changed(profile, changes)
+        loaded = load_changed(profile, changes)
         with progress_bar("circle tests") as progress, naming_option("buses"):
-            return compare(plan, buses=kinds, circle=circle, progress=progress)
+            return compare(loaded, buses=kinds, circle=circle, progress=progress)
 
     show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)

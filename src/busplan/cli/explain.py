@@ -75,13 +75,13 @@ def explain_command(
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.questions.explain import explain
 
-        plan = load_changed(profile, changes)
+        loaded = load_changed(profile, changes)
         with progress_bar("circle test") as progress, naming_option("transaction"):
             explanation = explain(
-                plan,
+                loaded,
                 figure,
-                period_us=periods_us(period, plan),
-                timing_model=None if timing is None else timing_models(timing, plan),
+                period_us=periods_us(period, loaded),
+                timing_model=None if timing is None else timing_models(timing, loaded),
                 transaction=None if transaction == ALL_MODELS else transaction,
                 progress=progress,
             )

@@ -237,6 +237,9 @@ def _machine(
     elif bytes_per_axis is not None:
         raise BusplanError("--bytes-per-axis: nothing takes it: each --group says the bytes of its nodes")
     if starter.hosts:
+        if host is None and values.asks:
+            # The first line that the profile would have from each.
+            say(*(f"{name}: {' '.join(lines.partition(chr(10))[0].split())}" for name, lines in starter.hosts.items()))
         host = values.value(host, "--host", f"Host of the master: {', '.join(starter.hosts)}", starter.host)
     _require_host(kind, host)
     return Machine(groups, period_us, size, host)

@@ -47,10 +47,10 @@ def latency_command(
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.questions.latency import latency
 
-        plan = load_changed(profile, changes)
+        loaded = load_changed(profile, changes)
         latencies = latency(
-            plan,
+            loaded,
             payload_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
-            timing_model=timing_models(timing, plan),
+            timing_model=timing_models(timing, loaded),
         )
         give(latencies.report())

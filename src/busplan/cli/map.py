@@ -64,10 +64,10 @@ def map_command(
         from busplan.cli.workers import available_processors, executor
         from busplan.questions.map import map_
 
-        plan = load_changed(profile, changes)
+        loaded = load_changed(profile, changes)
         with ExitStack() as run, naming_option("x", "y", "circle"):
             return map_(
-                plan,
+                loaded,
                 x=_along(x, option="--x"),
                 y=_along(y, option="--y"),
                 circle=circle,

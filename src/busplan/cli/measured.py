@@ -23,7 +23,8 @@ def measured_command(
     recording: Annotated[
         str,
         typer.Argument(
-            help="A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, BLF or TRC.",
+            help="A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, BLF or "
+            "TRC.",
             show_default=False,
         ),
     ],
@@ -51,7 +52,8 @@ def measured_command(
 
     Each figure has the planned and the recorded value, the residual, its expanded uncertainty U, and whether it is
     within the plan: jitter, times, load and bytes at most as planned, or no further beside than U. What the recording
-    does not show is said. Of EtherCAT record all packets of the master's port, both ways. Times are in us. `busplan manual measured` says how each figure is found. Exits 0 with any figures.
+    does not show is said. Of EtherCAT record all packets of the master's port, both ways. Times are in us. `busplan
+    manual measured` says how each figure is found. Exits 0 with any figures.
 
     Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
     """

@@ -67,10 +67,10 @@ def time_us(text: str, *, option: str) -> float:
     if match is None:
         raise BusplanError(f"{option} {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
     # With Decimal, 0.0003 s is exactly 300 us.
-    found_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
-    if isinf(found_us):
-        raise BusplanError(f"{option} {text}: is longer than any time; expected one as 4ms, 250us or 0.001s")
-    return found_us
+    duration_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
+    if isinf(duration_us):
+        raise BusplanError(f"{option} {text}: is too long; expected a time with its unit, as 4ms, 250us or 0.001s")
+    return duration_us
 
 
 def parse_sizes(text: str, *, option: str) -> list[int]:
@@ -105,7 +105,7 @@ def timing_models(timing: str, profile: "Profile") -> tuple[str, ...]:
 
 
 def timing_model(timing: str, profile: "Profile") -> str:
-    """The timing model of --timing, for commands that take one only.
+    """The timing model of --timing, for commands that take a single model.
 
     Raises
     ------
@@ -118,14 +118,14 @@ def timing_model(timing: str, profile: "Profile") -> str:
 
 
 def option(usage: str, words: str, **settings: Any) -> Any:
-    """Make an option whose default is said in its help, for it is None.
+    """Make an option whose help states the default: in the code it is None.
 
     Parameters
     ----------
     usage
         Name and value as in the help: "--jobs N".
     words
-        Its help, with the default in brackets at the end.
+        Text of its help, with the default in brackets at the end.
     settings
         Further settings of typer's option.
     """
@@ -142,7 +142,7 @@ def output_option(words: str) -> Any:
     Parameters
     ----------
     words
-        Beginning of the help: what is written where.
+        Beginning of its help: what is written where.
     """
     help_ = f"{words}; an old file is replaced; - is standard output.  [default: standard output]"
     return typer.Option("--output", "-o", metavar="FILE", parser=_file_unless_dash, help=help_, show_default=False)

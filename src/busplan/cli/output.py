@@ -1,6 +1,7 @@
 """All output: documents to stdout, messages to stderr."""
 
 import os
+import re
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -25,7 +26,23 @@ def say(*messages: str) -> None:
     with suppress(OSError):
         for message in messages:
             # Names and arguments may contain control characters.
-            print(printable(message), file=sys.stderr, flush=True)  # noqa: T201 - the only place that prints
+            for line in _fitting(printable(message)):
+                print(line, file=sys.stderr, flush=True)  # noqa: T201 - the only place that prints
+
+
+def _fitting(message: str) -> list[str]:
+    """Lines of a message: on a terminal it breaks at words, and the words of a card's line stand below each other."""
+    if not sys.stderr.isatty():
+        return [message]
+    from shutil import get_terminal_size
+    from textwrap import wrap
+
+    label = re.match(r" +\S.*?  +| *", message)
+    hang = " " * (label.end() if label else 0)
+    width = get_terminal_size().columns
+    if len(message) <= width:
+        return [message]
+    return wrap(message, width, subsequent_indent=hang, break_long_words=False, break_on_hyphens=False)
 
 
 def emit_text(text: str) -> None:

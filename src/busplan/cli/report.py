@@ -61,10 +61,10 @@ def report_command(
     with answer(format_, output, inputs=files, default="html", refused=_REFUSED) as give, naming(changes):
         from busplan.questions.report import report
 
-        plans = load_each(profiles, partial(load_changed, changes=changes))
+        loaded = load_each(profiles, partial(load_changed, changes=changes))
         with progress_bar("circle tests") as progress:
             page = report(
-                plans,
+                loaded,
                 title=title,
                 circle=circle,
                 progress=progress,

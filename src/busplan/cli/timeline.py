@@ -78,11 +78,11 @@ def timeline_command(
     def find() -> "TimelineAnswer":
         from busplan.questions.timeline import timeline
 
-        plan = load_changed(profile, changes)
+        loaded = load_changed(profile, changes)
         with naming_option("transaction"):
             return timeline(
-                plan,
-                timing_model=None if timing is None else timing_model(timing, plan),
+                loaded,
+                timing_model=None if timing is None else timing_model(timing, loaded),
                 from_us=from_us,
                 to_us=to_us,
                 transaction=transaction,

@@ -183,7 +183,7 @@ class OwnPicture(Drawing):
     lines
         Function that draws it in characters, `width` columns wide.
     stylesheet
-        Its own rules, behind those of all charts.
+        Its own rules, after those of all charts.
     """
 
     is_text_in_markdown = True

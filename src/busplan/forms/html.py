@@ -1,5 +1,6 @@
 """An answer as one self-contained HTML file: no network, no script; light, dark, narrow and printed styles."""
 
+import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.resources import files
@@ -20,6 +21,11 @@ from busplan.printable import json_text, printable_lines
 
 _TYPES: Final = ("ShownValue", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
 _BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Calculation", "Question", "Card", "Chapter")
+
+
+_DARK_RULES: Final = re.compile(r"@media screen and \(prefers-color-scheme: ?dark\) ?\{([^{}]*\{[^{}]*\})*\s*\}")
+_NOT_ON_LIGHT: Final = '&:not([data-jp-theme-light="true"] *)'
+"""JupyterLab's light theme stays light on a dark desktop."""
 
 
 def page(report: Report) -> str:
@@ -57,6 +63,7 @@ def fragment(report: Report) -> str:
     chart, style = ((page / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
     # The rules are nested in the fragment's own rule, where & stands for its outer element: that is its root.
     own = f"{chart}{_colours(blocks)}{style}".replace(":root", "&")
+    own = _DARK_RULES.sub(lambda rules: f"{_NOT_ON_LIGHT} {{\n{rules[0]}\n}}\n", own)
     return _template("fragment.html.j2").render(blocks=blocks, style=Markup(own))  # noqa: S704 - as above
 
 

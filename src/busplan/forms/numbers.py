@@ -30,7 +30,7 @@ _FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us
 _MILLISECOND_US: Final = 1e3
 _SECOND_US: Final = 1e6
 SILENT_UNITS: Final = frozenset(("", "1", "nodes", "axes"))
-"""Units that a sentence does not repeat behind a figure: a noun names them."""
+"""Units that a sentence does not repeat after a figure: a noun names them."""
 ROUNDING_UM: Final = 1e-6
 """Lengths below a picometre, in um, are float rounding."""
 
@@ -73,7 +73,7 @@ def with_unit(value: ShownValue) -> str:
 
 
 def unit_text(value: ShownValue) -> str:
-    """Unit behind a figure in a sentence, with its space."""
+    """Unit after a figure in a sentence, with its space."""
     if value.unit in SILENT_UNITS or figure_text(value) == MISSING:
         return ""
     return "%" if value.unit == "%" else f" {value.unit}"

@@ -67,12 +67,13 @@ def anchor(percent: float, *, edge: int = 5) -> str:
     return "start" if percent < edge else "end" if percent > 100 - edge else "middle"
 
 
-def paragraph(parent: Element, text: str, *, y: int, css: str) -> int:
-    """Draw wrapped text, and return the y below it."""
+def paragraph(parent: Element, text: str, *, x: int = 0, y: int, css: str = "") -> int:
+    """Draw text wrapped for a phone, and return the y below it."""
+    characters = _LINE_CHARACTERS * (PHONE - x) // PHONE
     # Letters of other scripts may be twice as wide.
-    for line in wrap(text, _LINE_CHARACTERS if text.isascii() else _LINE_CHARACTERS // 2):
+    for line in wrap(text, characters if text.isascii() else characters // 2):
         y += LINE
-        text_at(parent, line, x="0", y=y - 5, css=css)
+        text_at(parent, line, x=f"{x}", y=y - 5, css=css)
     return y
 
 

@@ -16,7 +16,7 @@ _LEAST_WORDS: Final = 24
 
 
 _BROKEN_WORDS: Final = 16
-"""Narrowest column of words that are broken."""
+"""Narrowest column of broken words, as a last resort."""
 
 
 class Extent(NamedTuple):
@@ -27,7 +27,7 @@ class Extent(NamedTuple):
     least: int
     """Width below which a word, a figure or a heading would be broken."""
     broken: int
-    """Least width as a last resort: words are broken, figures are not."""
+    """Width as a last resort: words are broken, figures are not."""
 
     @classmethod
     def of(cls, column: TableColumn, heads: Sequence[str], cells: Sequence[str]) -> "Extent":
@@ -98,7 +98,7 @@ def _width(columns: Sequence[int], extents: dict[int, Extent]) -> int:
 def _panels(table: Table, side: Sequence[int], extents: dict[int, Extent], width: int) -> list[tuple[int, ...]]:
     """Divide columns into panels that fit; columns of one group stay together where they can.
 
-    Words are rather broken than a table is divided.
+    Words are broken before a table is divided.
     """
     if sum(extents[number].broken for number in side) + GAP * (len(side) - 1) <= width:
         return [tuple(side)]
@@ -136,13 +136,13 @@ def shared_widths(columns: Sequence[int], extents: dict[int, Extent], *, width: 
         return [extents[number].natural for number in columns]
     widths = {number: extents[number].least for number in columns}
     spare = width - _width(columns, extents)
-    # The columns that need least come first: what they leave is for the others.
+    # Columns that need the least come first; what they do not need is left to the others.
     wanting = sorted(columns, key=lambda number: extents[number].natural - extents[number].least)
     for place, number in enumerate(wanting):
         more = min(extents[number].natural - extents[number].least, max(spare, 0) // (len(wanting) - place))
         widths[number] += more
         spare -= more
-    # What names a row is broken last.
+    # The first columns, which name a row, are broken last.
     for number in reversed(columns):
         less = min(widths[number] - extents[number].broken, max(-spare, 0))
         widths[number] -= less
@@ -151,7 +151,7 @@ def shared_widths(columns: Sequence[int], extents: dict[int, Extent], *, width: 
 
 
 _FAILS: Final = " !"
-"""Behind a figure that fails, for those who see no colours."""
+"""After a figure that fails, for those who see no colours."""
 _INDENT: Final = 4
 """Blanks before what stands below its row."""
 
@@ -189,7 +189,7 @@ def table_lines(
     is_whole
         If True, no row and no column is left out.
     whole_by
-        Says how the reader sees what is left out.
+        Words that tell the reader how to see what is left out.
     """
     rows = [row for row in table.rows if is_whole or not row.is_detail]
     columns = {

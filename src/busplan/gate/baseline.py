@@ -51,7 +51,7 @@ def figures_of(subject: Subject) -> dict[str, float]:
 
 
 def keys_of(profile: Profile) -> dict[str, object]:
-    """Keys of a profile to record: those that its file sets."""
+    """Values of a profile to record, by dotted key: those that its file sets."""
     said = flat(profile.model_dump(mode="json", exclude_unset=True))
     return {key: value for key, value in said if key not in _WORDS}
 

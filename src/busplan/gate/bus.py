@@ -90,7 +90,7 @@ def _room(subject: RuleSubject, counts: Any) -> Mending:
 
 
 def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """A node is not done once a cycle, where the bus does not wait for it."""
+    """A node does not finish within the period, where the bus does not wait for it."""
     deciding, network = subject.deciding, network_of(subject.profile)
     is_broken = NODE in deciding.exceeded
     if is_broken or NODE in (deciding.not_shown or ()):

@@ -33,7 +33,7 @@ class Finding(NamedTuple):
     marked_column: int
     """First column of the value, or of what stands for it: a name, a comment."""
     marked_end_column: int
-    """First column behind it."""
+    """First column after it."""
     problem: str
     """The problem."""
     help: str | None = None

@@ -71,30 +71,30 @@ def suppress(
     document
         The document.
     ran
-        Codes of the rules that have run: a suppression of others may have an effect.
+        Codes of the rules that have run; a suppression of any other rule is never said to have no effect.
     """
     left = list(violations)
-    own: list[Finding] = []
+    findings: list[Finding] = []
     for comment in suppressions(document):
         if not comment.codes:
             way_out = "write # busplan: ignore[CODE] reason"
-            own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, "the comment suppresses nothing", way_out))
+            findings.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, "the comment suppresses nothing", way_out))
         elif not comment.reason:
-            way_out = "add why behind the bracket"
-            own.append(_finding(SUPPRESSION_WITHOUT_REASON, comment, "the suppression says no reason", way_out))
+            way_out = "add the reason after the bracket"
+            findings.append(_finding(SUPPRESSION_WITHOUT_REASON, comment, "the suppression gives no reason", way_out))
         for code in comment.codes:
             hit = [placed for placed in left if placed.rule.code == code and placed.spot.line == comment.of_line]
             left = [placed for placed in left if placed not in hit]
             if code not in all_rules():
-                message = f"{code or 'nothing'} is no code of a rule"
+                message = f"{code or 'nothing'} is not the code of a rule"
             elif code in NEVER_SUPPRESSED:
                 message = f"{code} cannot be suppressed, it must be mended"
             elif not hit and code in ran:
                 message = f"{code} has nothing to suppress on line {comment.of_line}"
             else:
                 continue
-            own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, message))
-    return left, own
+            findings.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, message))
+    return left, findings
 
 
 def _finding(rule: Rule, suppression: Suppression, words: str, way_out: str = "") -> Finding:
@@ -110,9 +110,9 @@ class Fit(NamedTuple):
     verdict: str | None
     """fits, not shown to fit, or does not fit."""
     margin_corrected_us: float | None
-    """Margin: time left in the slice, corrected for the bias [us]."""
+    """Time left in the slice, corrected for the bias [us]."""
     uncertainty_us: float | None
-    """Expanded uncertainty of that [us]."""
+    """Expanded uncertainty of the corrected margin [us]."""
 
 
 class FileResult(NamedTuple):
@@ -211,9 +211,9 @@ def check_document(
         failure = f"{document.name}: {'; '.join(error.problems)}"
         return FileResult(document.name, profile.name, (), {}, failure=failure)
     subject = Subject(LoadedProfile(profile, document), changes, circle_steps=circle_steps if with_circle else None)
-    own = cycle_rules(profile.bus.kind)
-    violations = [_placed(document, rule, problem) for rule in own if rule.check for problem in rule.check(subject)]
-    ran = {rule.code for rule in own}
+    rules = cycle_rules(profile.bus.kind)
+    violations = [_placed(document, rule, problem) for rule in rules if rule.check for problem in rule.check(subject)]
+    ran = {rule.code for rule in rules}
     problems = list(circle.circle_problems(subject))
     violations += [_placed(document, all_rules()[code], problem) for code, problem in problems]
     ran |= circle.answered(subject, problems)

@@ -75,7 +75,7 @@ class Spot(NamedTuple):
     column: int
     marked_column: int
     marked_end_column: int
-    """The column behind the last."""
+    """The column after the last."""
 
 
 @dataclass(frozen=True)

@@ -166,7 +166,7 @@ def _edited(
 
 
 def _replaced(document: Document, path: KeyPath, new: str) -> str:
-    """Replace a value; a comment behind it stays in its column."""
+    """Replace a value; a comment after it stays in its column."""
     text, (_, _, start, end) = document.text, document.places[path]
     if any(start <= comment < end for comment in document.comments):
         raise _LayoutError(f"there are comments among the values of {path[-1]}")

@@ -29,7 +29,7 @@ class Place(NamedTuple):
 _GAP: Final = re.compile(r"[ \t\n,]*(?:#[^\n]*[ \t\n,]*)*")
 """Between two statements, or two values of an array or inline table."""
 _KEY: Final = re.compile(r"""[ \t]*([A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')[ \t]*([.=\]]?)[ \t]*""")
-"""One part of a key, and the sign behind it."""
+"""One part of a key, and the sign after it."""
 # A multi-line string may end in one or two quotes before the closing three.
 _STRING: Final = (
     r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\''''
@@ -92,7 +92,7 @@ class _Scanner:
         self.places[path] = Place(key_start, key_end, start, self.at)
 
     def key(self, path: KeyPath) -> tuple[KeyPath, Place]:
-        """Read a, "b" or a.b.c inside a table, and the sign behind it: its path and the place of its last part."""
+        """Read a, "b" or a.b.c inside a table, and the sign after it: its path and the place of its last part."""
         while match := _KEY.match(self.text, self.at):
             if path in self.newest:
                 path = (*path, self.newest[path])

@@ -13,9 +13,7 @@ from busplan.profile.write import short_text, value_text
 from busplan.servo.checks import dividing_step_us
 
 _CIRCLE: Final = re.compile(r"^(\[circle\].*\n)", re.MULTILINE)
-_TURN: Final = (
-    'path = "iso230-4"          # one whole turn is measured, behind a lead-in; the paper has a "trapezoid"\n'
-)
+_TURN: Final = 'path = "iso230-4"          # one whole turn is measured, after a lead-in; the paper has a "trapezoid"\n'
 _SUPPRESSION: Final = re.compile(r"^# busplan: ignore\[.*\n|[ \t]+# busplan: ignore\[.*", re.MULTILINE)
 
 
@@ -36,7 +34,7 @@ slice_ratio = {ratio}
 
 {parts}
 [limits]
-reserve = 0.15             # share of the slice that must stay free for a plan to fit
+reserve = 0.15             # share of the slice that must stay free for the cycle to fit
 
 [servo]                    # take the values from the drives' commissioning, then grade them "measured"
 grade = "assumed"
@@ -48,7 +46,7 @@ velocity_feedforward = 1   # assumed
 drive_lag_us = 1000        # assumed: time constant of the velocity loop, from its step response
 
 [circle]                   # the test circle of a ballbar
-path = "iso230-4"          # one whole turn is measured, behind a lead-in
+path = "iso230-4"          # one whole turn is measured, after a lead-in
 radius_mm = 100
 feed_mm_per_min = 3000
 

@@ -45,10 +45,11 @@ class CanFrames(NamedTuple):
     """Data, as the length code says it [bytes]."""
     bits: npt.NDArray[np.int64]
     """On the wire, interframe space included; 0 of a CAN FD frame [bits]."""
+    is_fd: npt.NDArray[np.bool_]
+    """Whether it is a CAN FD frame."""
     remote: int
-    fd: int
     errors: int
-    """Frames that ask for data, those of CAN FD, and error frames; the last ones are not among the frames."""
+    """Frames that ask for data, and error frames; the latter are not among the frames."""
     broken: str
     """Why the log ends where it does; empty of a whole one."""
 
@@ -154,8 +155,8 @@ class _Log:
             extended,
             sizes,
             np.where(fd, 0, written_bits(identifiers, extended, remote, np.minimum(sizes, _CLASSICAL_BYTES), data)),
+            fd,
             int(np.count_nonzero(remote)),
-            int(np.count_nonzero(fd)),
             self._errors,
             self.broken,
         )

@@ -79,7 +79,7 @@ def with_unchecked(section: _Section, key: str, value: object) -> _Section:
     section
         The profile, or a section of it.
     key
-        Dotted key below it; of several tables of a key, the name of the table stands behind the key.
+        Dotted key below it; of several tables of a key, the name of the table follows the key.
     value
         Anything that computes like a number: an array, or a traced number.
     """

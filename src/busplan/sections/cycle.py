@@ -162,13 +162,15 @@ SpareCount = Annotated[int, Field(ge=0, le=MAX_COUNT)]
 
 
 class Limits(Section):
-    """Section [limits]: what a plan must keep free.
+    """Section [limits]: what must stay free.
 
     `reserve` is part of every verdict. The others are for `busplan check`, which does not check what is left out.
     """
 
     reserve: Annotated[float, Field(ge=0, le=0.99, allow_inf_nan=False)] = Field(
-        default=0.0, description="Share of the time slice that must be free for a plan to fit, 0..0.99", examples=[0.15]
+        default=0.0,
+        description="Share of the time slice that must be free for a cycle to be shown to fit, 0..0.99",
+        examples=[0.15],
     )
 
     max_utilisation: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = Field(

@@ -140,8 +140,12 @@ class ServoSection(AxisKeys):
     grades: ServoGrades = Field(
         default_factory=ServoGrades, description="How single values are known, where not as servo.grade says"
     )
-    x: AxisOverride = Field(default_factory=AxisOverride, description="What the x axis has otherwise")
-    y: AxisOverride = Field(default_factory=AxisOverride, description="What the y axis has otherwise")
+    x: AxisOverride = Field(
+        default_factory=AxisOverride, description="Values for the x axis, in place of those for both"
+    )
+    y: AxisOverride = Field(
+        default_factory=AxisOverride, description="Values for the y axis, in place of those for both"
+    )
 
     def axis_keys(self, axis: Literal["x", "y"]) -> dict[str, Any]:
         """Keys of an axis by name, its own before those of both."""

@@ -228,14 +228,27 @@ def no_multiple(*, period_us: float, step_us: float) -> Iterator[Refused]:
     >>> [problem.message for problem in no_multiple(period_us=1000, step_us=2000)]
     ['step_us = 2000: longer than the period of 1000 us; the period is the longest step that fits']
     """
-    steps = period_us / step_us
-    if round(steps) == 0 or steps < 1 - _MULTIPLE_TOLERANCE:
+    if is_multiple(period_us, step_us):
+        return
+    if step_us > period_us:
         right = f"longer than the period of {period_us:g} us; the period is the longest step that fits"
-        yield Refused("step_us", step_us, right, ("period_us",))
-    elif abs(steps - round(steps)) > _MULTIPLE_TOLERANCE * steps:
+    else:
         fits_us = dividing_step_us(period_us, most_us=step_us)
         right = f"the period of {period_us:g} us is no multiple of it; {fits_us:.15g} us would fit"
-        yield Refused("step_us", step_us, right, ("period_us",))
+    yield Refused("step_us", step_us, right, ("period_us",))
+
+
+def is_multiple(period_us: Any, step_us: Any) -> Any:
+    """Whether a period is a whole number of steps, of one at least; of numbers or of arrays.
+
+    Examples
+    --------
+    >>> is_multiple(1000.0, 250.0), is_multiple(1000.0, 300.0), is_multiple(1000.0, 2000.0)
+    (True, False, False)
+    """
+    steps = period_us / step_us
+    nearest = (steps + 0.5) // 1
+    return (nearest > 0) & (abs(steps - nearest) <= _MULTIPLE_TOLERANCE * steps)
 
 
 def dividing_step_us(period_us: float, *, most_us: float) -> float:

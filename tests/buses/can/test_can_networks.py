@@ -1,4 +1,4 @@
-"""Networks as they are: identifiers of both lengths, messages of each node, PDOs by their lengths, any bit rate."""
+"""Networks as they are: identifiers of both lengths, messages of each node, PDOs by their lengths, any rate, CAN FD."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -220,6 +220,114 @@ def test_a_machine_on_another_bus_keeps_its_payload() -> None:
 
 
 def test_no_pdo_is_empty_or_too_long() -> None:
-    for lengths in ([], [0], [9], [1, 1, 1, 1, 1]):
+    for lengths in ([], [0], [65], [1, 1, 1, 1, 1]):
         with pytest.raises(ValueError, match="feedback_pdos"):
             profile(payload={"feedback_pdos": lengths, "write_bytes": 8})
+
+
+FD: dict[str, Any] = {**BASE["bus"], "data_bit_rate_kbit_s": 5000}
+
+
+def test_an_fd_bus_sends_sync_and_pdos_as_fd_frames() -> None:
+    own = profile(bus=FD, payload={"read_bytes": 20, "write_bytes": 64})
+    (found,) = busplan.capacity(own, timing_model=[WORST]).results
+    us = {term.name: plain(term.us) for term in found.terms}
+    # 33 nominal bits, and at 5 Mbit/s 35, 240 and 680 data bits.
+    assert us["sync"] == pytest.approx(33 + 35 / 5)
+    assert us["feedback"] == pytest.approx(3 * (33 + (5 + 160 + 4 + 21 + 7 + 1 + 42) / 5))
+    assert us["command"] == pytest.approx(3 * (33 + 680 / 5))
+    pdos = profile(bus=FD, payload={"feedback_pdos": [12, 48], "command_pdos": [64, 64, 64, 64]})
+    sizes = [(one.first, one.data_bytes) for one in streams(traffic_of_profile(pdos), is_stuffed=True)]
+    assert sizes == [(0x80, 0), (0x181, 12), (0x281, 48), *((0x201 + 0x100 * number, 64) for number in range(4))]
+
+
+def test_a_message_says_whether_it_is_fd() -> None:
+    own = profile(
+        message("classical", 0x300),
+        message("fd", 0x301, fd=True),
+        message("long", 0x302, fd=True, payload_bytes=48, identifier_bits=29),
+        bus=FD,
+    )
+    us = {stream.name: plain(stream.frame_us) for stream in _messages(own)}
+    assert us == {"classical": 135, "fd": 33 + 115 / 5, "long": pytest.approx(56 + 520 / 5)}
+    # The first 11 bits of the long identifier are 0; the FD message blocks.
+    assert responses(own)["classical"] == us["long"] + us["fd"] + 40 + 6 * us["fd"] + us["classical"]
+
+
+@pytest.mark.parametrize(
+    ("bus", "own", "words"),
+    [
+        (BASE["bus"], {"fd": True}, "asks for bus.data_bit_rate_kbit_s"),
+        (FD, {"payload_bytes": 9}, "is over the 8 bytes of a classical frame; fd = true allows 64"),
+        (FD, {"fd": True, "payload_bytes": 65}, "less than or equal to 64"),
+        ({**FD, "data_bit_rate_kbit_s": 500}, {}, "is under bit_rate_kbit_s, 1000"),
+        ({**FD, "data_bit_rate_kbit_s": 9000}, {}, "less than or equal to 8000"),
+    ],
+)
+def test_fd_keeps_its_ranges(bus: dict[str, Any], own: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        profile(message("own", 0x300, **own), bus=bus)
+    with pytest.raises(ValueError, match="has a PDO over the 8 bytes of a classical frame"):
+        profile(payload={"feedback_pdos": [12], "write_bytes": 8})
+
+
+def test_a_payload_over_four_fd_frames_breaks_the_limit() -> None:
+    for size, exceeded in ((256, False), (257, True)):
+        own = profile(bus=FD, payload={"read_bytes": size, "write_bytes": 8}, cycle={"period_us": 1e6})
+        assert ("payload" in busplan.capacity(own).results[0].exceeded) is exceeded
+
+
+def test_arrays_of_fd_points_give_what_each_point_gives() -> None:
+    own = profile(
+        # Which of them is longer rests on the rates.
+        message("long", 0x580, period_us=20_000.0, fd=True, payload_bytes=24),
+        message("classical", 0x1FFFFFFF, period_us=30_000.0, identifier_bits=29),
+        message("early", 0x10, period_us=5_000.0, fd=True, deadline_us=700.0),
+        bus=FD,
+    )
+    keys = {
+        "bus.nodes": np.array([1, 4, 14]).reshape(-1, 1, 1, 1),
+        "payload.read_bytes": np.array([3, 20, 257]).reshape(-1, 1, 1),
+        "bus.bit_rate_kbit_s": np.array([500.0, 1000.0]).reshape(-1, 1),
+        "bus.data_bit_rate_kbit_s": np.array([1000.0, 2000.0, 8000.0]),
+    }
+    varied = own
+    for key, values in keys.items():
+        varied = with_unchecked(varied, key, values.astype(float))
+    together, shape = network_of(varied), (3, 3, 2, 3)
+    answers: dict[str, Any] = {limit.key: limit.is_broken(together) for limit in LIMITS}
+    answers["required"] = CanCycle(together, WORST).required_us
+    told = {key: np.broadcast_to(each, shape) for key, each in answers.items()}
+    for place in np.ndindex(shape):
+        at = {key: np.broadcast_to(values, shape)[place].item() for key, values in keys.items()}
+        alone = network_of(override(own, at))
+        expected: dict[str, Any] = {limit.key: limit.is_broken(alone) for limit in LIMITS}
+        expected["required"] = pytest.approx(plain(CanCycle(alone, WORST).required_us), rel=1e-12)
+        assert {key: each[place] for key, each in told.items()} == expected, at
+
+
+def test_a_plan_raises_the_data_bit_rate_of_fd_alone() -> None:
+    own = profile(bus={**FD, "data_bit_rate_kbit_s": 1000}, payload={"read_bytes": 64, "write_bytes": 64})
+    tight = override(own, {"cycle.period_us": 4000.0})
+    recommended = busplan.plan(tight, free=["data_bit_rate"]).recommended
+    assert recommended is not None
+    assert recommended.changes == {"bus.data_bit_rate_kbit_s": 2000}
+    with pytest.raises(busplan.BusplanError, match="data_bit_rate"):
+        busplan.plan(profile(), free=["data_bit_rate"])
+
+
+def test_every_question_takes_an_fd_machine(run: Run, tmp_path: Path) -> None:
+    own = profile(
+        message("long", 0x580, fd=True, payload_bytes=48), bus=FD, payload={"read_bytes": 20, "write_bytes": 8}
+    )
+    (tmp_path / "arm.toml").write_text(profile_text(own), encoding="utf-8")
+    for command in ("capacity", "latency", "timeline", "map", "plan", "compare", "check"):
+        assert run(command, "arm.toml", cwd=tmp_path).returncode in (0, 1), command
+    said = run("latency", "arm.toml", cwd=tmp_path).stdout
+    assert "1000 kbit/s, 5000 kbit/s of data" in said
+    other = profile(message("long", 0x580, payload_bytes=8), payload={"read_bytes": 20, "write_bytes": 8})
+    (tmp_path / "old.toml").write_text(profile_text(other), encoding="utf-8")
+    said = run("diff", "old.toml", "arm.toml", cwd=tmp_path).stdout
+    assert "bus.data_bit_rate_kbit_s" in said
+    for kind in ("ethercat", "sercos3"):
+        assert converted(own, kind).profile.alike_nodes[0].bytes_of("read") == 20

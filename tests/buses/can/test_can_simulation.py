@@ -109,6 +109,7 @@ def traffic(random: Random, *, nodes: int) -> Traffic:
     return Traffic(
         period_us=1.0,
         bit_rate_kbit_s=1000,
+        data_bit_rate_kbit_s=0.0,
         identifier_bits=11,
         sync_identifier=random.choice([0x80, 0x80, 0x80, 0x15, 0x650]),
         sync_bytes=random.randint(0, 1),
@@ -134,12 +135,31 @@ def of_both_formats(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
     return sent._replace(messages=tuple(each))
 
 
-def scene(random: Random, *, has_both_formats: bool = False) -> Scene | None:
+def of_fd(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
+    """The same on CAN FD with two bit rates, of which both make whole microseconds: FD frames and classical frames."""
+    each = []
+    for message in of_both_formats(sent, random, nodes=nodes).messages:
+        own = message._replace(period_us=2 * message.period_us, deadline_us=2 * message.deadline_us)
+        if random.random() < 0.6:
+            own = own._replace(payload_bytes=random.choice([0, 8, 10, 16, 32, 64]), data_bit_rate_kbit_s=1000)
+        each.append(own)
+    pdos = (
+        own._replace(frame_bytes=(64,), most_bytes=256, payload_bytes=random.choice([1, 8, 20, 64, 70]))
+        for own in sent.pdos
+    )
+    return sent._replace(bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=tuple(pdos), messages=tuple(each))
+
+
+KINDS: Final = {"both formats": of_both_formats, "CAN FD": of_fd}
+"""What may become of random traffic of 11 bits."""
+
+
+def scene(random: Random, *, kind: str = "") -> Scene | None:
     """A random network; None where identifiers stand twice, the bus is full, or a message is late."""
     nodes = random.randint(1, 4)
     sent, write_us = traffic(random, nodes=nodes), random.choice([0, 0, random.randint(0, 300)])
-    if has_both_formats:
-        sent = of_both_formats(sent, random, nodes=nodes)
+    if kind:
+        sent = KINDS[kind](sent, random, nodes=nodes)
     slack_us = random.choice([0, 0, 1, random.randint(0, 300), random.randint(0, 4000)])
     found = judged(sent, nodes=nodes, write_us=write_us, slack_us=slack_us)
     if found is None or random.random() < 0.4:
@@ -264,13 +284,13 @@ def climbed(own: Scene, random: Random, *, runs: int) -> dict[str, float]:
     return best
 
 
-def attacked(seed: int, networks: int, *, runs: int, has_both_formats: bool = False) -> dict[str, tuple[float, int]]:
+def attacked(seed: int, networks: int, *, runs: int, kind: str = "") -> dict[str, tuple[float, int]]:
     """The largest share of each bound and its seed, from a seed on, and how many networks were fit to attack."""
     best: dict[str, tuple[float, int]] = {}
     fit = 0
     for number in range(seed, seed + networks):
         random = Random(number)
-        own = scene(random, has_both_formats=has_both_formats)
+        own = scene(random, kind=kind)
         if own is not None:
             fit += 1
             for name, share in climbed(own, random, runs=runs).items():
@@ -286,8 +306,9 @@ def test_no_simulated_run_takes_longer_than_the_model() -> None:
         assert 0.99 < share <= 1 + ROUNDING, (name, seed)
 
 
-def test_no_simulated_run_of_both_formats_takes_longer_than_the_model() -> None:
-    best = attacked(0, 60, runs=150, has_both_formats=True)
+@pytest.mark.parametrize("kind", ["both formats", "CAN FD"])
+def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str) -> None:
+    best = attacked(0, 60, runs=150, kind=kind)
     assert best.pop("networks")[0] > 10
     for name, (share, seed) in best.items():
         assert 0.99 < share <= 1 + ROUNDING, (name, seed)
@@ -296,7 +317,7 @@ def test_no_simulated_run_of_both_formats_takes_longer_than_the_model() -> None:
 def drives(nodes: int, *low: Message, read_us: int = 150, host_us: int = 0) -> Traffic:
     """Nodes with full PDOs, and messages of lower priorities."""
     pdos = (Pdos("read", "", 0x181, nodes, 8), Pdos("write", "", 0x201, nodes, 8))
-    return Traffic(1.0, 1000, 11, 0x80, 0, read_us, host_us, pdos, low)
+    return Traffic(1.0, 1000, 0.0, 11, 0x80, 0, read_us, host_us, pdos, low)
 
 
 LOW: Final = tuple(Message(f"low{number}", 0x7F0 + number, 8, 50_000, 0, 50_000) for number in range(3))
@@ -343,6 +364,6 @@ def test_a_late_cycle_and_a_fast_one_behind_it_hold_a_message_up() -> None:
 
 
 if __name__ == "__main__":
-    for both in (False, True):
-        for name, found in attacked(*map(int, sys.argv[1:]), runs=150, has_both_formats=both).items():
+    for kind in ("", *KINDS):
+        for name, found in attacked(*map(int, sys.argv[1:]), runs=150, kind=kind).items():
             sys.stdout.write(f"{name}: {found[0]:.4f}, seed {found[1]}\n")

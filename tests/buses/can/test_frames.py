@@ -1,12 +1,12 @@
 """Frame lengths against published figures, and against frames that are written bit by bit."""
 
-from itertools import cycle, islice
+from itertools import cycle, islice, pairwise, product
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.buses.can.equations import frame_bits, frame_us, payload_us
+from busplan.buses.can.equations import fd_frame_bits, frame_bits, frame_us, payload_us
 
 STUFFABLE = {11: 34, 29: 54}
 NEVER_STUFFED = 13
@@ -137,3 +137,191 @@ def test_frames_have_as_many_bits_as_hardware_counted(identifier: int, data: str
     # python-can, test/data/logfile.asc and issue_1299.asc. One more frame there, 6F9 05 0C 00 .., has 124 and not 123.
     identifier_bits = 29 if identifier > 0x7FF else 11
     assert written_bits(identifier, bytes.fromhex(data), identifier_bits=identifier_bits) == bits
+
+
+CRC_17, CRC_21 = (17, 0x1685B), (21, 0x102899)
+"""Width and polynomial of the checks of CAN FD (ISO 11898-1:2015)."""
+DLC_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+FD_NEVER_STUFFED = 12
+"""Acknowledge and its delimiter, end of frame, space of 3 bits."""
+
+
+def crc_fd(bits: list[int], width: int, polynomial: int) -> list[int]:
+    """The CRC of CAN FD over some bits: it begins with a 1 and zeros."""
+    register, mask = 1 << (width - 1), (1 << width) - 1
+    for bit in bits:
+        register = (register << 1 ^ (polynomial if bit ^ (register >> (width - 1)) else 0)) & mask
+    return binary(register, width)
+
+
+def fd_header(identifier: int, *, identifier_bits: int) -> list[int]:
+    """Start of frame to BRS, the bit that switches the bit rate."""
+    if identifier_bits == 11:
+        return [0, *binary(identifier, 11), 0, 0, 1, 0, 1]  # RRS, IDE, FDF, res, BRS
+    upper, lower = binary(identifier >> 18, 11), binary(identifier & 0x3FFFF, 18)
+    return [0, *upper, 1, 1, *lower, 0, 1, 0, 1]  # SRR, IDE; RRS, FDF, res, BRS
+
+
+def fd_body(data: bytes, *, is_passive: bool) -> list[int]:
+    """ESI, DLC and data."""
+    return [
+        int(is_passive),
+        *binary(DLC_LENGTHS.index(len(data)), 4),
+        *(bit for byte in data for bit in binary(byte, 8)),
+    ]
+
+
+def fd_stuffed(header: list[int], body: list[int]) -> tuple[list[int], list[int]]:
+    """Both parts with stuff bits: that behind the header has the new rate; behind the body is the fixed one alone."""
+    parts: tuple[list[int], list[int]] = ([], [])
+    last, run = -1, 0
+    bits = [*header, *body]
+    for place, bit in enumerate(bits):
+        run = run + 1 if bit == last else 1
+        parts[place >= len(header)].append(bit)
+        last = bit
+        if run == 5 and place < len(bits) - 1:
+            last, run = 1 - bit, 1
+            parts[place >= len(header) - 1].append(last)
+    return parts
+
+
+def fd_written(
+    identifier: int, data: bytes, *, identifier_bits: int, is_passive: bool = False
+) -> tuple[list[int], list[int]]:
+    """Bits of that very frame at both rates, from the start of frame to the CRC."""
+    header, body = fd_header(identifier, identifier_bits=identifier_bits), fd_body(data, is_passive=is_passive)
+    nominal, fast = fd_stuffed(header, body)
+    count = (len(nominal) + len(fast) - len(header) - len(body)) % 8
+    gray = binary(count ^ count >> 1, 3)
+    tail = [*gray, sum(gray) % 2]
+    tail += crc_fd([*nominal, *fast, *tail], *(CRC_21 if len(data) > 16 else CRC_17))
+    for place, bit in enumerate(tail):
+        if place % 4 == 0:
+            fast.append(1 - fast[-1])
+        fast.append(bit)
+    return nominal, fast
+
+
+def fd_written_bits(identifier: int, data: bytes, *, identifier_bits: int, is_passive: bool = False) -> tuple[int, int]:
+    """Length of that very frame at both rates, interframe space included."""
+    nominal, fast = fd_written(identifier, data, identifier_bits=identifier_bits, is_passive=is_passive)
+    return len(nominal) + FD_NEVER_STUFFED, len(fast) + 1
+
+
+FD_LONGEST = dict(zip(DLC_LENGTHS, (2, 3, 3, 2, 2, 3, 3, 2, 2, 3, 3, 2, 2, 3, 1, 2), strict=True))
+"""By how many data bits the longest frame of a length falls short of the worst case."""
+
+
+def longest_fd(size: int, *, identifier_bits: int) -> tuple[int, bytes, bool]:
+    """Identifier, data and ESI of a frame with the most stuff bits, of all there are.
+
+    What a bit adds rests on the run before it alone: of all beginnings with one run the best is kept.
+    """
+    header = "0xxxxxxxxxxx00101" if identifier_bits == 11 else "0xxxxxxxxxxx11xxxxxxxxxxxxxxxxxx0101"
+    pattern = f"{header}x{DLC_LENGTHS.index(size):04b}{'x' * 8 * size}"
+    best: dict[tuple[str, int], tuple[int, str]] = {("", 0): (0, "")}
+    for place, said in enumerate(pattern):
+        longer: dict[tuple[str, int], tuple[int, str]] = {}
+        for (last, run), (count, before) in best.items():
+            for bit in "01" if said == "x" else said:
+                key = bit, run + 1 if bit == last else 1
+                is_full = key[1] == 5 and place < len(pattern) - 1
+                key = ("10"[int(bit)], 1) if is_full else key
+                longer[key] = max(longer.get(key, (-1, "")), (count + is_full, before + bit))
+        best = longer
+    _, bits = max(best.values())
+    identifier = bits[1:12] if identifier_bits == 11 else bits[1:12] + bits[14:32]
+    body = bits[len(header) + 5 :]
+    return int(identifier, 2), int(body or "0", 2).to_bytes(size, "big"), bits[len(header)] == "1"
+
+
+@pytest.mark.parametrize("identifier_bits", [11, 29])
+@pytest.mark.parametrize("size", DLC_LENGTHS)
+def test_the_longest_fd_frames_come_near_the_worst_case(size: int, identifier_bits: int) -> None:
+    identifier, data, is_passive = longest_fd(size, identifier_bits=identifier_bits)
+    nominal, fast = fd_written_bits(identifier, data, identifier_bits=identifier_bits, is_passive=is_passive)
+    worst = fd_frame_bits(size, identifier_bits=identifier_bits, is_stuffed=True)
+    # No frame reaches it: FDF and BRS are 1 with a 0 between them, and the DLC is given.
+    assert worst == (nominal + 1, fast + FD_LONGEST[size])
+
+
+def test_the_longest_fd_frame_without_data_is_the_longest_of_all_of_them() -> None:
+    lengths = [
+        sum(fd_written_bits(identifier, b"", identifier_bits=11, is_passive=is_passive))
+        for identifier, is_passive in product(range(1 << 11), (False, True))
+    ]
+    identifier, data, is_passive = longest_fd(0, identifier_bits=11)
+    assert max(lengths) == sum(fd_written_bits(identifier, data, identifier_bits=11, is_passive=is_passive))
+
+
+def test_the_worst_case_of_fd_is_that_of_the_worst_bits() -> None:
+    for identifier_bits, opening in [(11, 17), (29, 36)]:
+        for size in DLC_LENGTHS:
+            least, most = (
+                fd_frame_bits(size, identifier_bits=identifier_bits, is_stuffed=one) for one in (False, True)
+            )
+            worst = [0, *islice(cycle([0] * 4 + [1] * 4), opening - 1)]
+            assert len(stuffed(worst)) - opening == most[0] - least[0]
+            # The opening may end with four alike.
+            body = [0] * 4 + [0, *islice(cycle([1] * 4 + [0] * 4), 4 + 8 * size)]
+            assert len(stuffed(body)) - len(body) == most[1] - least[1]
+
+
+@given(st.sampled_from([11, 29]), st.data(), st.sampled_from(DLC_LENGTHS), st.booleans())
+def test_no_fd_frame_is_longer_than_the_worst_case(
+    identifier_bits: int, draw: st.DataObject, size: int, is_passive: bool
+) -> None:
+    identifier = draw.draw(st.integers(0, 2**identifier_bits - 1))
+    data = bytes(draw.draw(st.lists(st.sampled_from([0x00, 0xFF, 0x0F, 0x87, 0x55]), min_size=size, max_size=size)))
+    actual = fd_written_bits(identifier, data, identifier_bits=identifier_bits, is_passive=is_passive)
+    each = (fd_frame_bits(size, identifier_bits=identifier_bits, is_stuffed=one) for one in (False, True))
+    for least, bits, most in zip(next(each), actual, next(each), strict=True):
+        assert least <= bits <= most
+
+
+@pytest.mark.parametrize(("size", "crc"), [(0, CRC_17), (16, CRC_17), (20, CRC_21), (64, CRC_21)])
+def test_the_writer_of_fd_frames_keeps_the_rules(size: int, crc: tuple[int, int]) -> None:
+    nominal, fast = fd_written(0x123, bytes(range(7, 7 + size)), identifier_bits=11)
+    width, _ = crc
+    fixed = 1 + (4 + width - 1) // 4
+    tail = fast[-(4 + width + fixed) :]
+    before = fast[: -len(tail)]
+    # Fixed stuff bits differ from what they follow, and what they keep apart is the count and a CRC that divides.
+    assert all(bit != last for last, bit in list(pairwise([before[-1], *tail]))[::5])
+    count_and_crc = [bit for place, bit in enumerate(tail) if place % 5]
+    assert len(count_and_crc) == 4 + width
+    assert sum(count_and_crc[:4]) % 2 == 0
+    assert not any(crc_fd([*nominal, *before, *count_and_crc], *crc))
+    least = fd_frame_bits(size, identifier_bits=11, is_stuffed=False)
+    assert len(nominal) + len(before) - 17 - 5 - 8 * size == len(nominal) + len(fast) + FD_NEVER_STUFFED + 1 - sum(
+        least
+    )
+
+
+@pytest.mark.parametrize("size", [8, 12, 16, 20, 64])
+def test_fd_lengths_hold_what_can_utils_counts(size: int) -> None:
+    # canframelen of 2023, without stuff bits: 1 + 1 + 4 + CRC + 8 s at the data bit rate, with 21 bits of CRC from 16
+    # bytes on, where ISO has 17 up to 16. It leaves out the stuff count and its fixed stuff bits.
+    can_utils = 1 + 1 + 4 + (21 if size > 16 else 17) + 8 * size
+    _, fast = fd_frame_bits(size, identifier_bits=11, is_stuffed=False)
+    assert fast - can_utils == 4 + (7 if size > 16 else 6)
+
+
+@pytest.mark.parametrize(("size", "padded"), [(8, 8), (9, 12), (13, 16), (21, 24), (33, 48), (49, 64)])
+def test_fd_data_is_padded_to_a_length_of_the_dlc(size: int, padded: int) -> None:
+    short, long = (fd_frame_bits(one, identifier_bits=29, is_stuffed=True) for one in (size, padded))
+    assert short == long
+
+
+@pytest.mark.parametrize(("size", "us"), [(1, 33 + 45 / 5), (64, 33 + 680 / 5), (65, 33 + 680 / 5 + 33 + 45 / 5)])
+def test_an_fd_payload_takes_frames_of_64_bytes(size: int, us: float) -> None:
+    found = payload_us(
+        size,
+        frame_bytes=(64,),
+        identifier_bits=11,
+        bit_rate_kbit_s=1000,
+        data_bit_rate_kbit_s=5000,
+        is_stuffed=True,
+    )
+    assert found == pytest.approx(us)

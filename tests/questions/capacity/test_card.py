@@ -40,9 +40,22 @@ def test_used_and_free_are_the_figures_of_the_verdict() -> None:
     assert lines["used"] == "105 us of 1000, 10 %"
     assert lines["free"] == "895 us, +/- 40; 100 must stay free"
     # 209.79 us + 44.76 us before SYNC0 at half of the period: 509.1 us, and up.
-    assert lines["fastest period"] == "510 us, for sync0"
+    assert lines["fastest period"] == "510 us, limited by sync0"
     assert lines["room for"] == "98 more nodes"
     assert lines["assumed"] == "bus.master_us: measure it first"
+
+
+def test_a_period_mends_no_limit_that_it_plays_no_part_in() -> None:
+    _, lines = card_of(busplan.capacity(busplan.load_profile("dvrk", changes={"group.full.nodes": 12})))
+    assert lines["limit"].startswith("the hub's block of 2116 bytes")
+    assert lines["fastest period"] == "none: no period keeps the limit"
+    _, lines = card_of(busplan.capacity("can-servo-8", period_us=1000))
+    assert lines["fastest period"] == "3.345 ms"
+    _, lines = card_of(busplan.capacity("sercos3-servo-8", period_us=300))
+    assert (lines["limit"], lines["fastest period"]) == (
+        "the bus allows no period of 300 us; the next are 250 and 500 us",
+        "250 us",
+    )
 
 
 def test_the_cure_stands_where_there_is_something_to_cure() -> None:
@@ -55,6 +68,10 @@ def test_the_cure_stands_where_there_is_something_to_cure() -> None:
     assert lines["short by"] == "20 us, +/- 6"
     assert lines["paper model"] == "says otherwise, 207 us needed of 250, but does not decide"
     assert "room for" not in lines
+    # Where nodes differ, nobody said which of them are to be more: no change is looked for, and none is spoken of.
+    verdict, lines = card_of(busplan.capacity("gantry-24", period_us=800))
+    assert (verdict, lines["room for"]) == ("FITS", "no more nodes")
+    assert "one more" not in lines
     verdict, lines = card_of(busplan.capacity(busplan.load_profile("paper-1ms", changes={"bus.gap_count": 3})))
     assert verdict == "FITS, BUT"
     assert lines["unsafe"] == "gap count"

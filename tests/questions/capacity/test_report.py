@@ -67,12 +67,20 @@ def test_the_verdict_names_margin_term_limit_and_change(profile: Profile) -> Non
     _, one = capacity(override(profile, {"cycle.period_us": 500})).results
     margin = f"Margin {one.margin_corrected_us:.3f} us +/- {one.uncertainty_us:.3f} us of 250.000 us"
     assert text.startswith(f"paper-1ms at 500 us: does not fit. {margin}, less a bias of {one.bias_us:.3f} us. ")
-    assert "Largest doubt: execution time, 54% of U squared." in text
-    assert "Not in it: host time (host.transaction_us), the slowest execution (node.execution.worst_extra_us)." in text
-    assert "The paper model says otherwise: 207.117 us needed of 250.000 us. It decides nothing." in text
+    assert "Largest doubt: execution time, 54% of the variance." in text
+    assert (
+        "Not included: host time (host.transaction_us), the slowest execution (node.execution.worst_extra_us)." in text
+    )
+    assert "The paper model says otherwise: 207.117 us needed of 250.000 us. It does not affect the verdict." in text
     assert f"Largest term: execution, 146.933 us of {one.required_us:.3f} us." in text
     assert "Shown to fit: 1 node (4 axes), limited by time." in text
     assert "Cheapest way to make it fit: bus.gap_count = 7, which leaves a margin of " in text
+
+
+def test_a_way_to_more_nodes_is_advised_only_where_none_is_spare(profile: Profile) -> None:
+    assert "Cheapest way to" not in words(profile)
+    assert "Shown to fit: 3 nodes" in words(profile)
+    assert "Cheapest way to 1 more node: " in words(override(profile, {"bus.nodes": 3}))
 
 
 def test_a_verdict_that_is_not_shown_says_so_with_its_reserve(profile: Profile) -> None:
@@ -98,7 +106,7 @@ def test_what_the_paper_cannot_express_is_not_applicable(profile: Profile) -> No
     own = override(profile, {"cycle.retries": 1, "host.transaction_us": 5.0})
     text = words(own)
     assert "The paper model is not applicable: it has no cycle.retries, host.transaction_us." in text
-    assert "Not in it: the slowest execution (node.execution.worst_extra_us)." in text
+    assert "Not included: the slowest execution (node.execution.worst_extra_us)." in text
     assert [one.timing_model for one in capacity(own).results] == ["standard"]
 
 
@@ -151,7 +159,7 @@ def test_one_table_a_payload_and_one_for_all_periods(profile: Profile) -> None:
     assert text.count("  not included ") == text.count("  largest part ") == 1
     assert text.index(" 500 us ") < text.index("  not included ")
     whole = render(capacity_report(result, verdicts(result))._replace(is_whole=True), "table")
-    assert whole.count("Not in it: ") == whole.count("The execution time behind these figures is") == 1
+    assert whole.count("Not included: ") == whole.count("The execution time behind these figures is") == 1
 
 
 def test_what_fails_is_marked_where_it_stands_and_the_rest_is_detail(profile: Profile) -> None:
@@ -159,11 +167,11 @@ def test_what_fails_is_marked_where_it_stands_and_the_rest_is_detail(profile: Pr
     report = capacity_report(result, verdicts(result))
     lines = render(report, "table").splitlines()
     row = {line[: line.index("  ", 4)].strip(): line for line in lines if line.count("  ") > 2}
-    assert [row[name].count(" !") for name in ("corrected margin", "margin", "required <= available")] == [1, 1, 1]
+    assert [row[name].count(" !") for name in ("corrected margin", "margin", "no limit broken")] == [1, 1, 1]
     assert "does not fit" in row["verdict"]
     assert "!" not in row["verdict"]
     assert lines[-1].startswith("! fails. Not shown: ")
-    # What takes no time and what decides nothing is detail.
+    # What takes no time and what does not decide is detail.
     assert not {"hold", "host", "utilisation", "smallest period"} & set(row)
     whole = render(report._replace(is_whole=True), "table")
     assert all(f"\n{name}  " in whole for name in ("  hold", "  host", "utilisation", "smallest period"))

@@ -102,7 +102,7 @@ def test_a_change_that_changes_nothing_gives_0_and_says_why(make: Maker) -> None
     for change, note in (
         ("a bus reset", "it is set so already"),
         ("one axis more per node", "no payload follows the axes"),
-        ("host time +10 us", "the gaps behind the transactions hide it"),
+        ("host time +10 us", "the gaps after the transactions hide it"),
     ):
         assert (found[change].margin_change_us, found[change].note) == (0.0, note)
     assert (found["a bus reset"].before, found["a bus reset"].after) == (63, 63)

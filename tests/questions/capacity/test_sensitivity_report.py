@@ -89,7 +89,7 @@ def test_it_says_what_moves_the_margin_most_and_what_is_lost(profile: Profile) -
 
 def test_where_nothing_takes_the_largest_term_away_it_says_what_comes_behind() -> None:
     text = "\n".join(lines(load("paper-dma").profile))
-    assert "Next bottleneck: behind idle, 84.188 us, which no key takes away, comes execution, 42.400 us;" in text
+    assert "Next bottleneck: after idle, 84.188 us, which no key takes away, comes execution, 42.400 us;" in text
 
 
 def test_the_table_is_no_wider_than_a_terminal(profile: Profile) -> None:

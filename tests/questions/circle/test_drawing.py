@@ -115,13 +115,13 @@ def test_a_plot_is_no_wider_than_its_place(width: int, columns: int) -> None:
 
 def test_an_end_of_the_scale_has_digits_that_tell_it_from_nothing() -> None:
     def label(error_um: float) -> str:
-        lines = plot((0.0, error_um))
+        lines = plot((0.0, error_um), (0.0, 0.0))
         return f"{lines[1].split()[0]} {lines[0].strip()}"
 
     assert [label(one) for one in (1234.56, 0.1, 0.06, 1e-4, 2e-5)] == [
         *("+1234.6 um", "+0.10 um", "+60.0 nm", "+0.10 nm", "+0.020 nm"),
     ]
-    assert plot((-1e-7, 5.0))[9].split()[0] == "0"
+    assert plot((-1e-7, 5.0), (0.0, 0.0))[9].split()[0] == "0"
 
 
 def test_errors_far_from_zero_are_drawn_without_it() -> None:
@@ -130,13 +130,19 @@ def test_errors_far_from_zero_are_drawn_without_it() -> None:
     assert lines[1] == f"+502.4580 |{' ' * 36}{'#' * 36}"
     assert lines[5] == "          |"
     assert lines[9] == f"+502.4560 |{'#' * 36}"
-    assert plot((-502.458, -502.456))[0].endswith("um, 0 lies above")
+    assert plot((-502.458, -502.456), (-502.456, -502.456))[0].endswith("um, 0 lies above")
     # A circle that is only too large has no shape to show.
     assert plot((502.456, 502.456))[0].split() == ["um"]
 
 
+def test_an_error_that_is_the_same_at_every_angle_is_said_and_not_drawn() -> None:
+    assert plot((0.4977, 0.4981)) == ["At every angle the error is from +0.49770 to +0.49810 um"]
+    assert plot((-5.0, 0.3)) == ["At every angle the error is from -5.0 to +0.3 um"]
+    assert "#" in plot((0.4977, 0.4981), (0.4977, 0.4980))[-2]
+
+
 def test_zero_is_named_beside_an_end_in_its_row() -> None:
-    lines = plot((-5.0, 0.3))
+    lines = plot((-5.0, 0.3), (0.0, 0.0))
     assert [line.split(" |")[0].strip() for line in lines[1:-1]] == ["0, +0.3", *[""] * 7, "-5.0"]
 
 

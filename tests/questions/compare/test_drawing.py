@@ -1,6 +1,8 @@
 """The picture of `busplan compare` in every form."""
 
+import re
 from functools import cache
+from itertools import pairwise
 from xml.etree.ElementTree import Element, fromstring
 
 import pytest
@@ -41,6 +43,23 @@ def test_every_point_that_carries_axes_is_a_dot_in_its_place(found: KindComparis
         assert float((dot.get("cx") or "").rstrip("%")) == pytest.approx(100 * plane.x(period_us), abs=1e-2)
         assert line.ink in (dot.get("class") or "")
         assert f"{axes} ax" in (dot.find(f"{SVG}title").text or "")  # type: ignore[union-attr]
+
+
+@EACH
+def test_no_label_lies_on_another_on_a_phone(found: KindComparison) -> None:
+    root = fromstring(compare_svg(found, title="T"))
+    own = next(text for text in root.iter(f"{SVG}text") if (text.text or "").startswith("this machine"))
+    up = next(text for text in root.iter(f"{SVG}text") if text.text == "axes, logarithmic")
+    assert float(own.get("y") or 0) - float(up.get("y") or 0) >= 14
+    periods = [text for text in root.iter(f"{SVG}text") if re.fullmatch(r"[\d.]+ [um]s", text.text or "")]
+    ends = []
+    for text in periods:
+        width = 7 * len(text.text or "")
+        start = 2.65 * float((text.get("x") or "").rstrip("%"))
+        start -= {"start": 0, "middle": width / 2, "end": width}[text.get("text-anchor") or ""]
+        ends.append((start, start + width))
+    assert len(ends) >= 3
+    assert all(end < start for (_, end), (start, _) in pairwise(ends))
 
 
 @EACH

@@ -238,7 +238,7 @@ def test_regressions_are_named_with_the_timing_that_has_them(paper: Profile) -> 
     found = difference(paper, override(paper, {"cycle.nonperiodic_us": 250}))
     assert regression_words(found, found.regressions(tolerance=0.8), tolerance=80) == (
         "regression: B is worse by more than 80 % in 9 figures: verdict, shown to fit, corrected margin, "
-        "smallest safe period, margin, utilisation, required time, smallest period, required <= available (standard)"
+        "smallest safe period, margin, utilisation, required time, smallest period, no limit broken (standard)"
     )
     assert regression_words(found, found.regressions(), tolerance=0).startswith("regression: B is worse in ")
 

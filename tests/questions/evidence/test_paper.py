@@ -124,7 +124,7 @@ def test_every_figure_has_the_grade_of_its_source(comparisons: list[Comparison],
 
 
 def test_the_kit_gains_less_on_the_bus_alone_than_was_measured_with_its_host(others: list[Comparison]) -> None:
-    rows = chosen(others, "dVRK: I/O time, one by one over by broadcasts", "standard model")
+    rows = chosen(others, "dVRK: I/O time, individual schedule divided by broadcast schedule", "standard model")
     assert rows["gain, of the bus alone"].published == 4
     # By hand, 8 hops and gap count 21: 309.555 us one by one, 135.053 us by broadcasts with isochronous requests.
     assert rows["gain, of the bus alone"].computed == pytest.approx(309.555 / 135.053, rel=1e-5)

@@ -50,7 +50,7 @@ def test_the_title_has_the_result_the_caption_the_least_known_grade(values_in: V
     assert isinstance(steps, Calculation)
     assert isinstance(inputs, Table)
     assert inputs.caption is not None
-    assert sentence_text(inputs.caption) == "It starts from these; the least well known is assumed."
+    assert sentence_text(inputs.caption) == "Inputs of this figure; the weakest grade is assumed."
     assert inputs.stacks
     assert "What the whole cycle needs" in str(about)
 

@@ -22,18 +22,18 @@ def said(profile: Profile) -> str:
     return str(busplan.capacity(profile).to_dict()["verdicts"][0]["text"])
 
 
-# Shares of U squared are those of the largest doubt; of the time 40 of 104.290 us, 244.600 of 420.448 us, and less than
+# Shares of the variance: of the largest doubt; of the time 40 of 104.290 us, 244.600 of 420.448 us, and less than
 # a quarter of the others: 42.4 of 200.779 us, and 400 of 2950 us.
 @pytest.mark.parametrize(
     ("name", "keys", "carries"),
     [
-        ("ethercat-servo-8", ["bus.master_us"], "carries 99% of U squared and 38% of the required time"),
-        ("paper-dma", ["node.execution"], "carries 80% of U squared"),
-        ("can-servo-8", ["node.execution"], "carries 100% of U squared"),
+        ("ethercat-servo-8", ["bus.master_us"], "carries 99% of the variance and 38% of the required time"),
+        ("paper-dma", ["node.execution"], "carries 80% of the variance"),
+        ("can-servo-8", ["node.execution"], "carries 100% of the variance"),
         (
             "gantry-24",
             ["group.drives.execution", "group.tool.execution", "group.io.execution"],
-            "together carry 74% of U squared and 58% of the required time",
+            "together carry 74% of the variance and 58% of the required time",
         ),
     ],
 )
@@ -60,7 +60,7 @@ def test_execution_times_of_some_groups_have_their_part_of_the_common_doubt() ->
     both, all_of_it = (figures(one, model="standard") for one in (override(profile, none), profile))
     left_us, whole_us = (next(d.us for d in one.doubts if d.key == "group.execution") for one in (both, all_of_it))
     variance = sum(one.us**2 for one in all_of_it.doubts)
-    assert f" {whole_us * (whole_us - left_us) / variance:.0%} of U squared" in carries
+    assert f" {whole_us * (whole_us - left_us) / variance:.0%} of the variance" in carries
 
 
 def test_what_is_known_or_carries_little_is_not_said() -> None:

@@ -156,6 +156,44 @@ def test_a_database_alone_says_what_is_missing() -> None:
     assert [each.rpartition(": ")[2] for each in left_out] == ["Door"]
 
 
+def fd_database(folder: Path, *, rate: str = 'BA_ "BaudrateCANFD" 5000000;\n') -> Path:
+    """The database with a long message of CAN FD, and one that is as long and of which nothing says what it is."""
+    text = (FILES / "machine.dbc").read_text(encoding="utf-8")
+    messages = "BO_ 258 Long: 48 Drive\n\nBO_ 259 Parts: 64 Drive\n\n"
+    formats = '"StandardCAN","ExtendedCAN",' + '"reserved",' * 12 + '"StandardCAN_FD","ExtendedCAN_FD"'
+    definitions = f'BA_DEF_ BO_ "VFrameFormat" ENUM {formats};\nBA_DEF_ "BaudrateCANFD" INT 0 16000000;\n'
+    values = 'BA_ "VFrameFormat" BO_ 258 14;\nBA_ "VFrameFormat" BO_ 256 14;\n'
+    values += 'BA_ "GenMsgCycleTime" BO_ 258 10;\nBA_ "GenMsgCycleTime" BO_ 259 10;\n'
+    text = text.replace("BA_DEF_ BO_", f"{messages}{definitions}BA_DEF_ BO_", 1)
+    path = folder / "fd.dbc"
+    path.write_text(text + rate + values, encoding="utf-8")
+    return path
+
+
+def test_messages_of_can_fd_are_brought_in(tmp_path: Path) -> None:
+    answer = imported("axis-5.dcf", str(fd_database(tmp_path)))
+    profile: Any = answer.profile
+    assert (profile.bus.bit_rate_kbit_s, profile.bus.data_bit_rate_kbit_s) == (500, 5000)
+    messages = {each.name: (each.fd, each.payload_bytes) for each in profile.message[2:]}
+    assert messages == {"Pressure": (True, 8), "Long": (True, 48), "Foreign": (False, 8)}
+    assert "left out, over the 8 bytes of a frame, and no file says that it is CAN FD: Parts" in answer.remarks
+
+
+def test_a_database_that_does_not_say_the_data_bit_rate_is_missing_it(tmp_path: Path) -> None:
+    path = fd_database(tmp_path, rate="")
+    with pytest.raises(busplan.BusplanError) as refused:
+        busplan.import_profile(path)
+    assert "bus.data_bit_rate_kbit_s: the data bit rate of CAN FD messages" in refused.value.problems
+    answer = imported("axis-5.dcf", str(path))
+    assert {row.dotted for row in answer.rows if row.fact.grade == "assumed"} >= {"bus.data_bit_rate_kbit_s"}
+    classical = tmp_path / "axis.toml"
+    classical.write_text(imported("axis-5.dcf").text, encoding="utf-8")
+    with pytest.raises(busplan.BusplanError, match=r"message\.Long\.fd = true: asks for bus\.data_bit_rate"):
+        busplan.import_profile(path, update=classical)
+    into = busplan.import_profile(fd_database(tmp_path), update=classical).profile
+    assert getattr(into.bus, "data_bit_rate_kbit_s", None) == 5000
+
+
 def test_an_eds_has_defaults_and_says_so() -> None:
     answer = imported("node.eds")
     assert any("an EDS has the defaults of a device" in remark for remark in answer.remarks)

@@ -145,6 +145,13 @@ def test_the_svg_has_a_cell_for_each_setting_in_its_colour(found: TradeOff, inli
     assert len(set(titles)) == len(titles) == len(found.cells)
 
 
+def test_the_legend_of_the_svg_is_no_wider_than_a_phone() -> None:
+    root = ET.fromstring(map_svg(trade_off(load("dvrk").profile), title="T"))
+    texts = [text.text or "" for text in root.iter(f"{SVG}text")]
+    assert "does not fit: hops and broadcasting" in texts
+    assert all(7 * len(text) < 335 for text in texts)
+
+
 def test_the_svg_frames_this_design() -> None:
     root = ET.fromstring(map_svg(mapped("shown"), title="t", inline=True))
     (frame,) = [rect for rect in root.iter(f"{SVG}rect") if rect.get("class") == "own"]

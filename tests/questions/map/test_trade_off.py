@@ -225,7 +225,7 @@ def test_a_design_with_other_values_is_not_on_its_map() -> None:
 @pytest.mark.parametrize(
     ("x", "y", "message"),
     [
-        (Direction(AXES, (8,)), Direction("bus.nodes", (2,)), "axes across and bus.nodes up both vary bus.nodes"),
+        (Direction(AXES, (8,)), Direction("bus.nodes", (2,)), "x = axes and y = bus.nodes both vary bus.nodes"),
         (Direction(PERIOD, (8,)), Direction(PERIOD, (9,)), "both vary cycle.period_us; give two keys"),
         (Direction(AXES, (1, 2, 3)), None, "no setting of this map can exist: axes = 1: no whole number of nodes"),
         (Direction(AXES, (0,)), None, "no setting of this map can exist: axes = 0: no whole number of nodes"),

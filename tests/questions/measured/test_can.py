@@ -133,6 +133,12 @@ def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
     assert [found.quantity for found in answer.outside] == ["last PDO behind SYNC of all cycles"]
 
 
+def test_every_frame_of_a_pdo_has_a_name_of_its_own(tmp_path: Path) -> None:
+    answer = of_log(candump(LOGGED), tmp_path, plan="canopen-6")
+    assert figure(answer, "feedback 1: period").recorded == pytest.approx(4000, abs=5)
+    assert any("not in the log: feedback 2, command 2," in remark for remark in answer.remarks)
+
+
 def test_a_plan_that_is_too_full_has_no_response_to_stand_beside(tmp_path: Path) -> None:
     plan = busplan.load_profile(PLAN, changes={"bus.bit_rate_kbit_s": 125})
     answer = of_log(candump(LOGGED), tmp_path, plan=plan)
@@ -160,9 +166,20 @@ def test_errors_remote_frames_and_can_fd_are_said(tmp_path: Path) -> None:
     more = "(1700000000.000001) can0 123#R\n(1700000000.000002) can0 20000080#0000000000000000\n"
     fd = "(1700000000.000003) can0 124##1" + "AA" * 16 + "\n"
     answer = of_log(more + fd + candump(LOGGED), tmp_path)
-    assert "1 frame of CAN FD: their bits are in no load." in answer.remarks
+    assert "1 frame of CAN FD: in no load, for the plan has none." in answer.remarks
     assert "1 remote frame: their length code is shown as data." in answer.remarks
     assert "1 error frame: their bits are in no load." in answer.remarks
+
+
+def test_frames_of_can_fd_are_in_the_load_with_the_most_stuff_bits(tmp_path: Path) -> None:
+    lines = [
+        f"({1_700_000_000 + cycle // 1000}.{cycle % 1000:03d}000) can0 181##1{'5A' * 12}\n" for cycle in range(2000)
+    ]
+    answer = of_log("".join(lines), tmp_path, plan="can-fd-arm-7")
+    assert "2,000 frames of CAN FD: in the load with the most stuff bits." in answer.remarks
+    plan: Any = busplan.load_profile("can-fd-arm-7")
+    us = 33 * 1000 / plan.bus.bit_rate_kbit_s + (5 + 96 + 4 + 17 + 6 + 1 + 26) * 1000 / plan.bus.data_bit_rate_kbit_s
+    assert figure(answer, "load ").recorded == pytest.approx(us / 1000, rel=0.01)
 
 
 def test_a_damaged_log_says_where(tmp_path: Path) -> None:

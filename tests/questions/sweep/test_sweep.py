@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
+from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.fit.figures import figures
@@ -107,6 +108,29 @@ def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile
     }
     grid = checked_grid(profile, axes, with_circle=False)
     assert_rows_are_those_of_capacity(profile, grid, chunk_points=data.draw(st.integers(1, 40)))
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "values"),
+    [
+        ("paper-4ms", "circle.feed_mm_per_min", (1000.0, 500_000.0)),
+        ("can-servo-8", "bus.bit_rate_kbit_s", (500.0, 1000.0)),  # the bus adds jitter of its own
+        ("sercos3-servo-8", "bus.master_jitter_us", (1.0, 400.0)),
+        ("ethercat-servo-8", "bus.nodes", (2, 8)),
+    ],
+)
+def test_a_circle_is_refused_at_the_points_where_capacity_refuses_it(
+    name: str, key: str, values: tuple[float, ...]
+) -> None:
+    # Steps that divide a period and others; jitter that the period has room for, with that of the bus or without.
+    axes: dict[str, Values] = {
+        "cycle.period_us": Listed((1000.0, 1003.0, 8000.0)),
+        "servo.step_us": Listed((25.0, 300.0)),
+        "delivery.jitter_us": Listed((0.0, 460.0, 3900.0, 4100.0)),
+        key: Listed(values),
+    }
+    profile = load(name).profile
+    assert_rows_are_those_of_capacity(profile, checked_grid(profile, axes, with_circle=True), chunk_points=14)
 
 
 @given(data=st.data(), nodes=st.integers(1, 20))

@@ -116,7 +116,7 @@ def test_a_column_shows_what_takes_most_of_it() -> None:
 def test_an_overrun_is_said_and_seen() -> None:
     one = plan(cycle__period_us=300.0)
     lines = drawn(one)
-    said = "57.117 us short, 207.117 us needed of 150.000 us by the paper model, which decides nothing."
+    said = "57.117 us short, 207.117 us needed of 150.000 us by the paper model, which does not affect the verdict."
     assert lines[0] == f"paper-4ms at 300 us: {said}"
     assert headline(one).state == "fails"
     over = row(lines, "over")

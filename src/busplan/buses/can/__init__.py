@@ -1,1 +1,1 @@
-"""CAN 2.0 with a CANopen cycle: SYNC, feedback and command PDOs of each node or axis, and other messages."""
+"""CAN 2.0 and CAN FD with a CANopen cycle: SYNC, feedback and command PDOs of each node or axis, and other messages."""

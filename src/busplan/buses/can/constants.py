@@ -1,4 +1,4 @@
-"""Figures of classical CAN and of a CANopen cycle, each with its source and grade."""
+"""Figures of classical CAN, of CAN FD and of a CANopen cycle, each with its source and grade."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -10,14 +10,19 @@ BIT_RATES: Final = (10, 20, 50, 125, 250, 500, 800, 1000)
 """Bit rates that CiA 301 names [kbit/s]."""
 LEAST_BIT_RATE, MOST_BIT_RATE = 5, 1000
 """Bit rates of transceivers and of the standard, any between them [kbit/s]."""
+DATA_BIT_RATES: Final = (1000, 2000, 4000, 5000, 8000)
+"""Data bit rates that transceivers of CAN FD are made for, up to those of CiA 601-4 [kbit/s]."""
+MOST_DATA_BIT_RATE: Final = DATA_BIT_RATES[-1]
+"""Largest data bit rate of CAN FD [kbit/s]."""
 IdentifierBits = Literal[11, 29]
 
 _DAVIS: Final = "Davis, Burns, Bril, Lukkien 2007; linux-can/can-utils, canframelen"
+_ISO: Final = "ISO 11898-1:2015, CAN FD frame with bit-rate switch"
 _CIA_301: Final = "CiA 301, pre-defined connection set; esd C.3032.21, 8.5"
 
 
-def _bits(value: int, meaning: str, *, symbol: str = "") -> Sourced:
-    return Sourced(value, unit="bits", grade="published", source=_DAVIS, meaning=meaning, symbol=symbol)
+def _bits(value: int, meaning: str, *, symbol: str = "", source: str = _DAVIS) -> Sourced:
+    return Sourced(value, unit="bits", grade="published", source=source, meaning=meaning, symbol=symbol)
 
 
 def _identifier(value: int, meaning: str) -> Sourced:
@@ -34,6 +39,26 @@ BITS_PER_BYTE: Final = Sourced(8, unit="bits", grade="published", source="defini
 FRAME_BYTES: Final = Sourced(
     8, unit="bytes", grade="published", source="CAN 2.0, DLC 0..8", meaning="most data of one frame"
 )
+
+FD_OPENING_BITS: Final = _bits(17, "bits of an FD base frame up to the switch of bit rate", symbol="a", source=_ISO)
+FD_OPENING_BITS_EXTENDED: Final = _bits(
+    36, "bits of an FD extended frame up to the switch of bit rate", symbol="a", source=_ISO
+)
+FD_CLOSING_BITS: Final = _bits(
+    12, "bits of an FD frame at the nominal bit rate behind its CRC: acknowledge, end of frame, space of 3", source=_ISO
+)
+FD_CONTROL_BITS: Final = _bits(5, "bits before the data of an FD frame: ESI and DLC", source=_ISO)
+FD_COUNT_BITS: Final = _bits(4, "stuff count of an FD frame", source=_ISO)
+FD_CRC_BITS: Final = _bits(17, "CRC of an FD frame of up to 16 bytes", symbol="crc", source=_ISO)
+FD_LONG_CRC_BITS: Final = _bits(21, "CRC of a longer FD frame", symbol="crc", source=_ISO)
+FD_SHORT_BYTES: Final = Sourced(
+    16, unit="bytes", grade="published", source=_ISO, meaning="most data of an FD frame with the short CRC"
+)
+FD_DELIMITER_BITS: Final = _bits(1, "CRC delimiter of an FD frame", source=_ISO)
+FD_FRAME_BYTES: Final = Sourced(64, unit="bytes", grade="published", source=_ISO, meaning="most data of one FD frame")
+FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
+"""Lengths that the DLC of an FD frame can say; other data is padded to the next [bytes]."""
+
 MAX_IDENTIFIER: Final[Mapping[int, int]] = MappingProxyType({11: (1 << 11) - 1, 29: (1 << 29) - 1})
 
 SYNC_IDENTIFIER: Final = _identifier(0x80, "identifier of SYNC")

@@ -1,6 +1,7 @@
 """The SYNC cycle: SYNC, feedback, the host, commands, and the waits for other messages."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import islice
 from math import inf
@@ -9,10 +10,10 @@ from typing import Final, Literal
 from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
 from busplan.buses.can.figures import BUS_LOAD, TERMS
-from busplan.buses.can.response import Response
+from busplan.buses.can.response import Response, TooManyStepsError
 from busplan.buses.can.streams import Stream, frame_sizes, last_identifier, place, streams
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import messages, response, waits
+from busplan.buses.can.waiting import messages, response, sync_spread_us, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
@@ -70,13 +71,18 @@ class CanCycle(BusCycle):
 
     @cached_property
     def _wire(self) -> dict[str, Number]:
-        return {"identifier_bits": self.traffic.identifier_bits, "bit_rate_kbit_s": self.traffic.bit_rate_kbit_s}
+        keys = ("identifier_bits", "bit_rate_kbit_s", "data_bit_rate_kbit_s")
+        return {key: getattr(self.traffic, key) for key in keys}
 
     def _frame_us(self, data_bytes: Number, **wire: Number) -> Number:
         return frame_us(data_bytes, **(self._wire | wire), is_stuffed=self.is_stuffed)
 
     def _message_us(self, message: Message) -> Number:
-        us = self._frame_us(message.payload_bytes, identifier_bits=message.identifier_bits)
+        us = self._frame_us(
+            message.payload_bytes,
+            identifier_bits=message.identifier_bits,
+            data_bit_rate_kbit_s=message.data_bit_rate_kbit_s,
+        )
         return named(us, f"{message.name}_us", f"C,{message.name}")
 
     def _pdo_us(self, pdos: Pdos) -> Number:
@@ -322,6 +328,10 @@ class CanCycle(BusCycle):
     @cached_property
     def sync_spread_us(self) -> Number:
         """Delay of SYNC by other messages, B + I [us]; infinite where it has no end."""
+        if self._sent.is_ordered:
+            with suppress(TooManyStepsError):
+                us: Number = sync_spread_us(self.traffic, is_stuffed=self.is_stuffed)
+                return us
         phases = self._phases(0, SYNC)
         return named(phases["blocking_us"] + phases["interference_us"], "sync_spread_us", "B + I")
 

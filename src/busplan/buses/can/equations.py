@@ -4,6 +4,7 @@ References
 ----------
 R. I. Davis, A. Burns, R. J. Bril, J. J. Lukkien, Controller Area Network (CAN) schedulability analysis: refuted,
 revisited and revised, Real-Time Systems 35, 2007.
+ISO 11898-1:2015, frame formats of CAN FD.
 """
 
 from collections.abc import Callable
@@ -12,13 +13,23 @@ from functools import lru_cache
 from busplan.buses.can.constants import (
     BASE_BITS,
     BITS_PER_BYTE,
+    FD_CLOSING_BITS,
+    FD_CONTROL_BITS,
+    FD_COUNT_BITS,
+    FD_CRC_BITS,
+    FD_DELIMITER_BITS,
+    FD_LENGTHS,
+    FD_LONG_CRC_BITS,
+    FD_OPENING_BITS,
+    FD_OPENING_BITS_EXTENDED,
+    FD_SHORT_BYTES,
     FIXED_BITS,
     FRAME_BYTES,
     STUFF_STEP_BITS,
     STUFFED_BITS,
     STUFFED_BITS_EXTENDED,
 )
-from busplan.elementwise import Number, choose, larger, rounded_down, rounded_up, smaller
+from busplan.elementwise import Number, choose, is_off, larger, next_entry, rounded_down, rounded_up, smaller
 
 _PLAIN = (int, float)
 KBIT_US = 1000
@@ -26,7 +37,7 @@ KBIT_US = 1000
 
 
 def frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bool) -> Number:
-    """Length of a data frame, interframe space included.
+    """Length of a classical data frame, interframe space included.
 
     Parameters
     ----------
@@ -58,6 +69,48 @@ def frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bool)
     return bits + rounded_down((stuffable - 1) / STUFF_STEP_BITS) if is_stuffed else bits
 
 
+def fd_frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bool) -> tuple[Number, Number]:
+    """Length of a CAN FD frame that switches its bit rate, interframe space included.
+
+    Parameters
+    ----------
+    data_bytes
+        Data of the frame, 0..64 [bytes], padded to the next length p that a DLC can say; float or array.
+    identifier_bits, is_stuffed
+        As `frame_bits` takes them. The fixed stuff bits of stuff count and CRC are always counted.
+
+    Returns
+    -------
+    tuple
+        Bits at the nominal bit rate, a + 12 with a = 17 or 36, and with stuffing floor((a - 1) / 4) more; bits at the
+        data bit rate, d + t + ceil(t / 4) + 1 with d = 5 + 8 p and t = 4 + 17, or 4 + 21 over 16 bytes, and with
+        stuffing floor((d + 3) / 4) more [bits]. The longest frames have 1 nominal and 1 to 3 data bits less, for some
+        bits of the header are fixed.
+
+    References
+    ----------
+    ISO 11898-1:2015. No worked figure is published.
+
+    Examples
+    --------
+    >>> fd_frame_bits(64, identifier_bits=11, is_stuffed=True), fd_frame_bits(10, identifier_bits=29, is_stuffed=False)
+    ((33.0, 680.0), (48.0, 129.0))
+    """
+    opening = choose(identifier_bits > BASE_BITS, FD_OPENING_BITS_EXTENDED, FD_OPENING_BITS)
+    padded_bytes = next_entry(FD_LENGTHS, data_bytes, words="the next length of a DLC")
+    stuffable = FD_CONTROL_BITS + BITS_PER_BYTE * padded_bytes
+    tail = FD_COUNT_BITS + choose(padded_bytes > FD_SHORT_BYTES, FD_LONG_CRC_BITS, FD_CRC_BITS)
+    nominal_bits: Number = opening + FD_CLOSING_BITS
+    data_bits: Number = stuffable + tail + rounded_up(tail / STUFF_STEP_BITS) + FD_DELIMITER_BITS
+    if not is_stuffed:
+        return nominal_bits, data_bits
+    # A stuff bit may come at once: the bits before it may be those of the opening.
+    return (
+        nominal_bits + rounded_down((opening - 1) / STUFF_STEP_BITS),
+        data_bits + rounded_up(stuffable / STUFF_STEP_BITS),
+    )
+
+
 def bit_us(bit_rate_kbit_s: Number) -> Number:
     """Time of a bit [us].
 
@@ -74,7 +127,14 @@ def bit_us(bit_rate_kbit_s: Number) -> Number:
     return KBIT_US / bit_rate_kbit_s
 
 
-def frame_us(data_bytes: Number, *, identifier_bits: Number, bit_rate_kbit_s: Number, is_stuffed: bool) -> Number:
+def frame_us(
+    data_bytes: Number,
+    *,
+    identifier_bits: Number,
+    bit_rate_kbit_s: Number,
+    data_bit_rate_kbit_s: Number = 0.0,
+    is_stuffed: bool,
+) -> Number:
     """Time of a data frame on the wire [us].
 
     Parameters
@@ -83,12 +143,19 @@ def frame_us(data_bytes: Number, *, identifier_bits: Number, bit_rate_kbit_s: Nu
         As `frame_bits` takes them.
     bit_rate_kbit_s
         Bit rate [kbit/s]; float or array.
+    data_bit_rate_kbit_s
+        Data bit rate of a CAN FD frame; 0 for a classical frame [kbit/s]; float or array.
 
     Examples
     --------
     >>> frame_us(8, identifier_bits=11, bit_rate_kbit_s=500, is_stuffed=True)
     270.0
+    >>> frame_us(8, identifier_bits=11, bit_rate_kbit_s=500, data_bit_rate_kbit_s=2000, is_stuffed=True)
+    123.5
     """
+    if not is_off(data_bit_rate_kbit_s):
+        nominal, data = fd_frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
+        return nominal * bit_us(bit_rate_kbit_s) + data * bit_us(data_bit_rate_kbit_s)
     bits = frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
     return bits * bit_us(bit_rate_kbit_s)
 
@@ -99,6 +166,7 @@ def payload_us(
     frame_bytes: tuple[float, ...] = (FRAME_BYTES,),
     identifier_bits: Number,
     bit_rate_kbit_s: Number,
+    data_bit_rate_kbit_s: Number = 0.0,
     is_stuffed: bool,
 ) -> Number:
     """Time of all frames of a payload: each is filled before the next, and the last has the rest [us].
@@ -109,7 +177,7 @@ def payload_us(
         Payload, 1 or more [bytes]; float or array.
     frame_bytes
         Most data of each frame in their order; further ones are as the last [bytes].
-    identifier_bits, bit_rate_kbit_s, is_stuffed
+    identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s, is_stuffed
         As `frame_us` takes them.
 
     Examples
@@ -118,11 +186,10 @@ def payload_us(
     >>> payload_us(10, **wire), payload_us(12, frame_bytes=(6, 6), **wire)
     (210.0, 230.0)
     """
-    wire = identifier_bits, bit_rate_kbit_s, is_stuffed
-    is_plain = isinstance(payload_bytes, _PLAIN) and isinstance(identifier_bits, _PLAIN)
-    if is_plain and isinstance(bit_rate_kbit_s, _PLAIN):
-        return _plain_payload_us(payload_bytes, frame_bytes, *wire)
-    return _payload_us(payload_bytes, frame_bytes, *wire)
+    wire = identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s
+    if all(isinstance(number, _PLAIN) for number in (payload_bytes, *wire)):
+        return _plain_payload_us(payload_bytes, frame_bytes, *wire, is_stuffed)
+    return _payload_us(payload_bytes, frame_bytes, *wire, is_stuffed)
 
 
 def _payload_us(
@@ -130,11 +197,16 @@ def _payload_us(
     frame_bytes: tuple[float, ...],
     identifier_bits: Number,
     bit_rate_kbit_s: Number,
+    data_bit_rate_kbit_s: Number,
     is_stuffed: bool,
 ) -> Number:
     def of_frame(data_bytes: Number) -> Number:
         return frame_us(
-            data_bytes, identifier_bits=identifier_bits, bit_rate_kbit_s=bit_rate_kbit_s, is_stuffed=is_stuffed
+            data_bytes,
+            identifier_bits=identifier_bits,
+            bit_rate_kbit_s=bit_rate_kbit_s,
+            data_bit_rate_kbit_s=data_bit_rate_kbit_s,
+            is_stuffed=is_stuffed,
         )
 
     def if_any(data_bytes: Number) -> Number:

@@ -1,4 +1,4 @@
-"""CAN 2.0 with a CANopen cycle, as a kind of bus."""
+"""CAN 2.0 and CAN FD with a CANopen cycle, as a kind of bus."""
 
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
@@ -29,7 +29,7 @@ _HOST_STEP_US: Final = 10.0
 
 
 class Can(Bus):
-    """Classical CAN, whose nodes send at SYNC."""
+    """CAN, classical or FD, whose nodes send at SYNC."""
 
     kind = "can"
     title = "CAN"
@@ -38,7 +38,7 @@ class Can(Bus):
         TimingModel(
             WORST,
             "as many stuff bits as a frame of its length can have",
-            error="this timing model takes 8 to 15% more than frames that were measured",
+            error="this timing model takes 8 to 15% more than classical frames that were measured",
         ),
         TimingModel(NONE, "no stuff bits"),
     )
@@ -63,6 +63,9 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),
         "bus.bit_rate_kbit_s": Key("f", meaning="if the cable is short enough", short="{} kbit/s"),
+        "bus.data_bit_rate_kbit_s": Key(
+            "f_data", meaning="if transceivers and cable carry it", short="{} kbit/s of data"
+        ),
         "bus.identifier_bits": Key("id_bits", meaning="all identifiers fit", short="identifiers of {} bits"),
         "bus.host_us": Key("host"),
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
@@ -93,7 +96,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         return not of_latency
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """PDOs of each axis, a higher bit rate, identifiers of 11 bits."""
+        """PDOs of each axis, higher bit rates, identifiers of 11 bits."""
         from busplan.buses.can.settings import settings  # plans alone ask for them
 
         return settings(network)
@@ -123,8 +126,10 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         return "every frame with the stuff bits of its length"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """The bit rate."""
-        return (f"{network.profile.bus.bit_rate_kbit_s:g} kbit/s",)
+        """The bit rate, or both of CAN FD."""
+        bus = network.profile.bus
+        data = "" if bus.data_bit_rate_kbit_s is None else f", {bus.data_bit_rate_kbit_s:g} kbit/s of data"
+        return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}",)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """Functions of `busplan.buses.can.evidence`."""

@@ -1,15 +1,16 @@
 """A CAN log beside the plan: period, jitter and data of every message, bits as they were, load, and bursts."""
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from busplan.buses.can.constants import BASE_BITS
+from busplan.buses.can.constants import BASE_BITS, FD_FRAME_BYTES, FRAME_BYTES
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.equations import bit_us, frame_bits
+from busplan.buses.can.equations import bit_us, frame_us
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
@@ -117,39 +118,56 @@ class _Seen:
         yield from self._load()
         yield from self._cycle()
         responses = {(each.group, each.name): each.phases for each in self.cycle.latencies()}
-        for stream in self.streams:
-            yield from self._stream(stream, responses.get((stream.group, stream.name)))
+        unstuffed = streams(self.cycle.traffic, is_stuffed=False)
+        labels = _labels(self.streams)
+        for stream, least, label in zip(self.streams, unstuffed, labels, strict=True):
+            response = responses.get((stream.group, stream.name))
+            yield from self._stream(stream, label, _spread_us(stream, plain(least.frame_us), response))
         frames = sum(len(sent.times_us) for sent in self.unplanned.values())
         note = _listed([*self.unplanned.values()])
         yield RecordedFigure("frames of no message of the plan", "1", 0, frames, None, "at most", frames, note=note)
 
+    def _wire_us(self, *, is_stuffed: bool) -> Floats:
+        """Each frame on the wire with the most stuff bits or with none [us]."""
+        frames, traffic, taken = self.frames, self.cycle.traffic, self.taken
+        us = np.zeros(len(taken))
+        for is_fd in (False, True):
+            data_bit_rate = plain(traffic.data_bit_rate_kbit_s) if is_fd else 0.0
+            own = np.flatnonzero(frames.is_fd[taken] == is_fd)
+            if not len(own) or (is_fd and not data_bit_rate):
+                continue
+            sizes = np.minimum(frames.sizes[taken[own]], FD_FRAME_BYTES if is_fd else FRAME_BYTES)
+            us[own] = frame_us(
+                sizes,
+                identifier_bits=np.where(frames.extended[taken[own]], 29, BASE_BITS),
+                bit_rate_kbit_s=traffic.bit_rate_kbit_s,
+                data_bit_rate_kbit_s=data_bit_rate,
+                is_stuffed=is_stuffed,
+            )
+        return us
+
     def _load(self) -> Iterator[RecordedFigure]:
         """Load as it was, beside that of the plan and those of the same frames with worst and without stuff bits."""
-        frames, count = self.frames, len(self.taken)
-        bits = frames.bits[self.taken]
+        count, is_fd = len(self.taken), self.frames.is_fd[self.taken]
         span_us = float(self.times_us[-1] - self.times_us[0])
         if count < 2 or span_us <= 0:  # noqa: PLR2004 - a distance
             return
+        worst_us, none_us = self._wire_us(is_stuffed=True), self._wire_us(is_stuffed=False)
+        own_us = np.where(is_fd, worst_us, self.frames.bits[self.taken] * self.bit_us)
         # The first frame ended with its stamp.
-        load = self.bit_us / span_us
-
-        def of_all(*, is_stuffed: bool) -> float:
-            identifier_bits = np.where(frames.extended[self.taken[1:]], 29, BASE_BITS)
-            sizes = np.minimum(frames.sizes[self.taken[1:]], 8) * (bits[1:] > 0)
-            each: Any = frame_bits(sizes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
-            return float(np.sum(each * (bits[1:] > 0)))
-
-        exact, worst, none = float(bits[1:].sum()), of_all(is_stuffed=True), of_all(is_stuffed=False)
-        planned = plain(self.cycle.load)
+        load, worst, none = (float(us[1:].sum()) / span_us for us in (own_us, worst_us, none_us))
         note = "exact bits of each frame, at the bit rate of the profile"
-        yield RecordedFigure("load", "share", planned, exact * load, None, "at most", count, note=note)
-        yield RecordedFigure("load, worst stuffing of these frames", "share", None, worst * load, None, "shown", count)
-        yield RecordedFigure("load, no stuffing of these frames", "share", None, none * load, None, "shown", count)
-        if worst > none:
-            stuffing = (exact - none) / (worst - none)
-            yield RecordedFigure("stuff bits of the possible ones", "share", None, stuffing, None, "shown", count)
-        idle_us = np.diff(self.times_us) - bits[1:] * self.bit_us
-        apart = np.flatnonzero(idle_us > _GAP_BITS * self.bit_us + min(self.stamp_us, self.bit_us * _GAP_BITS))
+        yield RecordedFigure("load", "share", plain(self.cycle.load), load, None, "at most", count, note=note)
+        yield RecordedFigure("load, worst stuffing of these frames", "share", None, worst, None, "shown", count)
+        yield RecordedFigure("load, no stuffing of these frames", "share", None, none, None, "shown", count)
+        possible_us = float((worst_us - none_us)[~is_fd].sum())
+        if possible_us:
+            stuffing = float((own_us - none_us)[~is_fd].sum()) / possible_us
+            number = int(np.count_nonzero(~is_fd))
+            yield RecordedFigure("stuff bits of the possible ones", "share", None, stuffing, None, "shown", number)
+        idle_us = np.diff(self.times_us) - own_us[1:]
+        gap_us = _GAP_BITS * self.bit_us
+        apart = np.flatnonzero(idle_us > gap_us + min(self.stamp_us, gap_us))
         runs = np.diff(np.concatenate(([-1], apart, [count - 1])))
         yield RecordedFigure("frames at once behind each other", "1", None, int(runs.max()), None, "shown", count)
 
@@ -194,29 +212,28 @@ class _Seen:
             if extended == is_extended and first <= identifier <= last
         ]
 
-    def _stream(self, stream: Stream, response: Mapping[str, Any] | None) -> Iterator[RecordedFigure]:
+    def _stream(self, stream: Stream, label: str, spread_us: float | None) -> Iterator[RecordedFigure]:
         each = self._of(stream)
         for sent in each:
             self.unplanned.pop((sent.identifier, stream.identifier_bits > BASE_BITS), None)
         missing = _whole(stream.identifiers) - len(each)
         if missing:
-            self.unseen.append(stream.label if not each else f"{missing} of {stream.label}")
+            self.unseen.append(label if not each else f"{missing} of {label}")
         if not each:
             return
         several = len(each) > 1
         repeated = [sent for sent in each if len(sent.times_us) > 1]
         key = f"message.{stream.name}" if stream.is_message else ""
         if repeated:
-            spread_us = self._spread_us(stream, response)
             most_often = min(repeated, key=lambda sent: sent.mean_us)
-            yield self._period(stream, most_often, key, spread_us, several=several)
-            yield self._scatter(stream, repeated, key, spread_us, several=several)
+            yield self._period(stream, label, most_often, key, spread_us, several=several)
+            yield self._scatter(stream, label, repeated, key, spread_us, several=several)
         fullest = max(each, key=lambda sent: sent.most_bytes)
         planned_bytes = plain(stream.data_bytes)
         if key and fullest.most_bytes > planned_bytes:
             self.edits[f"{key}.payload_bytes"] = fullest.most_bytes
         yield RecordedFigure(
-            f"{stream.label}: data",
+            f"{label}: data",
             "bytes",
             planned_bytes,
             fullest.most_bytes,
@@ -226,15 +243,8 @@ class _Seen:
             key and f"{key}.payload_bytes",
         )
 
-    def _spread_us(self, stream: Stream, response: Mapping[str, Any] | None) -> float | None:
-        """How much the plan lets the arrival of a message scatter, R less the shortest frame [us]."""
-        if response is None or not (stream.is_message or stream.name == SYNC):
-            return None
-        least = frame_bits(plain(stream.data_bytes), identifier_bits=stream.identifier_bits, is_stuffed=False)
-        return _finite(max(plain(response["worst_response_us"]) - plain(least) * self.bit_us, 0.0))
-
     def _period(
-        self, stream: Stream, sent: _Sent, key: str, spread_us: float | None, *, several: bool
+        self, stream: Stream, label: str, sent: _Sent, key: str, spread_us: float | None, *, several: bool
     ) -> RecordedFigure:
         """Mean distance of the frames, of the identifier that comes most often."""
         planned_us, count = plain(stream.period_us), len(sent.times_us)
@@ -243,7 +253,7 @@ class _Seen:
         scatter_us = scatter_us if spread_us is None else spread_us
         doubt = expanded(scatter_us / (count - 1) / 2, CLOCK_TOLERANCE * planned_us / 3**0.5)
         figure = RecordedFigure(
-            f"{stream.label}: period",
+            f"{label}: period",
             "us",
             planned_us,
             sent.mean_us,
@@ -258,7 +268,7 @@ class _Seen:
         return figure
 
     def _scatter(
-        self, stream: Stream, each: list[_Sent], key: str, spread_us: float | None, *, several: bool
+        self, stream: Stream, label: str, each: list[_Sent], key: str, spread_us: float | None, *, several: bool
     ) -> RecordedFigure:
         """Jitter of the arrival of a periodic message; of others the shortest distance."""
         planned_key = f"{key}.jitter_us" if key else ""
@@ -268,7 +278,7 @@ class _Seen:
             late, sent = max(found, key=lambda pair: pair[0].value)
             doubt = expanded(late.uncertainty or (sent.grid.doubt_us if sent.grid else 0.0))
             return RecordedFigure(
-                f"{stream.label}: jitter of the arrival{words}",
+                f"{label}: jitter of the arrival{words}",
                 "us",
                 spread_us,
                 late.value,
@@ -282,7 +292,7 @@ class _Seen:
         apart_us, sent = min(nearest, key=lambda pair: pair[0])
         planned_us = None if spread_us is None else max(plain(stream.period_us) - spread_us, 0.0)
         return RecordedFigure(
-            f"{stream.label}: shortest distance{words}",
+            f"{label}: shortest distance{words}",
             "us",
             planned_us,
             apart_us,
@@ -302,8 +312,11 @@ class _Seen:
             yield f"Its clock was set back {counted(self.steps_back, 'time')}: the longest stretch between is taken."
         if self.unseen:
             yield f"In the plan and not in the log: {', '.join(self.unseen)}."
-        if frames.fd:
-            yield f"{counted(frames.fd, 'frame')} of CAN FD: their bits are in no load."
+        fd = int(np.count_nonzero(frames.is_fd))
+        if fd:
+            has_rate = bool(plain(self.cycle.traffic.data_bit_rate_kbit_s))
+            words = "in the load with the most stuff bits" if has_rate else "in no load, for the plan has none"
+            yield f"{counted(fd, 'frame')} of CAN FD: {words}."
         if frames.remote:
             yield f"{counted(frames.remote, 'remote frame')}: their length code is shown as data."
         if frames.errors:
@@ -311,9 +324,27 @@ class _Seen:
         yield _NOT_SHOWN
 
 
+def _labels(each: Sequence[Stream]) -> list[str]:
+    """Name of each stream; those of a PDO with several frames are numbered."""
+    names = Counter(stream.label for stream in each)
+    seen: Counter[str] = Counter()
+    labels = []
+    for stream in each:
+        seen[stream.label] += 1
+        labels.append(f"{stream.label} {seen[stream.label]}" if names[stream.label] > 1 else stream.label)
+    return labels
+
+
 def _whole(number: Any) -> int:
     """A plain number that is whole."""
     return int(plain(number))
+
+
+def _spread_us(stream: Stream, least_us: float, response: Mapping[str, Any] | None) -> float | None:
+    """How much the plan lets the arrival of SYNC or a message scatter: R less the shortest frame [us]."""
+    if response is None or not (stream.is_message or stream.name == SYNC):
+        return None
+    return _finite(max(plain(response["worst_response_us"]) - least_us, 0.0))
 
 
 def _finite(us: float) -> float | None:

@@ -6,11 +6,13 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, model_validator
 
 from busplan.buses.can.constants import (
+    FD_FRAME_BYTES,
     FRAME_BYTES,
     LEAST_BIT_RATE,
     MAX_IDENTIFIER,
     MAX_LOAD,
     MOST_BIT_RATE,
+    MOST_DATA_BIT_RATE,
     MOST_NODES,
     MOST_PDOS,
     PIPELINE_CYCLES,
@@ -29,8 +31,9 @@ from busplan.sections.transactions import TransactionKind
 
 Identifier = Annotated[int, Field(ge=0, le=MAX_IDENTIFIER[29])]
 BitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_BIT_RATE, allow_inf_nan=False)]
+DataBitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_DATA_BIT_RATE, allow_inf_nan=False)]
 PdoBytes = Annotated[
-    tuple[Annotated[int, Field(ge=1, le=int(FRAME_BYTES))], ...],
+    tuple[Annotated[int, Field(ge=1, le=int(FD_FRAME_BYTES))], ...],
     Field(strict=False, min_length=1, max_length=int(MOST_PDOS)),
 ]
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
@@ -38,10 +41,16 @@ _MOST_CYCLES = 1000
 
 
 class CanBus(BusSection):
-    """Section [bus]: a CAN 2.0 bus with a SYNC cycle; no CAN FD."""
+    """Section [bus]: a bus of CAN 2.0 or CAN FD with a SYNC cycle."""
 
     kind: Literal["can"] = Field(description="Kind of bus", examples=["can"])
     bit_rate_kbit_s: BitRate = Field(description="Bit rate of the bus [kbit/s]", examples=[1000])
+    data_bit_rate_kbit_s: DataBitRate | None = Field(
+        default=None,
+        description="Data bit rate of CAN FD, behind the switch of bit rate: SYNC and PDOs are FD frames of up to 64 "
+        "bytes, and messages with fd = true; without it the bus is classical CAN [kbit/s]",
+        examples=[5000],
+    )
     nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[8])
     identifier_bits: IdentifierBits = Field(
         default=11,
@@ -83,6 +92,13 @@ class CanBus(BusSection):
         examples=[WORST],
     )
 
+    @model_validator(mode="after")
+    def _data_is_no_slower(self) -> Self:
+        if self.data_bit_rate_kbit_s is not None and self.data_bit_rate_kbit_s < self.bit_rate_kbit_s:
+            why = f"is under bit_rate_kbit_s, {self.bit_rate_kbit_s:g}: CAN FD switches to no slower bit rate"
+            raise refused(Problem(why, key="data_bit_rate_kbit_s", kind="inconsistent"))
+        return self
+
     @property
     def host_doubt_us(self) -> Number:
         """Standard uncertainty of the host's own time [us]."""
@@ -113,13 +129,13 @@ class CanPayload(PayloadSection):
     )
     feedback_pdos: PdoBytes | None = Field(
         default=None,
-        description="Most data of each feedback PDO, whose sum is the default of read_bytes; without it 8 bytes each "
-        "[bytes]",
+        description="Most data of each feedback PDO, up to 8, of CAN FD 64, whose sum is the default of read_bytes; "
+        "without it as much each [bytes]",
         examples=[[6, 6]],
     )
     command_pdos: PdoBytes | None = Field(
         default=None,
-        description="Most data of each command PDO, whose sum is the default of write_bytes; without it 8 bytes each "
+        description="Most data of each command PDO, as those of feedback, whose sum is the default of write_bytes "
         "[bytes]",
         examples=[[6, 6]],
     )
@@ -154,8 +170,13 @@ class CanMessage(Section):
     per_node: bool = Field(
         default=False, description="Whether each node sends it, in the order of the profile", examples=[True]
     )
-    payload_bytes: Annotated[int, Field(ge=0, le=int(FRAME_BYTES))] = Field(
-        description="Its data [bytes]", examples=[8]
+    fd: bool = Field(
+        default=False,
+        description="Whether it is a CAN FD frame that switches to bus.data_bit_rate_kbit_s, or a classical frame",
+        examples=[True],
+    )
+    payload_bytes: Annotated[int, Field(ge=0, le=int(FD_FRAME_BYTES))] = Field(
+        description="Its data, 0 to 8, of an FD frame to 64 [bytes]", examples=[8]
     )
     period_us: PeriodUs = Field(description="Shortest time from one to the next [us]", examples=[10_000])
     jitter_us: TimeUs = Field(
@@ -166,6 +187,13 @@ class CanMessage(Section):
         description="When it must have arrived, from its start; without it its period [us]",
         examples=[5000],
     )
+
+    @model_validator(mode="after")
+    def _is_one_frame(self) -> Self:
+        if self.payload_bytes > FRAME_BYTES and not self.fd:
+            why = f"is over the {FRAME_BYTES:g} bytes of a classical frame; fd = true allows {FD_FRAME_BYTES:g}"
+            raise refused(Problem(why, key="payload_bytes"))
+        return self
 
     @model_validator(mode="after")
     def _is_queued_within_its_period(self) -> Self:
@@ -250,15 +278,38 @@ class CanProfile(Profile):
             raise refused(*problems)
         return self
 
+    @model_validator(mode="after")
+    def _frames_are_of_the_bus(self) -> Self:
+        if self.bus.data_bit_rate_kbit_s is not None:
+            return self
+        problems = [
+            Problem("asks for bus.data_bit_rate_kbit_s: without it a bus is classical CAN", f"message.{place}.fd")
+            for place, message in enumerate(self.message)
+            if message.fd
+        ]
+        problems += (
+            Problem(f"has a PDO over the {FRAME_BYTES:g} bytes of a classical frame", f"{section}.{name}")
+            for section, payload in self._payloads()
+            for name in (f"{direction}_pdos" for direction in NAMES.values())
+            if max(getattr(payload, name) or (0,)) > FRAME_BYTES
+        )
+        if problems:
+            raise refused(*problems)
+        return self
+
+    def _payloads(self) -> Iterator[tuple[str, CanPayload]]:
+        """Section [payload] or all groups, each with its key."""
+        if self.payload is not None:
+            yield "payload", self.payload
+        yield from ((f"group.{place}", group) for place, group in enumerate(self.group))
+
     def _identifiers(self) -> Iterator[tuple[str, int | None, int]]:
         """Keys of identifiers, each with what it says and the length."""
         bits = self.bus.identifier_bits
         yield "bus.sync_identifier", self.bus.sync_identifier, bits
-        sections = [("payload", self.payload), *((f"group.{place}", group) for place, group in enumerate(self.group))]
-        for section, payload in sections:
-            if payload is not None:
-                yield f"{section}.feedback_identifier", payload.feedback_identifier, bits
-                yield f"{section}.command_identifier", payload.command_identifier, bits
+        for section, payload in self._payloads():
+            yield f"{section}.feedback_identifier", payload.feedback_identifier, bits
+            yield f"{section}.command_identifier", payload.command_identifier, bits
         for place, message in enumerate(self.message):
             yield f"message.{place}.identifier", message.identifier, message.identifier_bits or bits
 

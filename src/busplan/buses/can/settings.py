@@ -1,6 +1,6 @@
 """Settings of a CAN bus that a plan may change without new parts."""
 
-from busplan.buses.can.constants import BASE_BITS, BIT_RATES, MAX_IDENTIFIER
+from busplan.buses.can.constants import BASE_BITS, BIT_RATES, DATA_BIT_RATES, MAX_IDENTIFIER
 from busplan.buses.can.streams import streams
 from busplan.buses.can.traffic import traffic_of
 from busplan.buses.network import Network
@@ -9,7 +9,7 @@ from busplan.elementwise import plain
 
 
 def settings(network: Network) -> tuple[Setting, ...]:
-    """PDOs of each axis, a higher bit rate, identifiers of 11 bits.
+    """PDOs of each axis, a higher bit rate, of CAN FD a higher data bit rate, identifiers of 11 bits.
 
     Parameters
     ----------
@@ -17,7 +17,13 @@ def settings(network: Network) -> tuple[Setting, ...]:
         The network, of plain numbers.
     """
     several = any(nodes.node.axes > 1 for nodes in network.alike)
-    return (*((_pdo_per(network),) if several else ()), _bit_rate(network), _identifier_bits(network))
+    is_fd = network.profile.bus.data_bit_rate_kbit_s is not None
+    return (
+        *((_pdo_per(network),) if several else ()),
+        _bit_rate(network),
+        *((_data_bit_rate(network),) if is_fd else ()),
+        _identifier_bits(network),
+    )
 
 
 def _pdo_per(network: Network) -> Setting:
@@ -33,9 +39,19 @@ def _pdo_per(network: Network) -> Setting:
 
 def _bit_rate(network: Network) -> Setting:
     """Higher bit rates, the next higher first: the cable must be short enough."""
-    key = "bus.bit_rate_kbit_s"
-    higher = tuple({key: rate} for rate in BIT_RATES if rate > network.profile.bus.bit_rate_kbit_s)
+    key, bus = "bus.bit_rate_kbit_s", network.profile.bus
+    most = BIT_RATES[-1] if bus.data_bit_rate_kbit_s is None else bus.data_bit_rate_kbit_s
+    higher = tuple({key: rate} for rate in BIT_RATES if bus.bit_rate_kbit_s < rate <= most)
     return Setting("bit_rate", "bit rate", Cost.SCHEDULE, (key,), higher, "" if higher else "it is the highest")
+
+
+def _data_bit_rate(network: Network) -> Setting:
+    """Higher data bit rates of CAN FD, the next higher first: transceivers and cable must carry it."""
+    key = "bus.data_bit_rate_kbit_s"
+    higher = tuple({key: rate} for rate in DATA_BIT_RATES if rate > network.profile.bus.data_bit_rate_kbit_s)
+    return Setting(
+        "data_bit_rate", "data bit rate", Cost.SCHEDULE, (key,), higher, "" if higher else "it is the highest"
+    )
 
 
 def _identifier_bits(network: Network) -> Setting:

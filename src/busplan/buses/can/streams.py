@@ -118,6 +118,7 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
             "first": block,
             "identifiers": 1,
             "identifier_bits": traffic.identifier_bits,
+            "data_bit_rate_kbit_s": traffic.data_bit_rate_kbit_s,
             "period_us": traffic.period_us,
             "jitter_us": 0.0,
             "deadline_us": traffic.period_us,
@@ -127,6 +128,7 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
             size,
             identifier_bits=own["identifier_bits"],
             bit_rate_kbit_s=traffic.bit_rate_kbit_s,
+            data_bit_rate_kbit_s=own.pop("data_bit_rate_kbit_s"),
             is_stuffed=is_stuffed,
         )
         return Stream(name, **own, block=place(block, own["identifier_bits"]), data_bytes=size, frame_us=us)
@@ -156,7 +158,7 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
             yield own._replace(identifiers=choose(is_there, count, 0), frame_us=choose(is_there, own.frame_us, 0.0))
             left_bytes = left_bytes - most_bytes
     for message in traffic.messages:
-        more = {key: getattr(message, key) for key in ("period_us", "jitter_us", "deadline_us", "identifier_bits")}
+        more = {key: getattr(message, key) for key in _OF_MESSAGE}
         yield sent(
             message.name,
             int(plain(message.identifier)),
@@ -165,6 +167,9 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
             identifiers=_whole(message.senders),
             **more,
         )
+
+
+_OF_MESSAGE: Final = ("period_us", "jitter_us", "deadline_us", "identifier_bits", "data_bit_rate_kbit_s")
 
 
 def _most_bytes(pdos: Pdos) -> Iterator[int]:

@@ -5,10 +5,17 @@ from functools import cached_property, lru_cache, reduce
 from itertools import islice
 from typing import Any, Final, NamedTuple
 
-from busplan.buses.can.constants import BASE_BITS, COMMAND_IDENTIFIER, FEEDBACK_IDENTIFIER, FRAME_BYTES, MOST_PDOS
+from busplan.buses.can.constants import (
+    BASE_BITS,
+    COMMAND_IDENTIFIER,
+    FD_FRAME_BYTES,
+    FEEDBACK_IDENTIFIER,
+    FRAME_BYTES,
+    MOST_PDOS,
+)
 from busplan.buses.can.equations import share_bytes
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, Traced, choose, larger, pointwise
+from busplan.elementwise import Number, Traced, choose, is_off, larger, pointwise
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 FOLLOWS: Final = -1
@@ -55,6 +62,8 @@ class Message(NamedTuple):
     identifier_bits: Number = BASE_BITS
     senders: Number = 1
     """Nodes that send it, each with the identifier behind that of the node before [1]."""
+    data_bit_rate_kbit_s: Number = 0.0
+    """Of an FD frame; 0 for a classical frame."""
 
 
 class Traffic(NamedTuple):
@@ -62,6 +71,8 @@ class Traffic(NamedTuple):
 
     period_us: Number
     bit_rate_kbit_s: Number
+    data_bit_rate_kbit_s: Number
+    """Of SYNC and PDOs as FD frames; 0 where they are classical."""
     identifier_bits: Number
     sync_identifier: Number
     sync_bytes: Number
@@ -143,6 +154,9 @@ class Sent:
         order = [traffic.sync_identifier, *(pdos.identifier for pdos in traffic.pdos), *messages]
         if not all(message.identifier_bits is traffic.identifier_bits for message in traffic.messages):
             order += (traffic.identifier_bits, *(message.identifier_bits for message in traffic.messages))
+        if not all(is_off(message.data_bit_rate_kbit_s) for message in traffic.messages):
+            # Which of an FD frame and any other frame is longer rests on the rates and the format.
+            order += (traffic.bit_rate_kbit_s, traffic.data_bit_rate_kbit_s, traffic.identifier_bits)
         return all(isinstance(number, int | float) for number in order) and not any(
             isinstance(number, Traced) for number in traffic.numbers()
         )
@@ -219,8 +233,12 @@ def traffic_of_profile(profile: Any) -> Traffic:
 
 def without_times(traffic: Traffic) -> Traffic:
     """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
-    messages = tuple(message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for message in traffic.messages)
-    return traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, read_us=0.0, host_us=0.0, messages=messages)
+    messages = tuple(
+        message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0, data_bit_rate_kbit_s=0.0)
+        for message in traffic.messages
+    )
+    own = traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, data_bit_rate_kbit_s=0.0, read_us=0.0, host_us=0.0)
+    return own._replace(messages=messages)
 
 
 def host_us(bus: Any) -> Number:
@@ -239,13 +257,14 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes
     return Traffic(
         period_us=period_us,
         bit_rate_kbit_s=bus.bit_rate_kbit_s,
+        data_bit_rate_kbit_s=0.0 if bus.data_bit_rate_kbit_s is None else bus.data_bit_rate_kbit_s,
         identifier_bits=bus.identifier_bits,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
         read_us=reduce(larger, (sender.read_us for sender in senders)),
         host_us=host_us(bus),
         pdos=tuple(
-            _pdos(sender, kind, number, is_first=not place)
+            _pdos(sender, bus, kind, number, is_first=not place)
             for number, kind in enumerate(TRANSACTION_KINDS)
             for place, sender in enumerate(senders)
         ),
@@ -253,16 +272,18 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes
     )
 
 
-def _pdos(sender: _Senders, kind: TransactionKind, number: int, *, is_first: bool) -> Pdos:
+def _pdos(sender: _Senders, bus: Any, kind: TransactionKind, number: int, *, is_first: bool) -> Pdos:
     identifier = getattr(sender.payload, f"{NAMES[kind]}_identifier")
     if identifier is None:
         identifier = int(_FIRST[kind]) if is_first else FOLLOWS
     payload_bytes = share_bytes(sender.payloads_bytes[number], pdos=sender.pdos_each)
     pdos = Pdos(kind, sender.name, identifier, sender.pdos, payload_bytes)
     lengths = getattr(sender.payload, f"{NAMES[kind]}_pdos")
-    if lengths is None:
+    if lengths is not None:
+        return pdos._replace(frame_bytes=lengths, most_bytes=sum(lengths))
+    if bus.data_bit_rate_kbit_s is None:
         return pdos
-    return pdos._replace(frame_bytes=lengths, most_bytes=sum(lengths))
+    return pdos._replace(frame_bytes=(FD_FRAME_BYTES,), most_bytes=int(MOST_PDOS * FD_FRAME_BYTES))
 
 
 def _message(said: Any, bus: Any, nodes: Number) -> Message:
@@ -276,4 +297,5 @@ def _message(said: Any, bus: Any, nodes: Number) -> Message:
         deadline_us,
         bus.identifier_bits if said.identifier_bits is None else said.identifier_bits,
         nodes if said.per_node else 1,
+        bus.data_bit_rate_kbit_s if said.fd else 0.0,
     )

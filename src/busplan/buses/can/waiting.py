@@ -310,14 +310,37 @@ def response(own: Stream, traffic: Traffic, *, is_stuffed: bool) -> Response | N
     """
     if own.is_message:
         return messages(traffic, is_stuffed=is_stuffed).response(own)
-    rivals = [stream for stream in streams(traffic, is_stuffed=is_stuffed) if stream is not own]
-    lower_us = (
-        plain(stream.frame_us)
-        for stream in rivals
-        if not stream.goes_before(own) and (own.name != SYNC or stream.is_message)
-    )
-    higher = [stream.sender() for stream in rivals if stream.goes_before(own)]
+    higher, blocking_us = _rivals(own, streams(traffic, is_stuffed=is_stuffed))
     if own.identifiers > 1:
         higher.append(own.sender(own.identifiers - 1))
-    blocking_us, bit = max(lower_us, default=0.0), plain(bit_us(traffic.bit_rate_kbit_s))
-    return worst_response(own.sender(1), higher, blocking_us=blocking_us, bit_us=bit)
+    bit = plain(bit_us(traffic.bit_rate_kbit_s))
+    return worst_response(own.sender(1), higher, blocking_us=plain(blocking_us), bit_us=bit)
+
+
+def _rivals(own: Stream, each: Sequence[Stream]) -> tuple[list[Sender], Points]:
+    """What goes before SYNC or a PDO, and the longest frame that may hold it up [us]."""
+    higher = [stream.sender() for stream in each if stream is not own and stream.goes_before(own)]
+    lower = (stream for stream in each if not stream.goes_before(own) and (own.name != SYNC or stream.is_message))
+    nothing: Points = 0.0
+    return higher, reduce(larger, (stream.frame_us for stream in lower), nothing)
+
+
+def sync_spread_us(traffic: Traffic, *, is_stuffed: bool) -> Points:
+    """Delay of SYNC by messages, B + I; infinite where it has no end [us].
+
+    Parameters
+    ----------
+    traffic
+        What is sent, as `Sent.of` gives it.
+    is_stuffed
+        Whether the stuff bits of the worst case are counted.
+
+    Raises
+    ------
+    TooManyStepsError
+        It takes too many steps to find.
+    """
+    own, *_ = each = streams(traffic, is_stuffed=is_stuffed)
+    higher, blocking_us = _rivals(own, each)
+    worst = worst_instance(own.sender(1), higher, blocking_us=blocking_us, bit_us=bit_us(traffic.bit_rate_kbit_s))
+    return inf if worst is None else choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)

@@ -85,7 +85,7 @@ class EthercatCycle(BusCycle):
     @cached_property
     def process_bytes(self) -> Number:
         """Process data of all devices [bytes]."""
-        return named(total(own.number * own.data_bytes for own in self._devices), "process_bytes", "D")
+        return named(total(alike.number * alike.data_bytes for alike in self._devices), "process_bytes", "D")
 
     @cached_property
     def _overhead_bytes(self) -> Number:
@@ -103,7 +103,7 @@ class EthercatCycle(BusCycle):
 
     @property
     def most_required_us(self) -> Number:
-        """No less than with fewer devices: a short last frame takes less to receive than the full frame before it."""
+        """Upper bound over all smaller node counts: a short last frame is received faster than the full frame."""
         if not self.counts_reception:
             return self.required_us
         last_us, before_us = (
@@ -133,7 +133,7 @@ class EthercatCycle(BusCycle):
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def bias_us(self) -> Number:
-        """Time of process data beyond the wire: about a copy in the host [us]."""
+        """Time that process data take beyond the wire, about that of a copy in the host [us]."""
         return self.process_bytes * BYTE_BIAS_US
 
     def doubts(self) -> tuple[Doubt, ...]:
@@ -155,16 +155,16 @@ class EthercatCycle(BusCycle):
         return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in keys.items() if not value)
 
     def _frames(self) -> Iterator[BusEvent]:
-        """All of each frame but its data, then the data of each of its devices."""
-        sizes = [plain(own.data_bytes) for own in self._devices for _ in range(int(plain(own.number)))]
+        """Each frame: everything but its data, then the data of each device that it carries."""
+        sizes = [plain(alike.data_bytes) for alike in self._devices for _ in range(int(plain(alike.number)))]
         number = 0
         for run in frames(self.network):
-            for own in run.each():
+            for carried in run.each():
                 number += 1
-                overhead = plain(frame_bytes(run.datagrams_bytes)) - sum(sizes[device - 1] for device in own)
+                overhead = plain(frame_bytes(run.datagrams_bytes)) - sum(sizes[device - 1] for device in carried)
                 us, label = plain(sending_us(overhead)), f"headers of frame {number}"
                 yield BusEvent("overhead", "cycle_frames_us", us, label, None, "frame")
-                for device in own:
+                for device in carried:
                     us = plain(sending_us(sizes[device - 1]))
                     yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
 
@@ -187,7 +187,7 @@ class EthercatCycle(BusCycle):
         return arrival_us(self.network, node)
 
     def figures(self) -> Mapping[str, Number | None]:
-        """Frames and process data, and whether commands come before SYNC0."""
+        """Frames, process data, when the last command is taken, and when SYNC0 comes."""
         has_clocks = self.network.profile.bus.distributed_clocks
         return {
             "frames": self.packing.frames,

@@ -31,7 +31,13 @@ def _delay(spread: Spread, port: str, source: str) -> tuple[Sourced, Sourced]:
     """The mean delay of the devices of a port, and the standard uncertainty of one more kind of device."""
     of_mean, of_doubt = f"{source}, their mean", f"{source}, their sd sqrt(1 + 1/n)"
     return (
-        Sourced(spread.mean, unit="us", grade="measured", source=of_mean, meaning=f"delay of a {port} device, one way"),
+        Sourced(
+            spread.mean,
+            unit="us",
+            grade="measured",
+            source=of_mean,
+            meaning=f"one-way delay of a device with {port} ports",
+        ),
         Sourced(
             spread.uncertainty,
             unit="us",
@@ -55,7 +61,7 @@ BYTE_US: Final = Sourced(
 PREAMBLE_BYTES: Final = _bytes(8, "preamble and start of a frame", _ETHERNET)
 ETHERNET_BYTES: Final = _bytes(14, "Ethernet header: two addresses and the type", _ETHERNET)
 CHECK_BYTES: Final = _bytes(4, "frame check sequence", _ETHERNET)
-GAP_BYTES: Final = _bytes(12, "gap behind a frame", _ETHERNET)
+GAP_BYTES: Final = _bytes(12, "gap after a frame", _ETHERNET)
 HEADER_BYTES: Final = _bytes(2, "EtherCAT header of a frame", _ETG)
 DATAGRAM_BYTES: Final = _bytes(12, "header of a datagram, 10, and its working counter, 2", _ETG)
 LEAST_FRAME_BYTES: Final = _bytes(84, "shortest frame on the wire, gap included; shorter ones are padded", _ETHERNET)
@@ -144,7 +150,7 @@ SYNC_SHIFT: Final = Sourced(
     unit="1",
     grade="assumed",
     source="chosen: the middle of the cycle",
-    meaning="where SYNC0 of the distributed clocks lies behind the master's task, as a share of the period",
+    meaning="where SYNC0 of the distributed clocks lies after the master's task, as a share of the period",
 )
 
 CONSTANTS: Final = constants({key: value for key, value in globals().items() if not key.startswith("_")})

@@ -19,7 +19,7 @@ COMMAND: Final = Figure(
     better="less",
 )
 SYNC0: Final = Figure(
-    "sync0_us", "t_sync", "profile", "the first SYNC0 of the distributed clocks behind the master's task", "SYNC0"
+    "sync0_us", "t_sync", "profile", "the first SYNC0 of the distributed clocks after the master's task", "SYNC0"
 )
 OWN: Final = (FRAMES, PROCESS, COMMAND, SYNC0)
 TERMS: Final = (
@@ -28,7 +28,7 @@ TERMS: Final = (
         "cycle_jitter_us",
         "J",
         "profile",
-        "latest start of the frames behind the planned one",
+        "how late the frames may start",
         "master's jitter",
         ink="contention",
         letter="J",
@@ -72,7 +72,7 @@ LATENCY_TABLE: Final = (
     Figure("frame_wait_us", "wait", "profile", "wait of feedback for the next frame", "wait for a frame"),
     Figure("pipeline_us", "n T_s", "profile", "cycles that the master computes in", "master's pipeline"),
     Figure("master_us", "T_master", "profile", "the master's own time for a frame", "master"),
-    Figure("jitter_us", "J", "profile", "latest start of the frame behind the planned one", "jitter"),
+    Figure("jitter_us", "J", "profile", "how late the frame may start", "jitter"),
     Figure("sending_us", "sending", FRAME, "all frames of process data on the wire", "sending"),
     Figure("path_us", "path", "DC time stamps", "delay of devices and cables on the way", "devices and cables"),
     Figure(

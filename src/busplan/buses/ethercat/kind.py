@@ -108,7 +108,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         return of_latency
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """SYNC0 later in the cycle, for commands that come behind it."""
+        """SYNC0 later in the cycle, for commands that come after it."""
         bus = network.profile.bus
         if not (bus.distributed_clocks and bus.sync_shift):
             return ()

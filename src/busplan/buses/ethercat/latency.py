@@ -1,6 +1,6 @@
 """Latencies of a command to a drive, of feedback to the master, and of a loop over both.
 
-The master's task starts each cycle. SYNC0 of the distributed clocks lies at a share of the period behind it: there
+The master's task starts each cycle. SYNC0 of the distributed clocks lies at a share of the period after it: there
 drives sample, and commands that have arrived take effect. Without distributed clocks drives act when their frame has
 passed.
 """
@@ -26,7 +26,7 @@ _SUM = LATENCY_TABLE[-1].key
 
 
 def sync0_us(network: Network) -> Number:
-    """The first SYNC0 behind the master's task; 0 without distributed clocks [us]."""
+    """The first SYNC0 after the master's task; 0 without distributed clocks [us]."""
     return sync0_share(network) * network.period_us if network.profile.bus.distributed_clocks else 0.0
 
 

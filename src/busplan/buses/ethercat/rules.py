@@ -126,7 +126,7 @@ RULES: Final = (
         "command-behind-sync",
         "error",
         "commands are not shown to be taken before SYNC0",
-        "Drives with distributed clocks act at SYNC0, which lies at bus.sync_shift of the period behind the master's "
+        "Drives with distributed clocks act at SYNC0, which lies at bus.sync_shift of the period after the master's "
         "task. A command that has not arrived by then, with the master's jitter and the drive's own time, waits for "
         "the next one: a cycle more of dead time, and where only some drives are late their axes are a cycle apart. It "
         "is a limit, judged with its doubt as time is. With bus.sync_shift = 0, SYNC0 at the task itself, the SYNC0 "

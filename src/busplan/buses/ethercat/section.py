@@ -64,8 +64,8 @@ class EthercatBus(BusSection):
     )
     sync_shift: Annotated[float, Field(ge=0, le=0.999, allow_inf_nan=False)] = Field(
         default=float(SYNC_SHIFT),
-        description="Where SYNC0 lies behind the master's task, a share of the period, 0..0.999; 0 is the SYNC0 at the "
-        "next task; read with distributed clocks",
+        description="Where SYNC0 lies after the master's task, a share of the period, 0..0.999; 0 is the SYNC0 at the "
+        "next task; used only with distributed clocks",
         examples=[0.5],
     )
     mailbox_polls: Annotated[int, Field(ge=0, le=MAX_COUNT)] = Field(
@@ -76,8 +76,8 @@ class EthercatBus(BusSection):
     )
     master_us: TimeUs = Field(
         default=0.0,
-        description="The master's own time in each cycle: from its task to the wire, and back behind the last byte "
-        "[us]",
+        description="The master's own time in each cycle: from its task to the wire, and from the last byte to its "
+        "task [us]",
         examples=[30],
     )
     master_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
@@ -89,13 +89,11 @@ class EthercatBus(BusSection):
         "calibrated, else half of it [us]",
         examples=[5],
     )
-    master_jitter_us: TimeUs = Field(
-        default=0.0, description="Latest start of the frames behind the planned one [us]", examples=[20]
-    )
+    master_jitter_us: TimeUs = Field(default=0.0, description="How late the frames may start [us]", examples=[20])
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default=int(PIPELINE_CYCLES),
         description="Cycles from the frame that brings feedback to the one that takes the command computed from it; "
-        "of latency, and of a loop on the host",
+        "used in latencies and in a loop on the host",
         examples=[1],
     )
     timing_model: TimingModelName = Field(

@@ -146,7 +146,7 @@ def mailbox_frame_us(network: Network) -> Number:
 def arrival_us(network: Network, device: int) -> float:
     """When a device has its command, from the start of a cycle of plain numbers [us].
 
-    It acts when the last byte of its frame has come: a check behind the data says whether the frame is whole. The
+    It acts when the last byte of its frame has come: a check after the data says whether the frame is whole. The
     frames start as late as the master's jitter lets them.
 
     Parameters

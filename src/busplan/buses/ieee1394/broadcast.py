@@ -38,7 +38,7 @@ from busplan.elementwise import Number, alike, is_off, larger, named, total
 
 
 def hub_block_bytes(network: Network) -> Number:
-    """Payload of the hub's block: the data of each node behind its quadlet of sequence, and one of timing [bytes].
+    """Payload of the hub's block: the data of each node after its quadlet of sequence, and one of timing [bytes].
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def hub_block_bytes(network: Network) -> Number:
 
 
 def write_block_bytes(network: Network) -> Number:
-    """Payload of the write: the command to each node behind its header quadlet [bytes].
+    """Payload of the write: the command to each node after its header quadlet [bytes].
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Packets(NamedTuple):
 
 
 class Idle(NamedTuple):
-    """Idle bus before a request of the host, or behind the last request [us]."""
+    """Idle bus before a request of the host, or after the last request [us]."""
 
     gap_us: Number
     """The arbitration reset gap."""
@@ -128,14 +128,14 @@ class BroadcastCycle(CycleWithStarts):
 
     @cached_property
     def first_wait_us(self) -> Number:
-        """Wait of the first node behind the query, beyond its gap [us]."""
+        """Wait of the first node after the query, beyond its gap [us]."""
         return larger(self._clocks_us(FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
 
     def _clocks_us(self, clocks: Number) -> Number:
         return alike(clocks, self.link.hops) / BROADCAST_CLOCK_MHZ
 
     def slot_wait_us(self, group: Group) -> Number:
-        """Wait of the next node behind the broadcast of a node, where each has its own time [us].
+        """Wait of the next node after the broadcast of a node, where each has its own time [us].
 
         With unlike nodes it is the most: a node that is late because of a long broadcast waits less.
 
@@ -151,7 +151,7 @@ class BroadcastCycle(CycleWithStarts):
 
     @cached_property
     def slot_waits_us(self) -> Number:
-        """Wait of all nodes for their times behind the first; nobody waits behind the last [us]."""
+        """Wait of all nodes for their times after the first; nobody waits after the last [us]."""
         groups = self.network.groups
         return total(group.nodes * self.slot_wait_us(group) for group in groups) - self.slot_wait_us(groups[-1])
 
@@ -207,7 +207,7 @@ class BroadcastCycle(CycleWithStarts):
     def hub_wait(self) -> Idle:
         """From the last broadcast to the read of the hub.
 
-        The host waits 10 + 5 N us behind the query, and knows nothing of the broadcasts. Its own time follows that, or
+        The host waits 10 + 5 N us after the query, and knows nothing of the broadcasts. Its own time follows that, or
         the last broadcast if it is later.
         """
         return self._idle(self.host_us, late_us=self.late_us)
@@ -220,7 +220,7 @@ class BroadcastCycle(CycleWithStarts):
 
     @cached_property
     def idle(self) -> Idle:
-        """Behind the read of the hub, and behind the write."""
+        """After the read of the hub, and after the write."""
         return self._idle(self.host_us)
 
     @property
@@ -273,8 +273,8 @@ class BroadcastCycle(CycleWithStarts):
             write("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge"),
         )
         yield Run((*_waits(self.hub_wait, "before the hub is read"), *read_hub))
-        yield Run((*_waits(self.idle, "behind the hub's block"), *write_hub))
-        yield Run(_waits(self.idle, "behind the write"))
+        yield Run((*_waits(self.idle, "after the hub's block"), *write_hub))
+        yield Run(_waits(self.idle, "after the write"))
 
     def _phases(self) -> tuple[dict[str, Number], dict[str, Number]]:
         """The phases of the read of all data, from the query to the host, and of the write of all commands."""

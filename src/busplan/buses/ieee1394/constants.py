@@ -20,7 +20,7 @@ BASE_RATE_MBIT_S: Final = Sourced(
     98.304,
     unit="Mbit/s",
     grade="published",
-    source="IEEE 1394-1995; the gap tables of Linux, Apple and JHU know no packet speed",
+    source="IEEE 1394-1995; the gap tables of Linux, Apple and JHU do not depend on the packet speed",
     meaning="base rate: S100's data rate, and the clock that gaps and PHY delays are counted in",
     symbol="C",
 )
@@ -228,7 +228,7 @@ MAX_BROADCAST_NODES: Final = Sourced(
     unit="nodes",
     grade="published",
     source=f"{_JHU_SOFTWARE}: BoardIO::MAX_BOARDS",
-    meaning="largest number of nodes that the hub collects data of",
+    meaning="largest number of nodes that the hub collects data from",
 )
 BROADCAST_CLOCK_MHZ: Final = Sourced(
     49.152,
@@ -242,28 +242,28 @@ FIRST_BROADCAST_CLOCKS: Final = Sourced(
     unit="clocks",
     grade="published",
     source=_JHU_FIRMWARE,
-    meaning="how long the first node waits behind the query",
+    meaning="how long the first node waits after the query",
 )
 BROADCAST_SLOT_CLOCKS: Final = Sourced(
     256,
     unit="clocks",
     grade="published",
     source="JHU mechatronics-firmware, FireWire.v up to Rev 7: 256 clocks for each board before it",
-    meaning="from the time of a node to broadcast to that of the next, where each has its own",
+    meaning="from a node's time to broadcast to the next node's time, with timed requests",
 )
 HUB_WAIT_US: Final = Sourced(
     10,
     unit="us",
     grade="published",
     source=f"{_JHU_SOFTWARE}: 10 + 5 N",
-    meaning="what the host waits behind the query, whatever the number of nodes",
+    meaning="wait of the host after the query, whatever the number of nodes",
 )
 HUB_WAIT_PER_NODE_US: Final = Sourced(
     5,
     unit="us",
     grade="published",
     source=f"{_JHU_SOFTWARE}: 10 + 5 N",
-    meaning="what the host waits behind the query for each node",
+    meaning="further wait of the host after the query for each node",
 )
 BROADCAST_NODE_BYTES: Final = Sourced(
     4,
@@ -332,7 +332,7 @@ GAP_COUNT_TABLE_HOPS: Final = Sourced(
     unit="hops",
     grade="published",
     source="P1394a table C-2, 1394a table E-1, as Apple, JHU and, to 15 hops, Linux carry it",
-    meaning="hops that the table of smallest safe gap counts knows, for cables of 4.5 m",
+    meaning="most hops in the table of smallest safe gap counts, for cables of 4.5 m",
 )
 
 

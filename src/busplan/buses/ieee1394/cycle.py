@@ -32,8 +32,9 @@ _SHOWN: Final = (
 class Ieee1394Cycle(CycleWithStarts):
     """The synchronous packet, a read and then a write of every node, and the window for non-periodic data.
 
-    Every node is charged the hops of the farthest, or, with `charge_hops = "own"`, its own: for its arbitration only
-    where the host is the root. What all nodes hear, as the synchronous packet, goes to the farthest.
+    The times of a node count the hops of the farthest node or, with `charge_hops = "own"`, its own; its arbitration
+    counts its own only where the host is the root. What all nodes hear, as the synchronous packet, goes to the
+    farthest.
 
     References
     ----------
@@ -61,7 +62,7 @@ class Ieee1394Cycle(CycleWithStarts):
         return exchange(network, network.groups[place], kind, model=self.model, link=link, common=common, suffix=suffix)
 
     def _own_delays(self, link: Link) -> Delays:
-        """Delays over a node's own way; its arbitration goes to the root, wherever that is."""
+        """Delays over a node's own hops; its arbitration goes to the root, which may be any node."""
         own = self.delays_of(link, self.delays)
         is_at_host = self.network.profile.bus.root == "host"
         return own if is_at_host else own._replace(arbitration_us=self.delays.arbitration_us)
@@ -102,7 +103,7 @@ class Ieee1394Cycle(CycleWithStarts):
         return events(transaction, model=self.model)
 
     def bias_us(self) -> Number | None:
-        """Time of the transactions beyond the model, on the mean [us]."""
+        """Mean time that the transactions take beyond the model [us]; None under the paper model."""
         if not self.is_known:
             return None
         return doubts.bias_us(self.exchanges, self.network, gap_count=self.link.gap_count)
@@ -111,14 +112,14 @@ class Ieee1394Cycle(CycleWithStarts):
         """Inputs that are not known exactly."""
         if not self.is_known:
             return ()
-        # The hops of the synchronous packet, of retries and of cycle starts; those of transactions come to them.
+        # Hops of the synchronous packet, of retries and of cycle starts; `of_cycle` adds those of transactions.
         hop_delays = 2 + 3 * self.network.profile.cycle.retries + 2 * self.number_of_starts
         return doubts.of_cycle(
             self.exchanges, self.network, link=self.link, gaps=self.delays.gaps, hop_delays=hop_delays
         )
 
     def figures(self) -> Mapping[str, Number | None]:
-        """Settings of the bus, the latencies, and the number of nodes as the paper has it."""
+        """Settings of the bus, the latencies and gaps, and the number of nodes by equation (11)."""
         network, read, write = self.network, self._longest("read"), self._longest("write")
         given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
         return {
@@ -179,7 +180,7 @@ class Ieee1394Cycle(CycleWithStarts):
         )
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """Parts that the profile does not say."""
+        """Parts of the cycle that the profile does not give."""
         split = {id(transaction.group) for transaction in self.exchanges if transaction.responder.answer == "split"}
         return (
             *super().left_out(),

@@ -76,7 +76,7 @@ class CycleWithStarts(BusCycle):
 
     @abstractmethod
     def schedule(self) -> Iterator[BusEvent | Run]:
-        """The cycle in the order of its protocol, without retries and the window, which are behind it."""
+        """The cycle in the order of its protocol, without retries and the window, which follow it."""
 
     @property
     @abstractmethod
@@ -179,7 +179,7 @@ class CycleWithStarts(BusCycle):
         return extra_us + more * self.cycle_start_us
 
     def taking_us(self, group: Group) -> float:
-        """Nothing behind a split write, which holds the execution; else the node executes beside the bus [us]."""
+        """Nothing after a split write, which holds the execution; else the node executes beside the bus [us]."""
         is_split = group.node.write_response == "split" and not is_broadcast(self.network)
         return 0.0 if is_split else super().taking_us(group)
 
@@ -204,7 +204,7 @@ class CycleWithStarts(BusCycle):
 
     @property
     def is_known(self) -> bool:
-        """Whether the model's error is known: only of the model that decides."""
+        """Whether bias and doubts of the model are known: those of `standard`, which decides, are."""
         return self.model == "standard"
 
     def left_out(self) -> tuple[LeftOut, ...]:

@@ -18,7 +18,7 @@ from busplan.buses.ieee1394.constants import (
     MAX_GAP_COUNT,
     PHY_DELAY_HALF_WIDTH_US,
 )
-from busplan.buses.ieee1394.idle import Gaps, busy_us
+from busplan.buses.ieee1394.idle import Gaps, between_packets_us
 from busplan.buses.ieee1394.table_1 import residual
 from busplan.buses.ieee1394.timing import Link
 from busplan.buses.ieee1394.transactions import ARBITRATION, PACKET_PARTS, Exchange, arbitration_hops
@@ -90,13 +90,13 @@ def of_cycle(
         answer, bound_us = own.answer, own.execution_us + own.worst_extra_us
 
         def busy_at(steps: int) -> Number:
-            found_us = busy_us(
+            idle_us = between_packets_us(
                 answer,
                 gaps=gaps,
                 execution_us=bound_us + steps * execution_us if steps else bound_us,
                 host_us=own.host_us + steps * host_us if steps else own.host_us,
             )
-            return named(found_us, "busy_us", f"busy{steps:+d}u" if steps else "busy")
+            return named(idle_us, "busy_us", f"busy{steps:+d}u" if steps else "busy")
 
         above_us, own_us, below_us = busy_at(2), busy_at(0), busy_at(-2)
         return larger(above_us - own_us, own_us - below_us) / 2

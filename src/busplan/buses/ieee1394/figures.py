@@ -65,7 +65,7 @@ TERMS: Final = (
         "cycle_starts_us",
         "cycle starts",
         "cycle",
-        "cycle start packets, and the isochronous traffic behind them",
+        "cycle start packets, and the isochronous traffic after them",
         "cycle starts",
         ink="sync",
         letter="C",
@@ -259,7 +259,7 @@ LATENCY_TABLE: Final = tuple(
         "transaction_us",
     )
 )
-"""In the order of the bench: T1+T2, T3, T4+T5, and the gaps behind them."""
+"""In the order of the bench: T1+T2, T3, T4+T5, and the gaps after them."""
 
 FIGURES: Final = BusFigures(
     TERMS,

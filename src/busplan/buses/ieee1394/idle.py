@@ -4,7 +4,7 @@ A gap is a threshold of an idle period: the time for which the bus has been idle
 added to each other, and the time in which a node executes is idle bus, too. Fairness lets a node start one asynchronous
 packet in a fairness interval, which an idle period of the arbitration reset gap ends.
 
-The execution time is an upper bound, and a faster node must not make a plan worse: each time is the largest over all
+The execution time is an upper bound, and a faster node must not lengthen the cycle: each time is the largest over all
 faster nodes.
 
 References
@@ -34,11 +34,11 @@ class Gaps(NamedTuple):
     both_us: Number
     """T_sum, equation (10)."""
     alone: Number
-    """Whether there is a single node: a truth value, or an array of them."""
+    """Whether there is a single node: a boolean, or an array of booleans."""
 
 
 class IdleTime(NamedTuple):
-    """Idle bus around a transaction, beside the execution [us]."""
+    """Idle bus around a transaction, without the execution [us]."""
 
     idle_us: Number
     """Idle bus of the gaps."""
@@ -74,21 +74,23 @@ def gaps_as_thresholds(answer: Answer, *, gaps: Gaps, execution_us: Number, host
     IdleTime(idle_us=31.5, host_us=9.0)
     """
     if answer == "split":
-        alone_us = busy_us(answer, gaps=gaps, execution_us=execution_us, host_us=0.0)
+        without_host_us = between_packets_us(answer, gaps=gaps, execution_us=execution_us, host_us=0.0)
         if is_off(host_us):
-            return IdleTime(alone_us - execution_us, 0.0)
-        with_host_us = busy_us(answer, gaps=gaps, execution_us=execution_us, host_us=host_us)
-        return IdleTime(alone_us - execution_us, with_host_us - alone_us)
+            return IdleTime(without_host_us - execution_us, 0.0)
+        with_host_us = between_packets_us(answer, gaps=gaps, execution_us=execution_us, host_us=host_us)
+        return IdleTime(without_host_us - execution_us, with_host_us - without_host_us)
     idle_us = gaps.arbitration_reset_us
-    return IdleTime(idle_us, busy_us(answer, gaps=gaps, execution_us=execution_us, host_us=host_us) - idle_us)
+    return IdleTime(
+        idle_us, between_packets_us(answer, gaps=gaps, execution_us=execution_us, host_us=host_us) - idle_us
+    )
 
 
-def busy_us(answer: Answer, *, gaps: Gaps, execution_us: Number, host_us: Number) -> Number:
-    """Time of a transaction beside its packets: execution, gaps and host [us].
+def between_packets_us(answer: Answer, *, gaps: Gaps, execution_us: Number, host_us: Number) -> Number:
+    """Time of a transaction without its packets: execution, gaps and host [us].
 
-    Of a split transaction both idle periods: up to its response, and behind it. A fast node ends the first before the
-    arbitration reset gap, which the second must then wait for. With a single node on the bus, its response may find its
-    turn used in the same interval.
+    A split transaction has two idle periods, before and after its response. A fast node ends the first before the
+    arbitration reset gap has passed; then the second must be as long as that gap. A single node on the bus may have
+    used its turn in the fairness interval; then the first must be as long.
 
     Parameters
     ----------

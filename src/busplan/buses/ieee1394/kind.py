@@ -223,7 +223,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             Perturbation(
                 f"host time +{_HOST_STEP_US:g} us",
                 {"host.transaction_us": profile.host.transaction_us + _HOST_STEP_US},
-                if_nothing="the gaps behind the transactions hide it",
+                if_nothing="the gaps after the transactions hide it",
             ),
         )
 

@@ -232,16 +232,16 @@ RULES: Final = (
         "the paper's equations say otherwise",
         "The verdict is by the standard's timing, and the paper's equations contradict it. The paper counts gaps in "
         "the data rate, and adds up those of a transaction; the wire counts them at the base rate, four times slower "
-        "at S400, as thresholds of an idle period. A plan that fits the paper alone is likely to fail on the machine.",
+        "at S400, as thresholds of an idle period. A cycle that fits only by the paper is likely to fail.",
         paper_disagrees,
     ),
     Rule(
         "BP113",
         "fits-only-until-bus-reset",
         "warning",
-        "the cycle fits at its own gap count alone",
-        "After a bus reset the gap count is 63 until the bus manager writes it again (TI SLLS423I, p. 41). A plan that "
-        "fits with a smaller one alone stops working then: write the gap count after each reset, or plan with 63.",
+        "the cycle fits, but not after a bus reset",
+        "After a bus reset the gap count is 63 until the bus manager writes it again (TI SLLS423I, p. 41). A cycle "
+        "that fits only at a smaller count does not fit then: write the gap count after each reset, or plan with 63.",
         fits_only_until_bus_reset,
     ),
     Rule(

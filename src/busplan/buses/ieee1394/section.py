@@ -77,14 +77,14 @@ class Ieee1394Bus(BusSection):
     )
     charge_hops: Literal["farthest", "own"] = Field(
         default="farthest",
-        description="Which way each node is charged: that to the farthest node, or its own; in a tree its own is "
-        "the hops of its group. A broadcast goes to the farthest",
+        description="Cable hops in the times of each node: those to the farthest node, or its own (in a tree, the "
+        "hops of its group). A broadcast always goes to the farthest",
         examples=["own"],
     )
     root: Literal["host"] | None = Field(
         default=None,
-        description='Which node is the root that grants arbitration: "host", or none named. Where none is, with '
-        'charge_hops = "own", arbitration is charged the whole chain',
+        description='Root, which grants arbitration: "host"; without it any node may be the root, so with '
+        'charge_hops = "own" arbitration still counts the hops of the whole chain',
         examples=["host"],
     )
     timing_model: TimingModelName = Field(
@@ -94,13 +94,13 @@ class Ieee1394Bus(BusSection):
     )
     cycle_master: bool = Field(
         default=False,
-        description="Whether a node sends cycle start packets, one each 125 us; an OHCI host does by default "
+        description="Whether a node sends cycle start packets, one every 125 us; an OHCI host does by default "
         "(Linux, ohci.c)",
         examples=[True],
     )
     isochronous_us: Annotated[float, Field(ge=0, le=float(CYCLE_US), allow_inf_nan=False)] = Field(
         default=0.0,
-        description="Isochronous traffic behind each cycle start; 100 us at most (Linux, core.h: 80 % of a cycle) [us]",
+        description="Isochronous traffic after each cycle start; 100 us at most (Linux, core.h: 80 % of a cycle) [us]",
         examples=[20],
     )
     phy_delay_us: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = Field(
@@ -146,12 +146,12 @@ class Sync(Section):
 
     ping_us: TimeUs = Field(
         default=float(PING_US),
-        description="Latency of a ping to one node, measured; of the paper model alone [us]",
+        description="Latency of a ping to one node, measured; used by the paper model alone [us]",
         examples=[0.3],
     )
     ping_per_node_us: TimeUs = Field(
         default=float(PING_PER_NODE_US),
-        description="What each further node adds, measured; of the paper model alone [us]",
+        description="What each further node adds, measured; used by the paper model alone [us]",
         examples=[0.1],
     )
 
@@ -169,8 +169,8 @@ class Ieee1394CycleSection(CycleSection):
     broadcast_request: BroadcastRequest = Field(
         default="priority",
         description="How the nodes ask for the bus to broadcast: priority, each after a subaction gap (JHU firmware "
-        "Rev 9); isochronous, without one (Rev 8); timed, each at a time of its own (up to Rev 7); read with the "
-        "schedule broadcast",
+        "Rev 9); isochronous, without one (Rev 8); timed, each at a time of its own (up to Rev 7). Used only "
+        "by the broadcast schedule",
         examples=["isochronous"],
     )
     retries: Annotated[int, Field(ge=0, le=MAX_COUNT)] = Field(
@@ -196,13 +196,13 @@ class FittedExecution(Section):
 
     residual: Literal["none", "paper", "standard"] = Field(
         default="none",
-        description="Timing model whose packets were taken off the latency; none where their time was measured "
+        description="Timing model whose packet times were subtracted from the latency; none where they were measured "
         "(busplan calibrate writes it)",
         examples=["standard"],
     )
     measured_gap_count: Annotated[int, Field(ge=0, le=MAX_GAP_COUNT)] = Field(
         default=MAX_GAP_COUNT,
-        description="Gap count of the bus that the latency was measured on; read with another residual than none",
+        description="Gap count of the bus that the latency was measured on; used only with a residual other than none",
         examples=[63],
     )
 
@@ -235,7 +235,7 @@ class Ieee1394Node(NodeSection):
     response_us: Annotated[float, Field(ge=0, le=float(ARBITRATION_HOLD_US), allow_inf_nan=False)] = Field(
         default=float(ARBITRATION_HOLD_US),
         description="Time from the acknowledge to a concatenated response; hardware slower than MAX_BUS_HOLD, 1.63 us "
-        "(recalled), answers split. Other answers do not read it [us]",
+        "(recalled), answers split. Used only for concatenated answers [us]",
         examples=[0.5],
     )
 
@@ -246,7 +246,7 @@ class Ieee1394Group(Ieee1394Node, Ieee1394Payload, GroupSection):
     axes: GroupAxes = Field(examples=[4])
     hops: Count | None = Field(
         default=None,
-        description="Cable hops from the host to each node of the group, in a tree; in a chain their place says it",
+        description="Cable hops from the host to each node of the group, in a tree; not given in a chain",
         examples=[2],
     )
 

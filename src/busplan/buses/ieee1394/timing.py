@@ -86,7 +86,7 @@ class Link(NamedTuple):
 
 
 class Responder(NamedTuple):
-    """Answer of a node to a transaction, and the host's time behind it.
+    """Answer of a node to a transaction, and the host's time after it.
 
     Parameters
     ----------

@@ -258,7 +258,7 @@ def events(exchanged: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]
 
 
 _Divided = tuple[tuple[BusEvent, ...], tuple[BusEvent, ...]]
-"""Idle bus of a transaction before its response, and behind it."""
+"""Idle bus of a transaction before its response, and after it."""
 
 
 def _gap(kind: str, us: float, label: str) -> BusEvent:
@@ -266,7 +266,7 @@ def _gap(kind: str, us: float, label: str) -> BusEvent:
 
 
 def _added_up(phases: Phases) -> _Divided:
-    """Both gaps behind the transaction."""
+    """Both gaps after the transaction."""
     sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
     subaction = _gap("subaction_gap", sub_us, "subaction gap")
     return (), (subaction, _gap("arbitration_reset_gap", reset_us, "arbitration reset gap"))
@@ -278,7 +278,7 @@ def _by_idle_period(exchanged: Exchange) -> _Divided:
     sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
     idle_us = plain(phases.idle_us)
     if exchanged.responder.answer != "split":
-        return (), (_gap("arbitration_reset_gap", idle_us, "arbitration reset gap behind the transaction"),)
+        return (), (_gap("arbitration_reset_gap", idle_us, "arbitration reset gap after the transaction"),)
     execution_us = plain(phases.execution_us) + plain(phases.worst_extra_us)
     before_us = max(sub_us - execution_us, 0.0)
     behind_us = idle_us - before_us
@@ -289,9 +289,9 @@ def _by_idle_period(exchanged: Exchange) -> _Divided:
     return (
         (_gap("subaction_gap", before_us, "rest of the subaction gap before the response"),),
         (
-            _gap("subaction_gap", gap_us, "subaction gap behind the response")
+            _gap("subaction_gap", gap_us, "subaction gap after the response")
             if has_run
-            else _gap("arbitration_reset_gap", gap_us, "arbitration reset gap behind the response"),
+            else _gap("arbitration_reset_gap", gap_us, "arbitration reset gap after the response"),
             _gap("allowance", allowance_us, "allowance for a faster node"),
         ),
     )

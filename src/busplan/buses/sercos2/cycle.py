@@ -76,10 +76,10 @@ class Sercos2Cycle(SercosCycle):
             gap = BusEvent("gap", "cycle_gap_us", bus.at_gap_us, _GAP, rests_on="bus.at_gap_us", rounds=rounds)
             at = BusEvent("at", "cycle_at_us", at_us, "AT of a drive", transaction="at_stretch")
             yield Run((gap, at), group.nodes, place)
-        yield BusEvent("wait", "cycle_wait_us", bus.turnaround_us, "wait behind the last AT")
+        yield BusEvent("wait", "cycle_wait_us", bus.turnaround_us, "wait after the last AT")
         mdt = BusEvent("mdt", "cycle_mdt_us", self._telegram_us(self.mdt_bytes), "MDT", transaction="mdt_stretch")
         yield Run((mdt,), laid_out=lambda _: self._records(plain(mdt.us)))
-        yield BusEvent("wait", "cycle_wait_us", bus.recovery_us, "recovery of the drives behind the MDT")
+        yield BusEvent("wait", "cycle_wait_us", bus.recovery_us, "recovery of the drives after the MDT")
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def doubts(self) -> tuple[Doubt, ...]:
@@ -87,9 +87,9 @@ class Sercos2Cycle(SercosCycle):
         return (Doubt("bus.at_gap_us", "gap between two drives", self.by_term["cycle_gap_us"] * GAP_SHARE),)
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """The drives' recovery behind the MDT."""
+        """The drives' recovery after the MDT."""
         said = self.network.profile.bus.recovery_us
-        return () if said else (LeftOut("the recovery of the drives behind the MDT", "bus.recovery_us"),)
+        return () if said else (LeftOut("the recovery of the drives after the MDT", "bus.recovery_us"),)
 
     def figures(self) -> Mapping[str, Number | None]:
         """The data rate, and the data of the MDT."""

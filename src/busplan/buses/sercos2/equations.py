@@ -2,7 +2,7 @@
 
 References
 ----------
-IEC 61491; ISO/IEC 13239 (HDLC): a 0 is put behind five 1s between the flags.
+IEC 61491; ISO/IEC 13239 (HDLC): a 0 is put after five 1s between the flags.
 """
 
 from typing import Final, Literal
@@ -17,7 +17,7 @@ DataRate = Literal[2, 4, 8, 16]
 
 _CODE: Final = "sercos2-linuxcnc, a master that drives a ring"
 _KOLLMORGEN: Final = "Kollmorgen, sercos IDN set of S300/S700"
-_HDLC: Final = "sercos.com, telegrams of SERCOS I and II: a 0 behind five 1s"
+_HDLC: Final = "sercos.com, telegrams of SERCOS I and II: a 0 after five 1s"
 
 
 def _bytes(value: int, meaning: str, *, source: str = _CODE) -> Sourced:

@@ -22,7 +22,7 @@ TERMS: Final = (
         "cycle_wait_us",
         "wait",
         "profile",
-        "wait for the drives: before the first AT, behind the last, behind the MDT",
+        "wait for the drives: before the first AT, after the last, after the MDT",
         "wait for drives",
         ink="work",
         letter="W",

@@ -50,7 +50,7 @@ class Sercos2(SercosBus):
     title = "SERCOS I and II"
     also_called = ("SERCOS II", "SERCOS I", "SERCOS 1")
     timing_models = (
-        TimingModel(WORST, "a stuff bit behind every five bits, the most there can be"),
+        TimingModel(WORST, "a stuff bit after every five bits, the most there can be"),
         TimingModel(NONE, "no stuff bits"),
     )
     deciding_model = WORST

@@ -228,7 +228,7 @@ class Sercos3Cycle(SercosCycle):
             for size, node in data:
                 yield BusEvent(f"{sort}_data", term, size * BYTE_US, f"{label}: data of a device", node, sort)
             padding_us = (plain(padded_bytes(used)) - used) * BYTE_US
-            yield BusEvent("gap", term, padding_us + gap * BYTE_US, f"gap behind {label}", None, sort)
+            yield BusEvent("gap", term, padding_us + gap * BYTE_US, f"gap after {label}", None, sort)
 
 
 def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:

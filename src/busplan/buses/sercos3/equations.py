@@ -170,7 +170,7 @@ def _with_items(before: Filling, items: Items, next_bytes: Number, name: str) ->
 
 
 def telegrams_us(filling: Filling, *, gap_bytes: Number) -> Number:
-    """Time of telegrams on the wire, each with the gap behind it [us].
+    """Time of telegrams on the wire, each with the gap after it [us].
 
     Parameters
     ----------

@@ -23,12 +23,12 @@ SORTS: Final[dict[TransactionKind, str]] = {"write": "mdt", "read": "at"}
 
 
 class Telegrams(NamedTuple):
-    """All telegrams of one sort, as a network says them. The numbers may be of any sort."""
+    """All MDT or all AT of a network. The numbers may be of any sort."""
 
     first_bytes: Number
-    """Fields that the first begins with [bytes]."""
+    """Fields at the start of the first telegram [bytes]."""
     next_bytes: Number
-    """Fields that each other begins with [bytes]."""
+    """Fields at the start of each further telegram [bytes]."""
     items: tuple[Items, ...]
     """Service channels, control or status, then the data of each group."""
     name: str
@@ -78,6 +78,5 @@ def data_bytes(network: Network, payload_bytes: Number) -> Number:
 
 
 def has_connections(network: Network) -> bool:
-    """Tell whether cyclic data are connections, each with its control."""
-    is_first: bool = network.profile.bus.version == "V1.0"
-    return not is_first
+    """Tell whether the cyclic data of a device are a connection with a control of its own: from V1.1 on."""
+    return bool(network.profile.bus.version != "V1.0")

@@ -77,7 +77,7 @@ def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str
     for key in values or {}:
         if not isinstance(key, str):
             raise BusplanError(f"{name} {key!r}: expected a dotted key of the profile, as bus.nodes")
-    return {key: plain(value) for key, value in (values or {}).items()}
+    return {key: from_numpy(value) for key, value in (values or {}).items()}
 
 
 def argument(path: Path) -> str:
@@ -95,26 +95,26 @@ def argument(path: Path) -> str:
     return path if isinstance(path, str) else os.path.abspath(path)  # noqa: PTH100 - pathlib would resolve links
 
 
-def plain(value: Any) -> Any:
+def from_numpy(value: Any) -> Any:
     """Convert a NumPy number or array to Python; return anything else unchanged."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
 def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
-    """List of several values, converted from NumPy.
+    """List of the values, converted from NumPy.
 
     Raises
     ------
     BusplanError
         A single value, or no values.
     """
-    plain_values = plain(values)
+    plain_values = from_numpy(values)
     if isinstance(plain_values, str) or not isinstance(plain_values, Iterable):
         raise BusplanError(f"{name} {values!r}: expected several values, as a list")
-    values_found = [plain(value) for value in plain_values]
-    if not values_found:
+    python_values = [from_numpy(value) for value in plain_values]
+    if not python_values:
         raise BusplanError(f"{name}: no values; give at least one")
-    return values_found
+    return python_values
 
 
 def one_or_several(values: Any, *, name: str) -> list[Any]:
@@ -125,7 +125,7 @@ def one_or_several(values: Any, *, name: str) -> list[Any]:
     BusplanError
         No values.
     """
-    plain_values = plain(values)
+    plain_values = from_numpy(values)
     is_one = isinstance(plain_values, str | os.PathLike) or not isinstance(plain_values, Iterable)
     return [plain_values] if is_one else items(plain_values, name=name)
 
@@ -136,7 +136,7 @@ def checked_models(timing_model: Models | None, profile: Profile) -> tuple[str, 
     Raises
     ------
     BusplanError
-        An unknown or a repeated name.
+        An unknown or a repeated name, no name, or a model that cannot express the profile.
     """
     if timing_model is None:
         return model_names(profile)
@@ -188,7 +188,7 @@ def finite(value: object, *, name: str) -> float:
     BusplanError
         NaN, infinite, a bool, or not a number.
     """
-    number = plain(value)
+    number = from_numpy(value)
     # Comparing first: float() of a huge int would raise OverflowError.
     if type(number) not in (int, float) or not -MOST_FLOAT <= number <= MOST_FLOAT:
         raise BusplanError(f"{name} {number!r}: expected a finite number")
@@ -203,18 +203,18 @@ def whole(value: object, *, name: str) -> int:
     BusplanError
         Anything else, or more than the largest count in a profile.
     """
-    number = plain(value)
+    number = from_numpy(value)
     if type(number) is not int or not 1 <= number <= MAX_COUNT:
         raise BusplanError(f"{name} {number!r}: expected a whole number from 1 to {MAX_COUNT:,}")
     return number
 
 
 Origin = tuple[str, KeyChanges]
-"""A PROFILE argument, and the changes of that profile by options."""
+"""A PROFILE argument of the command line, and the changes of that profile by its options."""
 
 
 def origin_of(profile: Profile) -> Origin:
-    """Tell a PROFILE argument and the `--set` options that give a profile.
+    """The PROFILE argument and the `--set` options that give a profile on the command line.
 
     Parameters
     ----------
@@ -224,8 +224,8 @@ def origin_of(profile: Profile) -> Origin:
     Returns
     -------
     tuple
-        The shipped profile of its name with the changes that make it equal; or a file of its name, NAME.toml, where
-        no changes can.
+        The shipped profile of its name, with the changes that make them equal; or NAME.toml without changes, where
+        there is no such shipped profile or no option can make a change.
 
     Examples
     --------
@@ -239,12 +239,12 @@ def origin_of(profile: Profile) -> Origin:
 
 
 def key_changes(values: Mapping[str, object]) -> KeyChanges:
-    """Changes of a profile from new values by dotted key, as `--set` options say them.
+    """Changes of a profile from new values by dotted key, as `--set` options.
 
     Raises
     ------
     BusplanError
-        Not new values by key, two of them overlap, or a value that TOML has not.
+        Not new values by key, two keys overlap, or TOML cannot write a value.
     """
     return KeyChanges(tuple(_key_change(key, value) for key, value in values_by_key(values, name="changes").items()))
 
@@ -264,5 +264,5 @@ def _changes_of_shipped(profile: Profile) -> KeyChanges | None:
     try:
         changes = key_changes(differing)
         return changes if changes.applied(shipped) == profile else None
-    except (BusplanError, TypeError):  # a key that is gone, or a group of its own, is no value that an option sets
+    except (BusplanError, TypeError):  # no option removes a key or a group
         return None

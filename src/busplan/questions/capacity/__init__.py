@@ -50,7 +50,7 @@ class CapacityAnswer(Answer):
 
     @property
     def margin_us(self) -> float:
-        """Free time of a single period's slice, less the bias: `margin_corrected_us` of that model [us]."""
+        """Free time of a single period's slice, less the bias: `margin_corrected_us` of the model that decides [us]."""
         return cast("float", self._deciding.margin_corrected_us)
 
     @property
@@ -65,20 +65,20 @@ class CapacityAnswer(Answer):
     @property
     def results(self) -> tuple[CapacityFigures, ...]:
         """All sets of figures, period by period, and in each period timing model by timing model."""
-        return self._found.results
+        return self._capacity.results
 
     def report(self) -> Report:
         """The answer in blocks."""
         from busplan.questions.capacity.report import capacity_report
 
         if not self.sensitivities:
-            return capacity_report(self._found, self.verdicts)
+            return capacity_report(self._capacity, self.verdicts)
         from busplan.questions.capacity.sensitivity_report import sensitivity_report
 
-        return sensitivity_report(self._found, self.verdicts, self.sensitivities)
+        return sensitivity_report(self._capacity, self.verdicts, self.sensitivities)
 
     @property
-    def _found(self) -> Capacity:
+    def _capacity(self) -> Capacity:
         return Capacity(self.profile, self.periods)
 
 
@@ -101,8 +101,8 @@ def capacity(
         Name of a timing model, or several in this order; by default all of the kind of bus. IEEE 1394 has "paper" for
         the paper's equations as published, and "standard" for the standard's clock and packets.
     sensitivity
-        If True, `sensitivities` say what moves the margin: by how much each small change of the network does, by the
-        timing model that decides, and what binds next.
+        If True, `sensitivities` say by how much each small change of the network moves the margin, by the timing model
+        that decides, and what binds next.
 
     Returns
     -------

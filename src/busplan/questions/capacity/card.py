@@ -13,7 +13,7 @@ from busplan.forms.numbers import listed, period, plural
 from busplan.profile.toml import override
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.assumed import heavy_assumptions
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
 from busplan.questions.fit.circle_refusal import circle_refusals
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import bus_of, network_of
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _FIGURES: Final = 3
 """Digits of a time whose uncertainty is unknown."""
 _ALMOST: Final = 1 - 1e-9
-"""For rounding."""
+"""Share that float rounding may take."""
 _Line = tuple[str, Sentence]
 
 
@@ -47,7 +47,12 @@ def card(verdict: Verdict, profile: Profile, *, is_brief: bool = False) -> Card:
     at_period = override(profile, {PERIOD: verdict.period_us})
     counts = (plural(figures.nodes, "node"), plural(figures.axes, "axis"), period(verdict.period_us))
     subject = Sentence((Code(profile.name), f"  {bus.title}, {', '.join(counts)}"))
-    lines = [*_reasons(verdict, at_period), *_times(figures, at_period), *_own(at_period), *_room(verdict, at_period)]
+    lines = [
+        *_reasons(verdict, at_period),
+        *_times(figures, at_period),
+        *_bus_lines(at_period),
+        *_room(verdict, at_period),
+    ]
     if not is_brief:
         lines += _rests_on(verdict, at_period)
     return Card(subject, _verdict(verdict), _gauge(figures, at_period), tuple(lines))
@@ -78,7 +83,7 @@ def _used_us(figures: CapacityFigures) -> float:
 
 
 def _reasons(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
-    """Why the machine does not run as planned, beside time."""
+    """Reasons beside time why the machine does not run as the profile has it."""
     figures, bus = verdict.deciding, bus_of(profile)
     for cause in circle_refusals(profile):
         yield "circle", Sentence((f"cannot be run: {cause.message}",), "fails")
@@ -103,14 +108,17 @@ def _times(figures: CapacityFigures, profile: Profile) -> Iterator[_Line]:
     kept = f"; {_us(kept_us, doubt_us)} must stay free" if kept_us else ""
     yield ("short by" if margin_us < 0 else "free"), Sentence((f"{_us(abs(margin_us), doubt_us)} us{doubt}{kept}",))
     fastest_us = figures.safe_min_period_us
-    if fastest_us is None:
-        yield "fastest period", Sentence(("none that the bus knows is long enough",), "fails")
+    broken = filter(None, map(bus_of(profile).limit, limits_behind(figures)))
+    if not all(limit.is_of_period or limit.period or limit.kept_from_us for limit in broken):
+        yield "fastest period", Sentence(("none: no period keeps the limit",), "fails")
+    elif fastest_us is None:
+        yield "fastest period", Sentence(("no period that the bus allows is long enough",), "fails")
     else:
         yield "fastest period", Sentence((f"{period(_up(fastest_us, doubt_us))}{_kept_by(figures, profile)}",))
 
 
-def _own(profile: Profile) -> Iterator[_Line]:
-    """Lines of the kind of bus."""
+def _bus_lines(profile: Profile) -> Iterator[_Line]:
+    """Lines that only this kind of bus has."""
     bus = bus_of(profile)
     lines = bus.cycle(network_of(profile), model=bus.deciding_model).card_lines()
     return ((label, Sentence((words,))) for label, words in lines)
@@ -123,11 +131,11 @@ def _kept_by(figures: CapacityFigures, profile: Profile) -> str:
         return ""
     limits = (limit for limit in bus.limits if limit.period is not None)
     holding = (limit for limit in limits if plain(limit.shown.period_us(network)) >= fastest_us * _ALMOST)
-    return "".join(f", for {limit.key}" for limit in islice(holding, 1))
+    return "".join(f", limited by {limit.key}" for limit in islice(holding, 1))
 
 
 def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
-    """Nodes that fit beside those there are; the cure, where there is none or the machine does not run as planned."""
+    """Room for more nodes; without it the change that makes room, or that mends what is wrong."""
     figures = verdict.deciding
     spare = [(count.name or "nodes", (count.safe_nodes or 0) - count.nodes) for count in figures.counts]
     if verdict.all_well and any(number > 0 for _, number in spare):
@@ -140,18 +148,19 @@ def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
         yield "room for", Sentence(("no more nodes",))
     change, label = verdict.change, "one more" if verdict.all_well else "cure"
     if change is None:
-        yield label, Sentence((f"none: {verdict.no_change}",))
+        if verdict.no_change:
+            yield label, Sentence((f"none: {verdict.no_change}",))
         return
     meanings = change_meanings(bus_of(profile))
     settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
     after = change.figures
     left = f", which leaves {_us(after.margin_corrected_us or 0.0, after.uncertainty_us)} us"
-    untested = "; the circle is another one then" if change.circle_is_untested else ""
+    untested = "; this changes the circle" if change.circle_is_untested else ""
     yield label, joined(settings, Sentence((f"{left}{untested}",)), by="")
 
 
 def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
-    """The largest part, and what the verdict does not have, does not know, or nobody has tested."""
+    """The largest part, and what the verdict assumes, leaves out, or rests on without a test."""
     figures, bus = verdict.deciding, bus_of(profile)
     largest: Term = max(figures.terms, key=lambda term: plain(term.us))
     yield (
@@ -174,7 +183,7 @@ def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
             ),
         )
     )
-    yield "tested", Sentence((words or "not against figures of others",))
+    yield "tested", Sentence((words or "not against published figures",))
     for model in verdict.others:
         if contradicts(model.fits, figures):
             said = f"{_us(model.required_us, figures.uncertainty_us)} us needed of {_us(model.available_us, None)}"
@@ -192,7 +201,7 @@ def _us(us: float, doubt_us: float | None) -> str:
 
 
 def _up(us: float, doubt_us: float | None) -> float:
-    """A time rounded up to those digits."""
+    """A time rounded up to the digits that its doubt allows."""
     scale: float = 10.0 ** _decimals(us, doubt_us)
     return ceil(us * scale - 1e-6) / scale
 

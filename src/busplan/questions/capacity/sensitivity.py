@@ -1,4 +1,4 @@
-"""Sensitivity of the margin: the effect of each small change, and the next bottleneck behind the first."""
+"""Sensitivity of the margin: the effect of each small change, and the next bottleneck after the first."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final, NamedTuple
@@ -29,7 +29,7 @@ from busplan.sections.profile import Profile
 
 
 class NextLimit(NamedTuple):
-    """Limit of the nodes of one group now, and the next limit behind it; the other groups stay as they are."""
+    """Limit of the nodes of one group now, and the next limit after it; the other groups stay as they are."""
 
     group: str
     """Empty where all nodes are alike."""
@@ -44,7 +44,7 @@ class NextLimit(NamedTuple):
 
 
 class NextBottleneck(NamedTuple):
-    """The bottleneck now and the next one behind it, by the timing model that decides."""
+    """The bottleneck now and the next one after it, by the timing model that decides."""
 
     limits: tuple[NextLimit, ...]
     """One for each group of nodes."""

@@ -145,7 +145,7 @@ def next_bottleneck_sentence(bottlenecks: NextBottleneck, profile: Profile) -> S
         text = f"Next bottleneck: without {term}, now {{}}, the largest term is {behind}, {{}}, and the margin {{}}"
         of_term = sentence(text, term_us, behind_us, margin_us)
     else:
-        text = f"Next bottleneck: behind {term}, {{}}, which no key takes away, comes {behind}, {{}}"
+        text = f"Next bottleneck: after {term}, {{}}, which no key takes away, comes {behind}, {{}}"
         of_term = sentence(text, term_us, behind_us)
     limits = map(_limit, bottlenecks.limits)
     return joined(joined(of_term, *limits, by="; "), Sentence((".",)), by="")

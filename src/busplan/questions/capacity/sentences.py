@@ -83,7 +83,8 @@ def verdict_sentences(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
             attribute_value(REQUIRED, figures),
         )
     yield _carries(figures)
-    if verdict.change is not None or not (verdict.all_well and profile.group):
+    has_room = verdict.all_well and any((count.safe_nodes or 0) > count.nodes for count in figures.counts)
+    if not has_room and (verdict.change is not None or not (verdict.all_well and profile.group)):
         yield _advice(verdict, profile)
     yield from _assumed(figures, profile)
     yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
@@ -141,7 +142,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
     largest = next(iter(uncertainty_parts(figures)), None)
     if largest is not None and largest["share"]:
         share = ShownValue(largest["share"], "share", "%", 0)
-        sentences.append(sentence(f"Largest doubt: {largest['label']}, {{}} of U squared.", share))
+        sentences.append(sentence(f"Largest doubt: {largest['label']}, {{}} of the variance.", share))
     if profile.limits.reserve:
         reserve = ShownValue(profile.limits.reserve, "reserve", "%", 0)
         sentences.append(sentence("{} of the slice must stay free (limits.reserve).", reserve))
@@ -173,16 +174,16 @@ def _margin(figures: CapacityFigures, bus: "Bus") -> Sentence:
     (model,) = (model for model in bus.timing_models if model.name == bus.deciding_model)
     unknown = f"{model.error}, so no bias"
     if figures.uncertainty_us is not None:
-        return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown} is in it.", margin, uncertainty, of)
-    return sentence(f"Margin {{}} of {{}}; {unknown} and no uncertainty are in it.", margin, of)
+        return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown} is corrected.", margin, uncertainty, of)
+    return sentence(f"Margin {{}} of {{}}; {unknown} is corrected and no uncertainty given.", margin, of)
 
 
 def not_in_it(profile: Profile) -> Iterator[Sentence]:
-    """Say what the verdict leaves out, with the key that would say it; nothing if it leaves nothing out."""
+    """Say what the verdict leaves out, with the key that would give it; nothing if it leaves nothing out."""
     bus = bus_of(profile)
     left = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
     if left:
-        yield Sentence((f"Not in it: {', '.join(f'{missing.label} ({missing.key})' for missing in left)}.",))
+        yield Sentence((f"Not included: {', '.join(f'{missing.label} ({missing.key})' for missing in left)}.",))
 
 
 def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
@@ -192,7 +193,9 @@ def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
         if contradicts(model.fits, figures):
             needed = attribute_value(REQUIRED, model)
             available = attribute_value(AVAILABLE, model)
-            text = f"The {model.timing_model} model says otherwise: {{}} needed of {{}}. It decides nothing."
+            text = (
+                f"The {model.timing_model} model says otherwise: {{}} needed of {{}}. It does not affect the verdict."
+            )
             yield sentence(text, needed, available, state="warns")
     yield from not_applicable(profile)
 

@@ -1,4 +1,4 @@
-"""The verdict on one period: by the timing model that decides, with the other models' figures and a change."""
+"""The verdict on one period, by the timing model that decides, and the change that mends or extends the network."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from busplan.questions.plan.constraints import Need, missed_limits
 
 
 class Verdict(NamedTuple):
-    """Verdict on one period, and the change that mends it."""
+    """Verdict on one period, and the change that makes the cycle fit or carries another node."""
 
     period_us: float
     deciding: CapacityFigures
@@ -21,16 +21,16 @@ class Verdict(NamedTuple):
     missed_limits: tuple[Need, ...]
     """Needs of [limits] that the slice does not meet."""
     after_reset: CapacityFigures | None
-    """Figures after a bus reset, where the cycle fits as it is set and is not shown to fit then."""
+    """Figures after a bus reset; None unless the cycle is shown to fit now and not after the reset."""
     change: Change | None
     """The least change after which every constraint of a plan holds; or, where all do already, one that carries another
     node."""
     no_change: str
-    """Reason that no change is given; empty if one is."""
+    """Reason that no change is given; empty with a change."""
 
     @property
     def models_agree(self) -> bool | None:
-        """Whether required <= available is the same under every model; None where there is no other."""
+        """Whether `fits` is the same under every model that was asked for; None where there is no other."""
         return all(figures.fits == self.deciding.fits for figures in self.others) if self.others else None
 
     @property

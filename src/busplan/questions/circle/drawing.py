@@ -157,6 +157,8 @@ _ROWS: Final = 9
 def contour_lines(profile: ContourProfile, *, width: int) -> list[Line]:
     """Draw the smallest and largest error of each part of the circle; at least one is more than rounding.
 
+    Where every part has all of these errors there is nothing to see over the angle, and a line says so.
+
     Parameters
     ----------
     profile
@@ -174,10 +176,13 @@ def contour_lines(profile: ContourProfile, *, width: int) -> list[Line]:
     room = width - gutter - len(" |")
     columns = next((number for number in _COLUMNS if number <= room), _COLUMNS[-1])
     axis = "".join(f"{angle:<{columns // 4}}" for angle in (0, 90, 180, 270)).rstrip()
-    rows = zip(labels, _rows(profile.condensed(sectors=columns), edges), strict=True)
+    rows = [*_rows(profile.condensed(sectors=columns), edges)]
+    if all(set(cells) == {"#"} for cells in rows):
+        bottom, top = (labels[row].rpartition(" ")[2] for row in (-1, 0))
+        return [Line(f"At every angle the error is from {bottom} to {top} {unit.name}", "drawn")]
     return [
         Line(", ".join(filter(None, (f"{unit.name:>{gutter}}", scale.zero_outside))), "drawn"),
-        *(Line(f"{text:>{gutter}} |{cells}".rstrip(), "drawn") for text, cells in rows),
+        *(Line(f"{text:>{gutter}} |{cells}".rstrip(), "drawn") for text, cells in zip(labels, rows, strict=True)),
         Line(f"{'deg':>{gutter}}  {axis}", "drawn"),
     ]
 

@@ -65,7 +65,7 @@ CIRCLE_FIGURES: Final = (
         "phase_margin_deg",
         "phase margin",
         "loop",
-        "turn of the loop's phase that makes it unstable",
+        "smallest change of the loop's phase that makes it unstable",
         "phase margin",
         decimals=2,
         better="more",
@@ -74,13 +74,20 @@ CIRCLE_FIGURES: Final = (
         "gain_margin_db",
         "gain margin",
         "loop",
-        "change of the loop's gain that makes it unstable",
+        "smallest change of the loop's gain, up or down, that makes it unstable",
         "gain margin",
         decimals=2,
         better="more",
         relative=False,
     ),
-    Figure("crossover_hz", "f_c", "loop", "frequency at which the phase margin is counted", "crossover", decimals=2),
+    Figure(
+        "crossover_hz",
+        "f_c",
+        "loop",
+        "frequency at which the loop gain is 1, where the phase margin is taken",
+        "crossover",
+        decimals=2,
+    ),
     Figure("settled", "settled", "loop", "whether the loops settle before the measured turn; null on a trapezoid"),
     Figure(
         "mean_contour_error_mm",
@@ -178,7 +185,7 @@ class CircleFigures(NamedTuple):
     timing_model: str
     """Timing model that decided whether the bus fits."""
     bus_fits: bool
-    """Whether required <= available and no limit is broken."""
+    """Whether no limit is broken, time among them: required <= available."""
     verdict: str
     """fits, not shown to fit, or does not fit: a circle passes only on a bus that is shown to carry it."""
     required_us: float

@@ -107,7 +107,7 @@ def _ends(errors: Sequence[Floats]) -> tuple[float, float]:
 
 
 def _curves(run: CircleRun) -> tuple[Curve, ...]:
-    """The measured part, and what lies before and behind it; neighbours share a point."""
+    """The measured part, and what lies before and after it; neighbours share a point."""
     error_um = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm) * 1e3
     start, stop = run.measured.start, min(run.measured.stop, run.steps)
     parts = ((0, start + 1, False), (start, stop, True), (stop - 1, run.steps, False))

@@ -39,7 +39,7 @@ class CompareAnswer(Answer, KindComparison):
         Parameters
         ----------
         note
-            Words behind the title.
+            Words after the title.
 
         Raises
         ------

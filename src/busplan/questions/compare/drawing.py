@@ -202,7 +202,7 @@ def compare_svg(comparison: KindComparison, *, title: str, inline: bool = False)
 def _area(body: Element, comparison: KindComparison, plane: Plane, lines: tuple[KindLine, ...], *, y: int) -> int:
     """Draw the scales and the lines, and return the y below them."""
     text_at(body, "axes, logarithmic", x="0", y=y + 14, css="small")
-    top, labels = y + LINE + _RADIUS, axes_labels(plane)
+    top, labels = y + 2 * LINE + _RADIUS, axes_labels(plane)
     gutter = 100 * (_LETTER * max(len(str(label)) for label in labels) + 12) / PHONE
     area = inside(body, x_percent=gutter, width_percent=98 - gutter, y=0)
     for axes in labels:
@@ -213,13 +213,15 @@ def _area(body: Element, comparison: KindComparison, plane: Plane, lines: tuple[
     for line in lines:
         _line(area, line, plane, top=top)
     bottom = top + _HEIGHT
-    shown = period_labels(comparison)
-    own_us, every = comparison.profile.cycle.period_us, 1 + (len(shown) - 1) // 6
-    for number, (period_us, text) in enumerate(shown):
-        # Every label has its place on a phone; this machine's own is on its line.
-        if number % every == 0 and period_us != own_us:
-            at_percent = 100 * plane.x(period_us)
-            text_at(area, text, x=f"{at_percent:.5g}%", y=bottom + 18, css="small", anchor=anchor(at_percent))
+    own_us, room, taken = comparison.profile.cycle.period_us, 0.95 * PHONE * (98 - gutter) / 100, -float(_GAP)
+    for period_us, text in period_labels(comparison):
+        share, width = plane.x(period_us), _LETTER * len(text)
+        side = anchor(100 * share)
+        start = share * room - {"start": 0.0, "middle": width / 2, "end": width}[side]
+        # As many as have their place on a phone; this machine's own is on its line.
+        if start >= taken + _GAP / 2 and period_us != own_us:
+            text_at(area, text, x=f"{100 * share:.5g}%", y=bottom + 18, css="small", anchor=side)
+            taken = start + width
     text_at(area, "period, logarithmic", x="100%", y=bottom + 36, css="small", anchor="end")
     return bottom + 2 * LINE + _GAP
 

@@ -113,7 +113,7 @@ def _bus_record(machine: MachineOnKind | NotOnKind) -> Record:
 
 
 def tested_record(bus: Bus) -> Record:
-    """Which parts of a kind figures of others set, which they test, and which they do not test."""
+    """Parts of a kind's model that published figures set, that they test, and that they do not test."""
     tested_parts = parts_tested(bus.evidence_data)
     set_by, tested = map(parts_by, (tested_parts.set_by, tested_parts.parts))
     return {"set_by": set_by, "tested": tested, "not_tested": list(tested_parts.untested)}

@@ -120,7 +120,7 @@ def explain(
 
 
 def figure_names() -> list[str]:
-    """Names of the figures that `explain` takes, on all kinds of bus: each key, alone and behind its command."""
+    """Names of the figures that `explain` takes, on all kinds of bus: each key, alone and after its command."""
     registers = (figures_of(kind_named(kind)) for kind in kind_names())
     names = (
         name

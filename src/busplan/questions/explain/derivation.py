@@ -190,7 +190,7 @@ def explain(
     Returns
     -------
     Explanation
-        One derivation for each period, transaction and model, nested in this order; behind that of the corrected margin
+        One derivation for each period, transaction and model, nested in this order; after that of the corrected margin
         stands that of its uncertainty.
 
     Raises

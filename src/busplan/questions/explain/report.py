@@ -301,5 +301,5 @@ def _step(step: Step) -> blocks.CalculationStep:
 
 def _inputs(derivation: Derivation) -> Table:
     rows = (TableRow((Code(given.symbol), *input_cells(given))) for given in derivation.inputs)
-    caption = Sentence((f"It starts from these; the least well known is {derivation.weakest_grade}.",))
+    caption = Sentence((f"Inputs of this figure; the weakest grade is {derivation.weakest_grade}.",))
     return Table((_SYMBOL, *INPUT_COLUMNS), tuple(rows), caption, stacks=True)

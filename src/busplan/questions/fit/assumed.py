@@ -17,7 +17,7 @@ _MUCH: Final = Sourced(
     unit="1",
     grade="assumed",
     source="chosen",
-    meaning="share of U squared, or of the required time, from which on a verdict rests on a key",
+    meaning="share of the variance, or of the required time, from which on a verdict rests on a key",
 )
 _EXECUTION: Final = "execution"
 _Share = tuple[tuple[str, ...], float, str]
@@ -43,7 +43,7 @@ class HeavyAssumption(NamedTuple):
 
 
 def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssumption, ...]:
-    """The assumptions that carry more than a quarter of U squared or of the required time.
+    """The assumptions that carry more than a quarter of the variance or of the required time.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssu
     """
     variance = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     shares: list[_Share] = [
-        ((doubt.key,), float(doubt.us) ** 2 / variance, "U squared") for doubt in figures.doubts if variance
+        ((doubt.key,), float(doubt.us) ** 2 / variance, "the variance") for doubt in figures.doubts if variance
     ]
     shares += [((term.rests_on,), plain(term.us) / figures.required_us, "the required time") for term in figures.terms]
     # What is no key has no grade, and execution times are no term or doubt of one key.
@@ -73,7 +73,7 @@ def _is_assumed(profile: Profile, key: str) -> bool:
 
 
 def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> list[_Share]:
-    """The shares of the assumed execution times: what of its terms goes without them, and their part of U squared."""
+    """Shares of the assumed execution times: what of its terms goes without them, and their part of the variance."""
     network, bus = network_of(profile)._replace(period_us=figures.period_us), bus_of(profile)
     assumed = [group for group in network.groups if _counts(group, network)]
     if not assumed:
@@ -85,7 +85,7 @@ def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> li
     # A term that grows without execution times, as the wait for a gap does, is not carried by them.
     carried_us = sum(max(0.0, plain(term.us) - rest[term.key]) for term in figures.terms)
     of_time = (keys, carried_us / figures.required_us, "the required time")
-    return [(keys, whole_us * (whole_us - rest_us) / variance, "U squared"), of_time] if variance else [of_time]
+    return [(keys, whole_us * (whole_us - rest_us) / variance, "the variance"), of_time] if variance else [of_time]
 
 
 def _counts(group: Group, network: Network) -> bool:

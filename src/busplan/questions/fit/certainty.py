@@ -15,7 +15,7 @@ from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 
 TIME: Final = "time"
-"""Key of the limit that is none of the bus: the cycle takes longer than its slice."""
+"""Key of the limit of time, which is no limit of the bus: the cycle must fit its slice."""
 
 
 def cycle_of(profile: Profile, *, model: str, nodes: int | None = None) -> BusCycle:
@@ -40,7 +40,7 @@ def available_us(network: Network) -> Number:
 
 
 def fits_in(required_us: Number, *, available_us: Number) -> Number:
-    """Tell whether a cycle fits its share of the period; one that fills it exactly does.
+    """Tell whether a cycle fits its share of the period; a cycle that fills it exactly fits.
 
     Examples
     --------
@@ -51,7 +51,7 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
 
 
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
-    """The limits of closed forms: those of a network's kind of bus, without safety and doubts, and time the last."""
+    """The limits of a network's kind of bus, without those of safety and without doubts; time is the last."""
     bus = bus_of(network.profile)
     time = time_limit(lambda tried: bus.cycle(tried, model=model).most_required_us)
     return (*(limit.nominal for limit in bus.limits if not limit.is_safety), time)
@@ -79,18 +79,18 @@ class Certainty(NamedTuple):
     """A cycle with its bias and its uncertainty [us]. The numbers may be of any sort."""
 
     bias_us: Number | None
-    """Time that the bus takes beyond the timing model; None where nobody has measured it."""
+    """Time that the bus takes beyond the timing model; None where it is unknown."""
     margin_corrected_us: Number
-    """Rest of the slice after the cycle, less the bias."""
+    """What the cycle leaves of the slice, less the bias."""
     uncertainty_us: Number
     """U, two standard uncertainties."""
     safe_required_us: Number
-    """Slice with which the cycle is shown to fit, with the reserve."""
+    """Length of slice in which the cycle is shown to fit, reserve included."""
     doubts: tuple[Doubt, ...]
 
     @property
     def known_uncertainty_us(self) -> Number:
-        """U; infinite, for it is not known, where neither a bias nor any doubt is."""
+        """U; infinite where it is unknown, without a bias and without any doubt."""
         return (
             choose(self.uncertainty_us > 0, self.uncertainty_us, inf) if self.bias_us is None else self.uncertainty_us
         )
@@ -165,11 +165,11 @@ class Judged(Protocol):
 
     @property
     def not_shown(self) -> tuple[str, ...] | None:
-        """Keys of the limits that may be kept; None as the verdict."""
+        """Keys of the limits that are neither broken nor shown to be kept; None where the verdict is."""
 
 
 def limits_behind(judged: Judged) -> tuple[str, ...]:
-    """Keys of the limits of the bus that a verdict rests on, without time: the broken ones, or those not shown."""
+    """Keys of the limits of the bus that a verdict rests on, time left out: broken, or not shown to be kept."""
     keys = (judged.not_shown or ()) if judged.verdict == NOT_SHOWN else judged.exceeded
     return tuple(key for key in keys if key != TIME)
 

@@ -152,7 +152,7 @@ def _out_of_order(profile: Profile) -> Iterator[Refused]:
     elif any(unfit_delivery(delivery_of(profile), period_us=period_us)):
         known = f"which the circle test knows up to half the period, {period_us / 2:g} us, with jitter and skew"
         if apart_us := skew_us(profile):
-            right = f"the last axis then takes its set-points {apart_us:g} us behind the first, {known}"
+            right = f"the last axis then takes its set-points {apart_us:g} us after the first, {known}"
             yield Refused(bus_of(profile).key_of("clock"), "false", f"{right}; set it true if the drives have a clock")
         else:
             added_us = jitter_us(profile) - own.jitter_us

@@ -41,7 +41,7 @@ COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes
 class GroupCapacity:
     """How many nodes of one group a bus carries, the other groups as they are.
 
-    They are computed when they are asked for, the largest and the safe number each by itself.
+    The largest and the safe number are each computed when they are first read.
     """
 
     name: str
@@ -105,9 +105,9 @@ class GroupCapacity:
 
 
 class CapacityFigures(NamedTuple):
-    """Capacity at one period under one timing model; what each figure is stands in the register of its bus.
+    """Capacity at one period under one timing model; the `figures` of its bus say what each figure means.
 
-    The figures that only its kind of bus has, the terms and the numbers of nodes are attributes like all others.
+    Figures that only its kind of bus has, terms and numbers of nodes are attributes like all others.
     """
 
     kind: str
@@ -127,19 +127,19 @@ class CapacityFigures(NamedTuple):
     binding_term: str
     """Name of the largest term."""
     min_period_us: float | None
-    """This and `safe_min_period_us` are None where no period that the bus knows is long enough."""
+    """This and `safe_min_period_us` are None where no period that the bus allows is long enough."""
     min_slice_ratio: float
     exceeded: tuple[str, ...]
     """Keys of the limits that are broken."""
     fits: bool
-    """Whether required <= available and no limit is broken; the verdict is another question."""
+    """Whether no limit is broken, time among them: required <= available, without bias and uncertainty."""
     circle_refused_by: tuple[str, ...]
-    """Keys for which the circle that the profile asks for cannot be run."""
+    """Keys that prevent the profile's circle test from running."""
     bias_us: float | None
     """This and the figures below exist for the timing model that decides."""
     margin_corrected_us: float | None
     uncertainty_us: float | None
-    """None also where nothing is known of it."""
+    """None also where it is unknown."""
     safe_required_us: float | None
     safe_min_period_us: float | None
     not_shown: tuple[str, ...] | None
@@ -150,7 +150,7 @@ class CapacityFigures(NamedTuple):
     counts: tuple[GroupCapacity, ...]
     """How many nodes fit: of each [[group]], or of all where they are alike."""
     safe: bool
-    """Whether the bus is set so that it works reliably, beside fitting."""
+    """Whether every safety limit of the bus is kept, as a gap count that is safe for the hops."""
     own: FigureValues
     """Figures that only this kind of bus has."""
 
@@ -161,13 +161,13 @@ class CapacityFigures(NamedTuple):
 
     @property
     def _whole(self) -> GroupCapacity | None:
-        """The nodes, where all are alike; of groups each has its own figures, and those of the whole are None."""
+        """The nodes, where all are alike; groups have figures of their own, and those of the whole are None."""
         first = self.counts[0]
         return None if first.name else first
 
     @property
     def max_nodes(self) -> int | None:
-        """Most nodes that fit; None of groups."""
+        """Most nodes that fit; None with groups."""
         return None if self._whole is None else self._whole.max_nodes
 
     @property
@@ -182,7 +182,7 @@ class CapacityFigures(NamedTuple):
 
     @property
     def safe_nodes(self) -> int | None:
-        """Most nodes that are shown to fit; None of groups, and under a timing model that does not decide."""
+        """Most nodes that are shown to fit; None with groups, and under a timing model that does not decide."""
         return None if self._whole is None else self._whole.safe_nodes
 
     @property
@@ -212,14 +212,14 @@ class CapacityFigures(NamedTuple):
 
 
 class Capacity(NamedTuple):
-    """Answer of `capacity`: the profile as it was analysed, and the figures of each period, a set a model."""
+    """The profile as it was analysed, and for each period a set of figures for each timing model."""
 
     profile: Profile
     periods: tuple[tuple[CapacityFigures, ...], ...]
 
     @property
     def results(self) -> tuple[CapacityFigures, ...]:
-        """All sets of figures in one row."""
+        """All sets of figures, period by period."""
         return tuple(chain.from_iterable(self.periods))
 
 
@@ -277,10 +277,10 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     cycle = bus.cycle(network, model=model)
     numbers: dict[str, Any] = {key: existing(number) for key, number in numeric_figures(cycle).items()}
     own = FigureValues({key: None if number is None else plain(number) for key, number in cycle.figures().items()})
-    late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
+    overruns = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     codes = limit_codes(network)
     broken = tuple(key for key, code in codes.items() if code == BROKEN)
-    exceeded = (*broken, *((TIME,) if late else ()))
+    exceeded = (*broken, *((TIME,) if overruns else ()))
     decides = model == bus.deciding_model
     counts = (
         GroupCapacity(alike.name, int(alike.nodes), int(alike.nodes) * alike.node.axes, alike.node.axes, model, profile)
@@ -310,13 +310,16 @@ _UNDECIDED: Final[dict[str, Any]] = {
 
 def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Any]:
     """Figures of how sure the verdict is, by the names of `CapacityFigures`, without counts."""
-    sure = certainty(cycle)
-    codes = {**limits, TIME: time_code(sure, cycle.network)}
+    weighed = certainty(cycle)
+    codes = {**limits, TIME: time_code(weighed, cycle.network)}
     return {
-        **{key: None if number is None else existing(number) for key, number in certainty_numbers(sure, cycle).items()},
+        **{
+            key: None if number is None else existing(number)
+            for key, number in certainty_numbers(weighed, cycle).items()
+        },
         "not_shown": tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
         "verdict": VERDICTS[int(verdict_code(codes))],
-        "doubts": sure.doubts,
+        "doubts": weighed.doubts,
     }
 
 
@@ -335,7 +338,7 @@ def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number |
         "margin_corrected_us": weighed.margin_corrected_us,
         "uncertainty_us": weighed.known_uncertainty_us,
         "safe_required_us": weighed.safe_required_us,
-        "safe_min_period_us": shortest_us(cycle.network, weighed.safe_required_us, is_shown=True),
+        "safe_min_period_us": shortest_period_us(cycle.network, weighed.safe_required_us, is_shown=True),
     }
 
 
@@ -367,13 +370,13 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "utilisation": required_us / given_us,
         # What fits by rounding alone has no margin, and no negative one either.
         "margin_us": choose(spare_us < 0, choose(fits_in(required_us, available_us=given_us), 0.0, spare_us), spare_us),
-        "min_period_us": shortest_us(network, required_us),
+        "min_period_us": shortest_period_us(network, required_us),
         "min_slice_ratio": required_us / period_us,
     }
 
 
-def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) -> Number:
-    """The shortest period that gives a cycle its time, and that the bus knows; infinite where it knows none [us].
+def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = False) -> Number:
+    """The shortest period that the bus allows and that is long enough for a cycle; infinite where there is none [us].
 
     Parameters
     ----------
@@ -382,7 +385,7 @@ def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) 
     needed_us
         Time that the cycle needs [us].
     is_shown
-        Whether limits must be shown to be kept; otherwise doubts of their values play no part.
+        Whether limits must be shown to be kept; otherwise the uncertainty of their values plays no part.
     """
     bus = bus_of(network.profile)
     period_us = bus.periods.from_us(needed_us / network.slice_ratio)
@@ -395,7 +398,7 @@ def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) 
 
 
 def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures | None:
-    """Figures of a plan after a bus reset, where it fits as it is set and is not shown to fit then.
+    """Figures of a network after a bus reset; None unless it is shown to fit now and not after the reset.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 from itertools import accumulate
 
 from busplan.buses.cycle import BusCycle
-from busplan.elementwise import plain
+from busplan.elementwise import Number, plain
 from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.fit.network import bus_of
 from busplan.sections.base import value_at
@@ -53,7 +53,13 @@ def acts_at_once(profile: Profile) -> bool:
 
 def jitter_us(profile: Profile) -> float:
     """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds [us]."""
-    return float(profile.delivery.jitter_us + plain(_deciding_cycle(profile).sync_jitter_us()))
+    return float(plain(any_jitter_us(profile)))
+
+
+def any_jitter_us(profile: Profile) -> Number:
+    """As `jitter_us`, of a profile whose numbers may be arrays [us]."""
+    us: Number = profile.delivery.jitter_us + _deciding_cycle(profile).sync_jitter_us()
+    return us
 
 
 def _deciding_cycle(profile: Profile) -> BusCycle:

@@ -1,4 +1,4 @@
-"""The largest number of nodes that a bus carries, and what keeps it from being larger."""
+"""The largest number of nodes that a bus carries, and the limit that sets it."""
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -14,14 +14,14 @@ from busplan.sections.profile import Profile
 
 
 class MostNodes(NamedTuple):
-    """A largest number of nodes, and the place of its limit among those asked; arrays broadcast."""
+    """The largest number of nodes, and the index of the limit that sets it; arrays broadcast."""
 
     nodes: Number
     limit: Number
 
 
 def largest_nodes(profile: Profile, *, model: str, group: str = "") -> tuple[int, str]:
-    """Find the largest number of nodes that fits the profile's period, and what keeps it from being larger.
+    """Find the largest number of nodes that fits the profile's period, and the limit that sets it.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def largest_nodes(profile: Profile, *, model: str, group: str = "") -> tuple[int
 def safe_nodes(profile: Profile, *, group: str = "", without: str | None = None) -> tuple[int, str]:
     """Find the largest number of nodes that is shown to fit, with the reserve, on a bus that is set safely for them.
 
-    Each number of nodes has its own cycle, bias, uncertainty and limits; a gap count that follows them does so.
+    Each number of nodes is tried with its own cycle, bias, uncertainty and limits, and its own "optimal" gap count.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def safe_nodes(profile: Profile, *, group: str = "", without: str | None = None)
     group
         As for `largest_nodes`.
     without
-        Key of a limit that is not asked: what would keep nodes off the bus once it is gone.
+        Key of a limit that is left out, to find what binds next.
 
     Returns
     -------
@@ -74,50 +74,52 @@ def _with_key(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:
 
 
 def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_COUNT) -> MostNodes:
-    """Find the largest number of nodes within some limits; of equal answers the first limit gives its name.
+    """Find the largest number of nodes within some limits; where several limits give it, the first is named.
 
-    Each limit is asked by itself, cheap ones first, and below what those before it allow.
+    Each limit is tried by itself, cheap ones first, and only up to what the limits before it allow.
 
     Parameters
     ----------
     network
         Its own number of nodes plays no part. Its numbers may be arrays.
     limits
-        The limits; the value of none falls with the nodes.
+        The limits. Their values must not fall as nodes are added.
     ceiling
         No answer is larger [1].
     """
     nodes: Number = ceiling
-    # Limits that keep the same ceiling ask one network, whose parts are computed once.
-    full = lru_cache(maxsize=1)(network.with_nodes)
+    # Limits with the same ceiling share one network, whose parts are computed once.
+    cached_network = lru_cache(maxsize=1)(network.with_nodes)
     most: dict[int, Number] = {}
     for index in sorted(range(len(limits)), key=lambda index: limits[index].is_slow):
-        # One more, so that a limit that keeps the ceiling does not give its name to the answer of another.
-        most[index] = _most_within(limits[index], network, full, int(_greatest(nodes)) + 1)
+        # One above the ceiling, so that a limit that allows the ceiling is not taken for the limit that sets it.
+        most[index] = _most_within(limits[index], network, cached_network, int(_greatest(nodes)) + 1)
         nodes = smaller(nodes, most[index])
-    place: Number = len(limits) - 1  # time, where none keeps any out
+    first: Number = len(limits) - 1  # time, if no limit binds
     for index in reversed(range(len(limits))):
-        place = choose(most[index] <= nodes, index, place)
-    return MostNodes(nodes, place)
+        first = choose(most[index] <= nodes, index, first)
+    return MostNodes(nodes, first)
 
 
 _VALUE_COST: Final = 30
-"""Operations on each element that the value of a limit takes, about; comparing it takes one."""
+"""Operations that the value of a limit takes for each element, roughly; a comparison takes one."""
 
 
-def _most_within(limit: Limit, network: Network, full: Callable[[int], Network], ceiling: int) -> Number:
-    """The most nodes within one limit, which stays broken once it is, in the way that touches fewer elements.
+def _most_within(limit: Limit, network: Network, cached_network: Callable[[int], Network], ceiling: int) -> Number:
+    """The most nodes within one limit, which further nodes keep broken.
 
-    A value that varies over few axes of an array is cheap: it is asked for every number of nodes, and counted how often
-    it holds. Otherwise few numbers of nodes are asked, by halves.
+    There are two ways, and the cheaper is taken. A value that varies over few axes of an array is computed for every
+    number of nodes, and the numbers within the limit are counted. Otherwise the numbers of nodes are bisected.
     """
-    over = limit.is_broken(full(ceiling))
-    whole = _size(over)
+    over = limit.is_broken(cached_network(ceiling))
+    elements = _size(over)
     if not _any(over):
         return ceiling
-    if whole > 1:
-        counted = ceiling * (_size(limit.least_value(network.with_nodes(1))) * _VALUE_COST + whole)
-        if counted <= ceiling.bit_length() * whole * _VALUE_COST:
+    if elements > 1:
+        # A limit that tells without its value is computed for every element.
+        asked = elements if limit.breaks else _size(limit.least_value(network.with_nodes(1)))
+        counted = ceiling * (asked * _VALUE_COST + elements)
+        if counted <= ceiling.bit_length() * elements * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))
             return total(choose(is_over, 0, 1) for is_over in broken)
     low, high = choose(over, 0, ceiling), choose(over, ceiling - 1, ceiling)
@@ -132,8 +134,8 @@ def _size(number: Number) -> int:
     return int(getattr(number, "size", 1))
 
 
-def _any(truths: Number) -> bool:
-    return bool(truths.any() if hasattr(truths, "any") else truths)
+def _any(conditions: Number) -> bool:
+    return bool(conditions.any() if hasattr(conditions, "any") else conditions)
 
 
 def _greatest(number: Number) -> float:

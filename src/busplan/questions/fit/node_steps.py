@@ -9,7 +9,7 @@ import numpy as np
 from busplan.elementwise import FIT_ROUNDING
 from busplan.profile.toml import override
 from busplan.questions.fit.certainty import certainty
-from busplan.questions.fit.figures import shortest_us
+from busplan.questions.fit.figures import shortest_period_us
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.fit.node_limit import largest_nodes, safe_nodes
 from busplan.sections.base import MAX_TIME_US
@@ -70,7 +70,7 @@ def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     cycle = bus.cycle(network.with_nodes(counts), model=model)
     needed_us = np.asarray(certainty(cycle).safe_required_us if is_safe else cycle.most_required_us)
     said = network.asked_nodes
-    from_us = shortest_us(cycle.network, needed_us, is_shown=is_safe)
+    from_us = shortest_period_us(cycle.network, needed_us, is_shown=is_safe)
     return NodeSteps(
         model,
         said.node.axes,

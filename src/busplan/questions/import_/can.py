@@ -13,10 +13,12 @@ from busplan.questions.import_.text import ProfileLine, group_name, time_us
 
 _DIRECTIONS: Final = {"feedback": "read_bytes", "command": "write_bytes"}
 _FRAME_BYTES: Final = 8
+_FD_BYTES: Final = 64
 _PDO_STEP: Final = 0x100
 _MOST_PDOS: Final = 4
 _HEARTBEAT_ID: Final = 0x700
 _BIT_RATE: Final = "bit_rate_kbit_s"
+_DATA_BIT_RATE: Final = "data_bit_rate_kbit_s"
 _LISTED: Final = 8
 
 
@@ -47,6 +49,9 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     yield ProfileLine(
         "bus", _BIT_RATE, bus.get(_BIT_RATE) or Fact(1000, "", "assumed", "no file says it; the cable decides")
     )
+    if has_fd(messages):
+        assumed = "no file says it; SYNC and PDOs are FD frames with it, too"
+        yield ProfileLine("bus", _DATA_BIT_RATE, bus.get(_DATA_BIT_RATE) or Fact(2000, "", "assumed", assumed))
     for key in ("sync_identifier", "sync_counter"):
         if key in bus:
             yield ProfileLine("bus", key, bus[key])
@@ -69,9 +74,16 @@ def _lacking(machine: Reading, messages: list[ProfileLine]) -> Iterator[str]:
     )
     if _BIT_RATE not in machine.bus:
         yield f"bus.{_BIT_RATE}: the bit rate"
+    if has_fd(messages) and _DATA_BIT_RATE not in machine.bus:
+        yield f"bus.{_DATA_BIT_RATE}: the data bit rate of CAN FD messages"
     if "period_us" not in machine.bus:
         yield "cycle.period_us: the period of SYNC"
     yield from machine.remarks
+
+
+def has_fd(messages: list[ProfileLine]) -> bool:
+    """Whether lines of messages say that any is of CAN FD."""
+    return any(row.key == "fd" for row in messages)
 
 
 def _nodes(machine: Reading) -> Iterator[_Node]:
@@ -137,7 +149,10 @@ def part_rows(machine: Reading) -> Iterator[ProfileLine]:
     """What databases alone say: the bit rate and messages."""
     if _BIT_RATE in machine.bus:
         yield ProfileLine("bus", _BIT_RATE, machine.bus[_BIT_RATE])
-    yield from message_rows(machine)
+    messages = list(message_rows(machine))
+    if _DATA_BIT_RATE in machine.bus and has_fd(messages):
+        yield ProfileLine("bus", _DATA_BIT_RATE, machine.bus[_DATA_BIT_RATE])
+    yield from messages
 
 
 def message_rows(machine: Reading) -> Iterator[ProfileLine]:
@@ -188,8 +203,10 @@ def _message(found: Facts, used: set[int], taken: set[str], left_out: dict[str, 
     reason = ""
     if identifier.value in used:
         return
-    if ("is_fd" in found and found["is_fd"].value) or found["payload_bytes"].value > _FRAME_BYTES:
-        reason = "CAN FD, which a profile cannot say yet"
+    is_fd = "is_fd" in found and found["is_fd"].value
+    most_bytes = _FD_BYTES if is_fd else _FRAME_BYTES
+    if found["payload_bytes"].value > most_bytes:
+        reason = f"over the {most_bytes} bytes of a frame" + ("" if is_fd else ", and no file says that it is CAN FD")
     elif "period_us" not in found:
         reason = "no file says its period; give one that does, or add it by hand"
     if reason:
@@ -202,5 +219,7 @@ def _message(found: Facts, used: set[int], taken: set[str], left_out: dict[str, 
     yield ProfileLine(section, "identifier", identifier._replace(value=number, note=note))
     if identifier.value >= EXTENDED:
         yield ProfileLine(section, "identifier_bits", Fact(29, identifier.place))
+    if is_fd:
+        yield ProfileLine(section, "fd", found["is_fd"])
     yield ProfileLine(section, "payload_bytes", found["payload_bytes"])
     yield ProfileLine(section, "period_us", found["period_us"])

@@ -23,6 +23,13 @@ _SIGNALS: Final = re.compile(r"^[ \t]*(?:SG_|VAL_|SIG_VALTYPE_|SG_MUL_VAL_) .*$"
 _WHOLE_SIGNAL: Final = re.compile(r"\s*SG_ .*\[.*\].*\"\s*\S")
 _LINE: Final = re.compile(r"Invalid syntax at line (\d+), column (\d+)")
 _KILO: Final = 1000
+_LARGEST_IN_KILO: Final = {"bit_rate_kbit_s": 1000, "data_bit_rate_kbit_s": 8000}
+"""Numbers up to these are in kbit/s, larger ones in bit/s."""
+_RATES: Final = (
+    ("bit_rate_kbit_s", "baudrate", ("Baudrate", "BaudRate")),
+    ("data_bit_rate_kbit_s", "fd_baudrate", ("BaudrateCANFD", "BaudRateCANFD")),
+)
+"""Each bit rate: its key, what cantools calls that of a bus, and attributes of a DBC."""
 _MOST_BIT_RATE: Final = 10_000_000
 
 
@@ -60,7 +67,7 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
             lines.setdefault(match[1], line)
     if not database.messages:
         raise machine.refusal(1, f"a {title} without messages")
-    _bit_rate(database, machine)
+    _bit_rates(database, machine)
     for message in database.messages:
         line = lines.get(message.name, 1)
         place, number = machine.place(line), message.frame_id + EXTENDED * bool(message.is_extended_frame)
@@ -99,15 +106,16 @@ def _loaded(text: str, name: str, title: str, dialect: str) -> Any:
         ) from None
 
 
-def _bit_rate(database: Any, machine: Reading) -> None:
-    """The bit rate, where the database says it; refuse several buses."""
+def _bit_rates(database: Any, machine: Reading) -> None:
+    """The bit rates, where the database says them; refuse several buses."""
     used = {message.bus_name for message in database.messages}
     if len(used) > 1:
         names = ", ".join(sorted(map(str, used)))
         raise machine.refusal(1, f"messages of {len(used)} buses, {names}: a profile is one bus; export one")
-    rates = [bus.baudrate for bus in database.buses if bus.name in used and bus.baudrate]
     attributes = getattr(database.dbc, "attributes", None) or {}
-    rates += [attributes[key].value for key in ("Baudrate", "BaudRate") if key in attributes]
-    if rates and isinstance(rates[0], int | float) and 0 < rates[0] <= _MOST_BIT_RATE:
-        rate = rates[0] / _KILO if rates[0] > _KILO else rates[0]
-        machine.bus["bit_rate_kbit_s"] = Fact(rate, machine.place(1))
+    for key, of_bus, attribute_names in _RATES:
+        rates = [getattr(bus, of_bus) for bus in database.buses if bus.name in used and getattr(bus, of_bus)]
+        rates += [attributes[name].value for name in attribute_names if name in attributes]
+        if rates and isinstance(rates[0], int | float) and 0 < rates[0] <= _MOST_BIT_RATE:
+            rate = rates[0] / _KILO if rates[0] > _LARGEST_IN_KILO[key] else rates[0]
+            machine.bus[key] = Fact(rate, machine.place(1))

@@ -72,7 +72,7 @@ def profile_text(rows: Sequence[ProfileLine], *, name: str, files: Sequence[tupl
 
 
 def sections_text(rows: Sequence[ProfileLine]) -> str:
-    """The text of sections, each behind an empty line."""
+    """The text of sections, each after an empty line."""
     return "".join(f"{line}\n" for line in _sections(rows))
 
 

@@ -30,7 +30,7 @@ class MapAnswer(Answer, TradeOff):
         Parameters
         ----------
         note
-            Words behind the title.
+            Words after the title.
         """
         from busplan.questions.map.drawing import map_svg
         from busplan.questions.map.report import headline

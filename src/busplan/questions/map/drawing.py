@@ -139,8 +139,8 @@ def _along(direction: Direction, value: Value, profile: Profile) -> str:
 
 
 def map_title(trade_off: TradeOff) -> str:
-    """Say what lies along which direction."""
-    return f"{title_of(trade_off.y, trade_off.profile)} up, {title_of(trade_off.x, trade_off.profile)} across"
+    """Quantities on the y and x axis: "period against axes"."""
+    return f"{title_of(trade_off.y, trade_off.profile)} against {title_of(trade_off.x, trade_off.profile)}"
 
 
 def cell_words(trade_off: TradeOff, cell: Cell) -> str:
@@ -325,8 +325,7 @@ def _legend(body: Element, trade_off: TradeOff, looks: Looks, *, y: int) -> int:
     for entry in legend_of(trade_off, looks):
         SubElement(body, "rect", {"class": entry.ink, "y": str(y + 3), "width": "14", "height": "14"})
         text_at(body, entry.letter, x="7", y=y + 14, css="mark", anchor="middle")
-        text_at(body, entry.text, x="22", y=y + 15)
-        y += LINE
+        y = paragraph(body, entry.text, x=22, y=y)
     if trade_off.own is not None:
         SubElement(body, "rect", {"class": "own", "x": "1.5", "y": str(y + 4), "width": "11", "height": "11"})
         text_at(body, "this design", x="22", y=y + 15)

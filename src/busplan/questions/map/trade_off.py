@@ -63,17 +63,17 @@ class Cell(NamedTuple):
     axes: int
     state: State
     limited_by: tuple[str, ...]
-    """Limits that are broken; of a circle that fails, what it does not hold, and of one that cannot be run, the keys
-    that refuse it; none where it fits."""
+    """Limits that are broken; for a circle that fails, its failures; for a circle that cannot be run, the keys that
+    prevent it; empty where the cell fits."""
     binding_term: str
     """The largest term of the cycle."""
     verdict: VerdictWord
     margin_corrected_us: float
     uncertainty_us: float | None
-    """None where nothing is known of it."""
+    """None where it is unknown."""
     is_safe: bool
     circle_refused_by: tuple[str, ...] = ()
-    """Keys for which its circle cannot be run, whatever the state."""
+    """Keys that prevent its circle test from running, whatever the state."""
     circle_passed: bool | None = None
     """None where no circle was run, or no tolerance judges it."""
 
@@ -97,7 +97,7 @@ class Region(NamedTuple):
 
 
 def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value) -> Cell:
-    """Make a cell before any circle.
+    """Make a cell from its capacity alone, before any circle test.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value
     keys = figures["not_shown" if verdict == NOT_SHOWN else "exceeded"]
     broken = tuple(key for key in keys if key != TIME) or (TIME,)
     refused = tuple(figures["circle_refused_by"])
-    state, limits = _judged(verdict, broken=broken, unsafe=unsafe, refused=refused)
+    state, limits = _state_and_limits(verdict, broken=broken, unsafe=unsafe, refused=refused)
     return Cell(
         x=x,
         y=y,
@@ -133,10 +133,10 @@ def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value
     )
 
 
-def _judged(
+def _state_and_limits(
     verdict: VerdictWord, *, broken: tuple[str, ...], unsafe: tuple[str, ...], refused: tuple[str, ...]
 ) -> tuple[State, tuple[str, ...]]:
-    """State and limits: what does not fit is never called unsafe, and what is unsafe never a fit."""
+    """State of a cell and what limits it; "does not fit" goes before "unsafe", and both before "fits"."""
     if verdict == DOES_NOT_FIT:
         return verdict, broken
     if unsafe:
@@ -174,19 +174,19 @@ class _Judgement(NamedTuple):
     failures: tuple[str, ...]
 
 
-def _judge(task: _Task) -> _Judgement:
+def _run_circle(task: _Task) -> _Judgement:
     (result,) = circle_test(override(task.profile, task.changes), explain=False).results
     return _Judgement(result.passed, tuple(failure.name for failure in result.failures))
 
 
-def judged(
+def with_circles(
     profile: Profile,
     fitting: Mapping[Place, tuple[Cell, MapPoint]],
     *,
     mapper: Mapper,
     progress: Progress | None,
 ) -> dict[Place, Cell]:
-    """Run the circle tests of cells that fit, after saying what many of them cost.
+    """Run the circle tests of cells that fit; a long run is announced first.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ def judged(
     cost, runs = NOTHING, dict[Place, _Task]()
     cells = {place: cell for place, (cell, _) in fitting.items()}
     for place, (cell, setting) in fitting.items():
-        # A profile that asks for no circle has none to be refused until now.
+        # For a profile that asks for no circle, `cell_of` did not look for refusals.
         refused = tuple(cause.name for cause in refusals(setting.profile))
         if refused:
             cells[place] = cell._replace(state="circle cannot be run", limited_by=refused, circle_refused_by=refused)
@@ -218,7 +218,7 @@ def judged(
     places = list(runs)
     for start in range(0, len(places), _AT_ONCE):
         part = places[start : start + _AT_ONCE]
-        for place, judgement in zip(part, mapper(_judge, [runs[place] for place in part]), strict=True):
+        for place, judgement in zip(part, mapper(_run_circle, [runs[place] for place in part]), strict=True):
             cells[place] = _with_circle(cells[place], judgement)
         if progress is not None:
             progress(start + len(part), len(places))
@@ -304,8 +304,8 @@ def trade_off(
     profile
         The network.
     x, y
-        Its keys with their values, from `checked_direction`: what lies across, and what lies up. By default the axes of
-        all nodes, and the period.
+        Quantities on the x and y axis, each a key with its values, from `checked_direction`. By default the axes of all
+        nodes, and the period.
     with_circle
         Run the circle test of every cell that fits.
     mapper
@@ -337,7 +337,7 @@ def trade_off(
         y = default_direction(AXES if x.key == PERIOD else PERIOD, profile, with_circle=with_circle)
     key_x, key_y = (profile_key(direction.key, profile) for direction in (x, y))
     if key_x == key_y:
-        raise BusplanError(f"{x.key} across and {y.key} up both vary {key_x}; give two keys")
+        raise BusplanError(f"x = {x.key} and y = {y.key} both vary {key_x}; give two keys")
     settings = {
         (row, column): _setting(profile, (x.key, value_x), (y.key, value_y))
         for row, value_y in enumerate(y.values)
@@ -357,7 +357,7 @@ def trade_off(
             raise BusplanError(
                 f"{len(fitting):,} settings fit, and a map runs up to {MOST_CIRCLES:,} circle tests; give fewer values"
             )
-        cells |= judged(profile, fitting, mapper=mapper, progress=progress)
+        cells |= with_circles(profile, fitting, mapper=mapper, progress=progress)
     rows = tuple(
         tuple(
             cells[row, column] if (row, column) in cells else NotDrawn(value_x, value_y, str(settings[row, column]))
@@ -372,7 +372,7 @@ def _setting(profile: Profile, *along: tuple[str, Value]) -> MapPoint | str:
     """The profile at a point of the map, or why there is none."""
     changes: dict[str, Value] = {}
     try:
-        # How many nodes some axes are is asked with the other direction's value.
+        # Axes come last: the number of nodes that they need may depend on the other value.
         for key, value in sorted(along, key=lambda key_value: key_value[0] == AXES):
             own = profile_key(key, profile)
             is_axes = key == AXES
@@ -383,9 +383,9 @@ def _setting(profile: Profile, *along: tuple[str, Value]) -> MapPoint | str:
 
 
 def _swept(profile: Profile, settings: Mapping[Place, MapPoint]) -> Iterator[tuple[Place, Mapping[str, Any]]]:
-    """Figures of each setting, from sweeps over grids without any other setting."""
+    """Figures of each setting, from sweeps over grids of these settings alone."""
     places: dict[tuple[object, ...], Place] = {
-        tuple(point_set.changes.values()): at for at, point_set in settings.items()
+        tuple(setting.changes.values()): place for place, setting in settings.items()
     }
     model = bus_of(profile).deciding_model
     for grid in _grids(settings.values()):
@@ -396,7 +396,7 @@ def _swept(profile: Profile, settings: Mapping[Place, MapPoint]) -> Iterator[tup
 
 
 def _grids(settings: Collection[MapPoint]) -> Iterator[Grid]:
-    """Full grids that have every setting once: lines with the same values along them are one grid."""
+    """Full grids that together have every setting once: lines with equal values along them share a grid."""
     across_key, along_key = next(iter(settings)).changes
     lines: dict[Value, list[Value]] = {}
     for point in settings:
@@ -404,5 +404,5 @@ def _grids(settings: Collection[MapPoint]) -> Iterator[Grid]:
     alike: dict[tuple[Value, ...], list[Value]] = {}
     for across, along in lines.items():
         alike.setdefault(tuple(along), []).append(across)
-    for values, places in alike.items():
-        yield Grid({across_key: Listed(tuple(places)), along_key: Listed(values)})
+    for along_values, across_values in alike.items():
+        yield Grid({across_key: Listed(tuple(across_values)), along_key: Listed(along_values)})

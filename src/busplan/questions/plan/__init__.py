@@ -10,7 +10,7 @@ from busplan.profile.keys import flat
 from busplan.profile.write import whole as as_whole
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, finite, items, load_profile, plain, values_by_key, whole
+from busplan.questions.base.inputs import ProfileLike, finite, from_numpy, items, load_profile, values_by_key, whole
 from busplan.questions.circle.check import CircleCheck
 from busplan.questions.plan import planning as analysis
 from busplan.questions.plan.constraints import nodes_for_axes
@@ -121,7 +121,7 @@ def plan(
         "bus.gap_count": gap_count,
         "limits.reserve": None if reserve is None else finite(reserve, name="reserve"),
     }
-    kept = _changes({key: plain(value) for key, value in own.items() if value is not None})
+    kept = _changes({key: from_numpy(value) for key, value in own.items() if value is not None})
     kept += wanted.each if isinstance(wanted, KeyChanges) else _changes(values_by_key(wanted, name="wanted"))
     if axes is not None:
         kept = (_nodes(network, whole(axes, name="axes"), kept), *kept)

@@ -13,7 +13,7 @@ from busplan.questions.plan.search import Search
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
-UNTESTED_CIRCLE: Final = "the circle is another one then, and is not simulated here"
+UNTESTED_CIRCLE: Final = "this changes the circle, which is not simulated here"
 """Words for a change whose circle was not tested."""
 
 
@@ -49,7 +49,7 @@ def changeable(profile: Profile) -> tuple[str, ...]:
 def cure(profile: Profile, *, circle_steps: int | None = None) -> Cure:
     """Find the least change after which a profile holds every constraint but its circle.
 
-    One circle at most is simulated: the one after the change, where that is another one.
+    At most one circle is simulated: the one after the change, if the change alters it.
 
     Parameters
     ----------
@@ -70,9 +70,9 @@ def cure(profile: Profile, *, circle_steps: int | None = None) -> Cure:
 
 
 def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
-    """Find the least change after which a profile fits as a plan does, or, where it does, has room for a node more.
+    """Find the least change that meets every constraint of a plan or, where all are met, makes room for another node.
 
-    No circle is simulated: that is another question.
+    No circle is simulated.
 
     Parameters
     ----------
@@ -84,13 +84,13 @@ def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
     Returns
     -------
     tuple
-        The change, None if there is none; and if so, what stands in the way.
+        The change, and the reason where there is none; where groups differ, none is looked for and the reason is empty.
     """
     own = cure(profile)
     if own.changes is None or own.changes:
         return _change(profile, own, nodes=now.nodes), own.why
     if now.safe_nodes is None:
-        return None, ""  # nodes differ, and nobody asked for more of which
+        return None, ""  # nobody said which of the groups is to grow
     nodes = now.safe_nodes + 1
     if nodes > MAX_COUNT:
         return None, f"{MAX_COUNT} nodes are the most of a profile"

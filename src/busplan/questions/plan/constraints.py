@@ -48,8 +48,15 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
         Nodes differ, so that axes do not say how many of which.
     """
     if profile.group:
-        keys = ", ".join(alike.nodes_key for alike in profile.alike_nodes)
-        raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; set the nodes of a group instead: {keys}")
+        own = {alike: int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes}
+        needed = {alike: axes - sum(own.values()) + own[alike] for alike in own if alike.node.axes}
+        each = ", or ".join(
+            f"set {alike.nodes_key}={ceil(of_group / int(alike.node.axes))}"
+            for alike, of_group in needed.items()
+            if of_group > 0
+        )
+        instead = f"say instead: {each}" if each else "set the nodes of a group instead"
+        raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
     (alike,) = profile.alike_nodes
     return ceil(axes / int(alike.node.axes))
 

@@ -48,7 +48,7 @@ class ListedNumbers(NamedTuple):
     Parameters
     ----------
     numbers
-        They, ascending.
+        The numbers, ascending.
 
     Examples
     --------
@@ -317,7 +317,7 @@ def most_nodes(search: "Search", changes: Changes, cheaper: Sequence[Freedom], *
 
 
 def period_grid(profile: "Profile") -> NumberGrid:
-    """Periods that are advised: those that the bus knows, or short ones; no circle refuses one for its step."""
+    """Periods that are advised: those that the bus allows, or short numbers; the circle's step divides each."""
     known = bus_of(profile).periods.us
     if known:
         return ListedNumbers(tuple(us for us in known if goes_with_step(profile, us)))
@@ -325,7 +325,7 @@ def period_grid(profile: "Profile") -> NumberGrid:
 
 
 def longest_period_us(profile: "Profile") -> float:
-    """The longest period that a profile may have and its bus knows [us]."""
+    """The longest period that a profile may have and its bus allows [us]."""
     return min(bus_of(profile).periods.longest_us, MAX_TIME_US)
 
 

@@ -24,7 +24,7 @@ _HALVINGS: Final = 40
 
 
 class SmallestPeriod(NamedTuple):
-    """The smallest period at which a profile is shown to fit, of those that its bus knows."""
+    """The smallest period at which a profile is shown to fit, of those that its bus allows."""
 
     us: float | None
     """None if there is none [us]."""
@@ -57,7 +57,7 @@ def smallest_period(profile: Profile) -> SmallestPeriod:
 
 
 def _known_us(bus: Bus, least_us: float) -> float:
-    """The shortest period that a bus knows and that is no shorter than a time; infinite where none is [us]."""
+    """The shortest period of at least a time that a bus allows; infinite where there is none [us]."""
     return float(plain(bus.periods.from_us(max(MIN_STEP_US, least_us))))
 
 

@@ -72,7 +72,7 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
     bus = capacity(profile)
     own_us = profile.cycle.period_us
     near_us = (own_us * factor for factor in _PERIOD_FACTORS if MIN_STEP_US <= own_us * factor <= MAX_TIME_US)
-    periods_us = [us for us in near_us if us == own_us or bus_of(profile).periods.knows(us)]
+    periods_us = [us for us in near_us if us == own_us or bus_of(profile).periods.allows(us)]
     plan, no_schedule = _schedule(profile)
     no_circle = tuple(cause.message for cause in circle_refusals(profile))
     is_run = with_circle and profile.asks_for_circle and not no_circle

@@ -195,7 +195,7 @@ def _comparison(subjects: Sequence[_Subject]) -> Table:
         TableColumn("period", "us"),
         TableColumn("nodes"),
         TableColumn("axes"),
-        TableColumn("used", "%"),
+        TableColumn("utilisation", "%"),
         TableColumn("margin", "us"),
         TableColumn("+/-", "us"),
         TableColumn("safe axes"),

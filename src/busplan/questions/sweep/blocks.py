@@ -28,12 +28,13 @@ from busplan.questions.fit.certainty import (
 )
 from busplan.questions.fit.circle_refusal import loop_refusals, run_refusals
 from busplan.questions.fit.figures import COUNTS, certainty_numbers, numeric_figures
-from busplan.questions.fit.loop_delays import acts_at_once
+from busplan.questions.fit.loop_delays import acts_at_once, any_jitter_us
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.fit.node_limit import most_nodes
 from busplan.questions.sweep.grid import Array, Chunk, Grid
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
+from busplan.servo.checks import is_multiple
 
 CHUNK_POINTS: Final = 1 << 14
 """Points computed at once: their arrays fit into the processor's cache."""
@@ -231,8 +232,9 @@ def _refused(
 ) -> Column:
     """Keys for which the circle of each point cannot be run.
 
-    They are asked point by point, but only over the keys that they rest on: the period and those of the circle, all
-    where the bus is in the loop or in the skew.
+    They are asked point by point, but only over the keys that they rest on: the period, those of the circle, and those
+    of the jitter; all where the bus is in the loop or in the skew. A point whose step is refused is asked for no move:
+    points that differ in their steps and jitter alone are asked once.
 
     Parameters
     ----------
@@ -246,22 +248,47 @@ def _refused(
         `_causes` of the profile, which knows what it was asked before: chunks share values.
     """
     is_apart = profile.servo.loop == "node" and acts_at_once(profile)
-    has_words = any(own.dtype == object for own in chunk.values.values())
+    is_known = is_apart and all(own.dtype != object for own in chunk.values.values())
+    group = _with_axes(_without_steps(_at(profile, chunk.values)) if is_known else np.zeros((), int), len(chunk.shape))
     read = [
         (number, key, own.ravel().tolist())
         for number, (key, own) in enumerate(chunk.values.items())
-        if has_words or not is_apart or key.partition(".")[0] in CIRCLE_SECTIONS or key == "cycle.period_us"
+        if not is_known or key.startswith(_ASKED) or group.shape[number] > 1
     ]
     shape = [1] * len(chunk.shape)
     for number, _, _ in read:
         shape[number] = chunk.shape[number]
+    group = np.broadcast_to(group, shape)
     known: dict[tuple[str, ...], int] = {}
+    asked: dict[tuple[object, ...], _Causes] = {}
     always, where_it_fits = np.zeros(shape, np.intp), np.zeros(shape, np.intp)
     for where in np.ndindex(*shape):
-        causes = causes_at(tuple((key, values[where[number]]) for number, key, values in read))
+        changes = tuple((key, values[where[number]]) for number, key, values in read)
+        if group[where]:
+            alike = (group[where], *(change for change in changes if change[0].startswith(_DRIVES)))
+            causes = asked[alike] = asked.get(alike) or causes_at(changes)
+        else:
+            causes = causes_at(changes)
         always[where], where_it_fits[where] = (known.setdefault(names, len(known)) for names in causes)
     codes = always if np.array_equal(always, where_it_fits) else np.where(fits, where_it_fits, always)
     return Column(codes.astype(np.min_scalar_type(len(known))), tuple(map(list, known)))
+
+
+_ASKED: Final = (*(f"{section}." for section in CIRCLE_SECTIONS), "cycle.period_us")
+"""Keys that the causes rest on, whatever the bus."""
+_DRIVES: Final = tuple(key for key in _ASKED if key not in ("delivery.", "cycle.period_us"))
+
+
+def _without_steps(at: Profile) -> Array:
+    """A number above 0 where the step does not divide the period, which tells whether the delivery keeps its order.
+
+    The loops are closed on nodes with a clock in common.
+    """
+    half_us, skew_us = at.cycle.period_us / 2, abs(at.delivery.skew_us)
+    late = skew_us + any_jitter_us(at) > half_us
+    late_alone = skew_us + at.delivery.jitter_us > half_us
+    is_divided = is_multiple(at.cycle.period_us, at.servo.step_us)
+    return np.where(is_divided, 0, 1 + np.asarray(late) + 2 * np.asarray(late_alone))
 
 
 _NO_WORD: Final = Column(np.zeros((), np.uint8), (None,))

@@ -113,7 +113,7 @@ def with_circles(block: SweepBlock, results: Iterator[Array]) -> SweepBlock:
     block
         Its capacity.
     results
-        Those of its points, and of those behind them, each of shape (CIRCLE_COLUMNS,).
+        Those of its points, and of those after them, each of shape (CIRCLE_COLUMNS,).
     """
     columns = np.array([*islice(results, block.chunk.points)]).T.reshape(-1, *block.chunk.shape)
     circles = {name: _column(name, values) for name, values in zip(CIRCLE_COLUMNS, columns, strict=True)}

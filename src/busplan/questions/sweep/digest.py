@@ -92,7 +92,7 @@ class Digest:
         self._top, self._sort_by = top, sort_by
         self._sign = 1.0 if ascending else -1.0
         self._kept: list[tuple[float, Record]] = []
-        """The top rows, each behind its rank, the smallest first."""
+        """The top rows, each after its rank, the smallest first."""
         self._fits = [0] * len(sweep.timing_models)
         self._passed = [0] * len(sweep.timing_models)
         self._counts: Counter[str] = Counter()

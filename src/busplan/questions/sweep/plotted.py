@@ -150,7 +150,7 @@ class Plotted(NamedTuple):
 
     figure: Figure
     scales: tuple[PlotScale, ...]
-    """Of two, the first lies up and the second across."""
+    """Of two, the first is the y axis and the second the x axis."""
     panels: tuple[Panel, ...]
     deciding: str
     """The timing model that decides."""

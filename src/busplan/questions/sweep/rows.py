@@ -83,7 +83,7 @@ class TextWriter:
         self._header = ""
 
     def finish(self, *, complete: bool) -> None:
-        """Write what stands behind the rows; lines need no end, for fewer than announced are a part."""
+        """Write what follows the rows; lines need no end, for fewer than announced are a part."""
         self._say(self._header + (f'\n], "complete": {json_text(complete)}}}\n' if self._form == "json" else ""))
 
     def _say(self, text: str) -> None:
@@ -151,7 +151,7 @@ class RowsWriter(Protocol):
         """Write a block; blocks come in the order of the grid."""
 
     def finish(self, *, complete: bool) -> None:
-        """Write what stands behind the rows: the file is valid, and says if it is not complete."""
+        """Write what follows the rows: the file is valid, and says if it is not complete."""
 
 
 def rows_writer(form: RowsForm, sweep: Sweep, write: Callable[[bytes], object]) -> RowsWriter:

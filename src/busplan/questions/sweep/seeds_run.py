@@ -101,7 +101,7 @@ def with_seeds(block: SweepBlock, results: Iterator[Array], seeds: int) -> Sweep
     block
         Its capacity.
     results
-        Those of its points, each with every seed, and of those behind them, each of shape (CIRCLE_COLUMNS,).
+        Those of its points, each with every seed, and of those after them, each of shape (CIRCLE_COLUMNS,).
     seeds
         Tests of each point.
     """

@@ -187,7 +187,7 @@ def _geometric(name: str, first: Decimal, last: Decimal, factor: Decimal) -> Val
 
 def _even(name: str, first: Decimal, last: Decimal, count: str) -> Values:
     if not re.fullmatch(r"[0-9]{1,12}", count) or int(count) < 2:  # noqa: PLR2004
-        raise BusplanError(f"{name}: expected a count of 2 or more behind the #")
+        raise BusplanError(f"{name}: expected a count of 2 or more after the #")
     if first == last:
         raise BusplanError(f"{name}: {count} values from {first} to {last} are one")
     step = (last - first) / (int(count) - 1)

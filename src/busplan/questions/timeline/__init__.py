@@ -37,7 +37,7 @@ class TimelineAnswer(Answer, Schedule):
         Parameters
         ----------
         note
-            What the title says behind the headline.
+            What the title says after the headline.
         """
         from busplan.questions.timeline.report import headline
         from busplan.questions.timeline.svg import timeline_svg

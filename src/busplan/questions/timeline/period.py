@@ -72,7 +72,7 @@ def period_end_us(schedule: Schedule, bars: tuple[ModelBar, ...]) -> float:
 
 
 def rest(schedule: Schedule) -> Event | None:
-    """The part of the period behind slice and cycle; None if there is none."""
+    """The part of the period after slice and cycle; None if there is none."""
     if schedule.end_us >= schedule.figures.period_us:
         return None
     return schedule.cycle_events[-1]._replace(start_us=schedule.end_us, end_us=schedule.figures.period_us)

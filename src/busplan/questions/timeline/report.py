@@ -70,7 +70,7 @@ def headline(schedule: Schedule) -> Sentence:
         f" by the {figures.timing_model} model",
     )
     if figures.verdict is None:
-        return Sentence((*parts, ", which decides nothing."), state_of(figures.fits and figures.safe))
+        return Sentence((*parts, ", which does not affect the verdict."), state_of(figures.fits and figures.safe))
     state = state_of(figures.verdict == FITS and figures.safe)
     verdict = figure_value(VERDICT, figures.verdict)._replace(state=state)
     return Sentence((*parts, "; verdict: ", verdict, "."), state)

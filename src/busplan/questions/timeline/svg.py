@@ -143,7 +143,7 @@ def _strip_legend(
     colours |= {part.label: _PERIOD_CSS[part.label] for bar in bars for part in bar.spans}
     x = 0
     for label, css in colours.items():
-        width = 30 + 7 * len(label)
+        width = 26 + 8 * len(label)
         if x + width > PHONE:
             x, y = 0, y + LINE
         SubElement(body, "rect", {"class": css, "x": str(x), "y": str(y + 5), "width": "10", "height": "10"})

@@ -40,7 +40,7 @@ def with_profile(name: str, records: Sequence[Record]) -> list[Record]:
 
 
 def parts_by(parts: Mapping[str, str]) -> list[Record]:
-    """Each part of a kind that figures of others set or test, with what does."""
+    """Parts of a kind's model that published figures set or test, each with those figures."""
     return [{"part": part, "by": words} for part, words in parts.items()]
 
 

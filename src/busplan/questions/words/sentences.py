@@ -64,7 +64,7 @@ def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
 def refused_circle(profile: Profile) -> Iterator[Sentence]:
     """Say why the circle that a profile asks for cannot be run; nothing where it can.
 
-    It stands first in every answer with a verdict: a plan whose circle nobody can run is none.
+    It stands first in every answer with a verdict: a circle that cannot be run is said before the verdict.
     """
     causes = circle_refusals(profile)
     if causes:
@@ -126,19 +126,17 @@ def broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
 
 
 def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
-    """Say by part what of a kind figures of others set and test; nothing where they test all of it."""
+    """Say which parts of a kind's model published figures set and test; nothing where they test all of it."""
     tested = parts_tested(bus.evidence_data)
     kind = f"{bus.title} (kind {bus.kind})"
     if not tested.parts:
-        yield Sentence((f"No figure that others have published or measured tests the model of {kind}.",))
+        yield Sentence((f"No published or measured figure tests the model of {kind}.",))
     elif tested.untested:
-        said = {"set by figures of others": tested.set_by, "tested by others": tested.parts}
+        said = {"published figures set": tested.set_by, "independent figures test": tested.parts}
         phrases = (
-            f"{how}: {', '.join(f'{part} ({by})' for part, by in parts.items())}"
-            for how, parts in said.items()
-            if parts
+            f"{how} {', '.join(f'{part} ({by})' for part, by in parts.items())}" for how, parts in said.items() if parts
         )
-        yield Sentence((f"Of {kind} {'; '.join(phrases)}; not tested: {', '.join(tested.untested)}.",))
+        yield Sentence((f"Model of {kind}: {'; '.join(phrases)}; not tested: {', '.join(tested.untested)}.",))
 
 
 def not_applicable(profile: Profile) -> Iterator[Sentence]:
@@ -151,7 +149,7 @@ def not_applicable(profile: Profile) -> Iterator[Sentence]:
 
 
 def reset_sentence(after: CapacityFigures | None, profile: Profile) -> Iterator[Sentence]:
-    """Say that a plan stops fitting at a bus reset; nothing if it does not."""
+    """Say that a cycle stops fitting at a bus reset; nothing if it does not."""
     if after is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in bus_of(profile).safety.after_reset.items())
         text = f"After a bus reset, with {keys} until it is set again, the verdict is: {after.verdict}."
