@@ -130,7 +130,7 @@ def test_the_uncertainty_of_a_quantile_is_what_repetitions_scatter() -> None:
     )
 
 
-@given(st.integers(1, 10**6), st.floats(0.01, 0.3), st.integers(20, 3000), st.integers(0, 5))
+@given(st.integers(1, 10**6), st.floats(0.01, 0.15), st.integers(50, 3000), st.integers(0, 5))
 def test_a_period_is_found_whatever_is_missing(seed: int, scatter: float, count: int, missing: int) -> None:
     random = np.random.default_rng(seed)
     places = np.arange(count + missing)

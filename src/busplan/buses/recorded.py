@@ -26,7 +26,8 @@ class RecordedFigure(NamedTuple):
     """A figure as planned and as recorded, both in `unit`."""
 
     quantity: str
-    unit: str
+    unit: Literal["us", "bytes", "1", "share"]
+    """A share is 0..1."""
     planned: float | None
     recorded: float | None
     """None where the recording does not show it."""
@@ -76,3 +77,25 @@ def day_of(time_ns: int) -> str:
     if not _FIRST_DAY_NS <= time_ns < _LAST_DAY_NS:
         return ""
     return datetime.fromtimestamp(time_ns // 1_000_000_000, tz=UTC).date().isoformat()
+
+
+def share_words(share: float, *, of: str = "cycles") -> str:
+    """Say of which share of events a figure holds.
+
+    Examples
+    --------
+    >>> share_words(0.99), share_words(1, of="frames")
+    (' of 99 % of the cycles', ' of all frames')
+    """
+    return f" of all {of}" if share == 1 else f" of {100 * share:g} % of the {of}"
+
+
+def counted(number: int, name: str) -> str:
+    """A number of things.
+
+    Examples
+    --------
+    >>> counted(1, "frame"), counted(1200, "frame")
+    ('1 frame', '1,200 frames')
+    """
+    return f"{number:,} {name}{'s' * (number != 1)}"

@@ -22,7 +22,11 @@ def measured_command(
     profile: ProfileArgument,
     recording: Annotated[
         str,
-        typer.Argument(help="A recording of the machine: of EtherCAT a pcap or pcapng file.", show_default=False),
+        typer.Argument(
+            help="A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, BLF or "
+            "TRC.",
+            show_default=False,
+        ),
     ],
     quantile: Annotated[
         float,
@@ -47,9 +51,9 @@ def measured_command(
     """Show what the machine does by a recording of its bus, beside what was planned.
 
     Each figure has the planned and the recorded value, the residual, its expanded uncertainty U, and whether it is
-    within the plan: jitter, times and bytes at most as planned, the period equal to it, or no further beside than U.
-    What the recording does not show is said. Of EtherCAT record all packets of the master's port, both ways. Times are
-    in us. `busplan manual measured` says how each figure is found. Exits 0 with any figures.
+    within the plan: jitter, times, load and bytes at most as planned, or no further beside than U. What the recording
+    does not show is said. Of EtherCAT record all packets of the master's port, both ways. Times are in us. `busplan
+    manual measured` says how each figure is found. Exits 0 with any figures.
 
     Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
     """

@@ -1,6 +1,6 @@
 """Periods, lateness and quantiles of stamps."""
 
-from math import ceil, inf, sqrt
+from math import ceil, hypot, inf, sqrt
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -13,8 +13,8 @@ _BLOCK: Final = 500
 """Events over which a clock runs evenly."""
 _LEAST_BLOCKS: Final = 4
 _LEAST_ERROR_US: Final = 1e-6
-_DRIFT: Final = 4.0
-"""Mean square of the distances of medians from a line, in their standard errors, that only a drift makes."""
+_DRIFT_SIGMAS: Final = 10.0
+"""How far beyond 1 the mean square of the distances of medians from a line, in their standard errors, is a drift."""
 _EARLY_SHARE: Final = 0.999
 """Share of the events that are taken for no earlier than the earliest: a stamp may be wrong."""
 _AHEAD: Final = 20
@@ -111,9 +111,9 @@ def grid(times_us: Floats) -> Grid | None:
         return None
     places = _places(times_us, period_us)
     late = times_us - times_us[0] - places * period_us
-    late, slope, error = _without_drift(places.astype(np.float64), late)
+    late, slope, error, bend_us = _without_drift(places.astype(np.float64), late)
     # The places of the first and of the last event scatter as all do.
-    doubt_us = float(np.std(late)) * sqrt(3 / len(late))
+    doubt_us = hypot(float(np.std(late)) * sqrt(3 / len(late)), bend_us)
     missing = int(places[-1] - places[0]) + 1 - len(times_us)
     return Grid(period_us + slope, error, late, doubt_us, missing)
 
@@ -147,10 +147,11 @@ def _places(times_us: Floats, period_us: float) -> npt.NDArray[np.int64]:
     return places
 
 
-def _without_drift(places: Floats, late: Floats) -> tuple[Floats, float, float]:
+def _without_drift(places: Floats, late: Floats) -> tuple[Floats, float, float, float]:
     """Lateness about a straight line, its slope and the standard error of that; where clocks drift, about a bent one.
 
-    The line goes through medians of blocks. A clock drifts where they lie further off than they scatter.
+    The last value is the standard error of the bends. The line goes through medians of blocks. A clock drifts where
+    they lie further off than they scatter.
     """
     blocks = np.array_split(np.arange(len(late)), max(len(late) // _BLOCK, _LEAST_BLOCKS))
     at = np.array([places[block].mean() for block in blocks])
@@ -162,11 +163,12 @@ def _without_drift(places: Floats, late: Floats) -> tuple[Floats, float, float]:
     spread = float(np.sum(weight * (at - centre) ** 2))
     slope = float(np.sum(weight * (at - centre) * (value - level))) / spread
     left = value - level - slope * (at - centre)
-    misfit = float(np.sum(weight * left**2)) / (len(blocks) - 2)
-    straight = level + slope * (places - centre)
-    if misfit > _DRIFT:
-        straight = straight + np.interp(places, at, left)
-    return late - straight, slope, sqrt(max(misfit, 1.0) / spread)
+    free = len(blocks) - 2
+    misfit = float(np.sum(weight * left**2)) / free
+    straight, bend_us = level + slope * (places - centre), 0.0
+    if misfit > 1 + _DRIFT_SIGMAS * sqrt(2 / free):
+        straight, bend_us = straight + np.interp(places, at, left), float(np.mean(error_of))
+    return late - straight, slope, sqrt(max(misfit, 1.0) / spread), bend_us
 
 
 def line(sizes: Floats, values: Floats) -> tuple[float, float] | None:

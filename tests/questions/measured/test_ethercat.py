@@ -80,7 +80,8 @@ def test_period_jitter_and_masters_time_are_found_again_within_u(
     assert jitter.recorded == pytest.approx(0.9 * jitter_us, abs=2 * jitter.uncertainty)
     edits = answer.edits
     doubt: Any = edits["bus.master_uncertainty_us"]
-    assert edits["bus.master_us"] == pytest.approx(host_us + 0.9 * spread_us, abs=4 * doubt + 0.002)
+    # The delay of a device is rounded in the simulation: 8 times 0.8 ns.
+    assert edits["bus.master_us"] == pytest.approx(host_us + 0.9 * spread_us, abs=4 * doubt + 0.01)
     assert edits["bus.master_us"] == pytest.approx(master.recorded, abs=0.001)
     assert doubt < max(spread_us, 0.1)
 

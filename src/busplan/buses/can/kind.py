@@ -1,7 +1,7 @@
 """CAN 2.0 and CAN FD with a CANopen cycle, as a kind of bus."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
 from busplan.buses.can import rules
@@ -18,7 +18,12 @@ from busplan.buses.can.limits import LIMITS
 from busplan.buses.can.traffic import traffic_of
 from busplan.buses.network import Network
 from busplan.buses.parts import Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.recorded import Recorded
 from busplan.elementwise import plain
+from busplan.progress import Progress
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 _HOST_STEP_US: Final = 10.0
 
@@ -75,6 +80,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "message.identifier": Key("id"),
     }
     term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0},)
+    recordings = "a log of candump, ASC, BLF or TRC"
     evidence_data = ("can", "paper")
 
     def cycle(self, network: Network, *, model: str) -> CanCycle:
@@ -130,6 +136,12 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         from busplan.buses.can.evidence import FUNCTIONS  # a single command asks for them
 
         return FUNCTIONS
+
+    def recorded(self, network: Network, path: "Path", *, share: float, progress: Progress) -> Recorded:
+        """Compare a CAN log with the plan."""
+        from busplan.buses.can.recorded import recorded  # a single command asks for it, and numpy loads
+
+        return recorded(network, path, share=share, progress=progress)
 
 
 def _all_nodes(network: Network) -> str:

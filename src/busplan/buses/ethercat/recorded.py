@@ -21,7 +21,7 @@ from busplan.buses.ethercat.equations import (
 )
 from busplan.buses.ethercat.traffic import cables_us, devices_doubts, devices_us, housekeeping_bytes
 from busplan.buses.network import Network
-from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
+from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, counted, day_of, share_words
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -186,7 +186,7 @@ class _Seen:
         count, planned_us = len(self.starts), plain(self.network.period_us)
         apart_us = np.diff(self.times_us)
         doubt = expanded(found.uncertainty_us, CLOCK_TOLERANCE * planned_us / 3**0.5, self.stamp_us / len(apart_us))
-        note = f"{_counted(found.missing, 'period')} without a frame" if found.missing else ""
+        note = f"{counted(found.missing, 'period')} without a frame" if found.missing else ""
         yield RecordedFigure(
             "period", "us", planned_us, found.period_us, doubt, "equal", count, "cycle.period_us", note
         )
@@ -196,7 +196,7 @@ class _Seen:
         doubt = expanded(self.jitter.uncertainty or found.doubt_us, self.stamp_us * _TWO_STAMPS)
         planned_us = plain(self.network.profile.bus.master_jitter_us)
         yield RecordedFigure(
-            f"latest start{_share_words(self.share)}",
+            f"latest start{share_words(self.share)}",
             "us",
             planned_us,
             self.jitter.value,
@@ -207,7 +207,7 @@ class _Seen:
         )
 
     def _host(self, cycles: _Cycles) -> Iterator[RecordedFigure]:
-        words, count = _share_words(self.share), len(cycles.starts)
+        words, count = share_words(self.share), len(cycles.starts)
         if not count:
             return
         bus, terms = self.network.profile.bus, self.cycle.by_term
@@ -301,24 +301,24 @@ class _Seen:
         if not len(self.starts):
             yield "It has no frame of process data (LRD, LWR, LRW), so no period, no jitter and no time of the master."
         elif not self.has_period:
-            yield f"It has {_counted(len(self.starts), 'cycle')}, too few for a period."
+            yield f"It has {counted(len(self.starts), 'cycle')}, too few for a period."
         if self.steps_back:
             yield (
-                f"Its clock was set back {_counted(self.steps_back, 'time')}: cycles are those of the longest stretch "
+                f"Its clock was set back {counted(self.steps_back, 'time')}: cycles are those of the longest stretch "
                 "between, round trips over a step are left out."
             )
         if self.trips.unsent:
-            yield f"{_counted(self.trips.unsent, 'frame')} returned without having been seen to be sent."
+            yield f"{counted(self.trips.unsent, 'frame')} returned without having been seen to be sent."
         if frames.cut:
-            yield f"Left out: {_counted(frames.cut, 'EtherCAT frame')} that the recorder cut; record whole packets."
+            yield f"Left out: {counted(frames.cut, 'EtherCAT frame')} that the recorder cut; record whole packets."
         left_out = frames.others + notes.other_links + notes.without_time
         if left_out:
-            yield f"Left out: {_counted(left_out, 'packet')} of other protocols or interfaces, or without a time."
+            yield f"Left out: {counted(left_out, 'packet')} of other protocols or interfaces, or without a time."
         times_us = (frames.times_ns[self.trips.returned] - frames.times_ns[self.trips.sent]) / 1000
         short = int(np.count_nonzero(times_us < self.wire_us[self.trips.sent] - _GAP_US - 2 * self.stamp_us))
         if short:
             yield (
-                f"{_counted(short, 'frame')} returned sooner than it takes to send them: the stamps were not taken at "
+                f"{counted(short, 'frame')} returned sooner than it takes to send them: the stamps were not taken at "
                 "the master's port."
             )
         if self.master is not None and self.master.value < 0:
@@ -340,14 +340,6 @@ class _Seen:
         if self.own_bytes is not None:
             edits["bus.housekeeping_bytes"] = list(self.own_bytes)
         return edits
-
-
-def _share_words(share: float) -> str:
-    return " of all cycles" if share == 1 else f" of {100 * share:g} % of the cycles"
-
-
-def _counted(number: int, name: str) -> str:
-    return f"{number:,} {name}{'s' * (number != 1)}"
 
 
 def _words(part: Datagram) -> str:

@@ -82,9 +82,10 @@ def measured(
     profile
         The plan: a `Profile`, a path or a shipped name. It is not changed.
     recording
-        A file of the profile's kind of bus. EtherCAT: a capture of the master's port, pcap or pcapng.
+        A file of the profile's kind of bus. EtherCAT: a capture of the master's port, pcap or pcapng. CAN: a log of
+        `candump -l`, ASC, BLF or TRC (with the extra `import`).
     quantile
-        Share of the events that jitter and times of the master are to hold for, 0.5..1; 1 is the worst one recorded.
+        Share of the events that jitter and times are to hold for, 0.5..1; 1 is the worst one recorded.
     progress
         Called with the bytes read and those of the file.
 

@@ -38,7 +38,9 @@ _COLUMNS: Final = (
     TableColumn("n", rank=2),
     TableColumn("note", kind="words", rank=3, leaves="below", wraps=True),
 )
-_DECIMALS: Final = {"us": 3, "1": 0, "bytes": 0, "bits": 1, "%": 2}
+_DECIMALS: Final = {"us": 3, "1": 0, "bytes": 0, "share": 2}
+_UNITS: Final = {"1": "", "share": "%"}
+"""How a unit is shown, where not as it is."""
 _WITHIN: Final = {True: Words("yes", "passes"), False: Words("no", "fails")}
 _SMALL_US: Final = 1.0
 """A time below it has more decimals."""
@@ -90,7 +92,7 @@ def _blocks(answer: MeasuredAnswer) -> Iterator[Block]:
 def _row(figure: RecordedFigure) -> TableRow:
     within: Cell = "" if figure.within is None else _WITHIN[figure.within]
     shown = (_value(figure, name) for name in ("planned", "recorded", "residual", "uncertainty"))
-    unit = "" if figure.unit == "1" else figure.unit
+    unit = _UNITS.get(figure.unit, figure.unit)
     return TableRow((figure.quantity, unit, *shown, within, ShownValue(figure.events, "events"), figure.note))
 
 
@@ -99,7 +101,9 @@ def _value(figure: RecordedFigure, name: str) -> ShownValue:
     decimals = _DECIMALS[figure.unit]
     if figure.unit == "us" and max(map(abs, filter(None, (figure.planned, figure.recorded))), default=1) < _SMALL_US:
         decimals = 5
-    return ShownValue(value, name, figure.unit, decimals, signed=name == "residual", fixed=True)
+    return ShownValue(
+        value, name, _UNITS.get(figure.unit, figure.unit), decimals, signed=name == "residual", fixed=True
+    )
 
 
 def _record(figure: RecordedFigure) -> Record:

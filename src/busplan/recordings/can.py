@@ -1,0 +1,249 @@
+"""Frames of CAN logs as arrays, and the bits that each of them had on the wire."""
+
+import logging
+from array import array
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from busplan.errors import BusplanError
+from busplan.extras import require_extra
+from busplan.progress import Progress
+from busplan.recordings.statistics import Floats
+
+_EXTENDED, _REMOTE, _FD = 1, 2, 4
+_READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader", b"(": "CanutilsLogReader"}
+"""Readers of python-can, by the first bytes of a file."""
+_FORMATS: Final = "candump -l, Vector's ASC and BLF, PEAK's TRC"
+_TURN: Final = 5000
+"""Frames between two reports of progress."""
+_CRC_15: Final = 0x4599
+_CRC_BITS: Final = 15
+_NEVER_STUFFED: Final = 13
+"""Bits behind the CRC: its delimiter, acknowledge, end of frame and interframe space."""
+_RUN: Final = 5
+"""Equal bits behind which the opposite one is stuffed."""
+_PIECE: Final = 50_000
+_CLASSICAL_BYTES: Final = 8
+
+
+class CanFrames(NamedTuple):
+    """Frames of one channel, n of them in the order of the log."""
+
+    start_s: float
+    """Stamp of the first, in seconds since 1970 where the log says it."""
+    times_us: Floats
+    """From the first one [us]."""
+    identifiers: npt.NDArray[np.int64]
+    extended: npt.NDArray[np.bool_]
+    sizes: npt.NDArray[np.int64]
+    """Data, as the length code says it [bytes]."""
+    bits: npt.NDArray[np.int64]
+    """On the wire, interframe space included; 0 of a CAN FD frame [bits]."""
+    is_fd: npt.NDArray[np.bool_]
+    """Whether it is a CAN FD frame."""
+    remote: int
+    errors: int
+    """Frames that ask for data, and error frames; the latter are not among the frames."""
+    broken: str
+    """Why the log ends where it does; empty of a whole one."""
+
+
+def read_can(path: Path, *, progress: Progress) -> CanFrames:
+    """Read a CAN log.
+
+    Parameters
+    ----------
+    path
+        A log of `candump -l`, ASC, BLF or TRC.
+    progress
+        Called with the bytes read and those of the file.
+
+    Raises
+    ------
+    BusplanError
+        The file cannot be read, is of no known format, has no frame, or those of several channels; or python-can is
+        not installed.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(4)
+        size = path.stat().st_size
+    except OSError as error:
+        raise BusplanError(f"{path}: cannot be read: {error.strerror}") from None
+    name = next((reader for start, reader in _READERS.items() if head.startswith(start)), None)
+    if name is None:
+        raise BusplanError(f"{path}: is no CAN log that is read: {_FORMATS}")
+    require_extra("can", extra="import", option=str(path), module="can")
+    import can  # noqa: PLC0415 - an extra
+
+    # What it warns of is said by the frames that are missing.
+    logging.getLogger("can").addHandler(logging.NullHandler())
+    log = _Log()
+    reader: Any = None
+    try:
+        reader = getattr(can, name)(str(path))
+        stream = getattr(reader, "file", None)
+        log.read(reader, lambda: progress(min(stream.tell() if stream else 0, size), size))
+    except Exception as error:  # noqa: BLE001 - a damaged log fails in many ways
+        log.broken = f"{type(error).__name__}: {error}"
+    finally:
+        with suppress(Exception):
+            reader.stop()
+    return log.frames(path)
+
+
+class _Log:
+    """Frames read so far."""
+
+    def __init__(self) -> None:
+        self._times, self._identifiers, self._data = array("d"), array("I"), array("Q")
+        self._sizes, self._flags = array("B"), array("B")
+        self._channels: Counter[object] = Counter()
+        self._errors = 0
+        self.broken = ""
+
+    def read(self, messages: Iterator[Any], report: Callable[[], None]) -> None:
+        """Take all messages in."""
+        times, identifiers, data, sizes, flags = (
+            self._times.append,
+            self._identifiers.append,
+            self._data.append,
+            self._sizes.append,
+            self._flags.append,
+        )
+        number = 0
+        for message in messages:
+            number += 1
+            if not number % _TURN:
+                with suppress(OSError, ValueError):
+                    report()
+            if message.is_error_frame:
+                self._errors += 1
+                continue
+            self._channels[message.channel] += 1
+            times(message.timestamp)
+            identifiers(message.arbitration_id)
+            sizes(message.dlc)
+            data(int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"))
+            fd = message.is_fd or message.dlc > _CLASSICAL_BYTES
+            flags(message.is_extended_id * _EXTENDED | message.is_remote_frame * _REMOTE | fd * _FD)
+
+    def frames(self, path: Path) -> CanFrames:
+        """All frames as arrays."""
+        if not self._times:
+            why = f" ({self.broken})" if self.broken else ""
+            raise BusplanError(f"{path}: has no CAN frame{why}")
+        if len(self._channels) > 1:
+            named = ", ".join(f"{channel} ({count:,} frames)" for channel, count in self._channels.most_common())
+            raise BusplanError(f"{path}: has frames of {len(self._channels)} channels: {named}; keep those of one bus")
+        stamps = np.frombuffer(self._times, dtype=np.float64)
+        identifiers = np.frombuffer(self._identifiers, dtype=np.uint32).astype(np.int64)
+        flags = np.frombuffer(self._flags, dtype=np.uint8)
+        sizes = np.frombuffer(self._sizes, dtype=np.uint8).astype(np.int64)
+        extended, remote, fd = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD))
+        data = np.frombuffer(self._data, dtype=np.uint64)
+        return CanFrames(
+            float(stamps[0]),
+            (stamps - stamps[0]) * 1e6,
+            identifiers,
+            extended,
+            sizes,
+            np.where(fd, 0, written_bits(identifiers, extended, remote, np.minimum(sizes, _CLASSICAL_BYTES), data)),
+            fd,
+            int(np.count_nonzero(remote)),
+            self._errors,
+            self.broken,
+        )
+
+
+def written_bits(
+    identifiers: npt.NDArray[np.int64],
+    extended: npt.NDArray[np.bool_],
+    remote: npt.NDArray[np.bool_],
+    sizes: npt.NDArray[np.int64],
+    data: npt.NDArray[np.uint64],
+) -> npt.NDArray[np.int64]:
+    """Bits of frames on the wire, each with its own stuff bits, interframe space included.
+
+    Parameters
+    ----------
+    identifiers, extended, remote, sizes
+        Of n frames: identifier, whether it has 29 bits, whether it asks for data, and the length code [bytes].
+    data
+        Up to 8 bytes, the first one highest.
+
+    References
+    ----------
+    ISO 11898-1; CAN 2.0, 3.1.1 and the generator polynomial 0x4599.
+
+    Examples
+    --------
+    >>> one = np.array([0x14]), np.array([False]), np.array([False]), np.array([1]), np.array([1 << 56], np.uint64)
+    >>> int(written_bits(*one)[0])
+    58
+    """
+    bits = np.zeros(len(identifiers), dtype=np.int64)
+    sort = sizes * 4 + extended * 2 + remote
+    for kind in np.unique(sort):
+        places = np.flatnonzero(sort == kind)
+        for first in range(0, len(places), _PIECE):
+            piece = places[first : first + _PIECE]
+            columns = _columns(
+                identifiers[piece],
+                data[piece],
+                is_extended=bool(kind & 2),
+                is_remote=bool(kind & 1),
+                size=int(kind) // 4,
+            )
+            bits[piece] = _stuffed(columns)
+    return bits
+
+
+def _columns(
+    identifiers: npt.NDArray[np.int64],
+    data: npt.NDArray[np.uint64],
+    *,
+    is_extended: bool,
+    is_remote: bool,
+    size: int,
+) -> list[npt.NDArray[np.uint8]]:
+    """Bits of frames of one sort from their start to the CRC, of all frames a bit at a time."""
+    count = len(identifiers)
+
+    def same(*values: int) -> list[npt.NDArray[np.uint8]]:
+        return [np.full(count, value, dtype=np.uint8) for value in values]
+
+    def of(numbers: npt.NDArray[Any], width: int, *, above: int = 0) -> list[npt.NDArray[np.uint8]]:
+        shifts = range(above + width - 1, above - 1, -1)
+        return [(numbers >> numbers.dtype.type(shift) & numbers.dtype.type(1)).astype(np.uint8) for shift in shifts]
+
+    if is_extended:
+        head = [*same(0), *of(identifiers, 11, above=18), *same(1, 1), *of(identifiers, 18), *same(is_remote, 0, 0)]
+    else:
+        head = [*same(0), *of(identifiers, 11), *same(is_remote, 0, 0)]
+    length = same(*(size >> place & 1 for place in (3, 2, 1, 0)))
+    field = [] if is_remote else of(data, 8 * size, above=64 - 8 * size)
+    return [*head, *length, *field]
+
+
+def _stuffed(columns: list[npt.NDArray[np.uint8]]) -> npt.NDArray[np.int64]:
+    """Bits of frames with their CRC, stuff bits and all that follows."""
+    register = np.zeros(len(columns[0]), dtype=np.int32)
+    for bit in columns:
+        register = (register << 1 & 0x7FFF) ^ (register >> 14 ^ bit) * _CRC_15
+    check = [(register >> place & 1).astype(np.uint8) for place in range(_CRC_BITS - 1, -1, -1)]
+    last, run = np.full(len(register), 2, dtype=np.uint8), np.zeros(len(register), dtype=np.uint8)
+    stuffed = np.zeros(len(register), dtype=np.int64)
+    for bit in (*columns, *check):
+        run = np.where(bit == last, run + np.uint8(1), np.uint8(1))
+        is_full = run == _RUN
+        stuffed += is_full
+        last = np.where(is_full, 1 - bit, bit).astype(np.uint8)
+        run = np.where(is_full, np.uint8(1), run)
+    return stuffed + len(columns) + _CRC_BITS + _NEVER_STUFFED

@@ -1,0 +1,240 @@
+"""Logs of a simulated CAN bus: what was sent is found again, to the bit; what the log hides is said."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import TYPE_CHECKING, Any
+
+import can
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import busplan
+from busplan.buses.recorded import RecordedFigure
+from busplan.errors import BusplanError
+from busplan.questions.measured import MeasuredAnswer
+from busplan.recordings.can import read_can, written_bits
+from tests.oracles.can_recording import Logged, Queued, arbitrated, bits_of, candump, servo_8
+
+if TYPE_CHECKING:
+    from subprocess import CompletedProcess
+
+Run = Callable[..., "CompletedProcess[str]"]
+PLAN = "can-servo-8"
+LOGGED = arbitrated(servo_8(300))
+
+
+def of_log(text: str, tmp_path: Path, *, plan: Any = PLAN, **options: Any) -> MeasuredAnswer:
+    path = tmp_path / "bus.log"
+    path.write_text(text)
+    return busplan.measured(plan, path, **options)
+
+
+def figure(answer: MeasuredAnswer, start: str) -> RecordedFigure:
+    (found,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
+    return found
+
+
+frames = st.builds(
+    Queued,
+    st.just(0.0),
+    st.integers(0, 0x7FF),
+    st.binary(max_size=8) | st.sampled_from([bytes(8), b"\xff" * 8, b"\x0f" * 8, b"\xc3" * 5]),
+    st.booleans(),
+)
+
+
+@given(st.lists(frames, min_size=1, max_size=50), st.integers(0, 0x3FFFF))
+def test_the_bits_of_a_frame_are_those_written_one_by_one(each: list[Queued], lower: int) -> None:
+    each = [frame._replace(identifier=frame.identifier << 18 | lower) if frame.extended else frame for frame in each]
+    found = written_bits(
+        np.array([frame.identifier for frame in each]),
+        np.array([frame.extended for frame in each]),
+        np.zeros(len(each), dtype=np.bool_),
+        np.array([len(frame.data) for frame in each]),
+        np.array([int.from_bytes(frame.data.ljust(8, b"\0"), "big") for frame in each], dtype=np.uint64),
+    )
+    assert found.tolist() == [bits_of(frame) for frame in each]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_machine_within_its_plan_is_found_to_be(tmp_path: Path, seed: int) -> None:
+    logged = arbitrated(servo_8(300, seed=seed))
+    answer = of_log(candump(logged), tmp_path)
+    assert [found.quantity for found in answer.outside] == []
+    assert answer.edits == {}
+    assert answer.day == "2023-11-14"
+    # Every bit is counted: the load is that of the simulation.
+    load = sum(frame.bits for frame in logged[1:]) / (logged[-1].us - logged[0].us)
+    assert figure(answer, "load ").recorded == pytest.approx(load, rel=1e-6)
+    none, worst = (figure(answer, f"load, {sort}").recorded or 0 for sort in ("no", "worst"))
+    assert none < load < worst
+    assert figure(answer, "SYNC: period").recorded == pytest.approx(4000, abs=0.5)
+    assert figure(answer, "heartbeats: jitter").unit == "us"
+    assert figure(answer, "sdo-request: shortest distance").note == "not periodic"
+    last = max(frame.us % 4000 for frame in logged if 0x181 <= frame.identifier <= 0x208)
+    assert figure(answer, "last PDO behind SYNC").recorded == pytest.approx(last - 47, abs=60)
+
+
+def test_every_format_has_the_same_frames(tmp_path: Path) -> None:
+    logged = [*LOGGED[:400], Logged(LOGGED[400].us, 0x18FF0102, b"\1\2\3", True, 0)]
+    for ending in ("log", "asc", "blf", "trc"):
+        path = tmp_path / f"bus.{ending}"
+        with can.Logger(str(path)) as writer:
+            for frame in logged:
+                writer(
+                    can.Message(
+                        timestamp=1_700_000_000 + frame.us / 1e6,
+                        arbitration_id=frame.identifier,
+                        is_extended_id=frame.extended,
+                        data=frame.data,
+                        channel=0,
+                    )
+                )
+        found = read_can(path, progress=lambda _done, _total: None)
+        assert found.identifiers.tolist() == [frame.identifier for frame in logged], ending
+        assert found.extended.tolist() == [frame.extended for frame in logged]
+        assert found.bits.tolist() == [bits_of(frame) for frame in logged]
+        step_us = 100 if ending == "trc" else 2
+        assert found.times_us == pytest.approx([frame.us - logged[0].us for frame in logged], abs=step_us)
+        assert found.broken == ""
+
+
+def test_what_is_planned_and_not_seen_and_seen_and_not_planned_is_said(tmp_path: Path) -> None:
+    gone = {0x708, 0x183, 0x601}
+    logged = [frame for frame in LOGGED if frame.identifier not in gone]
+    logged += [Logged(k * 900.0 + 3, 0x7FF - k % 2, b"\1", False, 0) for k in range(20)]
+    logged += [Logged(50.0, 0x181, b"", True, 0)]
+    answer = of_log(candump(sorted(logged)), tmp_path)
+    assert "In the plan and not in the log: 1 of feedback, sdo-request, heartbeats." in answer.remarks
+    unplanned = figure(answer, "frames of no message")
+    # 0x181 of 29 bits is not the feedback of 11.
+    assert (unplanned.recorded, unplanned.note, unplanned.within) == (21, "0x181, 0x7fe, 0x7ff", False)
+
+
+def test_a_message_that_comes_more_often_or_longer_is_outside_and_measured(tmp_path: Path) -> None:
+    plan = busplan.load_profile(PLAN, changes={"message.heartbeats.period_us": 70_000})
+    logged = [frame._replace(data=b"\5\6") if frame.identifier == 0x708 else frame for frame in LOGGED]
+    answer = of_log(candump(logged), tmp_path, plan=plan)
+    assert [found.quantity for found in answer.outside] == ["heartbeats: period", "heartbeats: data"]
+    assert answer.edits["message.heartbeats.payload_bytes"] == 2
+    assert answer.edits["message.heartbeats.period_us"] == pytest.approx(50_000, rel=1e-3)
+
+
+def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
+    late = [frame._replace(us=frame.us + 1500 * (frame.identifier == 0x208)) for frame in servo_8(100)]
+    shaken = arbitrated(servo_8(300, sync_jitter_us=900))
+    assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").recorded == pytest.approx(900, abs=150)
+    assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").within is False
+    answer = of_log(candump(arbitrated(late)), tmp_path)
+    assert [found.quantity for found in answer.outside] == ["last PDO behind SYNC of all cycles"]
+
+
+def test_every_frame_of_a_pdo_has_a_name_of_its_own(tmp_path: Path) -> None:
+    answer = of_log(candump(LOGGED), tmp_path, plan="canopen-6")
+    assert figure(answer, "feedback 1: period").recorded == pytest.approx(4000, abs=5)
+    assert any("not in the log: feedback 2, command 2," in remark for remark in answer.remarks)
+
+
+def test_a_plan_that_is_too_full_has_no_response_to_stand_beside(tmp_path: Path) -> None:
+    plan = busplan.load_profile(PLAN, changes={"bus.bit_rate_kbit_s": 125})
+    answer = of_log(candump(LOGGED), tmp_path, plan=plan)
+    assert figure(answer, "sdo-request: shortest").planned is None
+    assert "NaN" not in answer.to_json()
+    assert "Infinity" not in answer.to_json()
+
+
+def test_a_burst_is_counted(tmp_path: Path) -> None:
+    burst = [Queued(10_000.0 * cycle, 0x300 + number, b"\xaa" * 8) for cycle in range(20) for number in range(7)]
+    answer = of_log(candump(arbitrated(burst)), tmp_path)
+    assert figure(answer, "frames at once").recorded == 7
+
+
+def test_a_clock_that_is_set_back_is_said(tmp_path: Path) -> None:
+    middle = LOGGED[len(LOGGED) * 2 // 3].us
+    logged = [frame._replace(us=frame.us - (frame.us > middle) * 1e6) for frame in LOGGED]
+    answer = of_log(candump(logged), tmp_path)
+    assert "Its clock was set back 1 time: the longest stretch between is taken." in answer.remarks
+    assert figure(answer, "SYNC: period").within is True
+    assert figure(answer, "SYNC: period").events in {200, 201}
+
+
+def test_errors_remote_frames_and_can_fd_are_said(tmp_path: Path) -> None:
+    more = "(1700000000.000001) can0 123#R\n(1700000000.000002) can0 20000080#0000000000000000\n"
+    fd = "(1700000000.000003) can0 124##1" + "AA" * 16 + "\n"
+    answer = of_log(more + fd + candump(LOGGED), tmp_path)
+    assert "1 frame of CAN FD: in no load, for the plan has none." in answer.remarks
+    assert "1 remote frame: their length code is shown as data." in answer.remarks
+    assert "1 error frame: their bits are in no load." in answer.remarks
+
+
+def test_frames_of_can_fd_are_in_the_load_with_the_most_stuff_bits(tmp_path: Path) -> None:
+    lines = [
+        f"({1_700_000_000 + cycle // 1000}.{cycle % 1000:03d}000) can0 181##1{'5A' * 12}\n" for cycle in range(2000)
+    ]
+    answer = of_log("".join(lines), tmp_path, plan="can-fd-arm-7")
+    assert "2,000 frames of CAN FD: in the load with the most stuff bits." in answer.remarks
+    plan: Any = busplan.load_profile("can-fd-arm-7")
+    us = 33 * 1000 / plan.bus.bit_rate_kbit_s + (5 + 96 + 4 + 17 + 6 + 1 + 26) * 1000 / plan.bus.data_bit_rate_kbit_s
+    assert figure(answer, "load ").recorded == pytest.approx(us / 1000, rel=0.01)
+
+
+def test_a_damaged_log_says_where(tmp_path: Path) -> None:
+    text = candump(LOGGED[:100])
+    answer = of_log(text + "(1700000001.0000) can0 zz#\n", tmp_path)
+    assert any(
+        remark.startswith("The log is cut or damaged behind frame 100, read up to there: ") for remark in answer.remarks
+    )
+    for ending in ("blf", "asc", "trc"):
+        path = tmp_path / f"bus.{ending}"
+        with can.Logger(str(path)) as writer:
+            for frame in LOGGED[:200]:
+                writer(
+                    can.Message(
+                        timestamp=frame.us / 1e6, arbitration_id=frame.identifier, data=frame.data, is_extended_id=False
+                    )
+                )
+        content, random = path.read_bytes(), Random(1)
+        for _ in range(15):
+            end = random.randrange(4, len(content))
+            path.write_bytes(content[:end] + random.choice((b"", b"\xff\0\n", b"nonsense\n")))
+            try:
+                read_can(path, progress=lambda _done, _total: None)
+            except BusplanError:
+                continue
+
+
+def test_what_cannot_be_told_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refusal(text: str) -> str:
+        with pytest.raises(BusplanError) as caught:
+            of_log(text, tmp_path)
+        return str(caught.value).removeprefix(f"{tmp_path}/")
+
+    two = candump(LOGGED[:30]) + candump(LOGGED[30:40], channel="can1")
+    assert (
+        refusal(two) == "bus.log: has frames of 2 channels: can0 (30 frames), can1 (10 frames); keep those of one bus"
+    )
+    assert refusal("a,b\n") == "bus.log: is no CAN log that is read: candump -l, Vector's ASC and BLF, PEAK's TRC"
+    assert refusal("(1700000000.000000) can0 \n").startswith("bus.log: has no CAN frame (")
+    assert refusal("") == "bus.log: is no CAN log that is read: candump -l, Vector's ASC and BLF, PEAK's TRC"
+    monkeypatch.setattr("busplan.extras.find_spec", lambda _name: None)
+    assert "install it with the extra, as in pip install 'busplan[import]'" in refusal(candump(LOGGED[:3]))
+
+
+def test_apply_writes_the_keys_of_a_message(run: Run, tmp_path: Path) -> None:
+    run("init", "arm", "--from", PLAN, cwd=tmp_path)
+    path = tmp_path / "arm.toml"
+    path.write_text(path.read_text().replace("period_us = 50000", "period_us = 70000"))
+    (tmp_path / "bus.log").write_text(candump(LOGGED))
+    done = run("measured", "arm.toml", "bus.log", "--apply", "--format", "json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["measured"] == {"message.heartbeats.period_us": pytest.approx(50_000, rel=1e-3)}
+    profile: Any = busplan.load_profile(path)
+    assert profile.message[2].period_us == pytest.approx(50_000, rel=1e-3)
+    assert "# busplan measured: the worst of " in path.read_text()
+    again = run("measured", "arm.toml", "bus.log", "--apply", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "--apply: bus.log shows no value of a key" in again.stderr
