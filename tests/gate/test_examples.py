@@ -1,7 +1,8 @@
 """Every rule has a valid and an invalid profile in `examples/CODE/`, and says of them what it should.
 
 An invalid one begins with `# expect: LINE:COLUMN ...`: each finding's place, and every one is of the folder's rule. A
-valid one has no findings at all. `baseline.json`, where there is one, is what the profiles beside it are held against.
+valid one has no findings at all. `baseline.json` or `recording.log`, where there is one, is what the profiles beside it
+are held against.
 """
 
 import json
@@ -15,6 +16,7 @@ import pytest
 from busplan.errors import PlacedError
 from busplan.gate.baseline import MODELS, read_baseline
 from busplan.gate.gate import FileResult, check_document, unreadable
+from busplan.gate.recording import Recording
 from busplan.gate.rules import all_rules
 from busplan.profile.toml import decode, override
 from busplan.questions.circle.figures import CircleTest
@@ -42,7 +44,12 @@ def checked(path: Path) -> FileResult:
     )
     content = path.read_bytes()
     try:
-        return check_document(decode(content, name=path.name), baseline=recorded.get(path.name))
+        recording = path.parent / "recording.log"
+        return check_document(
+            decode(content, name=path.name),
+            baseline=recorded.get(path.name),
+            recording=Recording(recording) if recording.exists() else None,
+        )
     except PlacedError as error:
         return unreadable(path.name, error, content)
 
@@ -117,6 +124,7 @@ def test_codes_are_stable() -> None:
         "BP203": "circle-impossible",
         "BP204": "circle-too-long",
         "BP301": "baseline-regression",
+        "BP401": "machine-outside-plan",
         "BP901": "suppression-without-reason",
         "BP902": "suppression-without-effect",
     }

@@ -83,6 +83,21 @@ def check_command(
     update_baseline: Annotated[
         bool, typer.Option("--update-baseline", help="Record the present axes and margins in the --baseline file.")
     ] = False,
+    recording: Annotated[
+        Path | None,
+        option(
+            "--recording FILE",
+            "Recording of the machine of the one profile, as `busplan measured` takes it: what is outside the plan "
+            "fails the check.  [default: none]",
+        ),
+    ] = None,
+    quantile: Annotated[
+        float,
+        option(
+            "--quantile SHARE",
+            "Share of the cycles of --recording that jitter and times are to hold for, 0.5..1 [1].  [default: 1]",
+        ),
+    ] = 1.0,
     skip_others: Annotated[
         bool, typer.Option("--skip-others", help="Skip named files without a `schema_version`, and count them.")
     ] = False,
@@ -108,6 +123,8 @@ def check_command(
     """
     if circle_steps is not None and not circle:
         raise BusplanError("--circle-steps: goes without --no-circle")
+    if quantile != 1 and recording is None:
+        raise BusplanError("--quantile: goes with --recording FILE")
     _require_baseline(baseline, update=update_baseline)
     if update_baseline and changes.each:
         raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
@@ -115,7 +132,7 @@ def check_command(
     from busplan.profile.collect import collect
 
     collection = collect(paths, stdin_name=stdin_filename, skip_others=skip_others)
-    _require_apart(collection.sources, output=output, baseline=baseline, updated=update_baseline)
+    _require_apart(collection.sources, recording, output=output, baseline=baseline, updated=update_baseline)
     recorded = None if baseline is None else _read_baseline(baseline, needed=not update_baseline)
     if recorded is not None and not recorded.is_current and not update_baseline:
         say(
@@ -129,6 +146,8 @@ def check_command(
             changes=changes,
             baseline=None if update_baseline or recorded is None or not recorded.is_current else recorded,
             record=update_baseline,
+            recording=recording,
+            quantile=quantile,
             skip_others=skip_others,
             executor=where,
             **({} if circle_steps is None else {"circle_steps": circle_steps}),
@@ -160,9 +179,15 @@ def _require_baseline(baseline: Path | None, *, update: bool) -> None:
 
 
 def _require_apart(
-    sources: "Sequence[ProfileSource]", *, output: Path | None, baseline: Path | None, updated: bool
+    sources: "Sequence[ProfileSource]",
+    recording: Path | None,
+    *,
+    output: Path | None,
+    baseline: Path | None,
+    updated: bool,
 ) -> None:
     read = [source.path for source in sources if source.failure is None]
+    read += [] if recording is None else [recording]
     if baseline is not None and not updated:
         read.append(baseline)
     require_apart({"--output": output, "--baseline": baseline if updated else None}, inputs=read)

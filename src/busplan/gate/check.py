@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from functools import partial
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import Any
 
 from busplan.errors import BusplanError
@@ -12,13 +12,14 @@ from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.gate.baseline import Baseline, Record, load_baseline, record_of
 from busplan.gate.gate import check_document, check_source
+from busplan.gate.recording import Recording
 from busplan.gate.report import CheckReport, Located, check_report, summary_sentence
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.collect import Collection, collect
 from busplan.profile.document import Document
 from busplan.profile.write import profile_text
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, argument, items, key_changes
+from busplan.questions.base.inputs import Path, ProfileLike, argument, items, key_changes
 from busplan.questions.circle.check import MOST_STEPS
 from busplan.sections.profile import Profile
 
@@ -59,6 +60,8 @@ def check(
     changes: Mapping[str, object] | KeyChanges = NO_CHANGES,
     baseline: str | os.PathLike[str] | Baseline | None = None,
     record: bool = False,
+    recording: Path | None = None,
+    quantile: float = 1.0,
     skip_others: bool = False,
     executor: Executor | None = None,
 ) -> CheckAnswer:
@@ -81,6 +84,11 @@ def check(
         against it has an error.
     record
         Also give the `figures` and `keys` of each file that a baseline records.
+    recording
+        A recording of the machine, for a single profile: as `busplan.measured` takes it. What is outside the plan is an
+        error.
+    quantile
+        Share of the events that worst cases of the recording hold for, 0.5..1.
     skip_others
         Skip named files without a `schema_version`, and count them.
     executor
@@ -110,7 +118,10 @@ def check(
     changed = changes if isinstance(changes, KeyChanges) else key_changes(changes)
     recorded = None if baseline is None else _recorded(baseline)
     collection, profiles = (paths, []) if isinstance(paths, Collection) else _collected(paths, skip_others=skip_others)
+    if recording is not None and len(collection.sources) + len(profiles) != 1:
+        raise BusplanError(f"recording {os.fspath(recording)}: goes with one profile, that of its machine")
     options: dict[str, Any] = {
+        "recording": None if recording is None else Recording(recording, quantile),
         "with_circle": circle,
         "circle_steps": circle_steps,
         "changes": changed,
@@ -141,7 +152,7 @@ def _collected(paths: ProfileLike | Iterable[ProfileLike], *, skip_others: bool)
 
 
 def _recorded(baseline: str | os.PathLike[str] | Baseline) -> Mapping[str, Record]:
-    known = baseline if isinstance(baseline, Baseline) else load_baseline(Path(baseline))
+    known = baseline if isinstance(baseline, Baseline) else load_baseline(FilePath(baseline))
     if not known.is_current:
         raise BusplanError("baseline: recorded by other timing models; record it again with --update-baseline")
     return known.profiles

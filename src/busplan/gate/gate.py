@@ -9,10 +9,12 @@ from busplan.errors import BusplanError, PlacedError
 from busplan.gate import circle
 from busplan.gate.baseline import Record, figures_of, keys_of, record_of, regression
 from busplan.gate.finding import Finding, Subject, Violation, finding_of
+from busplan.gate.recording import Recording, outside_plan
 from busplan.gate.rules import (
     BASELINE,
     BY_KIND,
     NEVER_SUPPRESSED,
+    RECORDING,
     SUPPRESSION_WITHOUT_EFFECT,
     SUPPRESSION_WITHOUT_REASON,
     all_rules,
@@ -177,6 +179,7 @@ def check_document(
     changes: KeyChanges = NO_CHANGES,
     baseline: Record | None = None,
     record: bool = True,
+    recording: Recording | None = None,
 ) -> FileResult:
     """Check one document against all rules.
 
@@ -194,6 +197,8 @@ def check_document(
         Record of the profile in a baseline; None for none.
     record
         Whether to give the figures that a baseline records.
+    recording
+        Recording of its machine; if it cannot be compared, the result has a failure. None for none.
 
     Returns
     -------
@@ -221,6 +226,13 @@ def check_document(
         lost = regression(subject, baseline)
         violations += [_placed(document, BASELINE, problem) for problem in lost]
         ran.add(BASELINE.code)
+    if recording is not None:
+        try:
+            outside = list(outside_plan(profile, recording))
+        except BusplanError as error:
+            return FileResult(document.name, profile.name, (), {}, failure="; ".join(error.problems))
+        violations += [_placed(document, RECORDING, problem) for problem in outside]
+        ran.add(RECORDING.code)
     if changes.each:
         # Comments were written for the file as it is: with changes, none counts as without effect.
         ran = set()

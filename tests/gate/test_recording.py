@@ -1,0 +1,76 @@
+"""`check --recording`: a machine outside its plan is an error, at the key that plans it."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+import busplan
+from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from subprocess import CompletedProcess
+
+Run = Callable[..., "CompletedProcess[str]"]
+CAPTURE = Path(__file__).parents[1] / "questions" / "measured" / "files" / "capture.pcapng"
+LOG = Path(__file__).parent / "examples" / "BP401" / "recording.log"
+
+
+def press(run: Run, folder: Path, old: str = "", new: str = "") -> Path:
+    run("init", "press", "--from", "ethercat-servo-8", cwd=folder)
+    path = folder / "press.toml"
+    path.write_text(path.read_text().replace(old, new))
+    return path
+
+
+def test_a_machine_within_its_plan_passes_and_one_outside_fails(run: Run, tmp_path: Path) -> None:
+    words = ("check", "press.toml", "--no-circle", "--recording", str(CAPTURE))
+    press(run, tmp_path)
+    done = run(*words, cwd=tmp_path)
+    assert (done.returncode, "BP401" in done.stdout) == (0, False), done
+    path = press(run, tmp_path, "master_jitter_us = 20 ", "master_jitter_us = 11 ")
+    done = run(*words, cwd=tmp_path)
+    assert done.returncode == 1
+    line = next(number for number, text in enumerate(path.read_text().splitlines(), 1) if "master_jitter_us" in text)
+    assert f"press.toml:{line}:1: BP401 error: bus.master_jitter_us: latest start of all cycles: " in done.stdout
+    assert "us recorded, at most 11.0 +/- " in done.stdout
+    assert "busplan measured --apply writes what was measured" in done.stdout
+    # Half of the cycles keep it.
+    assert "BP401" not in run(*words, "--quantile", "0.5", cwd=tmp_path).stdout
+    path.write_text(path.read_text().replace("# assumed: of such", "# busplan: ignore[BP401] a test bench; of such"))
+    assert run(*words, cwd=tmp_path).returncode == 0
+    # Without a recording the comment is not held to be without effect.
+    assert "BP902" not in run(*words[:3], cwd=tmp_path).stdout
+
+
+def test_what_no_key_plans_is_at_the_name(tmp_path: Path) -> None:
+    log = tmp_path / "bus.log"
+    log.write_text(LOG.read_text() + "(1700000001.000000) can0 7AA#00\n")
+    answer = busplan.check(LOG.parent / "valid.toml", recording=log)
+    (file,) = answer.files
+    (finding,) = file.findings
+    assert finding.message == "name: frames of no message of the plan: 1 recorded, at most 0 planned (0x7aa)"
+    assert (finding.line, finding.column) == (2, 1)
+
+
+def test_what_cannot_be_compared_is_no_finding(run: Run, tmp_path: Path) -> None:
+    press(run, tmp_path)
+    done = run("check", "press.toml", "--recording", str(LOG), cwd=tmp_path)
+    assert done.returncode == 2
+    assert "recording.log: is no pcap or pcapng file" in done.stderr
+    done = run("check", "press.toml", "--recording", "gone.pcap", cwd=tmp_path)
+    assert (done.returncode, "gone.pcap: cannot be read" in done.stderr) == (2, True)
+    done = run("check", "press.toml", "paper-4ms", "--recording", str(CAPTURE), cwd=tmp_path)
+    assert done.returncode == 2
+    assert "goes with one profile, that of its machine" in done.stderr
+    done = run("check", "press.toml", "--quantile", "0.9", cwd=tmp_path)
+    assert (done.returncode, "--quantile: goes with --recording FILE" in done.stderr) == (2, True)
+    done = run("check", "press.toml", "--recording", str(CAPTURE), "--quantile", "7", cwd=tmp_path)
+    assert (done.returncode, "quantile 7: expected a share of 0.5 to 1" in done.stderr) == (2, True)
+    (tmp_path / "own.pcapng").write_bytes(CAPTURE.read_bytes())
+    done = run("check", "press.toml", "--recording", "own.pcapng", "-o", "own.pcapng", cwd=tmp_path)
+    assert done.returncode == 2
+    assert (tmp_path / "own.pcapng").read_bytes() == CAPTURE.read_bytes()
+    with pytest.raises(BusplanError, match="goes with one profile"):
+        busplan.check(["paper-4ms", "paper-dma"], recording=CAPTURE)
