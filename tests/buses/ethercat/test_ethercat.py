@@ -513,7 +513,7 @@ def test_its_verdict_says_by_part_what_is_tested() -> None:
     # What a constant, a bias or U comes from is no test of it: a master's datagrams are those of its ENI files.
     parts = "bytes (3 captures), devices (14 machines or pairs), the master's datagrams (6 ENI files)"
     own = f"Model of EtherCAT (kind ethercat): published figures set {parts}; independent figures test frames"
-    assert f"{own} (1 more ENI file); not tested: the whole cycle of a machine." in said
+    assert f"{own} (the bytes of 1 more ENI file); not tested: the whole cycle of a machine." in said
 
 
 def test_its_evidence_says_where_figures_come_from(run: Run) -> None:
