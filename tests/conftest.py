@@ -82,7 +82,7 @@ def committed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "lost.toml").symlink_to("nowhere.toml")
     (folder / "out.toml").symlink_to("/etc/passwd")
     (folder / "broken.toml").write_text(LINE.replace("nodes = 2", "nodes = 0"), encoding="utf-8")
-    (folder / "large.toml").write_text("#" * 100_001, encoding="utf-8")
+    (folder / "large.toml").write_text("#" * 2_000_001, encoding="utf-8")
     git("add", ".")
     git("commit", "--quiet", "--message", "one")
     git("tag", "v1")

@@ -557,7 +557,7 @@ for number in range(int(kills)):
     for name in ("baseline", "report"):
         Path(name).write_bytes(Path(f"{name}.old").read_bytes())
     pid = child()
-    time.sleep(seconds * 3 * number / int(kills))  # a forked process is slower: its memory is copied
+    time.sleep(seconds * 4 * number / int(kills))  # a forked process is slower: it copies what it writes to
     os.kill(pid, 9)
     os.waitpid(pid, 0)
     for name in ("baseline", "report"):

@@ -458,9 +458,7 @@ def test_a_byte_order_mark_is_stepped_over() -> None:
 def test_a_file_may_be_as_long_as_the_limit_and_no_longer() -> None:
     comment = "#" * (MAX_FILE_BYTES - len(TEXT))
     assert read(TEXT + comment).name == "test"
-    assert the_problem(f"{TEXT}{comment}#") == (
-        "f.toml:1:1: the file is larger than 100,000 bytes; a profile is a page of TOML"
-    )
+    assert the_problem(f"{TEXT}{comment}#") == ("f.toml:1:1: the file is larger than 2,000,000 bytes; no profile is")
 
 
 @pytest.mark.parametrize(

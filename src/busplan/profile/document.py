@@ -118,11 +118,12 @@ class Document:
         from busplan.profile.keys import named_path  # loads pydantic
 
         grades: dict[str, Grade] = {}
+        known: dict[int, Any] = {}
         for path in self.places:
             offset = self.comments_beside.get(path, self.comments_beside.get(path[:-1]))
             match = None if offset is None else GRADING.match(self.text, offset)
             if match is not None:
-                grades[".".join(map(str, named_path(self.data(), path)))] = cast("Grade", match[1])
+                grades[".".join(map(str, named_path(self.data(), path, known)))] = cast("Grade", match[1])
         return grades
 
     def nearest(self, path: "KeyPath") -> "KeyPath":

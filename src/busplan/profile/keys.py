@@ -1,7 +1,7 @@
 """A profile as dotted keys with their values."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from busplan.errors import BusplanError
 from busplan.sections.base import Section, value_at
@@ -102,19 +102,37 @@ def path_of(data: Mapping[str, object], key: str) -> tuple[str | int, ...]:
     return tuple(step for step, _ in _steps(data, key.split(".")))
 
 
-def named_path(data: object, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
-    """The path with the names of tables in arrays instead of their indexes, where they have names."""
-    return tuple(name for _, name in _steps(data, path))
+_Known: TypeAlias = dict[int, tuple[dict[str, dict[str, Any]], list[str]]]
 
 
-def _steps(data: object, path: Iterable[str | int]) -> Iterator[tuple[str | int, str | int]]:
+def named_path(data: object, path: tuple[str | int, ...], known: _Known | None = None) -> tuple[str | int, ...]:
+    """The path with the names of tables in arrays instead of their indexes, where they have names.
+
+    Parameters
+    ----------
+    data
+        The tables.
+    path
+        The path.
+    known
+        Remembers the names of arrays from one path of `data` to the next.
+    """
+    return tuple(name for _, name in _steps(data, path, known))
+
+
+def _steps(
+    data: object, path: Iterable[str | int], known: _Known | None = None
+) -> Iterator[tuple[str | int, str | int]]:
     """Each part of a path; that of a table in an array as its index and as its name, whichever the path has."""
+    known = {} if known is None else known
     for part in path:
-        tables = named_tables(data) or {}
-        names = list(tables)
+        if id(data) not in known:
+            tables = named_tables(data) or {}
+            known[id(data)] = tables, list(tables)
+        tables, names = known[id(data)]
         if part in tables or (isinstance(part, int) and part < len(names)):
             name = names[part] if isinstance(part, int) else part
-            yield names.index(name), name
+            yield part if isinstance(part, int) else names.index(name), name
             data = tables[name]
         else:
             yield part, part

@@ -85,8 +85,9 @@ def findings(error: ValidationError | None, data: dict[str, Any]) -> Iterator[Ke
         One for each problem, in pydantic's order.
     """
     of_keys = () if error is None else (*_validated(error, data), *_of_nodes(data))
+    known: dict[int, Any] = {}
     for finding in dict.fromkeys((*of_keys, *_unknown_kind(data))):
-        yield finding._replace(named=named_path(data, finding.path))
+        yield finding._replace(named=named_path(data, finding.path, known))
 
 
 def _of_nodes(data: dict[str, Any]) -> Iterator[KeyFinding]:

@@ -18,8 +18,8 @@ from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
 from busplan.sourced import Grade
 
-MAX_FILE_BYTES: Final = 100_000
-"""A profile is a page of text; a larger file is something else."""
+MAX_FILE_BYTES: Final = 2_000_000
+"""Some 10,000 messages of a CAN network with their comments; a larger file is something else."""
 _OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
 """Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
 PERIOD_KEY: Final = "cycle.period_us"
@@ -58,7 +58,7 @@ def decode(content: bytes, *, name: str) -> Document:
 
 def too_large(name: str) -> PlacedError:
     """Make the error for a file that is too large for a profile."""
-    message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; a profile is a page of TOML"
+    message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; no profile is"
     return PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
 
 

@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 
 import busplan
+from busplan.buses.can import waiting
 from busplan.buses.can.constants import SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.limits import LIMITS
 from busplan.buses.can.response import Sender, worst_response
 from busplan.buses.can.section import CanProfile
+from busplan.buses.can.traffic import traffic_of_profile
+from busplan.buses.can.waiting import Messages
 from busplan.elementwise import pointwise
 from busplan.forms.blocks import Chapter, Table
 from busplan.profile.toml import override
@@ -159,3 +162,51 @@ def test_a_long_list_of_inputs_stands_once() -> None:
     assert len(chapters) > 40
     assert max(shown) > 100
     assert shown.count(max(shown)) < 3  # the messages', and that of the loop
+
+
+def of_all_sorts(count: int, *, load: float, random: Random) -> CanProfile:
+    """Messages of both formats, and some that each node sends, with few periods between them."""
+    sent = []
+    for number in range(count):
+        bits, identifier = random.choice([(11, 20 * number), (29, (20 * number << 18) + random.randrange(100))])
+        period_us = random.choice([2e4, 5e4, random.uniform(1e4, 1e5)]) * count / (100 * load)
+        keys = {"identifier": identifier + 1, "identifier_bits": bits, "payload_bytes": random.choice([1, 8])}
+        jitter_us = random.choice([0.0, 0.0, 500.0, random.uniform(0, period_us)])
+        more = {"period_us": period_us, "jitter_us": jitter_us, "per_node": random.random() < 0.2}
+        sent.append({"name": f"m{number}", **keys, **more, "deadline_us": random.uniform(0.02, 1) * period_us})
+    base = tomllib.loads(BASE)
+    return CanProfile.model_validate({**base, "bus": {**base["bus"], "sync_identifier": 0x1FFFFFFF}, "message": sent})
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_many_messages_have_the_responses_that_each_has_by_itself(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    random = Random(seed)
+    own = of_all_sorts(random.randint(50, 100), load=random.choice([0.3, 0.7, 1.2]), random=random)
+    traffic = traffic_of_profile(own)
+    together = Messages(traffic, is_stuffed=True)
+    monkeypatch.setattr(waiting, "MANY", 1000)
+    alone = Messages(traffic, is_stuffed=True)
+    for (first, bound), (second, expected) in zip(together.bounds(), alone.bounds(), strict=True):
+        assert (first.name, bound) == (second.name, pytest.approx(expected, rel=1e-12))
+        found, wanted = together.response(first), alone.response(second)
+        assert (found is None) is (wanted is None), first.name
+        if found is not None and wanted is not None:
+            assert found == pytest.approx(wanted, rel=1e-12), first.name
+    assert together.largest_least() == pytest.approx(alone.largest_least(), rel=1e-12)
+    assert [stream.name for stream, _ in together.may_be_late()] == [stream.name for stream, _ in alone.may_be_late()]
+    assert together.latest()[0].name == alone.latest()[0].name
+
+
+def test_ten_thousand_messages_are_answered(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "many.toml").write_text(profile_text(many(10_000, load=0.2, slow=0)), encoding="utf-8")
+    for command in ("capacity", "check"):
+        started_s = process_time()
+        assert run(command, "many.toml", cwd=tmp_path).returncode in (0, 1)
+        assert process_time() - started_s < MOST_S, command
+    text = (
+        (tmp_path / "many.toml").read_text(encoding="utf-8").replace("payload_bytes = 8\nperiod", "payload = 8\nperiod")
+    )
+    (tmp_path / "many.toml").write_text(text, encoding="utf-8")
+    started_s = process_time()
+    assert "more problems of this file are not listed" in run("check", "many.toml", cwd=tmp_path).stdout
+    assert process_time() - started_s < MOST_S

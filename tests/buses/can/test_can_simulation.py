@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import pytest
 
 from busplan.buses.can.streams import Stream, streams
-from busplan.buses.can.traffic import SYNC, Message, Pdos, Traffic
+from busplan.buses.can.traffic import SYNC, Message, MessageList, Pdos, Traffic
 from busplan.buses.can.waiting import messages, response, waits
 from busplan.elementwise import plain
 
@@ -119,7 +119,7 @@ def traffic(random: Random, *, nodes: int) -> Traffic:
             Pdos("read", "", 0x181, nodes, random.choice([1, 4, 8, 8, 10, 16])),
             Pdos("write", "", command, nodes, random.choice([1, 4, 8, 8, 10, 16])),
         ),
-        messages=tuple(messages),
+        messages=MessageList(messages),
     )
 
 
@@ -132,7 +132,7 @@ def of_both_formats(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
             identifier = (identifier << 18) + random.choice([0, 5, (1 << 18) - 200])
         senders = random.choice([1, 1, nodes])
         each.append(message._replace(identifier=identifier, identifier_bits=bits, senders=senders))
-    return sent._replace(messages=tuple(each))
+    return sent._replace(messages=MessageList(each))
 
 
 def of_fd(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
@@ -147,7 +147,7 @@ def of_fd(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
         own._replace(frame_bytes=(64,), most_bytes=256, payload_bytes=random.choice([1, 8, 20, 64, 70]))
         for own in sent.pdos
     )
-    return sent._replace(bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=tuple(pdos), messages=tuple(each))
+    return sent._replace(bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=tuple(pdos), messages=MessageList(each))
 
 
 KINDS: Final = {"both formats": of_both_formats, "CAN FD": of_fd}
@@ -166,7 +166,7 @@ def scene(random: Random, *, kind: str = "") -> Scene | None:
         return found
     # The tightest deadlines: fewer frames block.
     tight = (one._replace(deadline_us=found.responses_us[one.name]) for one in sent.messages)
-    return judged(sent._replace(messages=tuple(tight)), nodes=nodes, write_us=write_us, slack_us=slack_us)
+    return judged(sent._replace(messages=MessageList(tight)), nodes=nodes, write_us=write_us, slack_us=slack_us)
 
 
 def judged(sent: Traffic, *, nodes: int, write_us: int, slack_us: int) -> Scene | None:
@@ -182,7 +182,7 @@ def judged(sent: Traffic, *, nodes: int, write_us: int, slack_us: int) -> Scene 
     if sum(one.sender().load for one in each) > MOST_LOAD:
         return None
     ranked = messages(sent, is_stuffed=True)
-    if any(ranked.deadline_share(one) > 1 for one in ranked.by_priority()):
+    if any(share > 1 for _, share in ranked.deadline_shares()):
         return None
     bounds = {one.name: response(one, sent, is_stuffed=True) for one in each if one.is_message or one.name == SYNC}
     return Scene(sent, each, nodes, write_us, lasts_us, {name: one.us for name, one in bounds.items() if one})
@@ -317,7 +317,7 @@ def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str)
 def drives(nodes: int, *low: Message, read_us: int = 150, host_us: int = 0) -> Traffic:
     """Nodes with full PDOs, and messages of lower priorities."""
     pdos = (Pdos("read", "", 0x181, nodes, 8), Pdos("write", "", 0x201, nodes, 8))
-    return Traffic(1.0, 1000, 0.0, 11, 0x80, 0, read_us, host_us, pdos, low)
+    return Traffic(1.0, 1000, 0.0, 11, 0x80, 0, read_us, host_us, pdos, MessageList(low))
 
 
 LOW: Final = tuple(Message(f"low{number}", 0x7F0 + number, 8, 50_000, 0, 50_000) for number in range(3))

@@ -11,7 +11,15 @@ from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
 from busplan.buses.can.figures import BUS_LOAD, TERMS
 from busplan.buses.can.response import Response, TooManyStepsError
-from busplan.buses.can.streams import Stream, frame_sizes, last_identifier, place, streams
+from busplan.buses.can.streams import (
+    MessageStreams,
+    Stream,
+    frame_sizes,
+    last_identifier,
+    message_streams,
+    place,
+    streams,
+)
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
 from busplan.buses.can.waiting import messages, response, sync_spread_us, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
@@ -97,7 +105,22 @@ class CanCycle(BusCycle):
     @cached_property
     def _messages(self) -> tuple[tuple[Message, Number], ...]:
         """All other messages, each with the time of its frame."""
+        if self.traffic.is_plain:
+            us = (stream.frame_us for stream in self._message_streams.each)
+            return tuple(zip(self.traffic.messages, us, strict=True))
         return tuple((message, self._message_us(message)) for message in self.traffic.messages)
+
+    @property
+    def _message_streams(self) -> MessageStreams:
+        return message_streams(self.traffic, is_stuffed=self.is_stuffed)
+
+    @cached_property
+    def _before(self) -> tuple[tuple[Message, Number], ...]:
+        """Messages that may go before the last PDO, each with the time of its frame."""
+        if not self.traffic.is_plain:
+            return self._messages
+        last = place(int(plain(self._last)), self.traffic.identifier_bits)
+        return tuple(self._messages[number] for number in self._message_streams.around(last)[0])
 
     @cached_property
     def sync_us(self) -> Number:
@@ -146,7 +169,7 @@ class CanCycle(BusCycle):
         yield Run((), laid_out=lambda _: self._blocks(blocking, 1, 2))
         yield from self._feedback
         yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
-        for count, (message, us) in zip(counts, self._messages, strict=True):
+        for count, (message, us) in zip(counts, self._before, strict=True):
             yield Run((BusEvent("message", "cycle_interference_us", us, f"message {message.name}"),), count)
         yield from self._commands
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
@@ -185,7 +208,7 @@ class CanCycle(BusCycle):
         """
         is_own = is_off(extra_us)
         blocking_us, counts = self._own_waits if is_own else self._waits_beside(self._on_bus_us + extra_us)
-        return blocking_us + total(count * us for count, (_, us) in zip(counts, self._messages, strict=True))
+        return blocking_us + total(count * us for count, (_, us) in zip(counts, self._before, strict=True))
 
     @cached_property
     def _own_waits(self) -> tuple[Number, tuple[Number, ...]]:
@@ -206,9 +229,9 @@ class CanCycle(BusCycle):
         return blocking_us, tuple(self._higher(lasts_us))
 
     def _higher(self, lasts_us: Number) -> Iterator[Number]:
-        """Frames of each message that go before the last PDO in a span of time [1]."""
+        """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
-        for message, _ in self._messages:
+        for message, _ in self._before:
             count = _of_all(message, rounded_up((window_us + message.jitter_us) / message.period_us))
             yield choose(self._goes_before_last(message), count, 0)
 
@@ -277,6 +300,9 @@ class CanCycle(BusCycle):
 
     @property
     def _messages_load(self) -> Number:
+        if self.traffic.is_plain:
+            load: Number = self._message_streams.load
+            return load
         return total(_of_all(message, us) / message.period_us for message, us in self._messages)
 
     @property

@@ -1,7 +1,7 @@
 """Limits of a CAN bus and of the CANopen identifiers, the load of the bus, and deadlines."""
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial, reduce
+from functools import partial
 from math import inf
 from typing import Any, Final
 
@@ -25,10 +25,8 @@ def late_messages(traffic: Traffic) -> Iterator[tuple[str, str]]:
 
 def _late_streams(traffic: Traffic) -> Iterator[tuple[Stream, float]]:
     """Messages that miss their deadline, each with its response over its deadline."""
-    each = messages(traffic, is_stuffed=True)
-    for stream in streams(traffic, is_stuffed=True):
-        if stream.is_message and (share := plain(each.deadline_share(stream))) > 1:
-            yield stream, share
+    shares = {stream.name: (stream, plain(share)) for stream, share in _messages(traffic).deadline_shares()}
+    return ((stream, share) for message in traffic.messages for stream, share in (shares[message.name],) if share > 1)
 
 
 def _all_late(traffic: Traffic) -> str:
@@ -52,17 +50,17 @@ def _late(stream: Stream, share: float, traffic: Traffic) -> str:
     if share < inf:
         us = share * stream.deadline_us
         return f"its worst-case response time is {us:g} us, over its {stream.deadline_us:g} us"
-    load = messages(traffic, is_stuffed=True).load(stream)
+    load = _messages(traffic).load(stream)
     steps = "" if load >= SATURATED else f", and its busy period takes over {MOST_STEPS:.0f} steps to find"
     return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}{steps}"
 
 
 def _slowest(traffic: Traffic) -> float:
     """The largest response over deadline of any message of plain numbers [1]."""
-    each, largest = messages(traffic, is_stuffed=True), 0.0
+    largest = 0.0
     # The lowest priorities first: where they all have a response time, every message has.
-    for stream in each.by_priority():
-        largest = max(largest, plain(each.deadline_share(stream)))
+    for _, share in _messages(traffic).deadline_shares():
+        largest = max(largest, plain(share))
         if largest == inf:
             break
     return largest
@@ -74,9 +72,8 @@ def _deadline(network: Network) -> Number:
     return Sent(traffic_of(network)).of_points(_slowest, words=_DEADLINE_WORDS)
 
 
-def _largest(traffic: Traffic, share: Callable[[Messages, Stream], Number]) -> Number:
-    each = messages(traffic, is_stuffed=True)
-    return reduce(larger, (share(each, stream) for stream in each.by_priority()))
+def _messages(traffic: Traffic) -> Messages:
+    return messages(traffic, is_stuffed=True)
 
 
 def _is_late(network: Network) -> Number:
@@ -84,8 +81,8 @@ def _is_late(network: Network) -> Number:
     if not network.profile.message:
         return False
     sent = Sent(traffic_of(network))
-    least = sent.of(lambda traffic: _largest(traffic, Messages.least_share), words=_DEADLINE_WORDS)
-    most = sent.of(lambda traffic: _largest(traffic, Messages.bound_share), words=_DEADLINE_WORDS)
+    least = sent.of(lambda traffic: _messages(traffic).largest_least(), words=_DEADLINE_WORDS)
+    most = sent.of(lambda traffic: _messages(traffic).largest_bound(), words=_DEADLINE_WORDS)
 
     def is_late(at: float, least: float, most: float) -> bool:
         return bool(_has_late(sent.at(at))) if least <= 1 < most else least > 1
@@ -132,9 +129,11 @@ _POINTS_AT_ONCE: Final = 4096
 
 
 def _has_late(traffic: Traffic) -> Number:
-    each, late = messages(traffic, is_stuffed=True), False
-    for stream in each.by_priority():
-        late = late | (each.deadline_share(stream) > 1)
+    each, late = _messages(traffic), False
+    if traffic.is_plain:
+        return any(plain(each.deadline_share(own, bound)) > 1 for own, bound in each.may_be_late())
+    for _, share in each.deadline_shares():
+        late = late | (share > 1)
         if is_everywhere(late):
             break
     return late

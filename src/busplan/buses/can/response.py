@@ -83,13 +83,13 @@ def worst_response(
     Response(blocking_us=0, instance=1, interference_us=5000.0, us=3500.0)
     """
     try:
-        return worst_instance(own, higher, blocking_us=blocking_us, bit_us=bit_us, first_us=first_us)
+        return worst_instance(own, Demand(higher), blocking_us=blocking_us, bit_us=bit_us, first_us=first_us)
     except TooManyStepsError:
         return None
 
 
 def worst_instance(
-    own: Sender, higher: Sequence[Sender], *, blocking_us: Points, bit_us: Points, first_us: Points = 0.0
+    own: Sender, before: "Demand", *, blocking_us: Points, bit_us: Points, first_us: Points = 0.0
 ) -> Response | None:
     """As `worst_response`, of arrays, too: R is infinite at points that have none, and None says that none has one.
 
@@ -98,7 +98,6 @@ def worst_instance(
     TooManyStepsError
         It takes over `MOST_STEPS` to find, at all points together.
     """
-    before = Demand(higher)
     is_over = before.load + own.load >= SATURATED
     if is_everywhere(is_over):
         return None
@@ -115,7 +114,7 @@ def worst_instance(
                 return worst
             if instance == 1:
                 from_us = ahead_us + own.frames_us + before.frames_us
-                busy_us = Demand((own, *higher)).settled_us(ahead_us, steps, from_us=from_us, is_settled=is_over)
+                busy_us = before.behind(own).settled_us(ahead_us, steps, from_us=from_us, is_settled=is_over)
             is_over = is_over | (instance * own.period_us >= busy_us + own.jitter_us)
             if is_everywhere(is_over):
                 return worst
@@ -169,7 +168,7 @@ BELOW = 1 - 1e-9
 """A bound from below is taken so much lower, so that rounding does not put it above what it bounds."""
 
 
-_MANY = 50
+MANY = 50
 """Senders from which on arrays are faster."""
 _FEW_POINTS = 2000
 """Points up to which a single array of all senders is faster than an array of each."""
@@ -202,12 +201,29 @@ class Demand:
             self.frames_us = self.frames_us + frames_us
             self._of_jitter_us = self._of_jitter_us + load * jitter_us
 
+    @classmethod
+    def of_many(cls, senders: Sender) -> "Demand":
+        """Demand of senders of plain numbers, one or more, in arrays of all of them."""
+        demand = cls(())
+        demand._known_rows[0] = senders
+        sums = (senders.load, senders.frames_us, senders.load * senders.jitter_us)
+        demand.load, demand.frames_us, demand._of_jitter_us = (float(each.cumsum()[-1]) for each in sums)
+        return demand
+
+    def behind(self, own: Sender) -> "Demand":
+        """The same with one more sender, as the first."""
+        if self._senders or not self._known_rows:
+            return Demand((own, *self._senders))
+        import numpy as np
+
+        return Demand.of_many(Sender(*(np.append(first, rest) for first, rest in zip(own, self._rows(0), strict=True))))
+
     def in_window_us(self, window_us: Points) -> Points:
         """Frames that arrive in a window of time, sum ceil((window + J) / T) C, added in their order [us]."""
         is_plain = isinstance(window_us + self._of_jitter_us, float)
-        if len(self._senders) < _MANY and is_plain:
+        if len(self._senders) < MANY and is_plain and not self._known_rows:
             return reduce(lambda sum_us, own: sum_us + ceil((window_us + own[2]) / own[1]) * own[0], self._senders, 0.0)
-        if self._senders and getattr(window_us, "size", 1) < _FEW_POINTS:
+        if (self._senders or self._known_rows) and getattr(window_us, "size", 1) < _FEW_POINTS:
             import numpy as np
 
             us, period_us, jitter_us = self._rows(getattr(window_us, "ndim", 0))

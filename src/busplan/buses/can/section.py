@@ -230,10 +230,11 @@ class CanProfile(Profile):
     @model_validator(mode="after")
     def _messages_have_names(self) -> Self:
         names = [message.name for message in self.message]
+        seen: set[str] = set()
         problems = [
             Problem("there is a message of this name", key=f"message.{place}.name", kind="inconsistent")
             for place, name in enumerate(names)
-            if name in names[:place]
+            if name in seen or seen.add(name)  # type: ignore[func-returns-value] # add returns None
         ]
         problems += (
             Problem("is what the frames of the cycle are called", key=f"message.{place}.name", kind="inconsistent")

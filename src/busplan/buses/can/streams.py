@@ -2,15 +2,18 @@
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import lru_cache, reduce
+from functools import cached_property, lru_cache, reduce
 from itertools import accumulate, chain, combinations, islice, repeat
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from busplan.buses.can.constants import BASE_BITS, MAX_IDENTIFIER, MOST_PDOS, PDO_STEP
-from busplan.buses.can.equations import frame_us
+from busplan.buses.can.equations import frame_bits, frame_us
 from busplan.buses.can.response import Points, Sender
-from busplan.buses.can.traffic import FOLLOWS, SYNC, Pdos, Traffic
+from busplan.buses.can.traffic import FOLLOWS, SYNC, MessageList, Pdos, Traffic
 from busplan.elementwise import choose, larger, plain, smaller, total
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 Found = TypeVar("Found")
 
@@ -108,30 +111,144 @@ def streams(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
     is_stuffed
         Whether the stuff bits of the worst case are counted.
     """
-    return tuple(_streams(traffic, is_stuffed))
+    return (*_cyclic(traffic, is_stuffed), *message_streams(traffic, is_stuffed=is_stuffed).each)
 
 
-def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
-    def sent(name: str, block: int, size: Points, **more: Any) -> Stream:
-        own: dict[str, Any] = {
-            "group": "",
-            "first": block,
-            "identifiers": 1,
-            "identifier_bits": traffic.identifier_bits,
-            "data_bit_rate_kbit_s": traffic.data_bit_rate_kbit_s,
-            "period_us": traffic.period_us,
-            "jitter_us": 0.0,
-            "deadline_us": traffic.period_us,
-            **more,
-        }
-        us = frame_us(
-            size,
-            identifier_bits=own["identifier_bits"],
-            bit_rate_kbit_s=traffic.bit_rate_kbit_s,
-            data_bit_rate_kbit_s=own.pop("data_bit_rate_kbit_s"),
+class MessageStreams:
+    """The streams of all messages, and what rests on them alone.
+
+    Parameters
+    ----------
+    each
+        The streams, in the order of the profile.
+    is_stuffed
+        Whether the stuff bits of the worst case are counted.
+    """
+
+    def __init__(self, each: tuple[Stream, ...], *, is_stuffed: bool) -> None:
+        self.each = each
+        self.by_length = sorted(each, key=lambda stream: -_length(stream, is_stuffed=is_stuffed))
+        self._known: dict[Points, tuple[list[int], tuple[Stream, ...]]] = {}
+
+    @cached_property
+    def load(self) -> Points:
+        """Share of the bus, 0..1 [1]."""
+        return total(stream.sender().load for stream in self.each)
+
+    def around(self, last: Points) -> tuple[list[int], tuple[Stream, ...]]:
+        """Numbers of messages that may go before a place in the arbitration, and those behind it, the longest first."""
+        if not isinstance(last, int):
+            return self._around(last)
+        if last not in self._known:
+            self._known[last] = self._around(last)
+        return self._known[last]
+
+    def _around(self, last: Points) -> tuple[list[int], tuple[Stream, ...]]:
+        before = [number for number, stream in enumerate(self.each) if (stream.first_place <= last) is not False]
+        return before, tuple(stream for stream in self.by_length if (stream.last_place > last) is not False)
+
+    @cached_property
+    def columns(self) -> "NDArray[Any]":
+        """As `columns_of` of all of them."""
+        return columns_of(self.each)
+
+    @cached_property
+    def groups(self) -> "NDArray[Any]":
+        """Of each, the number of its pair of period and jitter, from 0: many messages have few of them."""
+        import numpy as np
+
+        _, period_us, jitter_us, *_ = self.columns
+        return np.unique(period_us + 1j * jitter_us, return_inverse=True)[1].ravel()
+
+
+def columns_of(each: Iterable[Stream]) -> "NDArray[Any]":
+    """Of plain streams: all frames, period, jitter, a frame, deadline, block and last place."""
+    import numpy as np  # of many streams alone
+
+    rows = [(*own.sender(), own.frame_us, own.deadline_us, own.block, own.last_place) for own in each]
+    return np.array(rows, dtype=float).T
+
+
+def message_streams(traffic: Traffic, *, is_stuffed: bool) -> MessageStreams:
+    """The streams of the messages; those of plain numbers are remembered."""
+    make = _known_messages if traffic.messages.is_plain and isinstance(traffic.bit_rate_kbit_s, int | float) else _made
+    return make(traffic.messages, traffic.bit_rate_kbit_s, is_stuffed)
+
+
+def _made(messages: MessageList, bit_rate_kbit_s: Points, is_stuffed: bool) -> MessageStreams:
+    each = (
+        _stream(
+            message.name,
+            int(plain(message.identifier)),
+            int(plain(message.payload_bytes)),
+            bit_rate_kbit_s=bit_rate_kbit_s,
+            is_stuffed=is_stuffed,
+            is_message=True,
+            identifiers=_whole(message.senders),
+            **{key: getattr(message, key) for key in _OF_MESSAGE},
+        )
+        for message in messages
+    )
+    return MessageStreams(tuple(each), is_stuffed=is_stuffed)
+
+
+_known_messages: Callable[..., MessageStreams] = lru_cache(maxsize=8)(_made)
+
+
+def _length(stream: Stream, *, is_stuffed: bool) -> float:
+    """Number by which the frames of messages are in order of their length, at every point of arrays."""
+    if isinstance(stream.frame_us, float):
+        return stream.frame_us
+    # Bit rates, and formats that are no plain numbers, are the same for all messages.
+    bits = stream.identifier_bits
+    return plain(
+        frame_bits(
+            stream.data_bytes,
+            identifier_bits=bits if isinstance(bits, int | float) else BASE_BITS,
             is_stuffed=is_stuffed,
         )
-        return Stream(name, **own, block=place(block, own["identifier_bits"]), data_bytes=size, frame_us=us)
+    )
+
+
+def _stream(
+    name: str,
+    block: int,
+    size: Points,
+    *,
+    bit_rate_kbit_s: Points,
+    data_bit_rate_kbit_s: Points,
+    identifier_bits: Points,
+    is_stuffed: bool,
+    **more: Any,
+) -> Stream:
+    us = frame_us(
+        size,
+        identifier_bits=identifier_bits,
+        bit_rate_kbit_s=bit_rate_kbit_s,
+        data_bit_rate_kbit_s=data_bit_rate_kbit_s,
+        is_stuffed=is_stuffed,
+    )
+    own: dict[str, Any] = {"group": "", "first": block, "identifiers": 1, "identifier_bits": identifier_bits, **more}
+    return Stream(name, **own, block=place(block, identifier_bits), data_bytes=size, frame_us=us)
+
+
+def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
+    """SYNC and all PDOs."""
+
+    def sent(name: str, block: int, size: Points, **more: Any) -> Stream:
+        return _stream(
+            name,
+            block,
+            size,
+            bit_rate_kbit_s=traffic.bit_rate_kbit_s,
+            data_bit_rate_kbit_s=traffic.data_bit_rate_kbit_s,
+            identifier_bits=traffic.identifier_bits,
+            is_stuffed=is_stuffed,
+            period_us=traffic.period_us,
+            jitter_us=0.0,
+            deadline_us=traffic.period_us,
+            **more,
+        )
 
     yield sent(SYNC, int(plain(traffic.sync_identifier)), _whole(traffic.sync_bytes))
     block = {"read": FOLLOWS, "write": FOLLOWS}
@@ -157,16 +274,6 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
             is_there = left_bytes > 0  # not at every point of an array
             yield own._replace(identifiers=choose(is_there, count, 0), frame_us=choose(is_there, own.frame_us, 0.0))
             left_bytes = left_bytes - most_bytes
-    for message in traffic.messages:
-        more = {key: getattr(message, key) for key in _OF_MESSAGE}
-        yield sent(
-            message.name,
-            int(plain(message.identifier)),
-            int(plain(message.payload_bytes)),
-            is_message=True,
-            identifiers=_whole(message.senders),
-            **more,
-        )
 
 
 _OF_MESSAGE: Final = ("period_us", "jitter_us", "deadline_us", "identifier_bits", "data_bit_rate_kbit_s")

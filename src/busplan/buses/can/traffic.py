@@ -66,6 +66,35 @@ class Message(NamedTuple):
     """Of an FD frame; 0 for a classical frame."""
 
 
+class MessageList(tuple[Message, ...]):  # noqa: SLOT001 - a tuple's subclass with slots holds no attribute
+    """Messages of a network. What rests on them alone is computed once for all networks that have them."""
+
+    @cached_property
+    def _hash(self) -> int:
+        return tuple.__hash__(self)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def numbers(self) -> tuple[Number, ...]:
+        """All their numbers in a row."""
+        return tuple(number for message in self for number in message[_MESSAGE_WORDS:])
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether all their numbers are plain."""
+        return all(isinstance(number, int | float) for number in self.numbers)
+
+    @cached_property
+    def timeless(self) -> "MessageList":
+        """The same with all times alike, which identifiers do not rest on."""
+        return MessageList(
+            message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0, data_bit_rate_kbit_s=0.0)
+            for message in self
+        )
+
+
 class Traffic(NamedTuple):
     """All that is sent. The numbers may be of any sort."""
 
@@ -81,13 +110,22 @@ class Traffic(NamedTuple):
     host_us: Number
     """From the last feedback to the queued commands [us]."""
     pdos: tuple[Pdos, ...]
-    messages: tuple[Message, ...]
+    messages: MessageList
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether all its numbers are plain."""
+        return self.messages.is_plain and all(isinstance(number, int | float) for number in self._own())
 
     def numbers(self) -> tuple[Number, ...]:
         """All its numbers in a row, as `with_numbers` takes them."""
+        return (*self._own(), *self.messages.numbers)
+
+    def _own(self) -> tuple[Number, ...]:
+        """Its numbers without those of messages."""
         pdos = (number for pdos in self.pdos for number in (pdos.identifier, pdos.pdos, pdos.payload_bytes))
         own: tuple[Any, ...] = self[:_OWN_NUMBERS]
-        return (*own, *pdos, *(number for message in self.messages for number in message[_MESSAGE_WORDS:]))
+        return (*own, *pdos)
 
     def with_numbers(self, *numbers: Number) -> "Traffic":
         """The same senders with other numbers, in the order of `numbers`."""
@@ -97,7 +135,7 @@ class Traffic(NamedTuple):
             pdos._replace(identifier=next(rest), pdos=next(rest), payload_bytes=next(rest)) for pdos in self.pdos
         )
         count = len(Message._fields) - _MESSAGE_WORDS
-        messages = tuple(Message(message.name, *islice(rest, count)) for message in self.messages)
+        messages = MessageList(Message(message.name, *islice(rest, count)) for message in self.messages)
         return Traffic._make((*own, pdos, messages))
 
 
@@ -150,6 +188,8 @@ class Sent:
     def is_ordered(self) -> bool:
         """Whether identifiers and sizes of messages are plain, formats alike or plain, and no number is traced."""
         traffic = self.traffic
+        if traffic.is_plain:
+            return True
         messages = (number for message in traffic.messages for number in (message.identifier, message.payload_bytes))
         order = [traffic.sync_identifier, *(pdos.identifier for pdos in traffic.pdos), *messages]
         if not all(message.identifier_bits is traffic.identifier_bits for message in traffic.messages):
@@ -164,6 +204,9 @@ class Sent:
     @cached_property
     def place(self) -> Number:
         """The place of the traffic of each point; points that are alike share it."""
+        if self.traffic.is_plain:
+            self._known = lambda _: self.traffic
+            return 0
         places: dict[tuple[float, ...], int] = {}
         place = pointwise(
             lambda *numbers: places.setdefault(numbers, len(places)), *self.traffic.numbers(), words="all that is sent"
@@ -233,12 +276,8 @@ def traffic_of_profile(profile: Any) -> Traffic:
 
 def without_times(traffic: Traffic) -> Traffic:
     """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
-    messages = tuple(
-        message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0, data_bit_rate_kbit_s=0.0)
-        for message in traffic.messages
-    )
     own = traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, data_bit_rate_kbit_s=0.0, read_us=0.0, host_us=0.0)
-    return own._replace(messages=messages)
+    return own._replace(messages=traffic.messages.timeless)
 
 
 def host_us(bus: Any) -> Number:
@@ -268,8 +307,25 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes
             for number, kind in enumerate(TRANSACTION_KINDS)
             for place, sender in enumerate(senders)
         ),
-        messages=tuple(_message(message, bus, nodes) for message in profile.message),
+        messages=_messages(profile.message, bus, nodes),
     )
+
+
+_known: tuple[tuple[Any, ...], MessageList, bool] | None = None
+"""What messages rest on, the messages, and whether they rest on the number of nodes."""
+
+
+def _messages(said: tuple[Any, ...], bus: Any, nodes: Number) -> MessageList:
+    """Messages of a profile. The last result is remembered: searches change the nodes and times of a network."""
+    global _known  # noqa: PLW0603 - a profile may hold arrays, and is told apart by identity alone
+    key = said, bus.identifier_bits, bus.data_bit_rate_kbit_s, nodes
+    if _known is not None:
+        *rest_same, has_same_nodes = (new is old for new, old in zip(key, _known[0], strict=True))
+        if all(rest_same) and (has_same_nodes or not _known[2]):
+            return _known[1]
+    messages = MessageList(_message(message, bus, nodes) for message in said)
+    _known = key, messages, any(message.per_node for message in said)
+    return messages
 
 
 def _pdos(sender: _Senders, bus: Any, kind: TransactionKind, number: int, *, is_first: bool) -> Pdos:

@@ -1,17 +1,19 @@
 """Waits of a cycle for other messages, and the worst-case response of each stream."""
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
-from functools import reduce
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property, reduce
 from itertools import accumulate, chain, islice, repeat
 from math import inf
 from operator import add
 from typing import Any, Final, NamedTuple
 
-from busplan.buses.can.constants import BASE_BITS, MOST_BLOCKS, SATURATED
-from busplan.buses.can.equations import bit_us, frame_bits
+from busplan.buses.can.constants import MOST_BLOCKS, SATURATED
+from busplan.buses.can.equations import bit_us
 from busplan.buses.can.response import (
     BELOW,
+    MANY,
+    Demand,
     Points,
     Response,
     Sender,
@@ -20,11 +22,13 @@ from busplan.buses.can.response import (
     worst_instance,
     worst_response,
 )
-from busplan.buses.can.streams import Stream, last_place, remembered, streams
+from busplan.buses.can.streams import Stream, columns_of, last_place, message_streams, remembered, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic
 from busplan.elementwise import choose, is_everywhere, larger, plain, rounded_up, smaller, total
 
 _CYCLIC: Final = (SYNC, *NAMES.values())
+_FRAME, _BLOCK = 3, 5
+"""Places of a frame and of the block in `columns_of`; numbers of a sender stand before a frame."""
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 
 
@@ -68,14 +72,14 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     """
     each = streams(traffic, is_stuffed=is_stuffed)
     last, bit = last_place(stream for stream in each if not stream.is_message), bit_us(traffic.bit_rate_kbit_s)
-    messages = [stream for stream in each if stream.is_message]
+    sent = message_streams(traffic, is_stuffed=is_stuffed)
+    before, lower = sent.around(last)
     higher = [
-        Sender(choose(is_higher, stream.sender().frames_us, 0.0), stream.period_us, stream.jitter_us + bit)
-        for stream in messages
-        if (is_higher := stream.first_place <= last) is not False
+        Sender(
+            choose(stream.first_place <= last, stream.sender().frames_us, 0.0), stream.period_us, stream.jitter_us + bit
+        )
+        for stream in (sent.each[number] for number in before)
     ]
-    by_length = sorted(messages, key=lambda stream: -_length(stream, is_stuffed=is_stuffed))
-    lower = tuple(stream for stream in by_length if (stream.last_place > last) is not False)
 
     def blocking_us(span_us: Points) -> Points:
         blocked: Points = 0.0
@@ -93,21 +97,6 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     return Waits(lasts_us, blocking_us(lasts_us), lower)
 
 
-def _length(stream: Stream, *, is_stuffed: bool) -> float:
-    """Number by which the frames of messages are in order of their length, at every point of arrays."""
-    if isinstance(stream.frame_us, float):
-        return stream.frame_us
-    # Bit rates, and formats that are no plain numbers, are the same for all messages.
-    bits = stream.identifier_bits
-    return plain(
-        frame_bits(
-            stream.data_bytes,
-            identifier_bits=bits if isinstance(bits, int | float) else BASE_BITS,
-            is_stuffed=is_stuffed,
-        )
-    )
-
-
 def _frames_within(stream: Stream, span_us: Points) -> Points:
     """Frames of a message of a lower priority that go within a span of time, of which three are enough [1]."""
     each = rounded_up(smaller((span_us + stream.deadline_us) / stream.period_us, int(MOST_BLOCKS)))
@@ -116,7 +105,8 @@ def _frames_within(stream: Stream, span_us: Points) -> Points:
 
 def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> dict[str, Points]:
     """Latest queueing of the last feedback and of all commands behind the start of their cycle, by name [us]."""
-    us = {name: total(stream.sender().frames_us for stream in each if stream.name == name) for name in _CYCLIC}
+    cyclic = [stream for stream in each if not stream.is_message]
+    us = {name: total(stream.sender().frames_us for stream in cyclic if stream.name == name) for name in _CYCLIC}
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
     commands_us = waits(traffic, others_us, is_stuffed=is_stuffed).lasts_us - us[_COMMAND]
     return {_FEEDBACK: commands_us - traffic.host_us - us[_FEEDBACK], _COMMAND: commands_us}
@@ -127,35 +117,52 @@ class _Start:
 
     Parameters
     ----------
-    ranked
-        All streams, in the order of arbitration.
-    late
-        Names of those that are late, which come at once, and again in the next cycle.
-    offset_us
-        From the start of the busy period to that of the next cycle [us].
+    senders
+        All senders, in the order of arbitration; or arrays of all of them.
+    is_late
+        Of each, whether it is late: it comes at once, and again in the next cycle.
+    groups
+        Of arrays, the number of the period and jitter of each, from 0.
     bit_us
         Time of a bit [us].
     """
 
-    def __init__(self, ranked: Sequence[Stream], late: Sequence[str], offset_us: Points, bit_us: Points) -> None:
-        self.senders = [
-            stream.sender()._replace(jitter_us=-offset_us) if late and not stream.is_message else stream.sender()
-            for stream in ranked
-        ]
-        self.first_us = _sums(
-            sender.frames_us * (stream.name in late) for sender, stream in zip(self.senders, ranked, strict=True)
-        )
-        # ceil(x) is less than x + 1.
-        # ceil(x) is no less than x.
-        self.least_us = _sums(sender.load * (sender.jitter_us + bit_us) for sender in self.senders)
-        self.most_us = _sums(
-            sender.frames_us + sender.load * (larger(sender.jitter_us, 0.0) + bit_us) for sender in self.senders
-        )
+    def __init__(
+        self, senders: Sequence[Sender] | Sender, is_late: Sequence[bool], bit_us: Points, groups: Points = None
+    ) -> None:
+        self.senders = senders
+
+        def least_us(sender: Sender) -> Points:
+            # ceil(x) is no less than x.
+            return sender.load * (sender.jitter_us + bit_us)
+
+        def most_us(sender: Sender) -> Points:
+            # ceil(x) is less than x + 1.
+            return sender.frames_us + sender.load * (larger(sender.jitter_us, 0.0) + bit_us)
+
+        if isinstance(senders, Sender):
+            import numpy as np
+
+            _, first = np.unique(groups, return_index=True)
+            self.times_us = senders.period_us[first], senders.jitter_us[first]
+            """Period and jitter of each group [us]."""
+            self.first_us = _sums_of_array(senders.frames_us * is_late)
+            self.least_us, self.most_us = _sums_of_array(least_us(senders)), _sums_of_array(most_us(senders))
+        else:
+            self.first_us = _sums(sender.frames_us * late for sender, late in zip(senders, is_late, strict=True))
+            self.least_us, self.most_us = _sums(map(least_us, senders)), _sums(map(most_us, senders))
 
 
-def _sums(numbers: Iterator[Points]) -> list[Points]:
+def _sums(numbers: Iterable[Points]) -> Points:
     """Sums of the first of some numbers, from none to all."""
     return [0.0, *accumulate(numbers, add)]
+
+
+def _sums_of_array(numbers: Points) -> Points:
+    """Sums of the first numbers of an array, from none to all."""
+    import numpy as np  # of many senders alone
+
+    return np.append(0.0, numbers.cumsum())
 
 
 class Messages:
@@ -175,18 +182,92 @@ class Messages:
 
     def __init__(self, traffic: Traffic, *, is_stuffed: bool) -> None:
         each = streams(traffic, is_stuffed=is_stuffed)
-        self._ranked = sorted(each, key=lambda stream: stream.block)
-        self._ranks = [stream.block for stream in self._ranked]
         self._bit_us = bit_us(traffic.bit_rate_kbit_s)
+        self._columns: Points = None
+        """As `columns_of` of all streams, where they are many and plain."""
+        if traffic.is_plain and len(traffic.messages) >= MANY:
+            import numpy as np  # of many messages alone
+
+            sent = message_streams(traffic, is_stuffed=is_stuffed)
+            cyclic = len(each) - len(sent.each)
+            columns = np.append(columns_of(each[:cyclic]), sent.columns, axis=1)
+            order = columns[_BLOCK].argsort(kind="stable")
+            self._groups = np.append(np.arange(cyclic), cyclic + sent.groups)[order]
+            self._columns = columns[:, order]
+            self._ranked = [each[place] for place in order.tolist()]
+        else:
+            self._ranked = sorted(each, key=lambda stream: stream.block)
+        self._ranks = [stream.block for stream in self._ranked]
         period_us, late_us = traffic.period_us, queued_us(each, traffic, is_stuffed=is_stuffed)
         places = (((), 0.0), ((_FEEDBACK, _COMMAND), late_us[_FEEDBACK]), ((_COMMAND,), late_us[_COMMAND]))
-        self._starts = [_Start(self._ranked, late, larger(period_us - us, 0.0), self._bit_us) for late, us in places]
-        self._loads = _sums(sender.load for sender in self._starts[0].senders)
-        frames_us: Iterator[Points] = (stream.frame_us for stream in reversed(self._ranked))
-        nothing: Points = 0.0
-        self._longest_us: list[Points] = [*accumulate(frames_us, larger, initial=nothing)][::-1]
+        self._starts = [self._start(late, larger(period_us - us, 0.0)) for late, us in places]
+        if self._columns is None:
+            self._loads = _sums(sender.load for sender in self._starts[0].senders)
+            frames_us: Iterator[Points] = (stream.frame_us for stream in reversed(self._ranked))
+            nothing: Points = 0.0
+            longest_us: Points = [*accumulate(frames_us, larger, initial=nothing)]
+        else:
+            self._loads = _sums_of_array(Sender(*self._columns[:_FRAME]).load)
+            longest_us = np.append(0.0, np.maximum.accumulate(self._columns[_FRAME][::-1]))
+        self._longest_us: Points = longest_us[::-1]
         """The longest frame from each rank on."""
         self._known: dict[str, Response | None] = {}
+
+    def _start(self, late: Sequence[str], offset_us: Points) -> _Start:
+        """The start of a busy period when some are late, so long before the next cycle [us]."""
+        is_late = [stream.name in late for stream in self._ranked]
+        if self._columns is None:
+            senders = [
+                stream.sender()._replace(jitter_us=-offset_us) if late and not stream.is_message else stream.sender()
+                for stream in self._ranked
+            ]
+            return _Start(senders, is_late, self._bit_us)
+        frames_us, period_us, jitter_us = self._columns[:_FRAME]
+        if late:
+            jitter_us = jitter_us.copy()
+            jitter_us[[not stream.is_message for stream in self._ranked]] = -offset_us
+        return _Start(Sender(frames_us, period_us, jitter_us), is_late, self._bit_us, self._groups)
+
+    @cached_property
+    def _ranks_by_name(self) -> dict[str, int]:
+        return {stream.name: rank for rank, stream in enumerate(self._ranked) if stream.is_message}
+
+    @cached_property
+    def _all(self) -> tuple[Points, Sender, Points]:
+        """Of all messages of plain numbers, the lowest priority first: first rank behind, a single frame, deadline."""
+        import numpy as np
+
+        is_message = [stream.is_message for stream in self._ranked]
+        _, period_us, jitter_us, frame_us, deadline_us, _, last = self._columns[:, is_message][:, ::-1]
+        behind = np.searchsorted(self._columns[_BLOCK], last, side="right")
+        return behind, Sender(frame_us, period_us, jitter_us), deadline_us
+
+    def bounds(self) -> Iterator[tuple[Stream, Points]]:
+        """All messages, that of the lowest priority first, each with its `bound_share`."""
+        if self._columns is None:
+            return ((stream, self.bound_share(stream)) for stream in self.by_priority())
+        return zip(self.by_priority(), self._bound(*self._all).tolist(), strict=True)
+
+    def largest_bound(self) -> Points:
+        """The largest `bound_share` of any message."""
+        if self._columns is None:
+            return reduce(larger, (share for _, share in self.bounds()))
+        return float(self._bound(*self._all).max())
+
+    def may_be_late(self) -> list[tuple[Stream, float]]:
+        """Plain messages that bounds do not show to be in time, the largest bound first, with their bounds."""
+        if self._columns is None:
+            over = [(own, plain(bound)) for own, bound in self.bounds() if bound > 1]
+        else:
+            bounds, each = self._bound(*self._all), [*self.by_priority()]
+            over = [(each[place], float(bounds[place])) for place in (bounds > 1).nonzero()[0].tolist()]
+        return sorted(over, key=lambda pair: -pair[1])
+
+    def largest_least(self) -> Points:
+        """The largest `least_share` of any message."""
+        if self._columns is None:
+            return reduce(larger, map(self.least_share, self.by_priority()))
+        return float(self._least(*self._all).max())
 
     def by_priority(self) -> Iterator[Stream]:
         """The messages, that of the lowest priority first."""
@@ -194,7 +275,8 @@ class Messages:
 
     def load(self, own: Stream) -> Points:
         """Load of the bus by a message and all that goes before it [1]."""
-        return self._loads[self._behind(own)]
+        load = self._loads[self._behind(own)]
+        return load if self._columns is None else float(load)
 
     def response(self, own: Stream) -> Response | None:
         """Worst-case response of a message of plain numbers; None where `worst_response` has none."""
@@ -213,25 +295,36 @@ class Messages:
     def _responses(self, own: Stream) -> Iterator[Response | None]:
         """The worst instance of a message from each start of a busy period."""
         behind = self._behind(own)
-        at = next(place for place, stream in enumerate(self._ranked) if stream.is_message and stream.name == own.name)
+        for start, before in zip(self._starts, self._before(own, behind), strict=True):
+            blocking_us, first_us = self._longest_us[behind], start.first_us[behind]
+            if self._columns is not None:
+                blocking_us, first_us = float(blocking_us), float(first_us)
+            yield worst_instance(own.sender(1), before, blocking_us=blocking_us, bit_us=self._bit_us, first_us=first_us)
+
+    def _before(self, own: Stream, behind: int) -> Iterator[Demand]:
+        """What goes before a message, other nodes' of its name among them, from each start of a busy period."""
+        at = self._ranks_by_name[own.name]
         is_single = isinstance(own.identifiers, int) and own.identifiers == 1
         siblings = [] if is_single else [own.sender(own.identifiers - 1)]
+        if self._columns is None:
+            for start in self._starts:
+                yield Demand([*start.senders[:at], *siblings, *start.senders[at + 1 : behind]])
+            return
+        import numpy as np
+
+        frames_us = self._columns[0, :behind].copy()
+        frames_us[at] = sum(sender.frames_us for sender in siblings)
+        of_groups_us = np.bincount(self._groups[:behind], frames_us)
         for start in self._starts:
-            yield worst_instance(
-                own.sender(1),
-                start.senders[:at] + siblings + start.senders[at + 1 : behind],
-                blocking_us=self._longest_us[behind],
-                bit_us=self._bit_us,
-                first_us=start.first_us[behind],
-            )
+            yield Demand.of_many(Sender(of_groups_us, *(each[: len(of_groups_us)] for each in start.times_us)))
 
     def latest(self) -> tuple[Stream, Response | None]:
         """The message of plain numbers with the largest response over its deadline, and its response."""
         # Bounds come in closed form: few exact responses are left to find.
-        ranked = sorted(self.by_priority(), key=self.bound_share, reverse=True)
-        latest, largest = ranked[0], 0.0
-        for own in ranked:
-            if self.bound_share(own) <= largest:
+        ranked = sorted(self.bounds(), key=lambda pair: plain(pair[1]), reverse=True)
+        latest, largest = ranked[0][0], 0.0
+        for own, bound in ranked:
+            if bound <= largest:
                 break
             response = self.response(own)
             share = inf if response is None else response.us / own.deadline_us
@@ -241,33 +334,40 @@ class Messages:
 
     def bound_share(self, own: Stream) -> Points:
         """A bound of the response over the deadline; infinite where the load of the bus leaves no response [1]."""
-        behind, sender = self._behind(own), own.sender(1)
-        load, own_most_us = self._loads[behind], sender.frames_us + sender.load * (sender.jitter_us + self._bit_us)
+        return self._bound(self._behind(own), own.sender(1), own.deadline_us)
+
+    def _bound(self, behind: Points, own: Sender, deadline_us: Points) -> Points:
+        load, own_most_us = self._loads[behind], own.frames_us + own.load * (own.jitter_us + self._bit_us)
         starts_us = (start.first_us[behind] + start.most_us[behind] for start in self._starts)
         most_us = reduce(larger, starts_us) - own_most_us + self._longest_us[behind]
         has_response = load < SATURATED
-        idle = choose(has_response, 1 - load + sender.load, 1.0)
-        return choose(has_response, (own.jitter_us + own.frame_us + most_us / idle) / own.deadline_us, inf)
+        idle = choose(has_response, 1 - load + own.load, 1.0)
+        return choose(has_response, (own.jitter_us + own.frames_us + most_us / idle) / deadline_us, inf)
 
     def least_share(self, own: Stream) -> Points:
         """Lower bound of the response over the deadline, of a busy period that begins with SYNC [1]."""
-        behind, sender = self._behind(own), own.sender(1)
-        load, waits_us = self._loads[behind], self._starts[0].least_us[behind] + self._longest_us[behind]
-        waits_us = waits_us - sender.load * (sender.jitter_us + self._bit_us)
-        has_response = load < SATURATED
-        idle = choose(has_response, 1 - load + sender.load, 1.0)
-        least_us = own.jitter_us + own.frame_us + waits_us / idle
-        return choose(has_response, least_us / own.deadline_us * BELOW, inf)
+        return self._least(self._behind(own), own.sender(1), own.deadline_us)
 
-    def deadline_share(self, own: Stream) -> Points:
-        """Response over deadline, or a bound of it that is no more than 1; infinite without a response [1].
+    def _least(self, behind: Points, own: Sender, deadline_us: Points) -> Points:
+        load, waits_us = self._loads[behind], self._starts[0].least_us[behind] + self._longest_us[behind]
+        waits_us = waits_us - own.load * (own.jitter_us + self._bit_us)
+        has_response = load < SATURATED
+        idle = choose(has_response, 1 - load + own.load, 1.0)
+        least_us = own.jitter_us + own.frames_us + waits_us / idle
+        return choose(has_response, least_us / deadline_us * BELOW, inf)
+
+    def deadline_shares(self) -> Iterator[tuple[Stream, Points]]:
+        """All messages, that of the lowest priority first, each with its `deadline_share`."""
+        return ((own, self.deadline_share(own, bound)) for own, bound in self.bounds())
+
+    def deadline_share(self, own: Stream, bound: Points) -> Points:
+        """Response over deadline, or its bound where that is no more than 1; infinite without a response [1].
 
         Raises
         ------
         TooManyStepsError
             It takes too many steps to find at some of several points.
         """
-        bound = self.bound_share(own)
         tells = (bound <= 1) | (bound == inf)
         if is_everywhere(tells):
             return bound
@@ -342,5 +442,7 @@ def sync_spread_us(traffic: Traffic, *, is_stuffed: bool) -> Points:
     """
     own, *_ = each = streams(traffic, is_stuffed=is_stuffed)
     higher, blocking_us = _rivals(own, each)
-    worst = worst_instance(own.sender(1), higher, blocking_us=blocking_us, bit_us=bit_us(traffic.bit_rate_kbit_s))
+    worst = worst_instance(
+        own.sender(1), Demand(higher), blocking_us=blocking_us, bit_us=bit_us(traffic.bit_rate_kbit_s)
+    )
     return inf if worst is None else choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)
