@@ -182,6 +182,13 @@ def test_frames_of_can_fd_are_in_the_load_with_the_most_stuff_bits(tmp_path: Pat
     assert figure(answer, "load ").recorded == pytest.approx(us / 1000, rel=0.01)
 
 
+def test_stuffing_is_that_of_classical_frames(tmp_path: Path) -> None:
+    fd = "".join(f"(1700000005.{number:06d}) can0 7F0##1{'00' * 64}\n" for number in range(0, 999_000, 1000))
+    alone, mixed = (of_log(candump(LOGGED) + more, tmp_path, plan="can-fd-arm-7") for more in ("", fd))
+    stuffing = [figure(answer, "stuff bits").recorded for answer in (alone, mixed)]
+    assert stuffing[0] == pytest.approx(stuffing[1], rel=1e-3)
+
+
 def test_a_damaged_log_says_where(tmp_path: Path) -> None:
     text = candump(LOGGED[:100])
     answer = of_log(text + "(1700000001.0000) can0 zz#\n", tmp_path)

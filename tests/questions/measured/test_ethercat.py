@@ -235,6 +235,9 @@ def test_what_cannot_be_told_is_refused(tmp_path: Path) -> None:
         of_packets(packets, tmp_path, plan="sercos3-servo-8")
     with refusal("quantile 0.3: expected a share of 0.5 to 1"):
         of_packets(packets, tmp_path, quantile=0.3)
+    for name in ("-", "a\0b"):
+        with refusal("a recording is read from a file"):
+            busplan.measured(PLAN, name)
     with refusal("cannot be read: No such file"):
         busplan.measured(PLAN, tmp_path / "nowhere.pcap")
     (tmp_path / "text.pcap").write_text("a,b\n1,2\n")
