@@ -18,7 +18,7 @@ from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, co
 from busplan.elementwise import plain
 from busplan.progress import Progress
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.statistics import Floats, Grid, expanded, grid, lateness, quantile
+from busplan.recordings.statistics import Floats, PeriodicEvents, expanded, grid, lateness, quantile
 
 _STEP_BACK_US: Final = -1000.0
 """Stamps of neighbours are so far out of order only where a clock was set [us]."""
@@ -42,7 +42,7 @@ class _Sent(NamedTuple):
     identifier: int
     times_us: Floats
     most_bytes: int
-    grid: Grid | None
+    grid: PeriodicEvents | None
     """Its periods, where it comes periodically."""
 
     @property
@@ -351,7 +351,7 @@ def _finite(us: float) -> float | None:
     return us if isfinite(us) else None
 
 
-def _is_periodic(periods: Grid) -> bool:
+def _is_periodic(periods: PeriodicEvents) -> bool:
     late_us = float(np.std(periods.late_us))
     return late_us <= _PERIODIC * periods.period_us and periods.missing <= _MISSING * len(periods.late_us)
 
