@@ -393,6 +393,8 @@ class BusFigures(NamedTuple):
     """Of `latency`, in the order of its document, where it has more than those rows."""
     has_many_transactions: bool = False
     """Whether the table of `latency` has a row for each transaction, and a column for each figure."""
+    deadlines: tuple[str, str] | None = None
+    """Keys of the time and of the deadline of a transaction, where a kind has such."""
 
     @property
     def latency_table(self) -> tuple[Figure, ...]:

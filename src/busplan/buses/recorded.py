@@ -79,17 +79,6 @@ def day_of(time_ns: int) -> str:
     return datetime.fromtimestamp(time_ns // 1_000_000_000, tz=UTC).date().isoformat()
 
 
-def share_words(share: float, *, of: str = "cycles") -> str:
-    """Say of which share of events a figure holds.
-
-    Examples
-    --------
-    >>> share_words(0.99), share_words(1, of="frames")
-    (' of 99 % of the cycles', ' of all frames')
-    """
-    return f" of all {of}" if share == 1 else f" of {100 * share:g} % of the {of}"
-
-
 def counted(number: int, name: str) -> str:
     """A number of things.
 

@@ -1,4 +1,4 @@
-"""Packets of pcap and pcapng files, in pieces, with exact stamps.
+"""CapturedPackets of pcap and pcapng files, in pieces, with exact stamps.
 
 Libraries such as dpkt give stamps of pcapng as floats, whose steps are 240 ns by now: more than the jitter of a good
 master. So the few fields of a record are read here.
@@ -36,7 +36,7 @@ _RESOLUTION, _OFFSET = 9, 14
 """Options of an interface: the tick of its stamps, and the seconds to add."""
 
 
-class Packets(NamedTuple):
+class CapturedPackets(NamedTuple):
     """Some packets of a capture, in the order of the file."""
 
     content: npt.NDArray[np.uint8]
@@ -54,9 +54,9 @@ class CaptureNotes:
 
     packets: int = 0
     other_links: int = 0
-    """Packets of interfaces that are no Ethernet."""
+    """CapturedPackets of interfaces that are no Ethernet."""
     without_time: int = 0
-    """Packets in records that have no stamp."""
+    """CapturedPackets in records that have no stamp."""
     broken_at: int | None = None
     """Byte of the file from which on nothing can be read; None of a whole file."""
 
@@ -66,8 +66,8 @@ def is_capture(head: bytes) -> bool:
     return head[:4] in _PCAP or head[:4] == _SECTION
 
 
-def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[Packets]:
-    """Packets of a capture of Ethernet, in pieces.
+def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[CapturedPackets]:
+    """CapturedPackets of a capture of Ethernet, in pieces.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[
         raise BusplanError(f"{path}: cannot be read: {error.strerror}") from None
 
 
-def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress) -> Iterator[Packets]:
+def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress) -> Iterator[CapturedPackets]:
     total = path.stat().st_size
     head = file.read(24)
     walker: _Walker
@@ -106,7 +106,7 @@ def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress)
         if rows:
             notes.packets += len(rows)
             starts, sizes, times = np.array(rows, dtype=np.int64).T
-            yield Packets(np.frombuffer(content, dtype=np.uint8), starts, sizes, times)
+            yield CapturedPackets(np.frombuffer(content, dtype=np.uint8), starts, sizes, times)
         at += used
         is_last = len(content) - len(held) < _PIECE_BYTES
         held = content[used:]

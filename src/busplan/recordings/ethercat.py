@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from busplan.errors import BusplanError
 from busplan.progress import Progress
-from busplan.recordings.capture import CaptureNotes, Numbers, Packets, interned, packets
+from busplan.recordings.capture import CapturedPackets, CaptureNotes, Numbers, interned, packets
 
 _TYPE: Final = 0x88A4
 _VLAN: Final = (0x8100, 0x88A8)
@@ -57,7 +57,7 @@ class EthercatFrames(NamedTuple):
     layouts: tuple[tuple[Datagram, ...], ...]
     notes: CaptureNotes
     others: int
-    """Packets that are no EtherCAT frame of datagrams."""
+    """CapturedPackets that are no EtherCAT frame of datagrams."""
     cut: int
     """EtherCAT frames that are not whole."""
 
@@ -95,7 +95,7 @@ class _Reader:
         self._masters: dict[int, int] = {}
         self._others = self._cut = 0
 
-    def read(self, piece: Packets) -> None:
+    def read(self, piece: CapturedPackets) -> None:
         """Take a piece in."""
         content, ends = piece.content, piece.starts + piece.sizes
         # Zeros behind the end, so that a header may be looked at before it is known to be whole.

@@ -35,7 +35,7 @@ class Quantile(NamedTuple):
     """Standard uncertainty; None where too few values lie beyond to say it, as beyond the largest."""
 
 
-class Grid(NamedTuple):
+class PeriodicEvents(NamedTuple):
     """Events that come once a period."""
 
     period_us: float
@@ -75,7 +75,7 @@ def quantile(values: Floats, share: float) -> Quantile:
     return Quantile(value, float(ordered[high - 1] - ordered[low - 1]) / (2 * _COVERAGE))
 
 
-def lateness(events: Grid, share: float) -> Quantile:
+def lateness(events: PeriodicEvents, share: float) -> Quantile:
     """How much the latest events, but for a share of them, are behind the earliest ones [us]."""
     latest, earliest = quantile(events.late_us, share), quantile(-events.late_us, max(share, _EARLY_SHARE))
     known = expanded(latest.uncertainty, earliest.uncertainty or 0.0, events.doubt_us)
@@ -90,7 +90,7 @@ def middle(values: Floats) -> Quantile:
     return Quantile(value, _MEDIAN_SHARE * (high - low) / _QUARTILES_OF_NORMAL / sqrt(len(values)))
 
 
-def grid(times_us: Floats) -> Grid | None:
+def grid(times_us: Floats) -> PeriodicEvents | None:
     """Find the period of events, and how late each is; None of too few events, or of several at once.
 
     Parameters
@@ -115,7 +115,7 @@ def grid(times_us: Floats) -> Grid | None:
     # The places of the first and of the last event scatter as all do.
     doubt_us = hypot(float(np.std(late)) * sqrt(3 / len(late)), bend_us)
     missing = int(places[-1] - places[0]) + 1 - len(times_us)
-    return Grid(period_us + slope, error, late, doubt_us, missing)
+    return PeriodicEvents(period_us + slope, error, late, doubt_us, missing)
 
 
 def _period(times_us: Floats) -> float:

@@ -244,6 +244,26 @@ def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path
         assert (explained.returncode, "inf" in explained.stdout) == (0, False)
 
 
+def test_latency_says_first_whether_all_messages_are_in_time_and_shows_the_latest_of_many(
+    run: Run, tmp_path: Path
+) -> None:
+    first = run("latency", "can-servo-8").stdout.partition("\n")[0]
+    assert first == "Every message keeps its deadline by the worst-stuffing model; command takes up to 2350 us of 4000."
+    many = "".join(
+        f'[[message]]\nname = "m{number}"\nidentifier = {0x400 + number}\npayload_bytes = 8\nperiod_us = 20000\n'
+        f"deadline_us = {19000 - 450 * number}\n"
+        for number in range(41)
+    )
+    path = tmp_path / "many.toml"
+    path.write_text(profile_text(load("can-servo-8").profile) + many, encoding="utf-8")
+    said = run("latency", path.name, "--timing", "worst-stuffing", cwd=tmp_path).stdout
+    assert "22 of 47 messages miss their deadlines by the worst-stuffing model; m40 takes up to " in said
+    assert "Not shown: 18 rows. --all shows all." in said
+    assert [word for word in ("m0 ", "m20 ", "m40 ") if f"\n{word}" in said] == ["m20 ", "m40 "]
+    whole = run("latency", path.name, "--timing", "worst-stuffing", "--all", cwd=tmp_path).stdout
+    assert "\nm0 " in whole
+
+
 def test_its_verdict_says_by_how_much_the_model_errs_to_the_safe_side(run: Run) -> None:
     said = run("capacity", "can-servo-8", "--all").stdout
     assert (

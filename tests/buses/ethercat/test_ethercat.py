@@ -196,7 +196,8 @@ def test_bytes_take_longer_than_the_wire() -> None:
         # Datagrams of 12 bytes and their data: what each master adds to the first frame.
         ("SOEM", "separate", [], [8]),
         ("IgH", "separate", [2], [2, 4]),
-        ("ethercrab", "separate", [], [8]),
+        # The state of each of the three devices.
+        ("ethercrab", "separate", [2, 2, 2], [8, 2, 2, 2]),
         ("TwinCAT", "shared", [4, 2, 1], [4, 4, 2, 1]),
         ("acontis", "shared", [4, 4, 2], [4, 4, 4, 2]),
         (None, "separate", [4, 4, 2], [4, 4, 4, 2]),
@@ -511,12 +512,25 @@ def test_frames_are_those_of_eni_files_and_loops_lie_within_u_but_for_one_machin
 def test_its_verdict_says_by_part_what_is_tested() -> None:
     said = " ".join(busplan.capacity(profile()).to_dict()["verdicts"][0]["text"].split())
     # What a constant, a bias or U comes from is no test of it: a master's datagrams are those of its ENI files.
-    parts = "bytes (3 captures), devices (14 machines or pairs), the master's datagrams (6 ENI files)"
+    parts = "bytes (3 captures), devices (14 machines or pairs), the master's datagrams (9 ENI files and captures)"
     own = f"Model of EtherCAT (kind ethercat): published figures set {parts}; independent figures test frames"
-    assert f"{own} (1 more ENI file); not tested: the whole cycle of a machine." in said
+    assert f"{own} (the bytes of 1 more ENI file); not tested: the whole cycle of a machine." in said
 
 
 def test_its_evidence_says_where_figures_come_from(run: Run) -> None:
     document = json.loads(run("evidence", "ethercat", "--format", "json").stdout)
     assert document["without"] == []
     assert {one["data"] for one in document["figures"]} == {"ethercat"}
+
+
+@pytest.mark.parametrize("nodes", [1, 100, 106, 107, 108, 250, 1000])
+def test_the_states_of_many_devices_are_counted_in_the_cycle_and_in_its_events(nodes: int) -> None:
+    one = profile(bus__master="ethercrab", bus__process_data=None, bus__nodes=nodes, bus__sync_shift=0.0)
+    found = terms(one)
+    # 40 bytes of each frame of 1498, 12 of each datagram of process data.
+    least = nodes * (14 + 32) + nodes * (14 + 32) / 1498 * 40
+    assert least * BYTE_US <= found["frames"] + found["data"] <= (least + 40 * 3 + nodes / 40 * 60) * BYTE_US + 10
+    sent = [
+        event for event in busplan.timeline(one, timing_model="last-byte").events if event.kind in {"overhead", "data"}
+    ]
+    assert sum(event.end_us - event.start_us for event in sent) == pytest.approx(found["frames"] + found["data"])

@@ -130,7 +130,7 @@ def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").recorded == pytest.approx(900, abs=150)
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").within is False
     answer = of_log(candump(arbitrated(late)), tmp_path)
-    assert [found.quantity for found in answer.outside] == ["last PDO behind SYNC of all cycles"]
+    assert [found.quantity for found in answer.outside] == ["last PDO behind SYNC"]
 
 
 def test_every_frame_of_a_pdo_has_a_name_of_its_own(tmp_path: Path) -> None:
@@ -180,6 +180,13 @@ def test_frames_of_can_fd_are_in_the_load_with_the_most_stuff_bits(tmp_path: Pat
     plan: Any = busplan.load_profile("can-fd-arm-7")
     us = 33 * 1000 / plan.bus.bit_rate_kbit_s + (5 + 96 + 4 + 17 + 6 + 1 + 26) * 1000 / plan.bus.data_bit_rate_kbit_s
     assert figure(answer, "load ").recorded == pytest.approx(us / 1000, rel=0.01)
+
+
+def test_stuffing_is_that_of_classical_frames(tmp_path: Path) -> None:
+    fd = "".join(f"(1700000005.{number:06d}) can0 7F0##1{'00' * 64}\n" for number in range(0, 999_000, 1000))
+    alone, mixed = (of_log(candump(LOGGED) + more, tmp_path, plan="can-fd-arm-7") for more in ("", fd))
+    stuffing = [figure(answer, "stuff bits").recorded for answer in (alone, mixed)]
+    assert stuffing[0] == pytest.approx(stuffing[1], rel=1e-3)
 
 
 def test_a_damaged_log_says_where(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def of_machine(
 
 
 def figure(answer: MeasuredAnswer, start: str) -> RecordedFigure:
-    (found,) = (figure for figure in answer.figures if figure.quantity.startswith(start))
+    (found,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
     return found
 
 
@@ -73,15 +73,15 @@ def test_period_jitter_and_masters_time_are_found_again_within_u(
     machine = Machine(period_us=period_us, jitter_us=jitter_us, host_us=host_us, host_spread_us=spread_us)
     answer = of_machine(machine, tmp_path_factory.mktemp("found"), seed=seed, quantile=0.9)
     period, jitter, master = (figure(answer, start) for start in ("period", "latest start", "master's time"))
-    assert period.recorded == pytest.approx(period_us, abs=5 * jitter_us / 1200**1.5 + 1e-4)
+    assert period.recorded == pytest.approx(period_us, abs=10 * jitter_us / 1200**1.5 + 1e-4)
     assert jitter.recorded is not None
     assert jitter.uncertainty is not None
-    # Twice U: one of twenty examples lies beyond U.
-    assert jitter.recorded == pytest.approx(0.9 * jitter_us, abs=2 * jitter.uncertainty)
+    # Some standard deviations more than U, for there are many examples.
+    assert jitter.recorded == pytest.approx(0.9 * jitter_us, abs=3 * jitter.uncertainty)
     edits = answer.edits
     doubt: Any = edits["bus.master_uncertainty_us"]
     # The delay of a device is rounded in the simulation: 8 times 0.8 ns.
-    assert edits["bus.master_us"] == pytest.approx(host_us + 0.9 * spread_us, abs=4 * doubt + 0.01)
+    assert edits["bus.master_us"] == pytest.approx(host_us + 0.9 * spread_us, abs=6 * doubt + 0.01)
     assert edits["bus.master_us"] == pytest.approx(master.recorded, abs=0.001)
     assert doubt < max(spread_us, 0.1)
 
@@ -90,7 +90,7 @@ def test_an_applied_profile_takes_as_long_as_the_machine_did(tmp_path: Path) -> 
     # Neither the copy of the bytes nor the doubt of the delays is counted twice.
     machine = Machine(jitter_us=0.001, host_spread_us=0.001)
     answer = of_machine(machine, tmp_path)
-    trip = figure(answer, "round trip of").recorded
+    trip = figure(answer, "round trip ").recorded
     keys = {key: value for key, value in answer.edits.items() if value is not None}
     applied = busplan.load_profile(PLAN, changes={**keys, "bus.mailbox_polls": 0})
     (deciding,) = (found for found in busplan.capacity(applied).results if found.timing_model == "last-byte")
@@ -100,7 +100,7 @@ def test_an_applied_profile_takes_as_long_as_the_machine_did(tmp_path: Path) -> 
 
 def test_a_slow_outlier_is_the_worst_case(tmp_path: Path) -> None:
     answer = of_machine(Machine(late={600: 700.0}), tmp_path)
-    jitter = figure(answer, "latest start of all cycles")
+    jitter = figure(answer, "latest start")
     assert jitter.recorded == pytest.approx(710, abs=11)
     assert jitter.within is False
     assert figure(answer, "period").recorded == pytest.approx(1000, abs=0.01)
@@ -170,7 +170,7 @@ def test_frames_of_a_cycle_are_those_that_come_as_often(tmp_path: Path) -> None:
     assert figure(answer, "frames in a cycle").within is False
     assert figure(answer, "datagrams").recorded == 1600 + 12 + 12 + 20
     assert figure(answer, "datagrams").note == "LRW 1000 FRMW 8 | LRW 600"
-    assert figure(answer, "round trip of").recorded == pytest.approx(230, abs=0.01)
+    assert figure(answer, "round trip ").recorded == pytest.approx(230, abs=0.01)
     assert figure(answer, "period").recorded == pytest.approx(1000, abs=0.01)
 
 
@@ -235,6 +235,9 @@ def test_what_cannot_be_told_is_refused(tmp_path: Path) -> None:
         of_packets(packets, tmp_path, plan="sercos3-servo-8")
     with refusal("quantile 0.3: expected a share of 0.5 to 1"):
         of_packets(packets, tmp_path, quantile=0.3)
+    for name in ("-", "a\0b"):
+        with refusal("a recording is read from a file"):
+            busplan.measured(PLAN, name)
     with refusal("cannot be read: No such file"):
         busplan.measured(PLAN, tmp_path / "nowhere.pcap")
     (tmp_path / "text.pcap").write_text("a,b\n1,2\n")
@@ -268,7 +271,7 @@ def test_set_changes_the_plan_that_is_compared(run: Run) -> None:
     words = ("measured", "ethercat-servo-8", str(FILES / "capture.pcapng"), "--set", "bus.master_jitter_us=3")
     document = json.loads(run(*words, "--format", "json").stdout)
     assert document["changes"] == {"bus.master_jitter_us": 3}
-    assert document["outside"] == ["latest start of all cycles"]
+    assert document["outside"] == ["latest start"]
 
 
 def test_apply_writes_what_was_measured_with_its_origin(run: Run, refused: Refused, tmp_path: Path) -> None:

@@ -103,4 +103,5 @@ FIGURES: Final = BusFigures(
     planned=(BUS_LOAD.key,),
     phases=LATENCY_TABLE,
     has_many_transactions=True,
+    deadlines=("worst_response_us", "deadline_us"),
 )

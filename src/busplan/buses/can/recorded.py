@@ -14,11 +14,11 @@ from busplan.buses.can.equations import bit_us, frame_us
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
-from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, counted, day_of, share_words
+from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, counted, day_of
 from busplan.elementwise import plain
 from busplan.progress import Progress
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.statistics import Floats, Grid, expanded, grid, lateness, quantile
+from busplan.recordings.statistics import Floats, PeriodicEvents, expanded, grid, lateness, quantile
 
 _STEP_BACK_US: Final = -1000.0
 """Stamps of neighbours are so far out of order only where a clock was set [us]."""
@@ -42,7 +42,7 @@ class _Sent(NamedTuple):
     identifier: int
     times_us: Floats
     most_bytes: int
-    grid: Grid | None
+    grid: PeriodicEvents | None
     """Its periods, where it comes periodically."""
 
     @property
@@ -193,7 +193,7 @@ class _Seen:
         planned_us = _finite(plain(self.cycle.required_us) - plain(self.network.nonperiodic_us))
         doubt = expanded(*(plain(doubt.us) for doubt in self.cycle.doubts()), behind.uncertainty or 0.0)
         yield RecordedFigure(
-            f"last PDO behind SYNC{share_words(self.share)}",
+            "last PDO behind SYNC",
             "us",
             planned_us,
             behind.value,
@@ -272,13 +272,12 @@ class _Seen:
     ) -> RecordedFigure:
         """Jitter of the arrival of a periodic message; of others the shortest distance."""
         planned_key = f"{key}.jitter_us" if key else ""
-        words = share_words(self.share, of="frames")
         if all(sent.grid is not None for sent in each):
             found = [(lateness(sent.grid, self.share), sent) for sent in each if sent.grid is not None]
             late, sent = max(found, key=lambda pair: pair[0].value)
             doubt = expanded(late.uncertainty or (sent.grid.doubt_us if sent.grid else 0.0))
             return RecordedFigure(
-                f"{label}: jitter of the arrival{words}",
+                f"{label}: jitter of the arrival",
                 "us",
                 spread_us,
                 late.value,
@@ -292,7 +291,7 @@ class _Seen:
         apart_us, sent = min(nearest, key=lambda pair: pair[0])
         planned_us = None if spread_us is None else max(plain(stream.period_us) - spread_us, 0.0)
         return RecordedFigure(
-            f"{label}: shortest distance{words}",
+            f"{label}: shortest distance",
             "us",
             planned_us,
             apart_us,
@@ -352,7 +351,7 @@ def _finite(us: float) -> float | None:
     return us if isfinite(us) else None
 
 
-def _is_periodic(periods: Grid) -> bool:
+def _is_periodic(periods: PeriodicEvents) -> bool:
     late_us = float(np.std(periods.late_us))
     return late_us <= _PERIODIC * periods.period_us and periods.missing <= _MISSING * len(periods.late_us)
 

@@ -123,7 +123,9 @@ HOUSEKEEPING_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
         "ethercrab": _datagrams(of="none", source="ethercrab", grade="published"),
         "TwinCAT": _datagrams(4, 2, 1, of="NOP, BRD, LRD", source=_ENI, grade="published"),
         "acontis": _datagrams(4, 4, 2, of="NOP, APWR, BRD", source=_ENI, grade="published"),
-        UNNAMED: _datagrams(4, 4, 2, of="as acontis", source="chosen: the most of those known", grade="assumed"),
+        UNNAMED: _datagrams(
+            4, 4, 2, of="as acontis", source="chosen: the most of those known but ethercrab", grade="assumed"
+        ),
     }
 )
 """Datagrams that each master adds to the first frame of every cycle, without those of distributed clocks."""
@@ -134,10 +136,20 @@ CLOCK_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
         "ethercrab": _datagrams(8, of="FRMW", source="ethercrab", grade="published"),
         "TwinCAT": _datagrams(4, of="ARMW", source=_ENI, grade="published"),
         "acontis": _datagrams(4, of="ARMW", source=_ENI, grade="published"),
-        UNNAMED: _datagrams(4, of="as acontis", source="chosen: the most of those known", grade="assumed"),
+        UNNAMED: _datagrams(
+            4, of="as acontis", source="chosen: the most of those known but ethercrab", grade="assumed"
+        ),
     }
 )
 """Datagrams of distributed clocks, which each master adds to them."""
+STATE_CHECK_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
+    {
+        "ethercrab": _datagrams(
+            2, of="FPRD of a device's state", source="ethercrab 0.6, push_state_checks", grade="published"
+        )
+    }
+)
+"""Datagram that a master adds for each device, by master: it reads the state of all of them in every cycle."""
 PIPELINE_CYCLES: Final = Sourced(
     1,
     unit="1",

@@ -21,7 +21,7 @@ from busplan.buses.ethercat.equations import (
 )
 from busplan.buses.ethercat.traffic import cables_us, devices_doubts, devices_us, housekeeping_bytes
 from busplan.buses.network import Network
-from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, counted, day_of, share_words
+from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, counted, day_of
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -196,7 +196,7 @@ class _Seen:
         doubt = expanded(self.jitter.uncertainty or found.doubt_us, self.stamp_us * _TWO_STAMPS)
         planned_us = plain(self.network.profile.bus.master_jitter_us)
         yield RecordedFigure(
-            f"latest start{share_words(self.share)}",
+            "latest start",
             "us",
             planned_us,
             self.jitter.value,
@@ -207,7 +207,7 @@ class _Seen:
         )
 
     def _host(self, cycles: _Cycles) -> Iterator[RecordedFigure]:
-        words, count = share_words(self.share), len(cycles.starts)
+        count = len(cycles.starts)
         if not count:
             return
         bus, terms = self.network.profile.bus, self.cycle.by_term
@@ -222,11 +222,11 @@ class _Seen:
         trip, typical = quantile(cycles.trips_us, self.share), middle(cycles.trips_us)
         yield RecordedFigure("round trip, median", "us", None, typical.value, None, "shown", count)
         doubt = expanded(*plan_doubts, trip.uncertainty or 0.0, stamps_us)
-        yield RecordedFigure(f"round trip{words}", "us", planned_us, trip.value, doubt, "at most", count)
+        yield RecordedFigure("round trip", "us", planned_us, trip.value, doubt, "at most", count)
         host_us = cycles.trips_us - cycles.wire_us - way_us - bias_us
         self.master = quantile(host_us, self.share)
         yield RecordedFigure(
-            f"master's time{words}",
+            "master's time",
             "us",
             plain(bus.master_us),
             self.master.value,

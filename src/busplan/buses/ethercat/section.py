@@ -41,7 +41,7 @@ class EthercatBus(BusSection):
     master: Master | None = Field(
         default=None,
         description="Name of the master, which says how process data travel and what datagrams it adds; without it "
-        "the most bytes of those known",
+        "the most bytes of those known but ethercrab",
         examples=["SOEM"],
     )
     process_data: ProcessData | None = Field(

@@ -12,6 +12,7 @@ from busplan.buses.ethercat.equations import (
     MEASURED_DELAY_UNCERTAINTY_US,
     SHARED,
     SPLIT,
+    STATE_CHECK_BYTES,
     UNNAMED,
     ProcessData,
     cable_us,
@@ -19,11 +20,12 @@ from busplan.buses.ethercat.equations import (
     device_us,
     frame_bytes,
     overhead_bytes,
+    room_bytes,
     sending_us,
 )
 from busplan.buses.ethercat.packing import Devices, Frames, Packing, frames_of, pack
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, alike, larger, named, plain, square_root, total
+from busplan.elementwise import Number, alike, larger, named, plain, rounded_down, square_root, total
 
 
 class Hop(NamedTuple):
@@ -73,8 +75,12 @@ def housekeeping_bytes(network: Network) -> Number:
     if bus.housekeeping_bytes is not None:
         return total(datagram_bytes(alike(size, network.nodes)) for size in bus.housekeeping_bytes)
     tables = (HOUSEKEEPING_BYTES, CLOCK_BYTES) if bus.distributed_clocks else (HOUSEKEEPING_BYTES,)
-    added = [table[bus.master or UNNAMED] for table in tables]
-    return total(alike(datagram, network.nodes) for datagram in added if datagram)
+    added = [alike(table[bus.master or UNNAMED], network.nodes) for table in tables if table[bus.master or UNNAMED]]
+    if bus.master in STATE_CHECK_BYTES:
+        checks_bytes = network.nodes * STATE_CHECK_BYTES[bus.master]
+        # Those of many devices fill frames of their own, whose headers count here.
+        added += [checks_bytes, rounded_down(checks_bytes / room_bytes(0)) * overhead_bytes(network.nodes)]
+    return total(added)
 
 
 def packing(network: Network, each: Sequence[Devices]) -> Packing:

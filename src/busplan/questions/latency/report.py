@@ -3,8 +3,12 @@
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import groupby
+from math import inf
+from operator import itemgetter
+from typing import Final
 
 from busplan.buses.figure import Figure
+from busplan.elementwise import within
 from busplan.forms.blocks import (
     Block,
     Code,
@@ -36,6 +40,7 @@ def latency_report(result: LatencyResult) -> Report:
 def _blocks(result: LatencyResult) -> Iterator[Block]:
     """Phases of each transaction, the timing models side by side; one table for each payload."""
     profile, network = result.profile, network_of(result.profile)
+    yield from _deadline_sentence(result)
     yield from latency_tables(result)
     yield Sentence((Code(profile.name), f": {bus_of(profile).latency_subject(network)}."))
     yield from not_applicable(profile)
@@ -64,14 +69,58 @@ def latency_tables(result: LatencyResult) -> Iterator[Table]:
 
 
 def _by_transaction(result: LatencyResult, figures: Sequence[Figure], subject: str) -> Iterator[Table]:
-    """One row for each transaction; one table for each payload and timing model."""
+    """One row for each transaction; one table for each payload and timing model.
+
+    A time and its deadline come first. Of many transactions those closest to their deadlines are shown.
+    """
+    first = bus_of(result.profile).figures.deadlines or ()
+    figures = sorted(figures, key=lambda figure: figure.key not in first)
     columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
-    tables: dict[tuple[int, str], list[TableRow]] = {}
+    tables: dict[tuple[int, str], list[Transaction]] = {}
     for number, transaction in _numbered(result.transactions):
-        values = (attribute_value(figure, transaction.phases) for figure in figures)
-        tables.setdefault((number, transaction.timing_model), []).append(TableRow((_name(transaction), *values)))
-    for (_, model), rows in tables.items():
+        tables.setdefault((number, transaction.timing_model), []).append(transaction)
+    for (_, model), transactions in tables.items():
+        least = sorted((_share(result, transaction) for transaction in transactions), reverse=True)[:_MOST_ROWS][-1]
+        rows = (
+            TableRow(
+                (_name(transaction), *(attribute_value(figure, transaction.phases) for figure in figures)),
+                is_detail=len(transactions) > _MOST_ROWS and _share(result, transaction) < least,
+            )
+            for transaction in transactions
+        )
         yield Table(columns, tuple(rows), Sentence((f"By the {model} model in us, {subject}",)), heads=1)
+
+
+_MOST_ROWS: Final = 30
+"""Transactions of a table beyond which it shows so many of them."""
+
+
+def _share(result: LatencyResult, transaction: Transaction) -> float:
+    """Time of a transaction over its deadline [1]: infinite without a time, 0 without a deadline."""
+    keys = bus_of(result.profile).figures.deadlines
+    us, deadline_us = (transaction.phases[key] for key in keys) if keys else (None, None)
+    if not isinstance(deadline_us, int | float):
+        return 0.0
+    return us / deadline_us if isinstance(us, int | float) else inf
+
+
+def _deadline_sentence(result: LatencyResult) -> Iterator[Sentence]:
+    """Say whether all transactions keep their deadlines by the model of the verdict, and which is the closest."""
+    keys, model = bus_of(result.profile).figures.deadlines, bus_of(result.profile).deciding_model
+    due = [
+        (share, transaction)
+        for transaction in result.transactions
+        if transaction.timing_model == model and (share := _share(result, transaction))
+    ]
+    if not keys or not due:
+        return
+    late = sum(not within(share, 1.0) for share, _ in due)
+    share, latest = max(due, key=itemgetter(0))
+    us, deadline_us = (latest.phases[key] for key in keys)
+    misses = "misses its deadline" if late == 1 else "miss their deadlines"
+    is_kept = f"{late} of {len(due)} messages {misses}" if late else "Every message keeps its deadline"
+    time = "has no worst-case response time" if us is None else f"takes up to {us:g} us of {deadline_us:g}"
+    yield Sentence((f"{is_kept} by the {model} model; {_name(latest)} {time}.",), "fails" if late else "neutral")
 
 
 def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, Transaction]]:

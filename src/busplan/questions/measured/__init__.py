@@ -112,8 +112,8 @@ def measured(
     if not isinstance(recording, str | os.PathLike):
         raise BusplanError(f"recording {recording!r}: expected the path of a file")
     source = os.fspath(recording)
-    if source == "-":
-        raise BusplanError("-: a recording is read from a file")
+    if source == "-" or "\0" in source:
+        raise BusplanError(f"{source}: a recording is read from a file")
     seen = bus_of(network).recorded(
         network_of(network), FilePath(source), share=share, progress=progress or (lambda _done, _total: None)
     )

@@ -77,9 +77,17 @@ def _blocks(answer: MeasuredAnswer) -> Iterator[Block]:
     outside = answer.outside
     state: State = "fails" if outside else "passes"
     inside = f"{len(judged) - len(outside)} of {plural(len(judged), 'figure')} within the plan"
+    share = "the worst recorded" if answer.quantile == 1 else f"those of {100 * answer.quantile:g} % of the events"
     names = f"; outside: {', '.join(figure.quantity for figure in outside)}" if outside else ""
     yield Sentence(
-        (Code(answer.profile.name), " beside ", Code(answer.source), ": ", Words(inside, state), f"{names}.")
+        (
+            Code(answer.profile.name),
+            " beside ",
+            Code(answer.source),
+            ": ",
+            Words(inside, state),
+            f"{names}. Jitter and times are {share}.",
+        )
     )
     yield Table(_COLUMNS, tuple(map(_row, answer.figures)), stacks=True)
     yield from (Sentence((remark,)) for remark in answer.remarks)
