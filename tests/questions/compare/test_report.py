@@ -104,7 +104,7 @@ def test_assumed_are_the_values_of_a_new_profile_and_the_defaults() -> None:
     assert sum(line.endswith("new profile") for line in short) == 2
     assert not [line for line in short if line.endswith("default")]
     assert short[-1] == "Not shown: 7 rows. --all shows all."
-    assert sum(line.endswith("default") for line in whole) == 6
+    assert sum(line.endswith("default") for line in whole) == 7
     assert not [line for line in said(compare(load("paper-1ms").profile, kinds=["ieee1394"])) if "Assumed" in line]
 
 
