@@ -192,6 +192,7 @@ def test_every_question_takes_a_machine_of_two_rates(run: Run, tmp_path: Path) -
     for command in ("capacity", "latency", "timeline", "map", "plan", "compare", "check"):
         assert run(command, "arm.toml", cwd=tmp_path).returncode in (0, 1), command
     assert "% with all PDOs in every cycle" in run("capacity", "arm.toml", cwd=tmp_path).stdout
+    assert "1000 kbit/s, PDOs of io every 4 cycles" in run("timeline", "arm.toml", cwd=tmp_path).stdout
     assert "group.io.every" in run("diff", "old.toml", "arm.toml", cwd=tmp_path).stdout
     assert "/ every,io" in run("explain", "arm.toml", "bus_load", cwd=tmp_path).stdout
     said = run("sweep", "arm.toml", "--vary", "group.io.every=1,2,4", "--vary", "group.io.nodes=2,6", cwd=tmp_path)

@@ -386,6 +386,26 @@ def test_a_late_cycle_and_a_fast_one_behind_it_hold_a_message_up() -> None:
     assert found.cycles_us[1] <= period_us
 
 
+def test_a_burst_of_messages_meets_slow_pdos_twice() -> None:
+    burst = tuple(Message(f"low{number:02}", 0x7E0 + number, 8, 50_000, 0, 50_000) for number in range(14))
+    pdos = tuple(
+        Pdos(kind, f"g{node}", base + node, 1, 8, every=1 if node == 0 else 2)
+        for kind, base in zip(TRANSACTION_KINDS, (0x181, 0x201), strict=True)
+        for node in range(4)
+    )
+    sent = drives(4, *burst, read_us=0)._replace(pdos=pdos)
+    own = judged(sent, nodes=4, write_us=0, slack_us=0)
+    assert own is not None
+    assert own.period_us == 55 + 8 * FRAME_US + 3 * FRAME_US
+    # All come with the SYNC of a full cycle, and the last of them is sent behind the next full cycle.
+    start_us = FULL * own.period_us
+    at = Moments(((0,) * CYCLES,) * 4, (0,) * CYCLES, ((start_us,),) * 14, ((start_us,),) * 14, 0)
+    (response_us,) = run(own, at).responses_us[-1]
+    assert response_us == 3 * 55 + (8 + 2 + 8) * FRAME_US + 14 * FRAME_US
+    # Beyond it the bound has a late cycle before, of which no more than the PDOs of a full one and SYNC.
+    assert response_us <= own.responses_us["low13"] <= response_us + 55 + 8 * FRAME_US
+
+
 if __name__ == "__main__":
     for kind in ("", *KINDS):
         for name, found in attacked(*map(int, sys.argv[1:]), runs=150, kind=kind).items():

@@ -148,10 +148,12 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         return "every frame with the stuff bits of its length"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """The bit rate, or both of CAN FD."""
+        """The bit rate, or both of CAN FD, and PDOs that are not in every cycle."""
         bus = network.profile.bus
         data = "" if bus.data_bit_rate_kbit_s is None else f", {bus.data_bit_rate_kbit_s:g} kbit/s of data"
-        return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}",)
+        rates = ((nodes.name, int(plain(nodes.payload.every))) for nodes in network.alike)
+        seldom = (f"PDOs {name and f'of {name} '}every {every} cycles" for name, every in rates if every > 1)
+        return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}", *seldom)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """Functions of `busplan.buses.can.evidence`."""
