@@ -198,6 +198,9 @@ def test_a_circle_needs_axes_in_every_cycle() -> None:
     asked = override(one, {"circle.radius_mm": 10.0})
     assert deciding(asked).circle_refused_by == ()
     assert "group.g0.every" in deciding(override(asked, {"group.g0.every": 2})).circle_refused_by
+    varied: dict[str, Any] = {"group.g0.every": [1, 2], "cycle.period_us": [500.0, 1000.0]}
+    swept = busplan.sweep(asked, vary=varied, timing_model=["last-byte"])
+    assert [bool(names) for names in swept["circle_refused_by"]] == [False, False, True, True]
 
 
 def test_the_largest_device_counts_whatever_its_cycle() -> None:
