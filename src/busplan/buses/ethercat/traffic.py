@@ -87,16 +87,17 @@ def devices(network: Network, *, beside: int | None = None) -> tuple[Devices, ..
     beside
         Place of a group: of the cycles in which it goes the fullest; of all without it.
     """
-    each = tuple(Devices(group.nodes, data_bytes(group, network)) for group in network.groups)
+    each = _each(network)
     if not has_rates(network):
         return each
+    numbers = _of_units(network, each)
 
     def due(place: int) -> Number:
-        def plainly(*numbers: float) -> float:
-            cycles = (cycle.due for cycle in _unit_cycles(network, numbers))
+        def plainly(*values: float) -> float:
+            cycles = (cycle.due for cycle in _unit_cycles(network, values))
             return float(next(due for due in cycles if beside is None or due[beside])[place])
 
-        return pointwise(plainly, *_of_units(network), words="whether the group goes in the fullest cycle")
+        return pointwise(plainly, *numbers, words="whether the group goes in the fullest cycle")
 
     return tuple(
         own._replace(data_bytes=choose(due(place) > 0, own.data_bytes, 0)) if group.is_slower else own
@@ -120,18 +121,25 @@ def mean_wire_bytes(network: Network, *, with_last: bool) -> Number:
         ]
         return sum(number * own_bytes for number, own_bytes in each) / sum(number for number, _ in each)
 
-    return pointwise(plainly, *_of_units(network), words="the mean over the common multiple of the rates")
+    return pointwise(
+        plainly, *_of_units(network, _each(network)), words="the mean over the common multiple of the rates"
+    )
 
 
 def cycles_of(network: Network) -> tuple[UnitCycle, ...]:
     """The cycles of the common multiple that differ, the fullest first; of plain numbers."""
-    return _unit_cycles(network, [plain(number) for number in _of_units(network)])
+    return _unit_cycles(network, [plain(number) for number in _of_units(network, _each(network))])
 
 
-def _of_units(network: Network) -> tuple[Number, ...]:
+def _each(network: Network) -> tuple[Devices, ...]:
+    """All devices in their order, whatever their rate."""
+    return tuple(Devices(group.nodes, data_bytes(group, network)) for group in network.groups)
+
+
+def _of_units(network: Network, each: Sequence[Devices]) -> tuple[Number, ...]:
     """What the cycles of units rest on: the datagrams of the master; rate, devices and bytes of each group."""
-    each = ((group.every, group.nodes, data_bytes(group, network)) for group in network.groups)
-    return (housekeeping_bytes(network), *chain.from_iterable(each))
+    units = ((group.every, *own) for group, own in zip(network.groups, each, strict=True))
+    return (housekeeping_bytes(network), *chain.from_iterable(units))
 
 
 def _unit_cycles(network: Network, numbers: Sequence[float]) -> tuple[UnitCycle, ...]:
