@@ -56,6 +56,17 @@ def test_init_writes_a_profile_of_ones_own_machine_with_its_verdict(run: Run, tm
     assert (data["node"]["execution"]["grade"], data["servo"]["grade"]) == ("assumed", "assumed")
 
 
+@pytest.mark.parametrize("bus", ["can", "ieee1394"])
+def test_the_sections_that_init_only_suggests_are_of_use_as_they_stand(run: Run, tmp_path: Path, bus: str) -> None:
+    run("init", "press", "--bus", bus, "--nodes", 6, "--axes", 6, "--period", "4ms", cwd=tmp_path)
+    path = tmp_path / "press.toml"
+    path.write_text(re.sub(r"(?m)^# (?=\[|\w+ = )", "", path.read_text(encoding="utf-8")), encoding="utf-8", newline="")
+    messages = [message["name"] for message in tomllib.loads(path.read_text(encoding="utf-8")).get("message", [])]
+    assert messages == (["sdo-response", "heartbeat"] if bus == "can" else [])
+    done = run("check", "press.toml", "--no-circle", cwd=tmp_path)
+    assert (done.returncode, "0 errors" in done.stderr) == (0, True), done.stdout
+
+
 def test_comments_are_in_line_whatever_the_values(run: Run, tmp_path: Path) -> None:
     run("init", "gantry", "--nodes", 2, "--axes", 2, "--period", "31.25us", cwd=tmp_path)
     written = (tmp_path / "gantry.toml").read_text(encoding="utf-8")

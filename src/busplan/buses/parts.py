@@ -213,6 +213,8 @@ class Starter(NamedTuple):
     """Advice on finding execution times, a format of `file`, the profile, and `group`, an option of `calibrate`."""
     base: str = "what a node does in each cycle"
     """Meaning of execution.base_us."""
+    more: str = ""
+    """Commented lines at its end."""
 
     def section(self, host: str | None = None) -> str:
         """Section [bus] with the lines of a host, by default of `host`."""

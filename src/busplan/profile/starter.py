@@ -53,7 +53,7 @@ feed_mm_per_min = 3000
 # How round must it be? Without a tolerance the circle is not judged. From the drawing or ISO 230-4, for example:
 # [tolerance]
 # circular_deviation_mm = 0.02
-"""
+{more}"""
 
 
 _COUNT: Final = "nodes = {nodes}                  # the host is not counted\n"
@@ -159,6 +159,7 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
         period=short_text(machine.period_us),
         bytes=f", {machine.bytes_per_axis} bytes an axis each way" if by_axis else "",
         step=f"step_us = {short_text(step_us)} ".ljust(_COMMENTS_AT),
+        more=starter.more and f"\n{starter.more}",
     )
     return _checked(text, name=name)
 

@@ -56,6 +56,21 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         slice_ratio="1            # assumed: the whole period is for communication",
         measure="measure both on a node: SYNC to its frame, command to effect",
         base="from SYNC to a queued feedback PDO, and from a command PDO to its effect",
+        more="""\
+# What else goes over the bus? Without it the load is too small. For example of CANopen nodes, each on its own:
+# [[message]]
+# name = "sdo-response"
+# identifier = 0x580       # and the node's number
+# per_node = true
+# payload_bytes = 8
+# period_us = 50000
+# [[message]]
+# name = "heartbeat"
+# identifier = 0x700       # and the node's number
+# per_node = true
+# payload_bytes = 1
+# period_us = 100000
+""",
     )
     event_kinds = EVENTS
     stretch_kinds = STRETCHES

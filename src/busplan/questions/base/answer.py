@@ -73,7 +73,10 @@ class Answer(ABC):
         """The picture, which not every answer has."""
         picture = self._repr_svg_()
         if picture is None:
-            raise BusplanError("there is nothing to draw: this answer has no picture")
+            raise BusplanError(
+                "there is nothing to draw: this answer has no picture; those of timeline, map_, compare, circle_test, "
+                "sweep, and capacity with sensitivity=True have one"
+            )
         return picture
 
     def _png(self) -> bytes:
