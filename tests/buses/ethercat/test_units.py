@@ -131,6 +131,8 @@ def test_units_of_several_rates_find_the_gaps_of_each_other() -> None:
     faster_last = [Unit(4, 1, 8), Unit(4, 1, 8), Unit(2, 1, 6), Unit(1, 1, 5)]
     assert starts(faster_last, is_spread=True) == (1, 3, 0, 0)
     assert starts(faster_last, is_spread=False) == (0, 0, 0, 0)
+    # The last one goes where no cycle gets over 11, although there are more bytes in those cycles together.
+    assert starts([Unit(2, 1, 6), Unit(4, 1, 10), Unit(4, 1, 1), Unit(6, 1, 5)], is_spread=True) == (0, 1, 3, 0)
 
 
 def test_a_rate_of_1_is_what_no_rate_is() -> None:
