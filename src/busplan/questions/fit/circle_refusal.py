@@ -9,7 +9,6 @@ from dataclasses import replace
 from math import inf
 from typing import Any, Final, Literal
 
-from busplan.elementwise import plain
 from busplan.questions.fit.certainty import available_us, cycle_of, fits_in
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us, skew_us
 from busplan.questions.fit.network import bus_of, network_of
@@ -78,7 +77,11 @@ def require_circle(profile: Profile) -> None:
 
 def loop_refusals(profile: Profile) -> tuple[Refused, ...]:
     """Why the loops of a profile cannot be simulated, whether or not its cycle fits the bus."""
-    return (*step_refusals(profile, profile.cycle.period_us), *_loop_over_the_bus(profile), *_slower_axes(profile))
+    return (
+        *step_refusals(profile, profile.cycle.period_us),
+        *_setpoints_of_several_cycles(profile),
+        *_loop_over_the_bus(profile),
+    )
 
 
 def run_refusals(profile: Profile, of_loop: tuple[Refused, ...]) -> tuple[Refused, ...]:
@@ -131,6 +134,14 @@ def step_refusals(profile: Profile, period_us: float) -> Iterator[Refused]:
         yield refused._replace(name=STEP, right=f"{refused.right}{default}", beside=("cycle.period_us",))
 
 
+def _setpoints_of_several_cycles(profile: Profile) -> Iterator[Refused]:
+    """Refuse axes whose set-points do not come in every cycle."""
+    key, every = bus_of(profile).setpoints_every(network_of(profile))
+    if every > 1:
+        whole = f"a period of {every * profile.cycle.period_us:g} us with 1 has the same set-points"
+        yield Refused(key, every, f"the circle test has a set-point in every cycle; {whole}")
+
+
 def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:
     """Refuse a loop on the host with more of the bus in it than its controller is made for."""
     period_us, delay_us = profile.cycle.period_us, max(loop_delays_us(profile))
@@ -142,14 +153,6 @@ def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:
         less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
         right = f'{why}, {most_us:g} us, at most; {less}close the loop on the node, servo.loop = "node"'
         yield Refused("servo.loop", '"host"', right)
-
-
-def _slower_axes(profile: Profile) -> Iterator[Refused]:
-    """Refuse axes that all take their set-points at slower rates."""
-    moved = [group for group in network_of(profile).groups if group.axes]
-    if moved and all(group.is_slower for group in moved):
-        right = "the circle test gives its axes a set-point in every cycle; make cycle.period_us that of its axes"
-        yield Refused(moved[0].key("every"), plain(moved[0].every), right)
 
 
 def _out_of_order(profile: Profile) -> Iterator[Refused]:
