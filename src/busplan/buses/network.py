@@ -41,7 +41,7 @@ class Group(NamedTuple):
     @property
     def every(self) -> Number:
         """Its data go in every n-th cycle: n [1]."""
-        number: Number = getattr(self.node, "every", 1)
+        number: Number = getattr(self.said.payload, "every", 1)
         return number
 
     @property

@@ -62,7 +62,7 @@ def _side_by_side(groups: Sequence[AlikeNodes]) -> list[list[AlikeNodes]]:
     runs: list[list[AlikeNodes]] = []
     for group in groups:
         # Groups at slower rates go in cycles of their own.
-        is_in_every = is_everywhere(getattr(group.node, "every", 1) <= 1)
+        is_in_every = is_everywhere(getattr(group.payload, "every", 1) <= 1)
         if runs and is_in_every and _is_alike(runs[-1][0].node, group.node):
             runs[-1].append(group)
         else:
