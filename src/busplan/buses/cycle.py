@@ -296,6 +296,10 @@ class BusCycle(ABC):
         """Lines that only this kind has on the card of a verdict: labels and words; of plain numbers."""
         return ()
 
+    def other_cycles(self) -> tuple[str, ...]:
+        """Sentences on the cycles beside this one, where nodes have rates of their own; of plain numbers."""
+        return ()
+
     def latencies(self) -> tuple[BusLatency, ...]:
         """The latencies; of a kind without transactions the cycle."""
         phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}

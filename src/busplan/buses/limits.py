@@ -148,15 +148,15 @@ def busy_doubt_us(group: Group) -> Number:
 def slow_groups(network: Network) -> Iterator[Group]:
     """Groups of plain numbers whose nodes are not shown to finish within the period."""
     for group in network.groups:
-        if _shown_us(group) > network.period_us:
+        if _shown_us(group) > _period_us(group, network):
             yield group
 
 
 def busy_words(group: Group, network: Network) -> str:
-    """Say how much of each period a node of a group executes; of plain numbers."""
+    """Say how much of each of its periods a node of a group executes; of plain numbers."""
     doubt_us = COVERAGE * plain(busy_doubt_us(group))
     either_way = f" +/- {doubt_us:.1f}" if doubt_us else ""
-    busy, most = told_apart(plain(busy_us(group)), plain(network.period_us))
+    busy, most = told_apart(plain(busy_us(group)), plain(_period_us(group, network)))
     return f"a node executes for {busy}{either_way} us of {most} us"
 
 
@@ -165,14 +165,24 @@ def _all_words(network: Network) -> str:
     return "; ".join(f"{name}: {words}" if name else words for name, words in busy)
 
 
+def _period_us(group: Group, network: Network) -> Number:
+    """From a cycle with the group's data to the next [us]."""
+    return network.period_us * group.every if group.is_slower else network.period_us
+
+
 def _shown_us(group: Group) -> Number:
     return busy_us(group) + COVERAGE * busy_doubt_us(group)
 
 
+def _of_a_cycle(us: Number, group: Group) -> Number:
+    """The share of a single cycle in a time that may take n of them [us]."""
+    return us / group.every if group.is_slower else us
+
+
 def _ends_us(network: Network) -> tuple[Number, Number]:
-    """Execution time of the slowest nodes, less and plus its expanded uncertainty [us]."""
-    least_us = (busy_us(group) - COVERAGE * busy_doubt_us(group) for group in network.groups)
-    return reduce(larger, least_us), reduce(larger, map(_shown_us, network.groups))
+    """Execution time of the slowest nodes in a cycle, less and plus its expanded uncertainty [us]."""
+    least_us = (_of_a_cycle(busy_us(group) - COVERAGE * busy_doubt_us(group), group) for group in network.groups)
+    return reduce(larger, least_us), reduce(larger, (_of_a_cycle(_shown_us(group), group) for group in network.groups))
 
 
 def _middle_us(network: Network) -> Number:
@@ -195,4 +205,4 @@ NODE_LIMIT: Final = share_limit(
     has_rule=True,
     says=_all_words,
 )
-"""T_exec(read) + T_exec(write) + both worst extras <= T_s, of every group."""
+"""T_exec(read) + T_exec(write) + both worst extras <= n T_s, of every group with data in every n-th cycle."""

@@ -3,7 +3,7 @@
 from functools import reduce
 from typing import Any, NamedTuple
 
-from busplan.elementwise import Number, larger, total
+from busplan.elementwise import Number, is_everywhere, larger, total
 from busplan.sections.alike_nodes import AlikeNodes
 
 
@@ -37,6 +37,17 @@ class Group(NamedTuple):
     def node(self) -> Any:
         """A node of the group, of its kind's own model: how it executes and answers."""
         return self.said.node
+
+    @property
+    def every(self) -> Number:
+        """Its data go in every n-th cycle: n [1]."""
+        number: Number = getattr(self.said.payload, "every", 1)
+        return number
+
+    @property
+    def is_slower(self) -> bool:
+        """Whether there are cycles without its data, at any point of an array."""
+        return not is_everywhere(self.every <= 1)
 
     @property
     def name(self) -> str:

@@ -232,6 +232,41 @@ def test_a_slower_task_is_counted_in_every_cycle(tmp_path: Path) -> None:
     assert any("a further task of 2000 us" in remark for remark in answer.remarks)
 
 
+def two_tasks(slower_us: int, *, start: int = 6) -> str:
+    """An axis in every cycle, and terminals of 100 bytes in the cycles of a slower task."""
+    devices = [
+        Device("Axis", 48, 48, axes=1),
+        *(Device(f"Terminal{n}", 400, 0, inputs_at=8 * (6 + 50 * n)) for n in range(2)),
+    ]
+    text = eni(devices, [(500, [[(BRD, 2), (LRW, 6)]]), (slower_us, [[(LRD, 100)]])])
+    for code, offset in ((LRW, 0), (LRD, start)):
+        where = f"<InputOffs>{offset}</InputOffs><OutputOffs>{offset}</OutputOffs>"
+        text = text.replace(f"<Cmd>{code}</Cmd>", f"<Cmd>{code}</Cmd>{where}")
+    return text
+
+
+def test_devices_of_a_slower_task_go_in_every_nth_cycle(tmp_path: Path) -> None:
+    answer = imported(two_tasks(2000), tmp_path)
+    profile = answer.profile
+    assert [(group.nodes, group.read_bytes, group.every) for group in profile.group] == [(1, 6, 1), (2, 50, 4)]
+    assert (profile.cycle.period_us, profile.bus.units) == (500, "together")
+    # Both frames to the byte where the tasks meet; what the slower frame has beside its data counts in every cycle.
+    fast, slow = 40 + 14 + 12 + 6, 40 + 12 + 100
+    assert frames_us(profile) == pytest.approx((max(fast, 84) + slow) * 0.08)
+    deciding = busplan.capacity(profile).verdicts[0].deciding
+    assert deciding.mean_utilisation < deciding.utilisation
+    assert not any("further task" in remark for remark in answer.remarks)
+
+
+@pytest.mark.parametrize(("slower_us", "start"), [(1250, 6), (2000, 0), (2000, 56), (5_000_000, 6)])
+def test_a_slower_task_without_known_devices_or_a_whole_rate_is_in_every_cycle(
+    tmp_path: Path, slower_us: int, start: int
+) -> None:
+    answer = imported(two_tasks(slower_us, start=start), tmp_path)
+    assert all(group.every == 1 for group in answer.profile.group)
+    assert any("a further task" in remark for remark in answer.remarks)
+
+
 def test_a_command_of_another_state_is_in_no_cycle(tmp_path: Path) -> None:
     text = eni([Device("Axis", 48, 48, axes=1)], [(500, [[(BRD, 200), (LRW, 60)]])])
     answer = imported(

@@ -13,24 +13,30 @@ from busplan.buses.ethercat.equations import (
     overhead_bytes,
     sending_us,
 )
-from busplan.buses.ethercat.figures import FRAME, TERMS
+from busplan.buses.ethercat.figures import FRAME, MEAN, TERMS
 from busplan.buses.ethercat.latency import last_command_us, latencies, loop_periods, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (
     arrival_us,
     cables_us,
+    cycles_of,
     devices,
     devices_doubts,
     devices_us,
     frames,
+    has_rates,
     hop,
     mailbox_frame_us,
+    mean_wire_bytes,
     packing,
+    process_us,
 )
+from busplan.buses.ethercat.units import UnitCycle
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind
-from busplan.elementwise import Number, choose, larger, named, plain, total
+from busplan.buses.time_slice import time_slice_us
+from busplan.elementwise import Number, choose, is_everywhere, larger, named, plain, total
 
 TimingModelName = Literal["last-byte", "vendors"]
 LAST_BYTE: Final[TimingModelName] = "last-byte"
@@ -62,6 +68,10 @@ _LEFT_OUT: Final = {
     "bus.mailbox_polls": "mailbox polls",
 }
 """Keys of [bus] that a cycle lacks where they are 0."""
+
+
+_MOST_LISTED: Final = 64
+"""Cycles of a common multiple that are listed [1]."""
 
 
 class EthercatCycle(BusCycle):
@@ -194,7 +204,68 @@ class EthercatCycle(BusCycle):
             "process_bytes": self.process_bytes,
             "command_us": last_command_us(self.network),
             "sync0_us": sync0_us(self.network) if has_clocks else None,
+            MEAN.key: self._mean_us / self._given_us,
         }
+
+    def _names(self, cycle: UnitCycle) -> str:
+        """Names of the groups of a cycle."""
+        names = (group.name for group, due in zip(self.network.groups, cycle.due, strict=True) if due)
+        return ", ".join(names) or "no group"
+
+    def other_cycles(self) -> tuple[str, ...]:
+        """The cycles of the common multiple of the rates, the fullest first, where groups have rates of their own."""
+        if not has_rates(self.network):
+            return ()
+        cycles = cycles_of(self.network)
+        number = sum(len(cycle.numbers) for cycle in cycles)
+        said = f"The groups meet every {number} cycles; this is the fullest"
+        if number > _MOST_LISTED:
+            return (f"{said}. More than {_MOST_LISTED} cycles are not listed.",)
+        each = (
+            f"{', '.join(map(str, cycle.numbers))}: {self._names(cycle)} ({self._needed_us(cycle):.3f} us)"
+            for cycle in cycles
+        )
+        return (f"{said}. Cycles {'; '.join(each)}.",)
+
+    @property
+    def _given_us(self) -> Number:
+        network = self.network
+        return time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
+
+    @property
+    def _mean_us(self) -> Number:
+        """What the mean cycle needs [us]."""
+        network = self.network
+        if not has_rates(network):
+            return self.required_us
+        mean_bytes = mean_wire_bytes(network, with_last=self._is_last_again)
+        return self._beside_us + sending_us(mean_bytes)
+
+    @property
+    def _is_last_again(self) -> bool:
+        """Whether the last frame of process data is counted once more."""
+        return self.counts_reception and is_everywhere(self.network.profile.bus.mailbox_polls <= 0)
+
+    @property
+    def _beside_us(self) -> Number:
+        """What every cycle needs beside its frames of process data [us]."""
+        return self.required_us - process_us(self.network) - (self._receive_us if self._is_last_again else 0.0)
+
+    def _needed_us(self, cycle: UnitCycle) -> float:
+        """What a cycle needs [us]."""
+        last_bytes = plain(frame_bytes(cycle.last_bytes)) if self._is_last_again else 0.0
+        return plain(self._beside_us) + plain(sending_us(cycle.wire_bytes + last_bytes))
+
+    def card_lines(self) -> tuple[tuple[str, str], ...]:
+        """Where groups have rates of their own: the cycle of the verdict, and the mean of all."""
+        if not has_rates(self.network):
+            return ()
+        cycles = cycles_of(self.network)
+        number, given_us = sum(len(cycle.numbers) for cycle in cycles), plain(self._given_us)
+        return (
+            ("fullest cycle", f"has {self._names(cycles[0])}; {len(cycles[0].numbers)} of {number} cycles are so"),
+            ("mean cycle", f"{plain(self._mean_us):.1f} us, {plain(self._mean_us) / given_us:.0%}".replace("%", " %")),
+        )
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """The master's pipeline, and the cycles that feedback and command wait for a frame and for SYNC0."""

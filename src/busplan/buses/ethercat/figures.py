@@ -21,7 +21,17 @@ COMMAND: Final = Figure(
 SYNC0: Final = Figure(
     "sync0_us", "t_sync", "profile", "the first SYNC0 of the distributed clocks after the master's task", "SYNC0"
 )
-OWN: Final = (FRAMES, PROCESS, COMMAND, SYNC0)
+MEAN: Final = Figure(
+    "mean_utilisation",
+    "U_mean",
+    "profile",
+    "share of the slice that the mean cycle uses, 0..1; the fullest uses more where groups have every > 1",
+    "mean load",
+    "%",
+    decimals=2,
+    better="less",
+)
+OWN: Final = (FRAMES, PROCESS, COMMAND, SYNC0, MEAN)
 TERMS: Final = (
     Figure("cycle_master_us", "T_master", "profile", "the master's own time", "master", ink="contention", letter="M"),
     Figure(
@@ -84,8 +94,8 @@ LATENCY_TABLE: Final = (
 FIGURES: Final = BusFigures(
     TERMS,
     capacity_figures(TERMS, own=OWN),
-    table=OWN,
-    compared=OWN,
+    table=OWN[:-1],
+    compared=OWN[:-1],
     planned=(FRAMES.key,),
     phases=LATENCY_TABLE,
     has_many_transactions=True,

@@ -133,6 +133,12 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
             ),
         )
 
+    def setpoints_every(self, network: Network) -> tuple[str, int]:
+        """Those of the group with axes whose process data go most often."""
+        with_axes = [group for group in network.groups if plain(group.axes)] or network.groups
+        fastest = min(with_axes, key=lambda group: plain(group.every))
+        return fastest.key("every"), int(plain(fastest.every))
+
     def payloads(self, network: Network) -> PayloadRange:
         """Whole bytes up to those of a frame."""
         each = 1 if layout(network) == SHARED else 2

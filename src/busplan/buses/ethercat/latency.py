@@ -74,6 +74,11 @@ def command_doubt_us(network: Network) -> Number:
     return square_root(total(part * part for part in parts))
 
 
+def _period_us(group: Group, network: Network) -> Number:
+    """From a cycle with the group's data to the next [us]."""
+    return group.every * network.period_us if group.is_slower else network.period_us
+
+
 def _way_us(network: Network) -> Number:
     """Delay of devices and cables to the last device and back [us]."""
     return named(devices_us(network) + cables_us(network), "way_us", "way")
@@ -98,7 +103,7 @@ def _command(group: Group, network: Network, sent_us: Number, way_us: Number) ->
     return {
         "drive_us": group.write_execution_us + group.worst_extra_us,
         "frame_wait_us": 0.0,
-        "pipeline_us": named(bus.pipeline_cycles * network.period_us, "pipeline_us", "n T_s"),
+        "pipeline_us": named(bus.pipeline_cycles * _period_us(group, network), "pipeline_us", "n T_s"),
         "master_us": bus.master_us,
         "jitter_us": bus.master_jitter_us,
         "sending_us": sent_us,
@@ -111,7 +116,8 @@ def _feedback(group: Group, network: Network, sent_us: Number, way_us: Number) -
     """From the sample to the start of the cycle whose frame takes it, and until the master has all frames."""
     ready_us = group.read_execution_us + group.worst_extra_us
     behind_us = sync0_us(network) + ready_us
-    wait_us = rounded_up(behind_us / network.period_us) * network.period_us - behind_us
+    period_us = _period_us(group, network)
+    wait_us = rounded_up(behind_us / period_us) * period_us - behind_us
     return {
         "drive_us": ready_us,
         "frame_wait_us": wait_us,
@@ -137,7 +143,7 @@ def loop_periods(network: Network, *, at_sync: bool) -> int:
     Returns
     -------
     int
-        Of the slowest group [1].
+        Of the slowest group, those at slower rates left out [1].
     """
     bus, period_us = network.profile.bus, plain(network.period_us)
     shift_us = plain(sync0_us(network)) if at_sync else 0.0
@@ -149,4 +155,5 @@ def loop_periods(network: Network, *, at_sync: bool) -> int:
         late_us = last_us + plain(group.write_execution_us) + extra_us - shift_us
         return plain(sampled) + (max(plain(rounded_up(late_us / period_us)), 0) if at_sync else 0)
 
-    return int(max(map(of, network.groups)) + plain(bus.pipeline_cycles))
+    groups = [group for group in network.groups if not group.is_slower] or network.groups
+    return int(max(map(of, groups)) + plain(bus.pipeline_cycles))

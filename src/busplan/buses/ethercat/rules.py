@@ -7,7 +7,7 @@ from typing import Final
 
 from busplan.buses.ethercat.equations import BYTE_BIAS_US, MOST_CABLE_M, MOST_DEVICES, room_bytes
 from busplan.buses.ethercat.latency import command_doubt_us, last_command_us, sync0_share
-from busplan.buses.ethercat.traffic import datagrams, devices
+from busplan.buses.ethercat.traffic import data_bytes, datagrams, devices
 from busplan.buses.limits import NODE_LIMIT
 from busplan.buses.network import Network
 from busplan.buses.parts import NOT_SHOWN_KEPT, Limit, share_limit
@@ -16,7 +16,7 @@ from busplan.elementwise import Number, larger, plain, total
 
 
 def _largest_device(network: Network) -> Number:
-    return reduce(larger, (device.data_bytes for device in devices(network)))
+    return reduce(larger, (data_bytes(group, network) for group in network.groups))
 
 
 def _longest_cable(network: Network) -> Number:

@@ -17,7 +17,9 @@ from busplan.buses.ethercat.equations import (
     ProcessData,
     room_bytes,
 )
+from busplan.buses.ethercat.units import MOST_CYCLES, common_multiple
 from busplan.elementwise import Number
+from busplan.errors import BusplanError
 from busplan.sections.base import MAX_COUNT, MISSING, Bytes, Count, Problem, TimeUs, refused
 from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
 from busplan.sections.execution import UNKNOWN_SHARE, Execution
@@ -96,6 +98,12 @@ class EthercatBus(BusSection):
         "used in latencies and in a loop on the host",
         examples=[1],
     )
+    units: Literal["spread", "together"] = Field(
+        default="spread",
+        description="Where groups with every > 1 go: spread over different cycles as evenly as possible, or all of "
+        "them together in one",
+        examples=["together"],
+    )
     timing_model: TimingModelName = Field(
         default=LAST_BYTE,
         description="Timing model whose figures lead the tables, last-byte or vendors; the verdict is always by "
@@ -142,6 +150,9 @@ class EthercatGroup(EthercatNode, GroupSection):
     """One of the sections [[group]]: devices that are alike, in the order of the segment."""
 
     axes: GroupAxes = Field(examples=[4])
+    every: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
+        default=1, description="The group's process data go in every n-th cycle [1]", examples=[4]
+    )
     execution: Execution = Field(
         default_factory=_at_once,
         validate_default=True,
@@ -177,6 +188,15 @@ class EthercatProfile(Profile):
     group: Annotated[tuple[EthercatGroup, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
     )
+
+    @model_validator(mode="after")
+    def _rates_meet(self) -> Self:
+        try:
+            common_multiple([group.every for group in self.group])
+        except BusplanError as error:
+            slowest = max(range(len(self.group)), key=lambda place: self.group[place].every)
+            raise refused(Problem(str(error), key=f"group.{slowest}.every", kind="inconsistent")) from None
+        return self
 
 
 PROFILE: Final = EthercatProfile

@@ -1,6 +1,7 @@
 """Frames of a network in a cycle, and their way through the devices."""
 
 from collections.abc import Iterator, Sequence
+from itertools import accumulate, chain
 from typing import NamedTuple
 
 from busplan.buses.ethercat.equations import (
@@ -24,8 +25,20 @@ from busplan.buses.ethercat.equations import (
     sending_us,
 )
 from busplan.buses.ethercat.packing import Devices, Frames, Packing, frames_of, pack
+from busplan.buses.ethercat.units import Unit, UnitCycle, unit_cycles
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, alike, larger, named, plain, rounded_down, square_root, total
+from busplan.elementwise import (
+    Number,
+    alike,
+    choose,
+    larger,
+    named,
+    plain,
+    pointwise,
+    rounded_down,
+    square_root,
+    total,
+)
 
 
 class Hop(NamedTuple):
@@ -64,9 +77,82 @@ def data_bytes(group: Group, network: Network) -> Number:
     return named(size_bytes, "device_bytes", f"d{group.name and f',{group.name}'}")
 
 
-def devices(network: Network) -> tuple[Devices, ...]:
-    """All devices in their order."""
+def devices(network: Network, *, beside: int | None = None) -> tuple[Devices, ...]:
+    """All devices in their order, as the fullest cycle has them: a device that does not go in it has no data.
+
+    Parameters
+    ----------
+    network
+        The network.
+    beside
+        Place of a group: of the cycles in which it goes the fullest; of all without it.
+    """
+    each = _each(network)
+    if not has_rates(network):
+        return each
+    numbers = _of_units(network, each)
+
+    def due(place: int) -> Number:
+        def plainly(*values: float) -> float:
+            cycles = (cycle.due for cycle in _unit_cycles(network, values))
+            return float(next(due for due in cycles if beside is None or due[beside])[place])
+
+        return pointwise(plainly, *numbers, words="whether the group goes in the fullest cycle")
+
+    return tuple(
+        own._replace(data_bytes=choose(due(place) > 0, own.data_bytes, 0)) if group.is_slower else own
+        for place, (own, group) in enumerate(zip(each, network.groups, strict=True))
+    )
+
+
+def has_rates(network: Network) -> bool:
+    """Whether a group does not go in every cycle."""
+    return any(group.is_slower for group in network.groups)
+
+
+def mean_wire_bytes(network: Network, *, with_last: bool) -> Number:
+    """Frames of process data of the mean cycle, with the last frame of each once more where asked [bytes]."""
+
+    def plainly(*numbers: float) -> float:
+        cycles = _unit_cycles(network, numbers)
+        each = [
+            (len(cycle.numbers), cycle.wire_bytes + (plain(frame_bytes(cycle.last_bytes)) if with_last else 0.0))
+            for cycle in cycles
+        ]
+        return sum(number * own_bytes for number, own_bytes in each) / sum(number for number, _ in each)
+
+    return pointwise(
+        plainly, *_of_units(network, _each(network)), words="the mean over the common multiple of the rates"
+    )
+
+
+def cycles_of(network: Network) -> tuple[UnitCycle, ...]:
+    """The cycles of the common multiple that differ, the fullest first; of plain numbers."""
+    return _unit_cycles(network, [plain(number) for number in _of_units(network, _each(network))])
+
+
+def _each(network: Network) -> tuple[Devices, ...]:
+    """All devices in their order, whatever their rate."""
     return tuple(Devices(group.nodes, data_bytes(group, network)) for group in network.groups)
+
+
+def _of_units(network: Network, each: Sequence[Devices]) -> tuple[Number, ...]:
+    """What the cycles of units rest on: the datagrams of the master; rate, devices and bytes of each group."""
+    units = ((group.every, *own) for group, own in zip(network.groups, each, strict=True))
+    return (housekeeping_bytes(network), *chain.from_iterable(units))
+
+
+def _unit_cycles(network: Network, numbers: Sequence[float]) -> tuple[UnitCycle, ...]:
+    first_bytes, *each = numbers
+    return unit_cycles(
+        tuple(
+            Unit(int(rate), int(nodes), size)
+            for rate, nodes, size in zip(each[::3], each[1::3], each[2::3], strict=True)
+        ),
+        is_spread=network.profile.bus.units == "spread",
+        datagrams=datagrams(network),
+        first_bytes=first_bytes,
+    )
 
 
 def housekeeping_bytes(network: Network) -> Number:
@@ -93,10 +179,14 @@ def packing(network: Network, each: Sequence[Devices]) -> Packing:
     )
 
 
-def frames(network: Network) -> tuple[Frames, ...]:
-    """The same frames in their order, of plain numbers."""
+def frames(network: Network, *, beside: int | None = None) -> tuple[Frames, ...]:
+    """The same frames in their order, of plain numbers; `beside` as `devices` has it."""
     return tuple(
-        frames_of(devices(network), datagrams=datagrams(network), first_bytes=plain(housekeeping_bytes(network)))
+        frames_of(
+            devices(network, beside=beside),
+            datagrams=datagrams(network),
+            first_bytes=plain(housekeeping_bytes(network)),
+        )
     )
 
 
@@ -163,7 +253,9 @@ def arrival_us(network: Network, device: int) -> float:
         Number of the device, from 1.
     """
     sent_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
-    for run in frames(network):
+    ends = accumulate(int(plain(group.nodes)) for group in network.groups)
+    own = next(place for place, end in enumerate(ends) if device <= end)
+    for run in frames(network, beside=own):
         frame_us, before = plain(sending_us(frame_bytes(run.datagrams_bytes))), device - run.first
         if before < run.devices * run.frames:
             sent_us += (before // run.devices + 1) * frame_us

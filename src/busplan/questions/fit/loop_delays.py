@@ -70,7 +70,8 @@ def _first_and_last_us(cycle: BusCycle) -> tuple[float, float]:
     """When the commands of the first and the last node with axes take effect, from the start of the cycle [us]."""
     network = cycle.network
     ends = list(accumulate(int(plain(group.nodes)) for group in network.groups))
-    moved = [place for place, group in enumerate(network.groups) if group.axes] or range(len(ends))
+    with_axes = [place for place, group in enumerate(network.groups) if group.axes] or range(len(ends))
+    moved = [place for place in with_axes if not network.groups[place].is_slower] or with_axes
 
     def effect_us(place: int, node: int) -> float:
         # A cycle that does not fit is never simulated; its delay must not stop the report that says so.

@@ -6,7 +6,7 @@ from typing import Final
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, Traced, total
+from busplan.elementwise import Number, Traced, is_everywhere, total
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.base import Section
 from busplan.sections.profile import Profile
@@ -61,7 +61,9 @@ def _side_by_side(groups: Sequence[AlikeNodes]) -> list[list[AlikeNodes]]:
     """Put neighbours that are alike in all but name and number together: then their cycle is that of a uniform bus."""
     runs: list[list[AlikeNodes]] = []
     for group in groups:
-        if runs and _is_alike(runs[-1][0].node, group.node):
+        # Groups at slower rates go in cycles of their own.
+        is_in_every = is_everywhere(getattr(group.payload, "every", 1) <= 1)
+        if runs and is_in_every and _is_alike(runs[-1][0].node, group.node):
             runs[-1].append(group)
         else:
             runs.append([group])

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from math import ceil
+from math import ceil, lcm
 from typing import Final
 
 from busplan.questions.import_.record import Fact, Line, Reading
@@ -20,6 +20,10 @@ _MOST_BYTES: Final = 1486
 _MOST_BITS: Final = 8 * 65_536
 _MOST_TIME_NS: Final = 10**12
 _MOST_DEVICES: Final = 65_535
+_MOST_CYCLES: Final = 1000
+"""Longest common multiple of rates that a profile takes."""
+_OFFSETS: Final = (("Recv", "InputOffs"), ("Send", "OutputOffs"))
+"""Data of a device, and the key of a datagram that says where they begin in the process image."""
 
 
 def read(content: bytes, name: str) -> Reading:
@@ -171,13 +175,75 @@ def _cycle(config: Element, machine: Reading) -> None:
     if not tasks or not tasks[0][2]:
         machine.remarks.append(f"{machine.file}: no Cyclic/Frame: which datagrams the master sends is not known")
         return
+    has_rates = _rates(config, [(period[0] if period else 0, task) for period, task, _ in tasks], machine)
     _frames(config, tasks[0][2], tasks[0][1].line, machine)
     for period, task, frames in tasks[1:]:
+        if has_rates:
+            # All of them are in the cycle in which the tasks meet.
+            machine.bus["frames"].value.extend(map(_sizes, frames))
+            continue
         machine.bus.setdefault("slower", Fact([], machine.place(task.line))).value.extend(map(_sizes, frames))
         machine.remarks.append(
             f"{machine.file}:{task.line}: a further task of {period[0] if period else 'unknown'} us: its frames are "
             "counted in every cycle, in cycle.nonperiodic_us"
         )
+
+
+def _rates(config: Element, tasks: list[tuple[int, Element]], machine: Reading) -> bool:
+    """Give devices of slower tasks their rate, where the file says which devices each task serves.
+
+    Returns
+    -------
+    bool
+        Whether each device belongs to a single task, and all periods are multiples of the shortest.
+    """
+    shortest = tasks[0][0]
+    rates = [period // shortest if shortest else 0 for period, _ in tasks]
+    is_whole = all(rate and rate * shortest == period for rate, (period, _) in zip(rates, tasks, strict=True))
+    if len(tasks) == 1 or not is_whole or lcm(*rates) > _MOST_CYCLES:
+        return False
+    served = [{tag: list(_image_spans(task, key, machine)) for tag, key in _OFFSETS} for _, task in tasks]
+    found: dict[int, int] = {}
+    for place, slave in enumerate(config.all("Slave")):
+        parts = [(tag, part) for tag, _ in _OFFSETS for part in _parts(slave, tag, machine)]
+        own = {
+            next(
+                (
+                    task
+                    for task, spans in enumerate(served)
+                    if any(part[0] in span and part[-1] in span for span in spans[tag])
+                ),
+                -1,
+            )
+            for tag, part in parts
+        }
+        if -1 in own or len(own) > 1:
+            return False
+        found[place] = own.pop() if own else 0
+    for place, number in found.items():
+        if number:
+            note = f"its task has {rates[number]} times the shortest period"
+            machine.nodes[place]["every"] = Fact(rates[number], machine.place(tasks[number][1].line), note=note)
+    return True
+
+
+def _image_spans(task: Element, key: str, machine: Reading) -> Iterator[range]:
+    """Bytes of the process image that each datagram of a task has."""
+    for command in task.all("Frame/Cmd"):
+        start = number(command, key, machine, most=_MOST_BITS)
+        length = number(command, "DataLength", machine, most=_MOST_BYTES)
+        code = number(command, "Cmd", machine, most=255)
+        if start and length and code and code[0] in (_LRD, _LWR, _LRW):
+            yield range(start[0], start[0] + length[0])
+
+
+def _parts(slave: Element, tag: str, machine: Reading) -> Iterator[range]:
+    """Bytes of the process image of each part of a device's data."""
+    for part in slave.all(f"ProcessData/{tag}"):
+        start = number(part, "BitStart", machine, most=_MOST_BITS)
+        length = number(part, "BitLength", machine, most=8 * _MOST_BYTES)
+        if start and length and length[0]:
+            yield range(start[0] // 8, ceil((start[0] + length[0]) / 8))
 
 
 def _sizes(frame: list[tuple[int, int, int]]) -> list[int]:
@@ -212,7 +278,8 @@ def _frames(config: Element, frames: list[list[tuple[int, int, int]]], line: Lin
         else:
             others.append(length)
     place = machine.place(line)
-    pairs = [(facts["read_bytes"].value, facts["write_bytes"].value) for facts in machine.nodes.values()]
+    own = [facts for facts in machine.nodes.values() if "every" not in facts]
+    pairs = [(facts["read_bytes"].value, facts["write_bytes"].value) for facts in own]
     separate, shared = sum(map(sum, pairs)), sum(map(max, pairs))
     total = sum(length for _, length in process)
     codes = {code for code, _ in process}

@@ -62,6 +62,9 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     yield from _master(bus)
     yield from _clocks(devices, period)
     yield from _mailbox(devices)
+    if any("every" in facts for facts in devices):
+        note = "whether slower tasks meet in a cycle no file says"
+        yield ProfileLine("bus", "units", Fact("together", "", "assumed", note))
     master_us = next(line for line in starter.hosts[starter.host].splitlines() if line.startswith("master_us"))
     value, _, note = master_us.partition("=")[2].partition("#")
     yield ProfileLine("bus", "master_us", Fact(float(value), "", "assumed", note.strip().removeprefix("assumed: ")))
@@ -139,7 +142,7 @@ def _groups(devices: Sequence[Facts]) -> Iterator[_Group]:
 
     def looks(number: int) -> tuple[object, ...]:
         facts = devices[number]
-        said = (facts[key].value if key in facts else None for key in (*_SIZES, "axes", "port"))
+        said = (facts[key].value if key in facts else None for key in (*_SIZES, "axes", "port", "every"))
         return (*said, "delay_us" in facts)
 
     for _, numbers in groupby(range(len(devices)), looks):
@@ -160,6 +163,8 @@ def _group(group: _Group, name: str) -> Iterator[ProfileLine]:
     yield ProfileLine(section, "axes", axes)
     for key in _SIZES:
         yield ProfileLine(section, key, first[key])
+    if "every" in first:
+        yield ProfileLine(section, "every", first["every"])
     if "port" in first:
         yield ProfileLine(section, "port", first["port"])
     if "delay_us" in first:

@@ -232,9 +232,9 @@ def _refused(
 ) -> Column:
     """Keys for which the circle of each point cannot be run.
 
-    They are asked point by point, but only over the keys that they rest on: the period, those of the circle, and those
-    of the jitter; all where the bus is in the loop or in the skew. A point whose step is refused is asked for no move:
-    points that differ in their steps and jitter alone are asked once.
+    They are asked point by point, but only over the keys that they rest on: the period, those of the circle, rates of
+    groups, and those of the jitter; all where the bus is in the loop or in the skew. A point whose step is refused is
+    asked for no move: points that differ in their steps and jitter alone are asked once.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def _refused(
     read = [
         (number, key, own.ravel().tolist())
         for number, (key, own) in enumerate(chunk.values.items())
-        if not is_known or key.startswith(_ASKED) or group.shape[number] > 1
+        if not is_known or key.startswith(_ASKED) or key.endswith(_RATE) or group.shape[number] > 1
     ]
     shape = [1] * len(chunk.shape)
     for number, _, _ in read:
@@ -265,7 +265,10 @@ def _refused(
     for where in np.ndindex(*shape):
         changes = tuple((key, values[where[number]]) for number, key, values in read)
         if group[where]:
-            alike = (group[where], *(change for change in changes if change[0].startswith(_DRIVES)))
+            alike = (
+                group[where],
+                *(change for change in changes if change[0].startswith(_DRIVES) or change[0].endswith(_RATE)),
+            )
             causes = asked[alike] = asked.get(alike) or causes_at(changes)
         else:
             causes = causes_at(changes)
@@ -276,6 +279,8 @@ def _refused(
 
 _ASKED: Final = (*(f"{section}." for section in CIRCLE_SECTIONS), "cycle.period_us")
 """Keys that the causes rest on, whatever the bus."""
+_RATE: Final = ".every"
+"""End of the keys by which all axes of a group may be at a slower rate."""
 _DRIVES: Final = tuple(key for key in _ASKED if key not in ("delivery.", "cycle.period_us"))
 
 

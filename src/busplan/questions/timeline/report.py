@@ -28,7 +28,7 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import period_value, sentence_text
-from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.certainty import FITS, cycle_of
 from busplan.questions.fit.network import bus_of
 from busplan.questions.timeline.characters import timeline_lines
 from busplan.questions.timeline.events import EVENTS, SHARE, TOTAL, Schedule, Total, totals
@@ -57,6 +57,8 @@ def _blocks(schedule: Schedule) -> Iterator[Block]:
     yield headline(schedule)
     yield from (Sentence((words,), "warns") for words in _warnings(schedule))
     yield margins_sentence(schedule)
+    cycle = cycle_of(schedule.profile, model=schedule.figures.timing_model)
+    yield from (Sentence((words,)) for words in cycle.other_cycles())
     yield timeline_chart(schedule)
     yield totals_table(schedule)
 

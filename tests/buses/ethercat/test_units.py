@@ -1,0 +1,233 @@
+"""Groups at several rates against all cycles of their common multiple, each written byte by byte."""
+
+from collections.abc import Sequence
+from itertools import product
+from math import lcm
+from statistics import fmean
+from typing import Any, Final
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import busplan
+from busplan.buses.ethercat.section import EthercatProfile
+from busplan.buses.ethercat.units import Unit, starts
+from busplan.elementwise import plain
+from busplan.errors import BusplanError
+from busplan.profile.toml import override
+from busplan.questions.fit.certainty import cycle_of
+from busplan.questions.fit.network import network_of
+from busplan.sections.profile import Profile
+
+BYTE_US: Final = 0.08
+E_BUS_US: Final = 2 * 0.1507
+EXECUTION: Final = {"kind": "linear", "grade": "measured", "base_us": 40.0, "per_byte_us": 0.0}
+Rated = tuple[int, int, int, int]
+"""Rate, devices, inputs and outputs of a group."""
+
+
+def profile(groups: Sequence[Rated], *, units: str = "spread", axes: int = 0, **bus: Any) -> Profile:
+    return EthercatProfile.model_validate(
+        {
+            "schema_version": 1,
+            "name": "press",
+            "bus": {"kind": "ethercat", "master": "SOEM", "master_us": 20.0, "units": units, **bus},
+            "cycle": {"period_us": 500.0},
+            "group": [
+                {
+                    "name": f"g{place}",
+                    "nodes": nodes,
+                    "every": every,
+                    "read_bytes": read,
+                    "write_bytes": write,
+                    "axes": axes,
+                    "port": "E-bus",
+                    "execution": EXECUTION,
+                }
+                for place, (every, nodes, read, write) in enumerate(groups)
+            ],
+        }
+    )
+
+
+def frames_of_cycle(groups: Sequence[Rated], first: Sequence[int], cycle: int, *, clocks: bool) -> list[int]:
+    """Bytes on the wire of each frame of a cycle: devices in their order, a new frame where the next has no room."""
+    sizes = [
+        read + write
+        for (every, nodes, read, write), start in zip(groups, first, strict=True)
+        if (cycle - start) % every == 0
+        for _ in range(nodes)
+    ]
+    held = 20 if clocks else 0
+    has_data, frames = False, []
+    for size in sizes:
+        more = size + 12 * (not has_data)
+        if held + more > 1538 - 40:
+            frames.append(held)
+            held, more = 0, size + 12
+        held, has_data = held + more, True
+    return [max(84, 40 + frame) for frame in (*frames, held) if frame]
+
+
+def written_us(groups: Sequence[Rated], first: Sequence[int], *, clocks: bool) -> list[float]:
+    """What each cycle of the common multiple needs [us]."""
+    way_us = 20 + E_BUS_US * sum(nodes for _, nodes, _, _ in groups)
+    cycles = range(lcm(*(every for every, *_ in groups)))
+    return [way_us + BYTE_US * sum(frames_of_cycle(groups, first, cycle, clocks=clocks)) for cycle in cycles]
+
+
+def placed(groups: Sequence[Rated], units: str) -> tuple[int, ...]:
+    return starts(
+        [Unit(every, nodes, read + write) for every, nodes, read, write in groups], is_spread=units == "spread"
+    )
+
+
+def deciding(one: Profile) -> Any:
+    return busplan.capacity(one, timing_model=["last-byte"]).results[0]
+
+
+GROUPS = st.lists(
+    st.tuples(st.sampled_from([1, 1, 2, 3, 4, 6]), st.integers(1, 40), st.integers(1, 300), st.integers(0, 300)),
+    min_size=1,
+    max_size=5,
+)
+
+
+@settings(max_examples=60)
+@given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans())
+def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
+    groups: list[Rated], units: str, clocks: bool
+) -> None:
+    one = profile(groups, units=units, distributed_clocks=clocks)
+    each_us = written_us(groups, placed(groups, units), clocks=clocks)
+    found = deciding(one)
+    assert found.required_us == pytest.approx(max(each_us), rel=1e-12)
+    assert found.mean_utilisation == pytest.approx(fmean(each_us) / 500, rel=1e-12)
+    events = busplan.timeline(one).cycle_events
+    assert sum(event.duration_us for event in events if event.term) == pytest.approx(found.required_us, rel=1e-12)
+
+
+@given(GROUPS)
+def test_together_the_fullest_cycle_is_that_without_rates(groups: list[Rated]) -> None:
+    without = deciding(profile([(1, nodes, read, write) for _, nodes, read, write in groups]))
+    found = deciding(profile(groups, units="together"))
+    assert found.required_us == without.required_us
+    assert found.process_bytes == without.process_bytes
+    assert found.uncertainty_us == pytest.approx(without.uncertainty_us, rel=1e-12)
+
+
+@given(st.lists(st.integers(1, 100), min_size=2, max_size=5), st.integers(2, 4))
+def test_units_of_one_rate_are_spread_within_a_third_of_the_most_even(sizes: list[int], every: int) -> None:
+    def fullest(first: Sequence[int]) -> int:
+        return max(sum(size for size, own in zip(sizes, first, strict=True) if own == cycle) for cycle in range(every))
+
+    best = min(map(fullest, product(range(every), repeat=len(sizes))))
+    assert best <= fullest(starts([Unit(every, 1, size) for size in sizes], is_spread=True)) <= best * 4 / 3
+
+
+def test_units_of_several_rates_find_the_gaps_of_each_other() -> None:
+    faster_last = [Unit(4, 1, 8), Unit(4, 1, 8), Unit(2, 1, 6), Unit(1, 1, 5)]
+    assert starts(faster_last, is_spread=True) == (1, 3, 0, 0)
+    assert starts(faster_last, is_spread=False) == (0, 0, 0, 0)
+    # The last one goes where no cycle gets over 11, although there are more bytes in those cycles together.
+    assert starts([Unit(2, 1, 6), Unit(4, 1, 10), Unit(4, 1, 1), Unit(6, 1, 5)], is_spread=True) == (0, 1, 3, 0)
+
+
+def test_a_rate_of_1_is_what_no_rate_is() -> None:
+    groups = [(1, 8, 20, 12), (1, 3, 60, 0)]
+    one = profile(groups, distributed_clocks=True)
+    data = one.model_dump(exclude_unset=True)
+    for group in data["group"]:
+        del group["every"]
+    del data["bus"]["units"]
+    assert deciding(one).by_key() == deciding(EthercatProfile.model_validate(data)).by_key()
+    assert deciding(one).mean_utilisation == deciding(one).utilisation
+
+
+def test_neighbours_that_are_alike_have_cycles_of_their_own() -> None:
+    found = deciding(profile([(2, 20, 60, 0), (2, 20, 60, 0)]))
+    assert found.process_bytes == 20 * 60
+    assert len(network_of(profile([(2, 20, 60, 0), (2, 20, 60, 0)])).groups) == 2
+    assert len(network_of(profile([(1, 20, 60, 0), (1, 20, 60, 0)])).groups) == 1
+
+
+def test_a_sweep_has_what_each_profile_has() -> None:
+    one = profile([(1, 4, 20, 12), (2, 10, 60, 0), (4, 8, 90, 30), (4, 5, 33, 0)], distributed_clocks=True)
+    keys = ("group.g1.every", "group.g2.nodes", "group.g3.read_bytes")
+    values: dict[str, list[Any]] = {keys[0]: [1, 2, 4, 6], keys[1]: [1, 30, 60], keys[2]: [0, 33, 300]}
+    swept = busplan.sweep(one, vary=values, timing_model=["last-byte", "vendors"])
+    rows = [dict(zip(swept, row, strict=True)) for row in zip(*(swept[name].tolist() for name in swept), strict=True)]
+    assert len(rows) == 2 * 4 * 3 * 3
+    for row in rows[::5]:
+        at = override(one, {key: row[key] for key in keys})
+        (alone,) = busplan.capacity(at, timing_model=[row["timing_model"]]).results
+        for key in ("required_us", "mean_utilisation", "frames", "process_bytes", "command_us", "utilisation"):
+            assert row[key] == pytest.approx(getattr(alone, key), rel=1e-12), key
+
+
+def test_a_node_of_a_slower_group_has_its_own_period_to_finish_in() -> None:
+    slow: dict[str, object] = {"group.g1.execution.base_us": 700.0}
+    assert deciding(override(profile([(1, 4, 20, 12), (3, 4, 20, 12)]), slow)).fits
+    assert "node" in deciding(override(profile([(1, 4, 20, 12), (2, 4, 20, 12)]), slow)).exceeded
+
+
+def test_a_device_that_is_not_in_the_fullest_cycle_has_its_command_with_its_own() -> None:
+    one = profile([(1, 1, 100, 0), (2, 1, 400, 0), (2, 1, 200, 0)])
+    cycle = cycle_of(one, model="last-byte")
+    sent_us = [BYTE_US * (52 + size) for size in (500, 500, 300)]
+    found = [cycle.arrival_us(device) for device in (1, 2, 3)]
+    assert found == pytest.approx([20 + us + device * E_BUS_US / 2 for device, us in enumerate(sent_us, start=1)])
+
+
+def test_latencies_of_a_slower_group_are_of_its_own_period() -> None:
+    both = busplan.latency(profile([(1, 4, 20, 12), (4, 4, 20, 12)]), timing_model=["last-byte"]).transactions
+    by_name = {(one.group, one.transaction): one.phases for one in both}
+    assert by_name["g0", "command"]["pipeline_us"] == 500
+    assert by_name["g1", "command"]["pipeline_us"] == 2000
+    assert by_name["g1", "feedback"]["frame_wait_us"] == 2000 - 40
+
+
+def test_rates_that_meet_too_seldom_are_refused() -> None:
+    with pytest.raises(BusplanError, match="meet every 999000 cycles; 1000 are looked through") as refused:
+        override(profile([(1, 4, 20, 12), (1, 4, 20, 12)]), {"group.g0.every": 999, "group.g1.every": 1000})
+    assert "group.g1.every" in str(refused.value)
+
+
+def test_a_circle_needs_axes_in_every_cycle() -> None:
+    one = profile([(1, 4, 20, 12), (2, 4, 20, 12)], axes=1, distributed_clocks=True)
+    asked = override(one, {"circle.radius_mm": 10.0})
+    assert deciding(asked).circle_refused_by == ()
+    assert "group.g0.every" in deciding(override(asked, {"group.g0.every": 2})).circle_refused_by
+    varied: dict[str, Any] = {"group.g0.every": [1, 2], "cycle.period_us": [500.0, 1000.0]}
+    swept = busplan.sweep(asked, vary=varied, timing_model=["last-byte"])
+    assert [bool(names) for names in swept["circle_refused_by"]] == [False, False, True, True]
+
+
+def test_the_largest_device_counts_whatever_its_cycle() -> None:
+    assert "payload" in deciding(profile([(1, 9, 400, 0), (2, 1, 1487, 0), (2, 9, 400, 0)])).exceeded
+
+
+def test_the_timeline_lists_the_cycles_of_the_common_multiple() -> None:
+    one = profile([(1, 1, 100, 0), (2, 1, 400, 0), (2, 1, 200, 0)])
+    us = [20 + 3 * E_BUS_US + BYTE_US * (52 + size) for size in (500, 300)]
+    (words,) = cycle_of(one, model="last-byte").other_cycles()
+    assert words.endswith(f"Cycles 1: g0, g1 ({us[0]:.3f} us); 2: g0, g2 ({us[1]:.3f} us).")
+    assert words in str(busplan.timeline(one))
+    (many,) = cycle_of(override(one, {"group.g1.every": 65}), model="last-byte").other_cycles()
+    assert many.endswith("every 130 cycles; this is the fullest. More than 64 cycles are not listed.")
+    assert cycle_of(profile([(1, 1, 100, 0)]), model="last-byte").other_cycles() == ()
+    _, vendors = busplan.capacity(one).results
+    assert f"({vendors.required_us:.3f} us)" in cycle_of(one, model="vendors").other_cycles()[0]
+
+
+def test_an_array_of_rates_computes_as_each_rate() -> None:
+    one = profile([(1, 4, 20, 12), (2, 10, 60, 0), (2, 8, 90, 30)])
+    wide = one.model_copy(
+        update={"group": (*one.group[:2], one.group[2].model_copy(update={"every": np.array([1, 2, 3])}))}
+    )
+    together = np.broadcast_to(np.asarray(cycle_of(wide, model="last-byte").required_us), 3)
+    for rate, us in zip((1, 2, 3), together.tolist(), strict=True):
+        alone = cycle_of(override(one, {"group.g2.every": rate}), model="last-byte")
+        assert us == plain(alone.required_us)
