@@ -3,7 +3,7 @@
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache, reduce
-from itertools import accumulate, chain, combinations, islice, repeat
+from itertools import accumulate, chain, combinations, islice, product, repeat
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from busplan.buses.can.constants import BASE_BITS, MAX_IDENTIFIER, MOST_PDOS, PDO_STEP
@@ -322,13 +322,13 @@ def last_place(each: Iterable[Stream]) -> Points:
 
 def identifiers_twice(each: Sequence[Stream]) -> Points:
     """Number of identifiers that stand twice or more often [1]."""
-    if all(isinstance(stream.last, int) for stream in each):
-        return sum(shared for *_, shared in collisions(each))
-    return total(
-        larger(smaller(early.last, late.last) - larger(early.first, late.first) + 1, 0)
-        for early, late in combinations(each, 2)
-        if has_format_of(early, late)
-    )
+    fixed = [stream for stream in each if isinstance(stream.last, int)]
+    varied = [stream for stream in each if not isinstance(stream.last, int)]
+    twice: Points = sum(shared for *_, shared in collisions(fixed))
+    for early, late in chain(combinations(varied, 2), product(varied, fixed)):
+        if has_format_of(early, late):
+            twice = twice + larger(smaller(early.last, late.last) - larger(early.first, late.first) + 1, 0)
+    return twice
 
 
 def has_format_of(early: Stream, late: Stream) -> bool:
