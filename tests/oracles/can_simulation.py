@@ -27,6 +27,13 @@ class SimulatedNode(NamedTuple):
     """From the end of SYNC to its queued feedback, cycle by cycle."""
     write_us: tuple[int, ...]
     """From the end of its last command frame to its effect, cycle by cycle."""
+    every: int = 1
+    full: int = 0
+    """It sends and takes its frames in this cycle and each `every` cycles before and behind it."""
+
+    def is_due(self, cycle: int) -> bool:
+        """Whether it takes part in a cycle."""
+        return (cycle - self.full) % self.every == 0
 
 
 class SimulatedMessage(NamedTuple):
@@ -106,7 +113,7 @@ class _Bus:
         self.syncs, self.commands, self.ends = [0] * cycles, [0] * cycles, [0] * cycles
         self.feedback = [[0] * len(nodes) for _ in range(cycles)]
         self.responses: list[list[int]] = [[] for _ in messages]
-        self.missing = [sum(len(node.feedback) for node in nodes)] * cycles
+        self.missing = [sum(len(node.feedback) for node in nodes if node.is_due(cycle)) for cycle in range(cycles)]
         """Feedback frames that have not arrived, of each cycle."""
         self.unsent = [[len(node.command) for node in nodes] for _ in range(cycles)]
         """Command frames that have not arrived, of each cycle and node."""
@@ -139,6 +146,8 @@ class _Bus:
         """Every node begins to execute."""
         self.syncs[cycle] = now_us - cycle * self.period_us
         for number, node in enumerate(self.nodes):
+            if not node.is_due(cycle):
+                continue
             ready_us = now_us + node.read_us[cycle]
             self.feedback[cycle][number] = ready_us - cycle * self.period_us
             for frame in node.feedback:
@@ -152,7 +161,7 @@ class _Bus:
         ready_us = now_us + self.host_us[cycle]
         self.commands[cycle] = ready_us - cycle * self.period_us
         for number, node in enumerate(self.nodes):
-            for frame in node.command:
+            for frame in node.command if node.is_due(cycle) else ():
                 self.put(ready_us, frame, COMMAND, cycle, number)
 
     def command_arrived(self, now_us: int, cycle: int, number: int) -> None:

@@ -117,6 +117,10 @@ class Bus(ABC):
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads that a plan may choose from."""
 
+    def setpoints_every(self, network: Network) -> tuple[str, int]:  # noqa: ARG002 - a kind may have a single rate
+        """Key and number of cycles from a set-point of the fastest axes to the next."""
+        return "", 1
+
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - most charge all alike
         """Say whose way on the wire the times of each node count."""
         return "every node alike"

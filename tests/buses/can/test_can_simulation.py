@@ -12,6 +12,7 @@ one.
 import importlib.util
 import sys
 from collections.abc import Iterator
+from itertools import cycle, islice
 from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -22,6 +23,7 @@ from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import SYNC, Message, MessageList, Pdos, Traffic
 from busplan.buses.can.waiting import messages, response, waits
 from busplan.elementwise import plain
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 if TYPE_CHECKING:
     from tests.oracles.can_simulation import Frame, Run, SimulatedMessage, SimulatedNode, simulate
@@ -34,6 +36,8 @@ else:
     SimulatedMessage, SimulatedNode = oracle.SimulatedMessage, oracle.SimulatedNode
 
 CYCLES: Final = 4
+FULL: Final = 1
+"""Number of a cycle in which all PDOs are due."""
 BASES: Final = (0x10, 0x20, 0x30, 0x100, 0x140, 0x190, 0x1F0, 0x210, 0x290, 0x2A0, 0x310, 0x600, 0x700, 0x701, 0x702)
 """Identifiers of messages: before SYNC, between all PDOs, and behind them."""
 MOST_LOAD: Final = 0.97
@@ -62,6 +66,9 @@ class Scene(NamedTuple):
     def frames(self, name: str) -> list[tuple[Frame, ...]]:
         """Frames of each node in one direction."""
         parts = [one for one in self.each if one.name == name]
+        if self.traffic.pdos[0].group:  # each node is a group
+            own = (pdos.group for pdos in self.traffic.pdos if pdos.name == name)
+            return [tuple(frame(one, 0) for one in parts if one.group == group) for group in own]
         return [tuple(frame(one, node) for one in parts) for node in range(self.nodes)]
 
     @property
@@ -150,7 +157,20 @@ def of_fd(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
     return sent._replace(bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=tuple(pdos), messages=MessageList(each))
 
 
-KINDS: Final = {"both formats": of_both_formats, "CAN FD": of_fd}
+def of_rates(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
+    """The same with each node a group, most of them not in every cycle, in any order of identifiers."""
+    rates = [random.choice([1, 1, 2, 2, 3, 4]) for _ in range(nodes)]
+    pdos = [
+        Pdos(kind, f"g{place}", base + 8 * start, 1, random.choice([1, 8, 8, 16]), every=rates[place])
+        for kind, base in zip(TRANSACTION_KINDS, (0x181, random.choice([0x201, 0x201, 0x120])), strict=True)
+        for place, start in enumerate(random.sample(range(nodes), nodes))
+    ]
+    between = (0x188, 0x18D, 0x195, 0x208, 0x20E, 0x215, 0x12E)  # and further frames
+    fresh = [one._replace(identifier=random.choice([one.identifier, *between])) for one in sent.messages]
+    return sent._replace(pdos=tuple(pdos), messages=MessageList(fresh))
+
+
+KINDS: Final = {"both formats": of_both_formats, "CAN FD": of_fd, "rates": of_rates}
 """What may become of random traffic of 11 bits."""
 
 
@@ -195,7 +215,10 @@ def run(own: Scene, at: Moments) -> Run:
     sent = (sent for _, sent in own.senders)
     return simulate(
         frame(sync, 0),
-        [SimulatedNode(*way, (own.write_us,) * CYCLES) for way in ways],
+        [
+            SimulatedNode(*way, (own.write_us,) * CYCLES, int(plain(pdos.every)), FULL)
+            for way, pdos in zip(ways, islice(cycle(own.traffic.pdos), own.nodes), strict=True)
+        ],
         [SimulatedMessage(*one) for one in zip(sent, at.due_us, at.queued_us, strict=True)],
         period_us=own.period_us,
         host_us=at.host_us,
@@ -244,9 +267,9 @@ def varied(own: Scene, at: Moments, last: Run, random: Random) -> Moments:
     if what == 2 or not queued_us:
         due_us, queued_us = fresh.due_us[place], fresh.queued_us[place]
     else:
-        cycle = random.randrange(CYCLES)
-        verge_us = random.choice([0, max(last.feedback_us[cycle]), last.commands_us[cycle]])
-        verge_us += cycle * own.period_us + random.choice([-1, -1, 0, 1, random.randint(-300, 50)])
+        place_of = random.randrange(CYCLES)
+        verge_us = random.choice([0, max(last.feedback_us[place_of]), last.commands_us[place_of]])
+        verge_us += place_of * own.period_us + random.choice([-1, -1, 0, 1, random.randint(-300, 50)])
         shift_us = verge_us - random.choice(queued_us)
         moved = [(due + shift_us, queued + shift_us) for due, queued in zip(due_us, queued_us, strict=True)]
         due_us = tuple(due for due, queued in moved if queued >= 0)
@@ -306,7 +329,7 @@ def test_no_simulated_run_takes_longer_than_the_model() -> None:
         assert 0.99 < share <= 1 + ROUNDING, (name, seed)
 
 
-@pytest.mark.parametrize("kind", ["both formats", "CAN FD"])
+@pytest.mark.parametrize("kind", ["both formats", "CAN FD", "rates"])
 def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str) -> None:
     best = attacked(0, 60, runs=150, kind=kind)
     assert best.pop("networks")[0] > 10
@@ -361,6 +384,26 @@ def test_a_late_cycle_and_a_fast_one_behind_it_hold_a_message_up() -> None:
     # It waits for commands twice: more than for each frame of the cycle once, and all other messages.
     assert response_us > 55 + 8 * FRAME_US + len(others) * FRAME_US + FRAME_US
     assert found.cycles_us[1] <= period_us
+
+
+def test_a_burst_of_messages_meets_slow_pdos_twice() -> None:
+    burst = tuple(Message(f"low{number:02}", 0x7E0 + number, 8, 50_000, 0, 50_000) for number in range(14))
+    pdos = tuple(
+        Pdos(kind, f"g{node}", base + node, 1, 8, every=1 if node == 0 else 2)
+        for kind, base in zip(TRANSACTION_KINDS, (0x181, 0x201), strict=True)
+        for node in range(4)
+    )
+    sent = drives(4, *burst, read_us=0)._replace(pdos=pdos)
+    own = judged(sent, nodes=4, write_us=0, slack_us=0)
+    assert own is not None
+    assert own.period_us == 55 + 8 * FRAME_US + 3 * FRAME_US
+    # All come with the SYNC of a full cycle, and the last of them is sent behind the next full cycle.
+    start_us = FULL * own.period_us
+    at = Moments(((0,) * CYCLES,) * 4, (0,) * CYCLES, ((start_us,),) * 14, ((start_us,),) * 14, 0)
+    (response_us,) = run(own, at).responses_us[-1]
+    assert response_us == 3 * 55 + (8 + 2 + 8) * FRAME_US + 14 * FRAME_US
+    # Beyond it the bound has a late cycle before, of which no more than the PDOs of a full one and SYNC.
+    assert response_us <= own.responses_us["low13"] <= response_us + 55 + 8 * FRAME_US
 
 
 if __name__ == "__main__":

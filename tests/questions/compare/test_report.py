@@ -48,7 +48,7 @@ def test_the_first_lines_say_where_it_fits_and_which_kind_is_best() -> None:
 def test_a_row_has_the_verdict_margin_smallest_period_axes_and_the_largest_term() -> None:
     own = "IEEE 1394, as it is fits 230.064 6.311 execution 552.494 12 time - PASSED 92.082"
     # The host keeps its half of the period on CAN, too.
-    new = "bus.bit_rate_kbit_s = 1000, bus.pipeline_cycles = 1, 6 defaults"
+    new = "bus.bit_rate_kbit_s = 1000, bus.pipeline_cycles = 1, 7 defaults"
     other = f"CAN does not fit -548.467 14.693 feedback 2126.320 0 time {new} PASSED 75.940"
     assert " ".join(row(PAPER, "IEEE 1394, as it is")) == own
     assert " ".join(row(PAPER, "CAN")) == other
@@ -103,8 +103,8 @@ def test_assumed_are_the_values_of_a_new_profile_and_the_defaults() -> None:
     short, whole = said(PAPER), said(PAPER, whole=True)
     assert sum(line.endswith("new profile") for line in short) == 2
     assert not [line for line in short if line.endswith("default")]
-    assert short[-1] == "Not shown: 6 rows. --all shows all."
-    assert sum(line.endswith("default") for line in whole) == 6
+    assert short[-1] == "Not shown: 7 rows. --all shows all."
+    assert sum(line.endswith("default") for line in whole) == 7
     assert not [line for line in said(compare(load("paper-1ms").profile, kinds=["ieee1394"])) if "Assumed" in line]
 
 

@@ -230,6 +230,22 @@ def test_a_second_pdo_goes_where_the_profile_can_say_it(case: str, tmp_path: Pat
     assert [each for each in found if each[0] != 0x705] == messages
 
 
+def test_a_node_with_every_fourth_sync_is_a_group_of_its_own(tmp_path: Path) -> None:
+    text = (FILES / "axis-5.dcf").read_text(encoding="utf-8")
+    for index in ("1800", "1400"):
+        head, section, rest = text.partition(f"[{index}sub2]\n")
+        assert section
+        line, _, rest = rest.partition("\n")
+        assert line == "DefaultValue=1"
+        text = f"{head}{section}DefaultValue=4\n{rest}"
+    path = tmp_path / "axis.dcf"
+    path.write_text(text, encoding="utf-8")
+    answer = busplan.import_profile(path)
+    profile: Any = answer.profile
+    assert [group.every for group in profile.group] == [4]
+    assert "transmission type of TPDO1" in answer.text
+
+
 def test_the_answer_has_every_form_and_can_be_pickled(tmp_path: Path) -> None:
     answer = imported("machine.xml", "slaves.txt")
     assert pickle.loads(pickle.dumps(answer)).to_dict() == answer.to_dict()

@@ -67,6 +67,13 @@ COMMAND_IDENTIFIER: Final = _identifier(0x201, "identifier of RPDO1 of node 1, 2
 PDO_STEP: Final = _identifier(0x100, "from the identifier of a PDO to that of the next PDO of the same node")
 MOST_PDOS: Final = _identifier(4, "PDOs of one node in one direction")
 MOST_NODES: Final = _identifier(127, "node-IDs")
+MOST_EVERY: Final = Sourced(
+    240,
+    unit="1",
+    grade="published",
+    source="CiA 301, transmission types",
+    meaning="SYNCs from a PDO to the next, at most",
+)
 
 PIPELINE_CYCLES: Final = Sourced(
     0,

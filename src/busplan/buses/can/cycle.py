@@ -21,7 +21,7 @@ from busplan.buses.can.streams import (
     streams,
 )
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import messages, response, sync_spread_us, waits
+from busplan.buses.can.waiting import messages, pending_us, response, sync_spread_us, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
@@ -180,6 +180,9 @@ class CanCycle(BusCycle):
         for message in islice(waited.blocks(), first, end):
             label = f"message {message.name} of a lower priority"
             yield blocking._replace(us=plain(message.frame_us), label=label)
+        if end is None and plain(waited.excess_us):
+            label = "messages of a lower priority, where a cycle with fewer PDOs lasts longer"
+            yield blocking._replace(us=plain(waited.excess_us), label=label)
 
     @cached_property
     def _own(self) -> dict[str, Number]:
@@ -231,6 +234,9 @@ class CanCycle(BusCycle):
     def _higher(self, lasts_us: Number) -> Iterator[Number]:
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
+        if self.traffic.has_rates:
+            words = "the longest of SYNC and PDOs less the shortest"
+            window_us = window_us + self._sent.of(partial(_pending_us, self.is_stuffed), words=words)
         for message, _ in self._before:
             count = _of_all(message, rounded_up((window_us + message.jitter_us) / message.period_us))
             yield choose(self._goes_before_last(message), count, 0)
@@ -292,11 +298,18 @@ class CanCycle(BusCycle):
     @cached_property
     def load(self) -> Number:
         """Share of the bus that all messages take, 0..1 [1]."""
-        return self._in_cycle_us / self.traffic.period_us + self._messages_load
+        return self._mean_us / self.traffic.period_us + self._messages_load
 
     @property
     def _in_cycle_us(self) -> Number:
         return self.sync_us + self._own["cycle_feedback_us"] + self._own["cycle_command_us"]
+
+    @property
+    def _mean_us(self) -> Number:
+        """SYNC and PDOs of the mean cycle [us]."""
+        if not self.traffic.has_rates:
+            return self._in_cycle_us
+        return self.sync_us + total(pdos.pdos * us / pdos.every for pdos, us in self._pdos)
 
     @property
     def _messages_load(self) -> Number:
@@ -309,12 +322,16 @@ class CanCycle(BusCycle):
     def load_period_us(self) -> Number:
         """The shortest period that keeps `limits.max_load`; infinite where the other messages take all of it [us]."""
         left = self.network.profile.limits.max_load - self._messages_load
-        return choose(left > 0, self._in_cycle_us / larger(left, FIT_ROUNDING), inf)
+        return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
         """The load of what is allowed, and the message that comes closest to its deadline."""
         most = self.network.profile.limits.max_load
-        load = ("load", f"{_short(100 * plain(self.load))} %, {_short(100 * most)} allowed")
+        words = f"{_short(100 * plain(self.load))} %, {_short(100 * most)} allowed"
+        if self.traffic.has_rates:
+            fullest = self._in_cycle_us / self.traffic.period_us + self._messages_load
+            words += f"; {_short(100 * plain(fullest))} % with all PDOs in every cycle"
+        load = ("load", words)
         if not self._messages:
             return (load,)
         latest, worst = messages(self.traffic, is_stuffed=self.is_stuffed).latest()
@@ -339,9 +356,18 @@ class CanCycle(BusCycle):
             "backlog_us": 0.0,
             "frame_us": self._in_cycle_us,
             "execution_us": us["cycle_wait_us"] + self.traffic.host_us,
-            "pipeline_us": self.network.profile.bus.pipeline_cycles * self.network.period_us,
+            "pipeline_us": self._pipeline_cycles * self.network.period_us,
         }
         return _numbered(parts_us, identifier=inf, data_bytes=inf, instance=inf, deadline_us=inf)
+
+    @property
+    def _pipeline_cycles(self) -> Number:
+        """Cycles from the one that brings feedback to the one that takes its commands, of the slowest group [1]."""
+        cycles: Number = self.network.profile.bus.pipeline_cycles
+        if not self.traffic.has_rates:
+            return cycles
+        due: Iterator[Number] = (rounded_up(cycles / pdos.every) * pdos.every for pdos in self.traffic.pdos)
+        return reduce(larger, due)
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """The host's pipeline, and the period to the next SYNC."""
@@ -417,6 +443,11 @@ def _waits(is_stuffed: bool, key: str, traffic: Traffic, others_us: Number) -> N
     """One figure of what a cycle waits for."""
     number: Number = getattr(waits(traffic, others_us, is_stuffed=is_stuffed), key)
     return number
+
+
+def _pending_us(is_stuffed: bool, traffic: Traffic) -> Number:
+    us: Number = pending_us(streams(traffic, is_stuffed=is_stuffed), traffic)
+    return us
 
 
 def _of_all(message: Message, number: Number) -> Number:

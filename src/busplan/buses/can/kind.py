@@ -87,6 +87,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "bus.sync_identifier": Key(default=SYNC_IDENTIFIER),
         "limits.max_load": Key(default=MAX_LOAD),
         "payload.pdo_per": Key(short="PDOs of each {}"),
+        "payload.every": Key("every", short="PDOs every {} cycles"),
         "node.execution.worst_extra_us": Key("T_extra"),
         "message.payload_bytes": Key("s"),
         "message.period_us": Key("T"),
@@ -136,15 +137,23 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         each = min((plain(group.axes) for group in network.groups if group.said.payload.pdo_per == "axis"), default=1)
         return PayloadRange(1, largest * max(int(each), 1), "PDOs", carrier="four frames")
 
+    def setpoints_every(self, network: Network) -> tuple[str, int]:
+        """Those of the group with axes whose PDOs go most often."""
+        with_axes = [group for group in network.groups if plain(group.axes)] or network.groups
+        said = min((group.said for group in with_axes), key=lambda nodes: int(plain(nodes.payload.every)))
+        return f"group.{said.name}.every" if said.name else "payload.every", int(plain(said.payload.every))
+
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
         """Say what each frame is charged."""
         return "every frame with the stuff bits of its length"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """The bit rate, or both of CAN FD."""
+        """The bit rate, or both of CAN FD, and PDOs that are not in every cycle."""
         bus = network.profile.bus
         data = "" if bus.data_bit_rate_kbit_s is None else f", {bus.data_bit_rate_kbit_s:g} kbit/s of data"
-        return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}",)
+        rates = ((nodes.name, int(plain(nodes.payload.every))) for nodes in network.alike)
+        seldom = (f"PDOs {name and f'of {name} '}every {every} cycles" for name, every in rates if every > 1)
+        return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}", *seldom)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """Functions of `busplan.buses.can.evidence`."""

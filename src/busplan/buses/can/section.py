@@ -13,6 +13,7 @@ from busplan.buses.can.constants import (
     MAX_LOAD,
     MOST_BIT_RATE,
     MOST_DATA_BIT_RATE,
+    MOST_EVERY,
     MOST_NODES,
     MOST_PDOS,
     PIPELINE_CYCLES,
@@ -115,6 +116,11 @@ class CanPayload(PayloadSection):
         default="node",
         description="Whether a node has one PDO in each direction, or each of its axes has; they share the payload",
         examples=["axis"],
+    )
+    every: Annotated[int, Field(ge=1, le=int(MOST_EVERY))] = Field(
+        default=1,
+        description="Its PDOs go with every n-th SYNC, CANopen's transmission type n; all count from the same SYNC",
+        examples=[4],
     )
     feedback_identifier: Identifier | None = Field(
         default=None,

@@ -77,9 +77,9 @@ class Stream(NamedTuple):
         """Its frames, or some of them, as a source."""
         return Sender((self.identifiers if count is None else count) * self.frame_us, self.period_us, self.jitter_us)
 
-    def goes_before(self, stream: "Stream") -> bool:
-        """Whether its frames win the arbitration against the last frame of another; of plain numbers."""
-        return bool((self.block if stream.is_message else self.first_place) <= stream.last_place)
+    def goes_before(self, stream: "Stream") -> Points:
+        """Whether its frames win the arbitration against the last frame of another."""
+        return (self.block if stream.is_message else self.first_place) <= stream.last_place
 
 
 def remembered(*, maxsize: int) -> "Callable[[Callable[..., Found]], Callable[..., Found]]":
@@ -235,7 +235,7 @@ def _stream(
 def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
     """SYNC and all PDOs."""
 
-    def sent(name: str, block: int, size: Points, **more: Any) -> Stream:
+    def sent(name: str, block: int, size: Points, every: Points = 1, **more: Any) -> Stream:
         return _stream(
             name,
             block,
@@ -244,7 +244,7 @@ def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
             data_bit_rate_kbit_s=traffic.data_bit_rate_kbit_s,
             identifier_bits=traffic.identifier_bits,
             is_stuffed=is_stuffed,
-            period_us=traffic.period_us,
+            period_us=traffic.period_us * every,
             jitter_us=0.0,
             deadline_us=traffic.period_us,
             **more,
@@ -266,6 +266,7 @@ def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
                 pdos.name,
                 block[pdos.kind] + step,
                 larger(smaller(left_bytes, most_bytes), 0),
+                pdos.every,
                 group=pdos.group,
                 first=first + step,
                 identifiers=count,

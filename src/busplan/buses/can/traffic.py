@@ -43,6 +43,8 @@ class Pdos(NamedTuple):
     """Most data of each of its frames in their order; further ones are as the last [bytes]."""
     most_bytes: int = int(MOST_PDOS * FRAME_BYTES)
     """The most that its frames may carry [bytes]."""
+    every: Number = 1
+    """Cycles from one to the next; all count from the same SYNC [1]."""
 
     @property
     def name(self) -> str:
@@ -117,13 +119,18 @@ class Traffic(NamedTuple):
         """Whether all its numbers are plain."""
         return self.messages.is_plain and all(isinstance(number, int | float) for number in self._own())
 
+    @property
+    def has_rates(self) -> bool:
+        """Whether some PDOs are not in every cycle."""
+        return not all(is_off(pdos.every - 1) for pdos in self.pdos)
+
     def numbers(self) -> tuple[Number, ...]:
         """All its numbers in a row, as `with_numbers` takes them."""
         return (*self._own(), *self.messages.numbers)
 
     def _own(self) -> tuple[Number, ...]:
         """Its numbers without those of messages."""
-        pdos = (number for pdos in self.pdos for number in (pdos.identifier, pdos.pdos, pdos.payload_bytes))
+        pdos = (getattr(pdos, key) for pdos in self.pdos for key in _OF_PDOS)
         own: tuple[Any, ...] = self[:_OWN_NUMBERS]
         return (*own, *pdos)
 
@@ -132,7 +139,7 @@ class Traffic(NamedTuple):
         rest: Iterator[Any] = iter(numbers)
         own = tuple(islice(rest, _OWN_NUMBERS))
         pdos = tuple(
-            pdos._replace(identifier=next(rest), pdos=next(rest), payload_bytes=next(rest)) for pdos in self.pdos
+            pdos._replace(**dict(zip(_OF_PDOS, islice(rest, len(_OF_PDOS)), strict=True))) for pdos in self.pdos
         )
         count = len(Message._fields) - _MESSAGE_WORDS
         messages = MessageList(Message(message.name, *islice(rest, count)) for message in self.messages)
@@ -141,6 +148,7 @@ class Traffic(NamedTuple):
 
 _OWN_NUMBERS: Final = len(Traffic._fields) - 2
 """Fields before the PDOs and the messages."""
+_OF_PDOS: Final = ("identifier", "pdos", "payload_bytes", "every")
 _MESSAGE_WORDS: Final = 1
 """Fields of words, which stand before the numbers."""
 
@@ -333,7 +341,7 @@ def _pdos(sender: _Senders, bus: Any, kind: TransactionKind, number: int, *, is_
     if identifier is None:
         identifier = int(_FIRST[kind]) if is_first else FOLLOWS
     payload_bytes = share_bytes(sender.payloads_bytes[number], pdos=sender.pdos_each)
-    pdos = Pdos(kind, sender.name, identifier, sender.pdos, payload_bytes)
+    pdos = Pdos(kind, sender.name, identifier, sender.pdos, payload_bytes, every=sender.payload.every)
     lengths = getattr(sender.payload, f"{NAMES[kind]}_pdos")
     if lengths is not None:
         return pdos._replace(frame_bytes=lengths, most_bytes=sum(lengths))

@@ -41,6 +41,8 @@ class Waits(NamedTuple):
     """Frames of a lower priority than SYNC and all PDOs that go where these leave the bus idle [us]."""
     lower: tuple[Stream, ...]
     """Messages of a lower priority than SYNC and all PDOs, the longest first."""
+    excess_us: Points = 0.0
+    """Part of `blocking_us` by which a cycle with fewer PDOs, where more messages block, lasts longer [us]."""
 
     def blocks(self) -> Iterator[Stream]:
         """One of them for each frame that goes, of plain numbers."""
@@ -68,10 +70,61 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     frame of a lower priority may have started then: three such frames, the longest that can be there. One of a message
     whose deadline D is kept ends within it, so ceil((w + D) / T) of them are there in w. Frames that go before the last
     PDO go whenever they are queued: ceil((w + J + bit) / T). That holds with what is still pending from the cycle
-    before, too: the last frame of that cycle started as long before its end as the last frame of this cycle does.
+    before, too: the last frame of that cycle started as long before its end as the last frame of this cycle does, or
+    with PDOs at several rates by `pending_us` longer.
+
+    PDOs that are not in every cycle are all due in the fullest. In a cycle with fewer of them, messages between these
+    and the last one are of a lower priority, and may take longer than the missing PDOs would.
     """
     each = streams(traffic, is_stuffed=is_stuffed)
-    last, bit = last_place(stream for stream in each if not stream.is_message), bit_us(traffic.bit_rate_kbit_s)
+    cyclic = [stream for stream in each if not stream.is_message]
+    fullest = _waits(traffic, others_us, last_place(cyclic), is_stuffed=is_stuffed)
+    lasts_us = fullest.lasts_us
+    for missing_us, last in _with_fewer(cyclic, traffic):
+        some_us = others_us - total(missing_us.values())
+        lasts_us = larger(lasts_us, _waits(traffic, some_us, last, is_stuffed=is_stuffed).lasts_us)
+    excess_us = lasts_us - fullest.lasts_us
+    return fullest._replace(blocking_us=fullest.blocking_us + excess_us, excess_us=excess_us)
+
+
+def _with_fewer(cyclic: Sequence[Stream], traffic: Traffic) -> Iterator[tuple[dict[str, Points], Points]]:
+    """Cycles without a slow group and all that end behind it: PDOs missing by name [us], and the last place left."""
+    if not traffic.has_rates:
+        return
+    groups = {stream.group: [own for own in cyclic if own.group == stream.group] for stream in cyclic[1:]}
+    lasts = {name: last_place(own) for name, own in groups.items()}
+    for name, own in groups.items():
+        if (own[0].period_us > traffic.period_us) is False:
+            continue
+        missing_us: dict[str, Points] = dict.fromkeys(NAMES.values(), 0.0)
+        last = cyclic[0].last_place
+        for beside, rest in groups.items():
+            is_due = (rest[0].period_us <= traffic.period_us) | (lasts[beside] < lasts[name])
+            last = larger(last, choose(is_due, lasts[beside], 0))
+            for stream in rest:
+                missing_us[stream.name] = missing_us[stream.name] + choose(is_due, 0.0, stream.sender().frames_us)
+        yield missing_us, last
+
+
+def pending_us(each: Iterable[Stream], traffic: Traffic) -> Points:
+    """How much longer the last frame of a cycle may be than that of the next, where PDOs are at several rates [us].
+
+    Parameters
+    ----------
+    each
+        All streams.
+    traffic
+        What they are of.
+    """
+    if not traffic.has_rates:
+        return 0.0
+    frames_us = [stream.frame_us for stream in each if not stream.is_message]
+    return reduce(larger, frames_us) - reduce(smaller, frames_us)
+
+
+def _waits(traffic: Traffic, others_us: Points, last: Points, *, is_stuffed: bool) -> Waits:
+    """The same of a cycle with some PDOs, to the last place of them."""
+    bit = bit_us(traffic.bit_rate_kbit_s) + pending_us(streams(traffic, is_stuffed=is_stuffed), traffic)
     sent = message_streams(traffic, is_stuffed=is_stuffed)
     before, lower = sent.around(last)
     higher = [
@@ -109,7 +162,14 @@ def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> 
     us = {name: total(stream.sender().frames_us for stream in cyclic if stream.name == name) for name in _CYCLIC}
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
     commands_us = waits(traffic, others_us, is_stuffed=is_stuffed).lasts_us - us[_COMMAND]
-    return {_FEEDBACK: commands_us - traffic.host_us - us[_FEEDBACK], _COMMAND: commands_us}
+    late_us = {_FEEDBACK: commands_us - traffic.host_us - us[_FEEDBACK], _COMMAND: commands_us}
+    for missing_us, last in _with_fewer(cyclic, traffic):
+        some_us = others_us - total(missing_us.values())
+        lasts_us = _waits(traffic, some_us, last, is_stuffed=is_stuffed).lasts_us
+        commands_us = lasts_us - us[_COMMAND] + missing_us[_COMMAND]
+        queued = commands_us - traffic.host_us - us[_FEEDBACK] + missing_us[_FEEDBACK], commands_us
+        late_us = {name: larger(late_us[name], own_us) for name, own_us in zip(late_us, queued, strict=True)}
+    return late_us
 
 
 class _Start:
@@ -200,7 +260,7 @@ class Messages:
         self._ranks = [stream.block for stream in self._ranked]
         period_us, late_us = traffic.period_us, queued_us(each, traffic, is_stuffed=is_stuffed)
         places = (((), 0.0), ((_FEEDBACK, _COMMAND), late_us[_FEEDBACK]), ((_COMMAND,), late_us[_COMMAND]))
-        self._starts = [self._start(late, larger(period_us - us, 0.0)) for late, us in places]
+        self._starts = [self._start(late, us, period_us) for late, us in places]
         if self._columns is None:
             self._loads = _sums(sender.load for sender in self._starts[0].senders)
             frames_us: Iterator[Points] = (stream.frame_us for stream in reversed(self._ranked))
@@ -213,19 +273,28 @@ class Messages:
         """The longest frame from each rank on."""
         self._known: dict[str, Response | None] = {}
 
-    def _start(self, late: Sequence[str], offset_us: Points) -> _Start:
-        """The start of a busy period when some are late, so long before the next cycle [us]."""
+    def _start(self, late: Sequence[str], late_us: Points, period_us: Points) -> _Start:
+        """The start of a busy period when some are late, so long behind the start of their cycle [us].
+
+        These come again with their own period. Of the others any may be due in the next cycle.
+        """
         is_late = [stream.name in late for stream in self._ranked]
+        offsets_us: list[Points] = [
+            larger((stream.period_us if own_late else period_us) - late_us, 0.0)
+            for stream, own_late in zip(self._ranked, is_late, strict=True)
+            if not stream.is_message
+        ]
         if self._columns is None:
+            rest = iter(offsets_us)
             senders = [
-                stream.sender()._replace(jitter_us=-offset_us) if late and not stream.is_message else stream.sender()
+                stream.sender()._replace(jitter_us=-next(rest)) if late and not stream.is_message else stream.sender()
                 for stream in self._ranked
             ]
             return _Start(senders, is_late, self._bit_us)
         frames_us, period_us, jitter_us = self._columns[:_FRAME]
         if late:
             jitter_us = jitter_us.copy()
-            jitter_us[[not stream.is_message for stream in self._ranked]] = -offset_us
+            jitter_us[[not stream.is_message for stream in self._ranked]] = [-us for us in offsets_us]
         return _Start(Sender(frames_us, period_us, jitter_us), is_late, self._bit_us, self._groups)
 
     @cached_property
@@ -417,12 +486,18 @@ def response(own: Stream, traffic: Traffic, *, is_stuffed: bool) -> Response | N
     return worst_response(own.sender(1), higher, blocking_us=plain(blocking_us), bit_us=bit)
 
 
-def _rivals(own: Stream, each: Sequence[Stream]) -> tuple[list[Sender], Points]:
+def _rivals(own: Stream, each: Iterable[Stream]) -> tuple[list[Sender], Points]:
     """What goes before SYNC or a PDO, and the longest frame that may hold it up [us]."""
-    higher = [stream.sender() for stream in each if stream is not own and stream.goes_before(own)]
-    lower = (stream for stream in each if not stream.goes_before(own) and (own.name != SYNC or stream.is_message))
-    nothing: Points = 0.0
-    return higher, reduce(larger, (stream.frame_us for stream in lower), nothing)
+    higher: list[Sender] = []
+    blocking_us: Points = 0.0
+    for stream in each:
+        is_higher = stream.goes_before(own)
+        if stream is not own and is_higher is not False:
+            sender = stream.sender()
+            higher.append(sender._replace(frames_us=choose(is_higher, sender.frames_us, 0.0)))
+        if is_higher is not True and (own.name != SYNC or stream.is_message):
+            blocking_us = larger(blocking_us, choose(is_higher, 0.0, stream.frame_us))
+    return higher, blocking_us
 
 
 def sync_spread_us(traffic: Traffic, *, is_stuffed: bool) -> Points:

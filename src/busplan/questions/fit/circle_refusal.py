@@ -77,7 +77,11 @@ def require_circle(profile: Profile) -> None:
 
 def loop_refusals(profile: Profile) -> tuple[Refused, ...]:
     """Why the loops of a profile cannot be simulated, whether or not its cycle fits the bus."""
-    return (*step_refusals(profile, profile.cycle.period_us), *_loop_over_the_bus(profile))
+    return (
+        *step_refusals(profile, profile.cycle.period_us),
+        *_setpoints_of_several_cycles(profile),
+        *_loop_over_the_bus(profile),
+    )
 
 
 def run_refusals(profile: Profile, of_loop: tuple[Refused, ...]) -> tuple[Refused, ...]:
@@ -128,6 +132,14 @@ def step_refusals(profile: Profile, period_us: float) -> Iterator[Refused]:
     default = "" if "step_us" in profile.servo.model_fields_set else f"; it is the default of {STEP}"
     for refused in no_multiple(period_us=period_us, step_us=profile.servo.step_us):
         yield refused._replace(name=STEP, right=f"{refused.right}{default}", beside=("cycle.period_us",))
+
+
+def _setpoints_of_several_cycles(profile: Profile) -> Iterator[Refused]:
+    """Refuse axes whose set-points do not come in every cycle."""
+    key, every = bus_of(profile).setpoints_every(network_of(profile))
+    if every > 1:
+        whole = f"a period of {every * profile.cycle.period_us:g} us with 1 has the same set-points"
+        yield Refused(key, every, f"the circle test has a set-point in every cycle; {whole}")
 
 
 def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:

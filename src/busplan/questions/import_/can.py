@@ -30,6 +30,11 @@ class _Node(NamedTuple):
     sent: dict[str, list[Pdo]]
     """PDOs of each direction that go in one payload."""
 
+    @property
+    def every(self) -> int:
+        """They go with every n-th SYNC."""
+        return self.sent["feedback"][0].every
+
 
 def rows(machine: Reading) -> Iterator[ProfileLine]:
     """Lines of the profile, without its head.
@@ -37,7 +42,7 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     Raises
     ------
     BusplanError
-        No node has PDOs with every SYNC in both directions: a profile has no cycle then.
+        No node has PDOs with SYNC in both directions: a profile has no cycle then.
     """
     bus = machine.bus
     period = _period(machine)
@@ -87,11 +92,13 @@ def has_fd(messages: list[ProfileLine]) -> bool:
 
 
 def _nodes(machine: Reading) -> Iterator[_Node]:
-    """Nodes whose PDOs go with every SYNC in both directions; all other PDOs become messages."""
+    """Nodes whose PDOs go with every n-th SYNC in both directions, the most often; all other PDOs become messages."""
     for number in sorted(machine.nodes):
         facts = machine.nodes[number]
-        sent = {key: _together([pdo for pdo in facts[key].value if pdo.every == 1]) for key in _DIRECTIONS}
-        if all(sent.values()):
+        both = (set.intersection(*({pdo.every for pdo in facts[key].value} for key in _DIRECTIONS))) - {0}
+        if both:
+            every = min(both)
+            sent = {key: _together([pdo for pdo in facts[key].value if pdo.every == every]) for key in _DIRECTIONS}
             yield _Node(number, facts, sent)
 
 
@@ -109,7 +116,7 @@ def _alike(place: int, node: _Node) -> tuple[Any, ...]:
     """What neighbours of one group share: sizes, axes, and identifiers that go up by one."""
     sizes = (tuple(pdo.payload_bytes for pdo in node.sent[key]) for key in _DIRECTIONS)
     starts = (node.sent[key][0].identifier - place for key in _DIRECTIONS)
-    return (*sizes, *starts, node.facts["axes"].value)
+    return (*sizes, *starts, node.every, node.facts["axes"].value)
 
 
 def _group(nodes: list[_Node], taken: set[str]) -> Iterator[ProfileLine]:
@@ -121,6 +128,9 @@ def _group(nodes: list[_Node], taken: set[str]) -> Iterator[ProfileLine]:
     yield ProfileLine(section, "nodes", Fact(len(nodes), identity.place, identity.grade, note))
     axes = first.facts["axes"]
     yield ProfileLine(section, "axes", axes)
+    if first.every > 1:
+        pdo = first.sent["feedback"][0]
+        yield ProfileLine(section, "every", Fact(first.every, pdo.place, note=f"transmission type of {pdo.name}"))
     for key, size in _DIRECTIONS.items():
         pdos = first.sent[key]
         names = ", ".join(pdo.name for pdo in pdos)

@@ -1,0 +1,201 @@
+"""PDOs with every n-th SYNC: the fullest cycle decides, the load is that of the mean cycle."""
+
+from collections.abc import Callable
+from math import lcm
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import busplan
+from busplan.buses.can.cycle import NONE, WORST, CanCycle
+from busplan.buses.can.limits import LIMITS
+from busplan.buses.can.section import CanProfile
+from busplan.buses.can.streams import streams
+from busplan.buses.can.traffic import traffic_of_profile
+from busplan.elementwise import plain
+from busplan.profile.conversion import converted
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+from busplan.profile.write import profile_text
+from busplan.questions.fit.network import network_of
+from busplan.sections.base import with_unchecked
+from busplan.sections.profile import Profile
+
+Run = Callable[..., Any]
+
+
+def group(name: str, nodes: int, *, size: int = 8, axes: int = 1, **keys: Any) -> dict[str, Any]:
+    execution = {"kind": "linear", "grade": "measured", "base_us": 40.0, "per_byte_us": 1.0}
+    sizes = {"read_bytes": size, "write_bytes": size}
+    return {"name": name, "nodes": nodes, "axes": axes, **sizes, "execution": execution, **keys}
+
+
+def message(name: str, identifier: int, **keys: Any) -> dict[str, Any]:
+    return {"name": name, "identifier": identifier, "payload_bytes": 8, "period_us": 1e5, **keys}
+
+
+def machine(*groups: dict[str, Any], messages: tuple[dict[str, Any], ...] = (), **bus: Any) -> CanProfile:
+    data = {
+        "schema_version": 1,
+        "name": "mixed",
+        "bus": {"kind": "can", "bit_rate_kbit_s": 1000, **bus},
+        "cycle": {"period_us": 4000.0},
+        "group": groups,
+        "message": messages,
+    }
+    return CanProfile.model_validate(data)
+
+
+DRIVES = group("drives", 4)
+
+
+def mixed(every: int = 4, **keys: Any) -> CanProfile:
+    return machine(DRIVES, group("io", 6, axes=0, every=every, **keys), messages=(message("sdo", 0x600),))
+
+
+def cycle(own: Profile, model: str = WORST) -> CanCycle:
+    return CanCycle(network_of(own), model)
+
+
+def responses(own: Profile) -> dict[str, float | None]:
+    answers = busplan.latency(own, timing_model=[WORST]).transactions
+    return {f"{answer.group} {answer.transaction}".strip(): answer.worst_response_us for answer in answers}
+
+
+@pytest.mark.parametrize("rates", [(1, 1, 1), (1, 4, 2), (3, 4, 6), (2, 2, 2), (5, 1, 240)])
+def test_the_load_is_that_of_all_cycles_of_the_common_multiple(rates: tuple[int, ...]) -> None:
+    own = machine(*(group(f"g{place}", place + 1, every=every, size=3) for place, every in enumerate(rates)))
+    cycles, sent_us = lcm(*rates), 0.0
+    for number in range(cycles):
+        due = [nodes.nodes for nodes, every in zip(own.group, rates, strict=True) if number % every == 0]
+        sent_us += 55 + sum(2 * nodes * 85 for nodes in due)
+    assert plain(cycle(own).load) == pytest.approx(sent_us / cycles / 4000)
+
+
+def test_the_fullest_cycle_decides() -> None:
+    slow, fast = mixed(every=4), mixed(every=1)
+    for model in (WORST, NONE):
+        assert cycle(slow, model).by_term == cycle(fast, model).by_term
+        assert plain(cycle(slow, model).load) < plain(cycle(fast, model).load)
+    one, other = (busplan.capacity(own).results[0] for own in (slow, fast))
+    assert (one.margin_us, one.uncertainty_us) == (other.margin_us, other.uncertainty_us)
+
+
+def test_every_cycle_is_what_it_was_without_the_key() -> None:
+    said, silent = mixed(every=1), machine(DRIVES, group("io", 6, axes=0), messages=(message("sdo", 0x600),))
+    assert responses(said) == responses(silent)
+    assert busplan.capacity(said).to_dict()["results"] == busplan.capacity(silent).to_dict()["results"]
+
+
+def test_nodes_that_are_alike_may_all_be_slow() -> None:
+    own = override(load("can-servo-8").profile, {"payload.every": 3})
+    assert plain(cycle(own).load) < plain(cycle(override(own, {"payload.every": 1})).load)
+
+
+def test_slow_pdos_go_before_a_message_less_often() -> None:
+    # At 125 kbit/s 8 us a bit: a message waits for several cycles of PDOs.
+    own = machine(
+        group("drives", 2),
+        group("io", 1, every=4, size=4),
+        messages=(message("long", 0x700),),
+        bit_rate_kbit_s=125,
+    )
+    slower = override(own, {"cycle.period_us": 9000.0, "limits.max_load": 0.95})
+    each = {stream.label: stream for stream in streams(traffic_of_profile(slower), is_stuffed=True)}
+    assert each["io feedback"].period_us == 4 * each["drives feedback"].period_us == 36_000
+    slow, fast = (responses(override(slower, {"group.io.every": every}))["long"] for every in (4, 1))
+    assert slow is not None
+    # The message meets each PDO of a late cycle and of the next; those of io once.
+    drives_us, io_us, sync_us, own_us = 4 * 1080, 2 * 760, 440, 1080
+    assert slow == drives_us + io_us + sync_us + own_us
+    assert fast is None or fast >= slow
+
+
+def test_more_nodes_fit_where_they_are_seldom_due() -> None:
+    own = override(mixed(every=4), {"limits.max_load": 0.5})
+    for every, fits in ((4, True), (1, False)):
+        found = busplan.capacity(override(own, {"group.io.every": every})).results[0]
+        assert ("load" not in found.exceeded) is fits
+    most = next(
+        nodes
+        for nodes in range(1, 40)
+        if busplan.capacity(override(own, {"group.io.nodes": nodes + 1})).results[0].verdict != "fits"
+    )
+    assert {each.name: each.safe_nodes for each in busplan.capacity(own).results[0].groups}["io"] == most
+
+
+def test_a_cycle_with_fewer_pdos_may_last_longer() -> None:
+    # The message goes before the PDOs of io, and is of a lower priority where these are not due.
+    own_message = message("between", 0x300, period_us=2000.0)
+    drives = group("drives", 1, size=1)
+    slow = group("io", 1, size=1, axes=0, every=2, feedback_identifier=0x7F0, command_identifier=0x7F1)
+    own, alone = (machine(*groups, messages=(own_message,)) for groups in ((drives, slow), (drives,)))
+    fullest_us = plain(cycle(override(own, {"group.io.every": 1})).required_us)
+    assert fullest_us == 55 + 2 * 41 + 4 * 65 + 135
+    # It blocks twice there, and the two missing PDOs of one byte are shorter.
+    assert plain(cycle(alone).required_us) == fullest_us - 2 * 65 + 135
+    assert plain(cycle(own).required_us) == plain(cycle(alone).required_us)
+    shown = busplan.timeline(own)
+    assert shown.used_us == pytest.approx(plain(cycle(own).required_us))
+
+
+def test_a_loop_waits_for_the_cycle_in_which_its_commands_are_due() -> None:
+    loops = {}
+    for pipeline in (0, 1, 4, 5):
+        own = override(mixed(every=4), {"bus.pipeline_cycles": pipeline})
+        loops[pipeline] = responses(own)["loop"]
+    cycle_us = loops[0]
+    assert cycle_us is not None
+    assert loops == {0: cycle_us, 1: cycle_us + 16_000, 4: cycle_us + 16_000, 5: cycle_us + 32_000}
+
+
+def test_the_circle_needs_a_set_point_in_every_cycle() -> None:
+    assert busplan.circle_test(mixed(every=4)).results[0].max_contour_error_mm is not None
+    own = override(mixed(), {"group.drives.every": 2})
+    with pytest.raises(busplan.BusplanError, match=r"group\.drives\.every = 2: the circle test has a set-point in"):
+        busplan.circle_test(own)
+
+
+def test_arrays_of_points_give_what_each_point_gives() -> None:
+    own = machine(
+        group("drives", 2, size=1),
+        group("io", 1, size=1, axes=0, every=2, feedback_identifier=0x7A0, command_identifier=0x7C0),
+        messages=(message("between", 0x300, period_us=2000.0), message("low", 0x7FF, deadline_us=5000.0)),
+    )
+    keys = {
+        "group.io.every": np.array([1, 2, 5]).reshape(-1, 1, 1),
+        "group.io.nodes": np.array([1, 4, 12]).reshape(-1, 1),
+        "cycle.period_us": np.array([1500.0, 4000.0]),
+    }
+    varied: Any = own
+    for key, values in keys.items():
+        varied = with_unchecked(varied, key, values.astype(float))
+    together, shape = network_of(varied), (3, 3, 2)
+
+    def answers(network: Any) -> dict[str, Any]:
+        found: dict[str, Any] = {limit.key: limit.is_broken(network) for limit in LIMITS}
+        run = CanCycle(network, WORST)
+        return {**found, "required": run.required_us, "load": run.load, "jitter": run.sync_jitter_us()}
+
+    told = {key: np.broadcast_to(each, shape) for key, each in answers(together).items()}
+    for place in np.ndindex(shape):
+        at = {key: np.broadcast_to(values, shape)[place].item() for key, values in keys.items()}
+        expected = answers(network_of(override(own, at)))
+        assert {key: each[place] for key, each in told.items()} == pytest.approx(expected), at
+
+
+def test_every_question_takes_a_machine_of_two_rates(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "arm.toml").write_text(profile_text(mixed()), encoding="utf-8")
+    (tmp_path / "old.toml").write_text(profile_text(mixed(every=1)), encoding="utf-8")
+    for command in ("capacity", "latency", "timeline", "map", "plan", "compare", "check"):
+        assert run(command, "arm.toml", cwd=tmp_path).returncode in (0, 1), command
+    assert "% with all PDOs in every cycle" in run("capacity", "arm.toml", cwd=tmp_path).stdout
+    assert "1000 kbit/s, PDOs of io every 4 cycles" in run("timeline", "arm.toml", cwd=tmp_path).stdout
+    assert "group.io.every" in run("diff", "old.toml", "arm.toml", cwd=tmp_path).stdout
+    assert "/ every,io" in run("explain", "arm.toml", "bus_load", cwd=tmp_path).stdout
+    said = run("sweep", "arm.toml", "--vary", "group.io.every=1,2,4", "--vary", "group.io.nodes=2,6", cwd=tmp_path)
+    assert said.returncode == 0
+    assert run("sweep", "arm.toml", "--vary", "group.io.every=1,241", cwd=tmp_path).returncode == 2
+    assert "group.io.every" in converted(mixed(), "sercos3").left_out
