@@ -12,7 +12,7 @@ MASTER = bytes.fromhex("001122334455")
 BYTE_US = 0.08
 COPY_US = 0.0035
 HOP_US = 0.698
-LRW, BRD, FRMW, FPRD = 12, 7, 14, 4
+LRW, BRD, FRMW, FPRD, APRD, BWR = 12, 7, 14, 4, 1, 8
 
 
 @dataclass
@@ -84,6 +84,52 @@ def simulated(machine: Machine, cycles: int, *, seed: int = 1) -> list[tuple[flo
             back = ethernet(machine.datagrams, index=index, counters=counters, returned=True)
             packets.append((start + way + host, back))
     return sorted(packets, key=lambda packet: packet[0])
+
+
+def register(command: int, address: int, at: int, data: bytes, counter: int, *, returned: bool) -> bytes:
+    """A frame of one datagram on registers, as it stands in a capture."""
+    body = struct.pack("<BBHHHH", command, 7, address, at, len(data), 0) + data + struct.pack("<H", counter)
+    source = bytes([MASTER[0] | 2 * returned]) + MASTER[1:]
+    return b"\xff" * 6 + source + b"\x88\xa4" + struct.pack("<H", len(body) | 0x1000) + body
+
+
+def start_up(
+    hops_ns: tuple[int, ...], *, clocks_ns: tuple[int, ...], ports: int = 1, read: int = FPRD, width: int = 16
+) -> list[tuple[float, bytes]]:
+    """A master that latches and reads the port times of a line, 1 ms before the first cycle.
+
+    hops_ns: one way from each device to the next; clocks_ns: what each device's own clock shows as the frame enters
+    it; ports: the one that leads on; read: command; width: bytes of a read.
+    """
+    count = len(clocks_ns)
+    packets = [
+        (
+            register(BWR, 0, 0x900, bytes(4), 0, returned=False),
+            register(BWR, count, 0x900, bytes(4), count, returned=True),
+        )
+    ]
+    for number, entered in enumerate(clocks_ns):
+        times = [0, 0, 0, 0]
+        times[0] = entered % 2**32
+        if number + 1 < count:
+            times[ports] = (entered + 2 * sum(hops_ns[number:])) % 2**32
+        data = struct.pack("<4I", *times)
+        # The address by place counts up in each device that it passes.
+        sent, back = (-number & 0xFFFF, count - number) if read == APRD else (0x1000 + number,) * 2
+        for at in range(0, 16, width):
+            part = data[at : at + width]
+            packets.append(
+                (
+                    register(read, sent, 0x900 + at, bytes(width), 0, returned=False),
+                    register(read, back, 0x900 + at, part, 1, returned=True),
+                )
+            )
+    times_us = [-1000 + 20.0 * place for place in range(len(packets))]
+    return [
+        (time + late, frame)
+        for time, pair in zip(times_us, packets, strict=True)
+        for late, frame in zip((0, 15), pair, strict=True)
+    ]
 
 
 def pcap(

@@ -39,6 +39,8 @@ class RecordedFigure(NamedTuple):
     key: str = ""
     """Dotted key of the profile that plans it."""
     note: str = ""
+    is_mean: bool = False
+    """Whether it is the mean of its events, whatever the quantile."""
 
     @property
     def residual(self) -> float | None:
@@ -77,14 +79,3 @@ def day_of(time_ns: int) -> str:
     if not _FIRST_DAY_NS <= time_ns < _LAST_DAY_NS:
         return ""
     return datetime.fromtimestamp(time_ns // 1_000_000_000, tz=UTC).date().isoformat()
-
-
-def counted(number: int, name: str) -> str:
-    """A number of things.
-
-    Examples
-    --------
-    >>> counted(1, "frame"), counted(1200, "frame")
-    ('1 frame', '1,200 frames')
-    """
-    return f"{number:,} {name}{'s' * (number != 1)}"

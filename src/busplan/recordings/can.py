@@ -15,6 +15,7 @@ from busplan.errors import BusplanError
 from busplan.extras import require_extra
 from busplan.progress import Progress
 from busplan.recordings.statistics import Floats
+from busplan.recordings.words import counted
 
 _EXTENDED, _REMOTE, _FD = 1, 2, 4
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader", b"(": "CanutilsLogReader"}
@@ -30,6 +31,8 @@ _RUN: Final = 5
 """Equal bits behind which the opposite one is stuffed."""
 _PIECE: Final = 50_000
 _CLASSICAL_BYTES: Final = 8
+_LONG_BYTES: Final = (16, 20, 24, 32, 48, 64)
+"""Length codes 10 to 15, as python-can gives them even of classical frames; they have 8 bytes in those."""
 
 
 class CanFrames(NamedTuple):
@@ -42,7 +45,7 @@ class CanFrames(NamedTuple):
     identifiers: npt.NDArray[np.int64]
     extended: npt.NDArray[np.bool_]
     sizes: npt.NDArray[np.int64]
-    """Data, as the length code says it [bytes]."""
+    """Data, as the length code says it; codes of 9 to 15 are of 8 bytes in a classical frame [bytes]."""
     bits: npt.NDArray[np.int64]
     """On the wire, interframe space included; 0 of a CAN FD frame [bits]."""
     is_fd: npt.NDArray[np.bool_]
@@ -129,23 +132,29 @@ class _Log:
             self._channels[message.channel] += 1
             times(message.timestamp)
             identifiers(message.arbitration_id)
-            sizes(message.dlc)
             data(int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"))
-            fd = message.is_fd or message.dlc > _CLASSICAL_BYTES
-            flags(message.is_extended_id * _EXTENDED | message.is_remote_frame * _REMOTE | fd * _FD)
+            sizes(message.dlc)
+            fd = message.is_fd
+            # CAN FD has no remote frames: what a log marks so has data that it lost.
+            remote = message.is_remote_frame and not fd
+            flags(message.is_extended_id * _EXTENDED | remote * _REMOTE | fd * _FD)
 
     def frames(self, path: Path) -> CanFrames:
         """All frames as arrays."""
         if not self._times:
             why = f" ({self.broken})" if self.broken else ""
-            raise BusplanError(f"{path}: has no CAN frame{why}")
+            errors = f" but {counted(self._errors, 'error frame')}" if self._errors else ""
+            raise BusplanError(f"{path}: has no CAN frame{errors}{why}")
         if len(self._channels) > 1:
-            named = ", ".join(f"{channel} ({count:,} frames)" for channel, count in self._channels.most_common())
+            named = ", ".join(
+                f"{channel} ({counted(count, 'frame')})" for channel, count in self._channels.most_common()
+            )
             raise BusplanError(f"{path}: has frames of {len(self._channels)} channels: {named}; keep those of one bus")
         stamps = np.frombuffer(self._times, dtype=np.float64)
         identifiers = np.frombuffer(self._identifiers, dtype=np.uint32).astype(np.int64)
         flags = np.frombuffer(self._flags, dtype=np.uint8)
         sizes = np.frombuffer(self._sizes, dtype=np.uint8).astype(np.int64)
+        codes = np.where(sizes < _LONG_BYTES[0], sizes, 10 + np.searchsorted(_LONG_BYTES[:-1], sizes))
         extended, remote, fd = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD))
         data = np.frombuffer(self._data, dtype=np.uint64)
         return CanFrames(
@@ -153,8 +162,8 @@ class _Log:
             (stamps - stamps[0]) * 1e6,
             identifiers,
             extended,
-            sizes,
-            np.where(fd, 0, written_bits(identifiers, extended, remote, np.minimum(sizes, _CLASSICAL_BYTES), data)),
+            np.where(fd, sizes, np.minimum(sizes, _CLASSICAL_BYTES)),
+            np.where(fd, 0, written_bits(identifiers, extended, remote, codes, data)),
             fd,
             int(np.count_nonzero(remote)),
             self._errors,
@@ -174,7 +183,8 @@ def written_bits(
     Parameters
     ----------
     identifiers, extended, remote, sizes
-        Of n frames: identifier, whether it has 29 bits, whether it asks for data, and the length code [bytes].
+        Of n frames: identifier, whether it has 29 bits, whether it asks for data, and the length code, 0..15; those
+        above 8 have 8 bytes.
     data
         Up to 8 bytes, the first one highest.
 
@@ -228,7 +238,8 @@ def _columns(
     else:
         head = [*same(0), *of(identifiers, 11), *same(is_remote, 0, 0)]
     length = same(*(size >> place & 1 for place in (3, 2, 1, 0)))
-    field = [] if is_remote else of(data, 8 * size, above=64 - 8 * size)
+    data_bits = 0 if is_remote else 8 * min(size, _CLASSICAL_BYTES)
+    field = of(data, data_bits, above=64 - data_bits)
     return [*head, *length, *field]
 
 

@@ -1,6 +1,7 @@
 """EtherCAT frames of a capture: their stamps, datagrams and working counters, as arrays."""
 
 from pathlib import Path
+from struct import Struct
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy.typing as npt
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings.capture import CapturedPackets, CaptureNotes, Numbers, interned, packets
+from busplan.recordings.words import counted
 
 _TYPE: Final = 0x88A4
 _VLAN: Final = (0x8100, 0x88A8)
@@ -26,6 +28,12 @@ COMMANDS: Final = {
 _FIELDS: Final = 7
 """Bytes that say what a datagram is: command + 1, logical address, size."""
 _HEADER_BYTES: Final = 12
+_APRD, _FPRD, _BRD, _BWR = 1, 4, 7, 8
+_PORT_TIMES: Final = range(0x0900, 0x0910)
+"""Registers of the receive times of ports 0 to 3, of 4 bytes each (ETG.1000.4, distributed clocks)."""
+_PORTS: Final = 4
+_HEAD: Final = Struct("<BBHHH")
+"""Command, index, address of the device, register, and size with its flags."""
 
 
 class Datagram(NamedTuple):
@@ -40,6 +48,15 @@ class Datagram(NamedTuple):
     def is_process_data(self) -> bool:
         """Whether it is addressed to the process image."""
         return self.command in LOGICAL
+
+
+class Latch(NamedTuple):
+    """A broadcast write that every device stamps at its ports, and the times that were read behind it."""
+
+    devices: int
+    """Devices that the write passed: each adds 1 to its address."""
+    ports_ns: dict[tuple[int, int], dict[int, int]]
+    """Time of each port by its number, by command and address of the read; modulo 2^32 [ns]."""
 
 
 class EthercatFrames(NamedTuple):
@@ -60,6 +77,10 @@ class EthercatFrames(NamedTuple):
     """CapturedPackets that are no EtherCAT frame of datagrams."""
     cut: int
     """EtherCAT frames that are not whole."""
+    latches: tuple[Latch, ...]
+    """Those whose port times were read."""
+    unlatched: int
+    """Reads of port times without a broadcast write before them."""
 
 
 def read_ethercat(path: Path, *, progress: Progress) -> EthercatFrames:
@@ -93,7 +114,8 @@ class _Reader:
         self._layout_of_key: list[int] = []
         self._counters: dict[bytes, int] = {}
         self._masters: dict[int, int] = {}
-        self._others = self._cut = 0
+        self._others = self._cut = self._unlatched = 0
+        self._latches: list[Latch] = []
 
     def read(self, piece: CapturedPackets) -> None:
         """Take a piece in."""
@@ -112,8 +134,11 @@ class _Reader:
         if not fits.any():
             return
         starts, at, ends, times = piece.starts[fits], at[fits] + 4, ends[fits], piece.times_ns[fits]
-        whole, key_rows, counter_rows = _datagrams(content, at, ends)
+        whole, key_rows, counter_rows, clocks = _datagrams(content, at, ends)
         self._cut += int(np.count_nonzero(~whole))
+        for frame, header in sorted(clocks):
+            if whole[frame] and content[starts[frame] + 6] & _DEVICES_BIT:
+                self._port_times(content[header:])
         starts, times, key_rows, counter_rows = starts[whole], times[whole], key_rows[whole], counter_rows[whole]
         if not len(starts):
             return
@@ -129,6 +154,26 @@ class _Reader:
             address = address << 8 | content[starts + 6 + byte]
         for value, count in zip(*np.unique(address, return_counts=True), strict=True):
             self._masters[int(value)] = self._masters.get(int(value), 0) + int(count)
+
+    def _port_times(self, datagram: npt.NDArray[np.uint8]) -> None:
+        """Take in a returned datagram on the receive times of ports."""
+        command, _, address, register, size = _HEAD.unpack(datagram[: _HEAD.size].tobytes())
+        size &= 0x7FF
+        if command == _BWR:
+            if register == _PORT_TIMES.start:
+                self._latches.append(Latch(address, {}))
+            return
+        content = datagram[10 : 12 + size].tobytes()
+        if command not in (_APRD, _FPRD, _BRD) or content[size:] != b"\x01\0":
+            return
+        if not self._latches:
+            self._unlatched += 1
+            return
+        times_ns = self._latches[-1].ports_ns.setdefault((command, address), {})
+        for port in range(_PORTS):
+            at = _PORT_TIMES[4 * port] - register
+            if 0 <= at <= size - 4:
+                times_ns[port] = int.from_bytes(content[at : at + 4], "little")
 
     def _new_key(self, key: bytes) -> None:
         """Number the datagrams without their indexes."""
@@ -151,7 +196,9 @@ class _Reader:
                 "without it, and record again"
             )
         if len(self._masters) > 1:
-            named = ", ".join(f"{_address(value)} ({count:,} frames)" for value, count in self._masters.items())
+            named = ", ".join(
+                f"{_address(value)} ({counted(count, 'frame')})" for value, count in self._masters.items()
+            )
             raise BusplanError(
                 f"{path}: has frames of {len(self._masters)} masters: {named}; keep the frames of one, as in Wireshark "
                 "with the filter eth.src"
@@ -159,7 +206,19 @@ class _Reader:
         times, returned, keys, counters = (np.concatenate(part) for part in zip(*self._parts, strict=True))
         layouts = tuple(map(_datagrams_of, self._layouts))
         layout = np.array(self._layout_of_key, dtype=np.int64)[keys]
-        return EthercatFrames(times, returned, layout, keys, counters, layouts, notes, self._others, self._cut)
+        return EthercatFrames(
+            times,
+            returned,
+            layout,
+            keys,
+            counters,
+            layouts,
+            notes,
+            self._others,
+            self._cut,
+            tuple(latch for latch in self._latches if latch.ports_ns),
+            self._unlatched,
+        )
 
 
 def _word(content: npt.NDArray[np.uint8], at: Numbers) -> Numbers:
@@ -168,11 +227,15 @@ def _word(content: npt.NDArray[np.uint8], at: Numbers) -> Numbers:
 
 def _datagrams(
     content: npt.NDArray[np.uint8], at: Numbers, ends: Numbers
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.uint8], npt.NDArray[np.uint8]]:
-    """Whether each frame is whole; index, command, address and size of its datagrams, and their working counters."""
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.uint8], npt.NDArray[np.uint8], list[tuple[int, int]]]:
+    """Whether each frame is whole; index, command, address and size of its datagrams, and their working counters.
+
+    The last are frame and place of each datagram on the receive times of ports.
+    """
     whole, walking = np.ones(len(at), dtype=np.bool_), np.ones(len(at), dtype=np.bool_)
     last = len(content) - 16
     keys, counters = [], []
+    clocks: list[tuple[int, int]] = []
     while walking.any():
         header = np.minimum(at, last)
         command = content[header]
@@ -181,6 +244,9 @@ def _datagrams(
         fits = walking & (counter_at + 2 <= ends)
         whole &= fits | ~walking
         is_logical = fits & np.isin(command, tuple(LOGICAL))
+        is_clock = fits & ~is_logical & (content[header + 5] == _PORT_TIMES.start >> 8)
+        is_clock &= content[header + 4] < len(_PORT_TIMES)
+        clocks += [(int(frame), int(header[frame])) for frame in np.flatnonzero(is_clock)]
         key = np.zeros((len(at), _FIELDS + 1), dtype=np.uint8)
         key[:, 0] = content[header + 1]
         key[:, 1] = command + 1
@@ -194,7 +260,7 @@ def _datagrams(
         counters.append(counter)
         walking = fits & (content[header + 7] & 0x80 != 0)
         at = at + size + _HEADER_BYTES
-    return whole, np.concatenate(keys, axis=1), np.concatenate(counters, axis=1)
+    return whole, np.concatenate(keys, axis=1), np.concatenate(counters, axis=1), clocks
 
 
 def _datagrams_of(layout: bytes) -> tuple[Datagram, ...]:

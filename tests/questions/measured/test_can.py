@@ -167,8 +167,8 @@ def test_errors_remote_frames_and_can_fd_are_said(tmp_path: Path) -> None:
     fd = "(1700000000.000003) can0 124##1" + "AA" * 16 + "\n"
     answer = of_log(more + fd + candump(LOGGED), tmp_path)
     assert "1 frame of CAN FD: in no load, for the plan has none." in answer.remarks
-    assert "1 remote frame: their length code is shown as data." in answer.remarks
-    assert "1 error frame: their bits are in no load." in answer.remarks
+    assert "1 remote frame: the length code is shown as data." in answer.remarks
+    assert "1 error frame: in no load." in answer.remarks
 
 
 def test_frames_of_can_fd_are_in_the_load_with_the_most_stuff_bits(tmp_path: Path) -> None:
@@ -187,6 +187,36 @@ def test_stuffing_is_that_of_classical_frames(tmp_path: Path) -> None:
     alone, mixed = (of_log(candump(LOGGED) + more, tmp_path, plan="can-fd-arm-7") for more in ("", fd))
     stuffing = [figure(answer, "stuff bits").recorded for answer in (alone, mixed)]
     assert stuffing[0] == pytest.approx(stuffing[1], rel=1e-3)
+
+
+def test_a_long_length_code_of_a_classical_frame_is_one_of_8_bytes(tmp_path: Path) -> None:
+    head = "date Sam Sep 30 15:06:13.191 2017\nbase hex  timestamps absolute\ninternal events logged\n"
+    each = [f"{number}.000000 1  7F0  Tx   d {code} 00 11 22 33 44 55 66 77\n" for number, code in enumerate("8AF")]
+    (tmp_path / "bus.asc").write_text(head + "".join(each))
+    log = read_can(tmp_path / "bus.asc", progress=lambda _done, _total: None)
+    assert log.sizes.tolist() == [8, 8, 8]
+    assert not log.is_fd.any()
+    # Counted one by one, each with the other code in its length field and CRC.
+    words = [f"{0x7F0:012b}000{code:04b}{0x0011223344556677:064b}" for code in (8, 10, 15)]
+    for word, bits in zip(words, log.bits, strict=True):
+        crc = 0
+        for bit in word:
+            crc = (crc << 1 & 0x7FFF) ^ (0x4599 if (crc >> 14) != int(bit) else 0)
+        sent = ""
+        for bit in f"{word}{crc:015b}":
+            sent += bit
+            if len(sent) > 4 and len(set(sent[-5:])) == 1:
+                sent += str(1 - int(bit))
+        assert bits == len(sent) + 13
+
+
+def test_a_load_without_its_can_fd_frames_is_not_judged(tmp_path: Path) -> None:
+    fd = "".join(f"(17000000{second}.000000) can0 080##1{'5A' * 64}\n" for second in range(10, 20))
+    answer = of_log(fd, tmp_path)
+    assert not [found for found in answer.figures if found.quantity.startswith("load")]
+    mixed = of_log(candump(LOGGED) + fd, tmp_path)
+    assert figure(mixed, "load ").within is None
+    assert figure(mixed, "load ").note.endswith("without frames of CAN FD")
 
 
 def test_a_damaged_log_says_where(tmp_path: Path) -> None:

@@ -16,7 +16,18 @@ import busplan
 from busplan.buses.recorded import RecordedFigure
 from busplan.errors import BusplanError
 from busplan.questions.measured import MeasuredAnswer
-from tests.oracles.ethercat_recording import FPRD, FRMW, LRW, Machine, ethernet, pcapng, simulated
+from tests.oracles.ethercat_recording import (
+    APRD,
+    FPRD,
+    FRMW,
+    LRW,
+    Machine,
+    ethernet,
+    pcapng,
+    register,
+    simulated,
+    start_up,
+)
 
 if TYPE_CHECKING:
     from subprocess import CompletedProcess
@@ -199,6 +210,68 @@ def test_the_time_of_a_byte_is_found_from_frames_of_several_sizes(tmp_path: Path
     assert found.planned == pytest.approx(0.0835, abs=0.0002)
     assert any("no frame of process data" in remark for remark in answer.remarks)
     assert answer.edits == {}
+
+
+HOPS_NS = (700, 690, 820)
+CLOCKS_NS = (2**32 - 1000, 5, 77_000, 2**31 + 4)
+"""Of the first device wraps while the frame is behind it."""
+
+
+@pytest.mark.parametrize(("read", "width", "port"), [(FPRD, 16, 1), (APRD, 16, 3), (FPRD, 4, 1)])
+def test_port_times_say_the_delay_of_each_device_of_a_line(tmp_path: Path, read: int, width: int, port: int) -> None:
+    machine = Machine(host_spread_us=0.001, hop_us=0.7367)
+    started = start_up(HOPS_NS, clocks_ns=CLOCKS_NS, ports=port, read=read, width=width)
+    answer = of_packets(started + simulated(machine, 100), tmp_path)
+    *delays, mean = (found for found in answer.figures if "delay of device" in found.quantity)
+    assert [found.recorded for found in delays] == [0.7, 0.69, 0.82]
+    assert [found.quantity for found in delays] == [f"delay of device {number}" for number in (2, 3, 4)]
+    assert [found.planned for found in delays] == pytest.approx([0.698] * 3, abs=0.001)
+    assert (mean.quantity, mean.within) == ("mean delay of devices 2 to 4", True)
+    assert mean.recorded == pytest.approx(0.736667)
+    assert answer.edits["node.delay_us"] == pytest.approx(0.736667)
+    # The master's time is what the measured delays leave.
+    assert answer.edits["bus.master_us"] == pytest.approx(30, abs=0.01)
+    exact = busplan.load_profile(PLAN, changes={"node.delay_us": 0.6, "node.cable_m": 10})
+    beside = of_packets(started + simulated(machine, 100), tmp_path, plan=exact)
+    assert figure(beside, "delay of device 2").planned == pytest.approx(0.65)
+    assert "mean delay of devices 2 to 4" in [found.quantity for found in beside.outside]
+    assert beside.edits["node.delay_us"] == pytest.approx(0.736667 - 0.05)
+    # A plan that a recording was written into holds it, though no device has its mean.
+    applied = busplan.load_profile(PLAN, changes={"node.delay_us": answer.edits["node.delay_us"]})
+    again = of_packets(started + simulated(machine, 100), tmp_path, plan=applied)
+    assert figure(again, "mean delay").within is True
+    assert again.edits["bus.master_us"] == pytest.approx(30, abs=0.01)
+    assert answer.notes["node"] == "busplan measured: the mean of 1 event in capture.pcapng of 2023-11-14"
+
+
+def test_what_port_times_do_not_say_is_said(tmp_path: Path) -> None:
+    cycles = simulated(Machine(), 100)
+
+    def remark(started: list[tuple[float, bytes]]) -> str:
+        answer = of_packets(started + cycles, tmp_path)
+        assert "node.delay_us" not in answer.edits
+        return next(remark for remark in answer.remarks if "ort times" in remark)
+
+    whole = start_up(HOPS_NS, clocks_ns=CLOCKS_NS)
+    assert "read 4 times without the broadcast write" in remark(whole[2:])
+    assert "the write passed 4 devices, and those of 3 were read" in remark(whole[:-2])
+    ports = b"".join(value.to_bytes(4, "little") for value in (10, 500, 300, 0))
+    branch = (-500.0, register(FPRD, 0x1001, 0x900, ports, 1, returned=True))
+    assert "times of 3 ports: it is a branch" in remark([*whole, branch])
+    stale = (-500.0, register(FPRD, 0x1003, 0x900, ports[:8] + bytes(8), 1, returned=True))
+    assert "0 devices have a time of port 0 alone" in remark([*whole, stale])
+    no_port = (-500.0, register(FPRD, 0x1001, 0x900, bytes(4) + ports[4:8] + bytes(8), 1, returned=True))
+    assert "no time of its port 0" in remark([*whole, no_port])
+    turned = (-500.0, register(FPRD, 0x1001, 0x900, ports[4:8] + ports[:4] + bytes(8), 1, returned=True))
+    assert "by another port than 0" in remark([*whole, turned])
+    alike = (-500.0, register(FPRD, 0x1001, 0x900, whole[3][1][-18:-2], 1, returned=True))
+    assert "as far from the end as others" in remark([*whole, alike])
+    unread = [(time, frame[:-2] + bytes(2) if len(frame) == 44 else frame) for time, frame in whole]
+    assert not any("ort times" in remark for remark in of_packets(unread + cycles, tmp_path).remarks)
+    # A line of another length than planned is shown, with nothing beside it.
+    fewer = of_packets(start_up(HOPS_NS[1:], clocks_ns=CLOCKS_NS[1:]) + cycles, tmp_path)
+    assert (figure(fewer, "delay of device 2").planned, figure(fewer, "delay of device 2").recorded) == (None, 0.69)
+    assert "node.delay_us" not in fewer.edits
 
 
 def test_stamps_that_were_not_taken_at_the_port_are_said(tmp_path: Path) -> None:

@@ -14,11 +14,12 @@ from busplan.buses.can.equations import bit_us, frame_us
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
-from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, counted, day_of
+from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, Sense, day_of
 from busplan.elementwise import plain
 from busplan.progress import Progress
 from busplan.recordings.can import CanFrames, read_can
 from busplan.recordings.statistics import Floats, PeriodicEvents, expanded, grid, lateness, quantile
+from busplan.recordings.words import counted
 
 _STEP_BACK_US: Final = -1000.0
 """Stamps of neighbours are so far out of order only where a clock was set [us]."""
@@ -157,7 +158,12 @@ class _Seen:
         # The first frame ended with its stamp.
         load, worst, none = (float(us[1:].sum()) / span_us for us in (own_us, worst_us, none_us))
         note = "exact bits of each frame, at the bit rate of the profile"
-        yield RecordedFigure("load", "share", plain(self.cycle.load), load, None, "at most", count, note=note)
+        sense: Sense = "at most"
+        if is_fd.any() and not self.has_fd:
+            if is_fd.all():
+                return
+            note, sense = f"{note}; without frames of CAN FD", "shown"
+        yield RecordedFigure("load", "share", plain(self.cycle.load), load, None, sense, count, note=note)
         yield RecordedFigure("load, worst stuffing of these frames", "share", None, worst, None, "shown", count)
         yield RecordedFigure("load, no stuffing of these frames", "share", None, none, None, "shown", count)
         possible_us = float((worst_us - none_us)[~is_fd].sum())
@@ -302,6 +308,11 @@ class _Seen:
             "not periodic" + (f", {_named(sent)}" if several else ""),
         )
 
+    @property
+    def has_fd(self) -> bool:
+        """Whether the plan has a data phase of CAN FD."""
+        return bool(plain(self.cycle.traffic.data_bit_rate_kbit_s))
+
     def remarks(self) -> Iterator[str]:
         """What the log has beside the figures."""
         frames = self.frames
@@ -313,13 +324,12 @@ class _Seen:
             yield f"In the plan and not in the log: {', '.join(self.unseen)}."
         fd = int(np.count_nonzero(frames.is_fd))
         if fd:
-            has_rate = bool(plain(self.cycle.traffic.data_bit_rate_kbit_s))
-            words = "in the load with the most stuff bits" if has_rate else "in no load, for the plan has none"
+            words = "in the load with the most stuff bits" if self.has_fd else "in no load, for the plan has none"
             yield f"{counted(fd, 'frame')} of CAN FD: {words}."
         if frames.remote:
-            yield f"{counted(frames.remote, 'remote frame')}: their length code is shown as data."
+            yield f"{counted(frames.remote, 'remote frame')}: the length code is shown as data."
         if frames.errors:
-            yield f"{counted(frames.errors, 'error frame')}: their bits are in no load."
+            yield f"{counted(frames.errors, 'error frame')}: in no load."
         yield _NOT_SHOWN
 
 

@@ -19,14 +19,16 @@ from busplan.buses.ethercat.equations import (
     frame_bytes,
     sending_us,
 )
+from busplan.buses.ethercat.ports import line_delays
 from busplan.buses.ethercat.traffic import cables_us, devices_doubts, devices_us, housekeeping_bytes
 from busplan.buses.network import Network
-from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, counted, day_of
+from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings.ethercat import COMMANDS, Datagram, EthercatFrames, read_ethercat
 from busplan.recordings.statistics import Floats, Quantile, expanded, grid, lateness, line, middle, quantile, step
+from busplan.recordings.words import counted
 
 _MASTER: Final = "bus.master_us"
 _JITTER: Final = "bus.master_jitter_us"
@@ -109,6 +111,7 @@ class _Seen:
         self.stamp_us = step(frames.times_ns)
         self.wire_us = np.array([_wire_us(layout) for layout in frames.layouts])[frames.layout]
         self.trips = _trips(frames)
+        self.delays = line_delays(frames.latches, frames.unlatched)
         self.has_period = False
         self.jitter: Quantile | None = None
         self.master: Quantile | None = None
@@ -177,6 +180,7 @@ class _Seen:
             yield from self._layout(cycles)
         yield from self._lost()
         yield from self._byte()
+        yield from self.delays.figures(self.network)
 
     def _period(self) -> Iterator[RecordedFigure]:
         found = grid(self.times_us)
@@ -223,7 +227,7 @@ class _Seen:
         yield RecordedFigure("round trip, median", "us", None, typical.value, None, "shown", count)
         doubt = expanded(*plan_doubts, trip.uncertainty or 0.0, stamps_us)
         yield RecordedFigure("round trip", "us", planned_us, trip.value, doubt, "at most", count)
-        host_us = cycles.trips_us - cycles.wire_us - way_us - bias_us
+        host_us = cycles.trips_us - cycles.wire_us - way_us - self.delays.more_us(self.network) - bias_us
         self.master = quantile(host_us, self.share)
         yield RecordedFigure(
             "master's time",
@@ -323,12 +327,13 @@ class _Seen:
             )
         if self.master is not None and self.master.value < 0:
             yield "The machine is faster than wire and devices of the profile, which has more of them than it."
+        yield from self.delays.remarks
         yield f"Stamps have steps of {self.stamp_us:g} us."
         yield _NOT_SHOWN
 
     def edits(self) -> dict[str, object]:
         """New value of each key that was measured; None removes one."""
-        edits: dict[str, Any] = {}
+        edits: dict[str, Any] = {**self.delays.edits(self.network)}
         if self.master is not None and self.master.value > 0:
             edits[_MASTER] = round(self.master.value, 3)
             edits["bus.master_grade"] = "measured"

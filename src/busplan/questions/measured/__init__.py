@@ -57,7 +57,8 @@ class MeasuredAnswer(Answer):
         """The comment that `--apply` writes above each section: how, how many, from which file, of which day."""
         from busplan.questions.measured.report import provenance
 
-        return {key.rpartition(".")[0]: provenance(self) for key in self.edits}
+        sections = dict.fromkeys(key.rpartition(".")[0] for key in self.edits)
+        return {section: provenance(self, section) for section in sections}
 
     def report(self, *, applied_to: str | None = None) -> Report:
         """The answer in blocks.

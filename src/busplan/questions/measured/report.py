@@ -46,10 +46,14 @@ _SMALL_US: Final = 1.0
 """A time below it has more decimals."""
 
 
-def provenance(answer: MeasuredAnswer) -> str:
-    """Origin of measured values, as a one-line comment for the profile."""
-    count = max(figure.events for figure in answer.figures)
-    share = "the worst" if answer.quantile == 1 else f"{100 * answer.quantile:g} %"
+def provenance(answer: MeasuredAnswer, section: str) -> str:
+    """Origin of the measured values of a section, as a one-line comment for the profile."""
+    own = [figure for figure in answer.figures if figure.key.startswith(f"{section}.")] or answer.figures
+    if all(figure.is_mean for figure in own):
+        share = "the mean"
+    else:
+        share = "the worst" if answer.quantile == 1 else f"{100 * answer.quantile:g} %"
+    count = max(figure.events for figure in own)
     day = f" of {answer.day}" if answer.day else ""
     return f"busplan measured: {share} of {plural(count, 'event')} in {PurePath(answer.source).name}{day}"
 
@@ -116,7 +120,7 @@ def _value(figure: RecordedFigure, name: str) -> ShownValue:
 
 def _record(figure: RecordedFigure) -> Record:
     fields = figure._asdict()
-    key, note = fields.pop("key"), fields.pop("note")
+    key, note, _ = fields.pop("key"), fields.pop("note"), fields.pop("is_mean")
     return {**fields, "residual": figure.residual, "within": figure.within, "key": key or None, "note": note or None}
 
 
