@@ -83,15 +83,33 @@ def with_unchecked(section: _Section, key: str, value: object) -> _Section:
     value
         Anything that computes like a number: an array, or a traced number.
     """
-    name, _, rest = key.partition(".")
-    inner = getattr(section, name)
-    new = value
-    if isinstance(inner, tuple) and rest:
-        own, _, rest = rest.partition(".")
-        new = tuple(with_unchecked(table, rest, value) if table.name == own else table for table in inner)
-    elif rest:
-        new = with_unchecked(inner, rest, value)
-    return section.model_copy(update={name: new})
+    return with_all_unchecked(section, {key: value})
+
+
+def with_all_unchecked(section: _Section, values: Mapping[str, object]) -> _Section:
+    """Return a copy with several keys replaced, unvalidated: values by dotted key, as `with_unchecked` takes it."""
+    new: dict[str, Any] = {}
+    for name, below in _by_first_part(values).items():
+        inner = getattr(section, name)
+        if "" in below:
+            new[name] = below[""]
+        elif isinstance(inner, tuple):
+            of_table = _by_first_part(below)
+            new[name] = tuple(
+                with_all_unchecked(table, of_table[table.name]) if table.name in of_table else table for table in inner
+            )
+        else:
+            new[name] = with_all_unchecked(inner, below)
+    return section.model_copy(update=new)
+
+
+def _by_first_part(values: Mapping[str, object]) -> dict[str, dict[str, object]]:
+    """Values by the rest of their keys, which is empty at the end, by the first part."""
+    parts: dict[str, dict[str, object]] = {}
+    for key, value in values.items():
+        name, _, rest = key.partition(".")
+        parts.setdefault(name, {})[rest] = value
+    return parts
 
 
 def value_at(section: Section, key: str) -> Any:
@@ -106,8 +124,21 @@ def value_at(section: Section, key: str) -> Any:
     """
     value: Any = section
     for part in key.split("."):
-        if isinstance(value, tuple):
-            value = next((table for table in value if getattr(table, "name", None) == part), None)
-        else:
-            value = getattr(value, part, None)
+        value = _by_name(value).get(part) if isinstance(value, tuple) else getattr(value, part, None)
     return value
+
+
+_KEPT: Final = 8
+"""Most tuples of tables whose names are kept."""
+_known: Final[dict[int, tuple[tuple[Any, ...], dict[str, Any]]]] = {}
+"""Tables of a tuple by name, with the tuple, which so keeps its identity: there may be thousands to look up in."""
+
+
+def _by_name(tables: tuple[Any, ...]) -> dict[str, Any]:
+    known = _known.get(id(tables))
+    if known is None:
+        if len(_known) >= _KEPT:
+            _known.clear()
+        by_name = {table.name: table for table in reversed(tables) if hasattr(table, "name")}
+        known = _known[id(tables)] = tables, by_name
+    return known[1]

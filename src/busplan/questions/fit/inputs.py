@@ -9,7 +9,7 @@ from busplan.elementwise import GivenTable, Traced
 from busplan.profile.kinds import cycle_keys, models_of
 from busplan.profile.toml import comment_grade
 from busplan.questions.fit.network import bus_of
-from busplan.sections.base import value_at, with_unchecked
+from busplan.sections.base import value_at, with_all_unchecked
 from busplan.sections.execution import TableExecution
 from busplan.sections.profile import Profile
 from busplan.sourced import SYMBOLS, Input
@@ -108,20 +108,20 @@ def traced_profile(profile: Profile) -> Profile:
 
     So are words that choose between numbers.
     """
-    copy = profile
+    values: dict[str, object] = {}
     for key in cycle_keys(profile):
         value = value_at(profile, key)
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if is_number or (isinstance(value, str) and _chooses(profile, key)):
-            copy = with_unchecked(copy, key, traced(profile, key))
+            values[key] = traced(profile, key)
     for alike in profile.alike_nodes:
         execution, key = alike.node.execution, alike.node_key(_TABLE)
         if isinstance(execution, TableExecution):
             table = GivenTable(execution.time_us)
             symbol = f"table,{alike.name}" if alike.name else "table"
             table.given = given(profile, key)._replace(symbol=symbol, value=f"{len(execution.time_us)} points")
-            copy = with_unchecked(copy, key, table)
-    return copy
+            values[key] = table
+    return with_all_unchecked(profile, values)
 
 
 def _chooses(profile: Profile, key: str) -> bool:
