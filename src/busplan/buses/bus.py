@@ -31,6 +31,7 @@ from busplan.buses.parts import (
 )
 from busplan.buses.recorded import Recorded
 from busplan.buses.rule import Rule
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.sourced import Sourced
@@ -120,6 +121,10 @@ class Bus(ABC):
     def setpoints_every(self, network: Network) -> tuple[str, int]:  # noqa: ARG002 - a kind may have a single rate
         """Key and number of cycles from a set-point of the fastest axes to the next."""
         return "", 1
+
+    def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
+        """Say how large a network is, in plain numbers: each number with its noun."""
+        return (int(plain(network.nodes)), "node"), (int(plain(network.axes)), "axis")
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - most charge all alike
         """Say whose way on the wire the times of each node count."""

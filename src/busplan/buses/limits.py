@@ -181,6 +181,8 @@ def _of_a_cycle(us: Number, group: Group) -> Number:
 
 def _ends_us(network: Network) -> tuple[Number, Number]:
     """Execution time of the slowest nodes in a cycle, less and plus its expanded uncertainty [us]."""
+    if not network.groups:
+        return 0.0, 0.0
     least_us = (_of_a_cycle(busy_us(group) - COVERAGE * busy_doubt_us(group), group) for group in network.groups)
     return reduce(larger, least_us), reduce(larger, (_of_a_cycle(_shown_us(group), group) for group in network.groups))
 

@@ -35,7 +35,7 @@ class KeyValue(NamedTuple):
 
 
 def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
-    """List all keys of a profile, including those with default values.
+    """List all keys of a profile, including those with default values; none of a cycle where there is none.
 
     Parameters
     ----------
@@ -55,7 +55,8 @@ def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
     (KeyValue(value=2, source='file'), 'default')
     """
     said = dict(flat(profile.model_dump(exclude_unset=True)))
-    return {key: KeyValue(value, "file" if key in said else "default") for key, value in flat(profile.model_dump())}
+    whole = profile.model_dump(exclude=None if profile.has_cycle else {"cycle"})
+    return {key: KeyValue(value, "file" if key in said else "default") for key, value in flat(whole)}
 
 
 def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:

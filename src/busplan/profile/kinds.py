@@ -20,6 +20,8 @@ _OF_GROUP: Final = ("name", "execution.kind")
 """Keys of a group that say how the others are read."""
 _CHANGE_NO_FIGURE: Final = ("bus.kind", "bus.timing_model", "node.execution.kind")
 """Keys that say how the others are read, or what is shown first."""
+_OF_CYCLE: Final = ("cycle.", "node.", "payload.", "bus.nodes", *_OF_VERDICT)
+"""Beginnings of keys that no figure of a network without a cycle depends on."""
 
 
 def kind_of(data: Mapping[str, object]) -> str | None:
@@ -84,7 +86,9 @@ def cycle_keys(profile: Profile) -> tuple[str, ...]:
     """Keys of a profile that its cycle, or its verdict, may depend on."""
     model = profile_model(profile.bus.kind)
     several = [name for name, field in model.model_fields.items() if _are_several(field.annotation)]
-    return _cycle_keys(model, tuple((name, tuple(table.name for table in getattr(profile, name))) for name in several))
+    tables = tuple((name, tuple(table.name for table in getattr(profile, name))) for name in several)
+    keys = _cycle_keys(model, tables)
+    return keys if profile.has_cycle else tuple(key for key in keys if not key.startswith(_OF_CYCLE))
 
 
 @cache

@@ -17,7 +17,6 @@ from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, profile_mode
 from busplan.profile.positions import KeyPath
 from busplan.profile.write import value_text
 from busplan.sections.base import MISSING, Problem
-from busplan.sections.profile import nodes_problems
 
 _TAG: Final = "kind"
 """The key that selects the member of a union of tables."""
@@ -93,10 +92,10 @@ def findings(error: ValidationError | None, data: dict[str, Any]) -> Iterator[Ke
 def _of_nodes(data: dict[str, Any]) -> Iterator[KeyFinding]:
     """Problems of how a profile says its nodes: the model looks for them only where there are no others."""
     bus, model = data.get("bus"), profile_model(kind_of(data))
-    said = {"node", "payload", "group"}.intersection(data)
+    said = {name for name in data if name in model.model_fields}
     if not isinstance(bus, dict) or "nodes" in bus or kind_of(data) is None:
         said.add("bus.nodes")  # or nobody can tell
-    for problem in nodes_problems(said):
+    for problem in model.nodes_problems(said):
         if problem.key != "bus.nodes" or (isinstance(bus, dict) and kind_of(data) is not None):
             yield _of_problem(problem, (), model)
 

@@ -28,6 +28,8 @@ SCHEMA_VERSION: Final = 1
 
 CIRCLE_SECTIONS: Final = ("servo", "mechanics", "delivery", "circle", "tolerance")
 """The sections that only a circle test reads; a profile that has any of them asks for it."""
+OF_ALIKE_NODES: Final = ("bus.nodes", "payload", "node")
+"""Keys on the nodes, where all are alike."""
 
 
 def _without_control_characters(allowed: str) -> Callable[[str], str]:
@@ -84,15 +86,36 @@ class Profile(Section):
 
     @property
     def alike_nodes(self) -> tuple[AlikeNodes, ...]:
-        """The nodes, as groups of which each is alike, in the order of the chain."""
+        """The nodes, as groups of which each is alike, in the order of the chain; none of a network without a cycle."""
         if self.group:
             return tuple(AlikeNodes(group.name, group.nodes, group, group) for group in self.group)
-        return (AlikeNodes("", self.bus.nodes, self.node, self.payload),)
+        return (AlikeNodes("", self.bus.nodes, self.node, self.payload),) if self.has_cycle else ()
+
+    @property
+    def has_cycle(self) -> bool:
+        """Whether it has nodes, and so a cycle; a kind of bus may have networks without."""
+        return True
+
+    @classmethod
+    def nodes_problems(cls, said: Collection[str]) -> Iterator[Problem]:
+        """Tell what is wrong with the way a profile says its nodes: all alike, or in groups.
+
+        Parameters
+        ----------
+        said
+            Which sections, and which of the key bus.nodes, it has.
+        """
+        for key in OF_ALIKE_NODES:
+            if "group" in said and key in said:
+                own = ", as group.NAME.nodes" if key == "bus.nodes" else ""
+                yield Problem(f"each [[group]] has its own{own}; remove one of the two", key=key, kind="inconsistent")
+            elif "group" not in said and key not in said:
+                yield Problem(MISSING, key=key, kind="missing-key")
 
     @model_validator(mode="after")
     def _nodes_are_said_once(self) -> Self:
-        said = {"bus.nodes": self.bus.nodes, "node": self.node, "payload": self.payload, "group": self.group or None}
-        problems = list(nodes_problems({key for key, value in said.items() if value is not None}))
+        said = {name for name in self.model_fields_set if getattr(self, name) not in (None, ())}
+        problems = list(self.nodes_problems(said | ({"bus.nodes"} if self.bus.nodes is not None else set())))
         names = [group.name for group in self.group]
         problems += (
             Problem("there is a group of this name", key=f"group.{place}.name", kind="inconsistent")
@@ -129,22 +152,3 @@ def _payloads(alike: AlikeNodes, place: int) -> Iterator[tuple[str, int, str]]:
         key, size = alike.payload.key_of(kind), int(alike.bytes_of(kind))
         yield f"{section}.{key}", size, (f"makes {size} bytes, which " if key.endswith("_per_axis") else "")
 
-
-_OF_ALIKE_NODES: Final = ("bus.nodes", "payload", "node")
-"""Keys on the nodes, where all are alike."""
-
-
-def nodes_problems(said: Collection[str]) -> Iterator[Problem]:
-    """Tell what is wrong with the way a profile says its nodes: all alike, or in groups.
-
-    Parameters
-    ----------
-    said
-        Which of the keys bus.nodes, node, payload and group it has.
-    """
-    for key in _OF_ALIKE_NODES:
-        if "group" in said and key in said:
-            own = ", as group.NAME.nodes" if key == "bus.nodes" else ""
-            yield Problem(f"each [[group]] has its own{own}; remove one of the two", key=key, kind="inconsistent")
-        elif "group" not in said and key not in said:
-            yield Problem(MISSING, key=key, kind="missing-key")

@@ -56,6 +56,8 @@ STRETCHES: Final = (
 class CanCycle(BusCycle):
     """SYNC, the wait for the slowest node, all feedback PDOs, the host, all command PDOs, and the window.
 
+    A network of messages alone has no cycle: then no term takes time, and only loads and response times are there.
+
     All nodes execute at once: feedback waits for the slowest of them, and so does the next SYNC behind the commands.
     Before SYNC, the last feedback and the commands a frame of a lower priority may be on the wire; frames of higher
     priorities go whenever they are queued.
@@ -162,6 +164,8 @@ class CanCycle(BusCycle):
 
     def written(self) -> Iterator[BusEvent | Run]:
         """The cycle node by node, with other messages as late for the commands as they can be."""
+        if not self.traffic.has_cycle:
+            return
         blocking_us, counts = self._own_waits
         blocking = BusEvent("blocking", "cycle_blocking_us", blocking_us, "messages of a lower priority")
         yield Run((blocking,), laid_out=lambda _: self._blocks(blocking, 0, 1))
@@ -188,6 +192,8 @@ class CanCycle(BusCycle):
     def _own(self) -> dict[str, Number]:
         """The terms without those of other messages."""
         keys = ("cycle_sync_us", "cycle_wait_us", "cycle_feedback_us", "cycle_host_us", "cycle_command_us")
+        if not self.traffic.has_cycle:
+            return dict.fromkeys(keys, 0.0)
         return summed((*self._opening, *self._feedback, *self._commands), keys)
 
     @cached_property
@@ -262,12 +268,14 @@ class CanCycle(BusCycle):
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """Growth of the cycle if its nodes take longer: more messages may arrive, too [us]."""
-        if not self._messages:
+        if not self._messages or not self.traffic.has_cycle:
             return extra_us
         return extra_us + self._waits_us(after_us + extra_us) - self._waits_us(after_us)
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The execution time, what two standard uncertainties more change, halved, and the host's own time."""
+        if not self.traffic.has_cycle:
+            return ()
         swing_us = total((self._wait_us(kind, uncertainties=2) - self._wait_us(kind)) / 2 for kind in TRANSACTION_KINDS)
         key = "node.execution" if self.network.is_uniform else "group.execution"
         bus = self.network.profile.bus
@@ -276,6 +284,8 @@ class CanCycle(BusCycle):
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """The host's own time, the slowest execution, and what else is on the bus."""
+        if not self.traffic.has_cycle:
+            return ()
         bus = self.network.profile.bus
         host = () if bus.pipeline_cycles or bus.host_us else (LeftOut("host time", "bus.host_us"),)
         slowest = (
@@ -298,6 +308,8 @@ class CanCycle(BusCycle):
     @cached_property
     def load(self) -> Number:
         """Share of the bus that all messages take, 0..1 [1]."""
+        if not self.traffic.has_cycle:
+            return self._messages_load
         return self._mean_us / self.traffic.period_us + self._messages_load
 
     @property
@@ -322,6 +334,8 @@ class CanCycle(BusCycle):
     def load_period_us(self) -> Number:
         """The shortest period that keeps `limits.max_load`; infinite where the other messages take all of it [us]."""
         left = self.network.profile.limits.max_load - self._messages_load
+        if not self.traffic.has_cycle:
+            return choose(left >= 0, 0.0, inf)
         return choose(left > 0, self._mean_us / larger(left, FIT_ROUNDING), inf)
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
@@ -341,10 +355,10 @@ class CanCycle(BusCycle):
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
-        ends = ((pdos.name, pdos.group) for pdos in self.traffic.pdos)
-        names = ((SYNC, ""), *ends, *((message.name, "") for message in self.traffic.messages))
+        ends = ((SYNC, ""), *((pdos.name, pdos.group) for pdos in self.traffic.pdos)) if self.traffic.has_cycle else ()
+        names = (*ends, *((message.name, "") for message in self.traffic.messages))
         each = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
-        return (*each, BusLatency(LOOP, None, self._loop()))
+        return (*each, *((BusLatency(LOOP, None, self._loop()),) if self.traffic.has_cycle else ()))
 
     def _loop(self) -> dict[str, Number]:
         """Parts of the way from SYNC to the last executed command that rests on it."""

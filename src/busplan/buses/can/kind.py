@@ -105,6 +105,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
 
     def latency_subject(self, network: Network) -> str:
         """Say whose response time it is."""
+        if not network.groups:
+            return ", ".join(("worst case of every message", *self.setup_words(network)))
         return ", ".join((f"worst case of SYNC, of the last PDO of {_all_nodes(network)}", *self.setup_words(network)))
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
@@ -118,7 +120,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         return settings(network)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """A slower host, SYNC with its counter, and identifiers of 29 bits."""
+        """A slower host, SYNC with its counter, and identifiers of 29 bits; of a network with a cycle."""
         bus = network.profile.bus
         counted = "SYNC has its counter already" if bus.sync_counter else ""
         extended = "they have 29 bits already" if bus.identifier_bits > BASE_BITS else ""
@@ -142,6 +144,10 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         with_axes = [group for group in network.groups if plain(group.axes)] or network.groups
         said = min((group.said for group in with_axes), key=lambda nodes: int(plain(nodes.payload.every)))
         return f"group.{said.name}.every" if said.name else "payload.every", int(plain(said.payload.every))
+
+    def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
+        """Nodes and axes; of a network without them its messages."""
+        return super().counted(network) if network.groups else ((len(network.profile.message), "message"),)
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
         """Say what each frame is charged."""

@@ -8,7 +8,7 @@ from typing import Any, Final
 from busplan.buses.can.constants import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.response import TooManyStepsError
-from busplan.buses.can.streams import Stream, collisions, has_format_of, identifiers_twice, last_identifier, streams
+from busplan.buses.can.streams import Stream, collisions, has_format, identifiers_twice, last_identifier, streams
 from busplan.buses.can.traffic import Sent, Traffic, pdos_of, traffic_of, without_times
 from busplan.buses.can.waiting import Messages, messages
 from busplan.buses.limits import NODE_LIMIT
@@ -172,21 +172,25 @@ def _from(first: int, shared: int) -> str:
 
 
 def _collisions(network: Network) -> Number:
-    return _of_identifiers(network, identifiers_twice, words="identifiers that stand twice")
+    def twice(traffic: Traffic) -> Number:
+        number: Number = identifiers_twice(streams(traffic, is_stuffed=True))
+        return number
+
+    return _of_identifiers(network, twice, words="identifiers that stand twice")
 
 
 def _largest_identifier(network: Network) -> Number:
-    def largest(each: Sequence[Stream]) -> Number:
-        # SYNC comes first and has the format of the bus; the section checks messages of the other.
-        last: Number = last_identifier(stream for stream in each if has_format_of(each[0], stream))
+    def largest(traffic: Traffic) -> Number:
+        # The section checks messages of the other format.
+        each = streams(traffic, is_stuffed=True)
+        last: Number = last_identifier(stream for stream in each if has_format(stream, traffic.identifier_bits))
         return last
 
     return _of_identifiers(network, largest, words="the largest identifier")
 
 
-def _of_identifiers(network: Network, function: Callable[[Sequence[Stream]], Number], *, words: str) -> Number:
-    sent = Sent(without_times(traffic_of(network)))
-    return sent.of(lambda traffic: function(streams(traffic, is_stuffed=True)), words=words)
+def _of_identifiers(network: Network, function: Callable[[Traffic], Number], *, words: str) -> Number:
+    return Sent(without_times(traffic_of(network))).of(function, words=words)
 
 
 def _most_identifier(network: Network) -> Number:
@@ -204,7 +208,7 @@ def _largest_pdo(network: Network) -> Number:
 
 def _most_bytes(network: Network) -> int:
     """The most that any PDO may carry [bytes]."""
-    return min(pdos.most_bytes for pdos in traffic_of(network).pdos)
+    return min((pdos.most_bytes for pdos in traffic_of(network).pdos), default=0)
 
 
 def _payload_words(network: Network) -> str:
@@ -216,7 +220,9 @@ def _payload_words(network: Network) -> str:
 
 
 def _kept_from_us(is_broken: Callable[[Network], Number], network: Network) -> float:
-    """The period from which on a limit holds; infinite where none is long enough [us]."""
+    """The period from which on a limit holds; infinite where none is long enough, or messages have no cycle [us]."""
+    if not traffic_of(network).has_cycle:
+        return inf
     broken_us = kept_us = plain(network.period_us)
     while is_broken(network._replace(period_us=kept_us)):
         broken_us, kept_us = kept_us, 2 * kept_us

@@ -1,6 +1,6 @@
 """The keys that only profiles of a CAN bus have, in [bus], [payload], [[group]], [[message]] and [limits]."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
@@ -24,10 +24,19 @@ from busplan.buses.can.constants import (
 from busplan.buses.can.cycle import WORST, TimingModelName
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC
 from busplan.elementwise import Number
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
-from busplan.sections.cycle import BusSection, GroupAxes, GroupName, GroupSection, Limits, NodeSection, PayloadSection
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, MISSING, Count, Problem, Section, TimeUs, refused
+from busplan.sections.cycle import (
+    BusSection,
+    CycleSection,
+    GroupAxes,
+    GroupName,
+    GroupSection,
+    Limits,
+    NodeSection,
+    PayloadSection,
+)
 from busplan.sections.execution import UNKNOWN_SHARE
-from busplan.sections.profile import Profile
+from busplan.sections.profile import CIRCLE_SECTIONS, OF_ALIKE_NODES, Profile
 from busplan.sections.transactions import TransactionKind
 
 Identifier = Annotated[int, Field(ge=0, le=MAX_IDENTIFIER[29])]
@@ -219,10 +228,33 @@ class CanLimits(Limits):
     )
 
 
+_OF_NODES: Final = (*OF_ALIKE_NODES, "group")
+_OF_CYCLE: Final = {
+    "bus": (
+        "sync_identifier",
+        "sync_counter",
+        "pipeline_cycles",
+        "host_us",
+        "host_grade",
+        "host_uncertainty_us",
+    ),
+    "limits": ("reserve", "max_utilisation", "min_spare_nodes", "min_spare_axes"),
+}
+"""Keys of sections that only a network with a cycle has."""
+
+
+def _no_cycle() -> CycleSection:
+    """The cycle of a network of messages alone: it is so long that nothing of it comes twice."""
+    return CycleSection(period_us=MAX_TIME_US)
+
+
 class CanProfile(Profile):
-    """A whole profile: one motion network and its cycle."""
+    """A whole profile: one motion network and its cycle, or a network of messages alone."""
 
     bus: CanBus = Field(description="The bus")
+    cycle: CycleSection = Field(
+        default_factory=_no_cycle, description="The communication cycle; a network of messages alone has none"
+    )
     payload: CanPayload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
     node: NodeSection | None = Field(default=None, description="One distributed node, where nodes are alike")
     group: Annotated[tuple[CanGroup, ...], Field(strict=False)] = Field(
@@ -232,6 +264,40 @@ class CanProfile(Profile):
         default=(), description="Other messages on the bus"
     )
     limits: CanLimits = Field(default_factory=CanLimits, description="What the gate asks for beyond fitting")
+
+    @property
+    def has_cycle(self) -> bool:
+        """Whether it has nodes, and so SYNC and PDOs."""
+        return bool(self.group) or self.node is not None
+
+    @classmethod
+    def nodes_problems(cls, said: Collection[str]) -> Iterator[Problem]:
+        """Tell what is wrong with the way a profile says its nodes: all alike, in groups, or none beside messages."""
+        if "message" in said and not any(key in said for key in _OF_NODES):
+            if "cycle" in said:
+                why = "has no nodes; add bus.nodes, [node] and [payload], or remove it: messages alone have no cycle"
+                yield Problem(why, key="cycle", kind="inconsistent")
+            return
+        yield from super().nodes_problems(said)
+        if "cycle" not in said:
+            yield Problem(MISSING, key="cycle", kind="missing-key")
+
+    @model_validator(mode="after")
+    def _says_nothing_of_a_cycle(self) -> Self:
+        if self.has_cycle:
+            return self
+        keys = [name for name in CIRCLE_SECTIONS if name in self.model_fields_set]
+        keys += (
+            f"{section}.{name}"
+            for section, names in _OF_CYCLE.items()
+            for name in names
+            if name in getattr(self, section).model_fields_set
+        )
+        keys += (f"message.{place}.per_node" for place, message in enumerate(self.message) if message.per_node)
+        if keys:
+            why = "asks for nodes, and a network of messages alone has none; remove it"
+            raise refused(*(Problem(why, key=key, kind="inconsistent") for key in keys))
+        return self
 
     @model_validator(mode="after")
     def _messages_have_names(self) -> Self:
@@ -313,7 +379,8 @@ class CanProfile(Profile):
     def _identifiers(self) -> Iterator[tuple[str, int | None, int]]:
         """Keys of identifiers, each with what it says and the length."""
         bits = self.bus.identifier_bits
-        yield "bus.sync_identifier", self.bus.sync_identifier, bits
+        if self.has_cycle:
+            yield "bus.sync_identifier", self.bus.sync_identifier, bits
         for section, payload in self._payloads():
             yield f"{section}.feedback_identifier", payload.feedback_identifier, bits
             yield f"{section}.command_identifier", payload.command_identifier, bits

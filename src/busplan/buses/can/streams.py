@@ -233,7 +233,9 @@ def _stream(
 
 
 def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
-    """SYNC and all PDOs."""
+    """SYNC and all PDOs; none of messages alone."""
+    if not traffic.has_cycle:
+        return
 
     def sent(name: str, block: int, size: Points, every: Points = 1, **more: Any) -> Stream:
         return _stream(
@@ -312,8 +314,8 @@ def _whole(number: Points) -> Points:
 
 
 def last_identifier(each: Iterable[Stream]) -> Points:
-    """The largest identifier of some streams."""
-    return reduce(larger, (choose(stream.identifiers > 0, stream.last, 0) for stream in each))
+    """The largest identifier of some streams; 0 of none."""
+    return reduce(larger, (choose(stream.identifiers > 0, stream.last, 0) for stream in each), 0)
 
 
 def last_place(each: Iterable[Stream]) -> Points:
@@ -327,14 +329,14 @@ def identifiers_twice(each: Sequence[Stream]) -> Points:
     varied = [stream for stream in each if not isinstance(stream.last, int)]
     twice: Points = sum(shared for *_, shared in collisions(fixed))
     for early, late in chain(combinations(varied, 2), product(varied, fixed)):
-        if has_format_of(early, late):
+        if has_format(early, late.identifier_bits):
             twice = twice + larger(smaller(early.last, late.last) - larger(early.first, late.first) + 1, 0)
     return twice
 
 
-def has_format_of(early: Stream, late: Stream) -> bool:
-    """Whether two streams have identifiers of one length; lengths that vary from point to point are alike."""
-    bits = early.identifier_bits, late.identifier_bits
+def has_format(stream: Stream, identifier_bits: Points) -> bool:
+    """Whether a stream has identifiers of a length; lengths that vary from point to point are alike."""
+    bits = stream.identifier_bits, identifier_bits
     return not all(isinstance(length, int | float) for length in bits) or bits[0] == bits[1]
 
 
@@ -347,6 +349,6 @@ def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, in
         for number, place in enumerate(ordered)
         for behind in ordered[number + 1 : bisect_right(firsts, each[place].last)]
     )
-    for early, late in sorted(pair for pair in pairs if has_format_of(*(each[place] for place in pair))):
+    for early, late in sorted(pair for pair in pairs if has_format(each[pair[0]], each[pair[1]].identifier_bits)):
         first = max(each[early].first, each[late].first)
         yield each[early], each[late], first, min(each[early].last, each[late].last) - first + 1

@@ -16,6 +16,7 @@ from busplan.buses.can.constants import (
 from busplan.buses.can.equations import share_bytes
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, choose, is_off, larger, pointwise
+from busplan.sections.base import MAX_TIME_US
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 FOLLOWS: Final = -1
@@ -118,6 +119,11 @@ class Traffic(NamedTuple):
     def is_plain(self) -> bool:
         """Whether all its numbers are plain."""
         return self.messages.is_plain and all(isinstance(number, int | float) for number in self._own())
+
+    @property
+    def has_cycle(self) -> bool:
+        """Whether it has SYNC and PDOs; messages alone have none."""
+        return bool(self.pdos)
 
     @property
     def has_rates(self) -> bool:
@@ -301,11 +307,22 @@ def host_us(bus: Any) -> Number:
 
 def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes: Number) -> Traffic:
     bus = profile.bus
-    return Traffic(
-        period_us=period_us,
+    alone = Traffic(
+        period_us=MAX_TIME_US,
         bit_rate_kbit_s=bus.bit_rate_kbit_s,
         data_bit_rate_kbit_s=0.0 if bus.data_bit_rate_kbit_s is None else bus.data_bit_rate_kbit_s,
         identifier_bits=bus.identifier_bits,
+        sync_identifier=0,
+        sync_bytes=0,
+        read_us=0.0,
+        host_us=0.0,
+        pdos=(),
+        messages=_messages(profile.message, bus, nodes),
+    )
+    if not senders:
+        return alone
+    return alone._replace(
+        period_us=period_us,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
         read_us=reduce(larger, (sender.read_us for sender in senders)),
@@ -315,7 +332,6 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes
             for number, kind in enumerate(TRANSACTION_KINDS)
             for place, sender in enumerate(senders)
         ),
-        messages=_messages(profile.message, bus, nodes),
     )
 
 

@@ -258,9 +258,11 @@ class Messages:
         else:
             self._ranked = sorted(each, key=lambda stream: stream.block)
         self._ranks = [stream.block for stream in self._ranked]
-        period_us, late_us = traffic.period_us, queued_us(each, traffic, is_stuffed=is_stuffed)
-        places = (((), 0.0), ((_FEEDBACK, _COMMAND), late_us[_FEEDBACK]), ((_COMMAND,), late_us[_COMMAND]))
-        self._starts = [self._start(late, us, period_us) for late, us in places]
+        places: list[tuple[tuple[str, ...], Points]] = [((), 0.0)]
+        if traffic.has_cycle:
+            late_us = queued_us(each, traffic, is_stuffed=is_stuffed)
+            places += ((_FEEDBACK, _COMMAND), late_us[_FEEDBACK]), ((_COMMAND,), late_us[_COMMAND])
+        self._starts = [self._start(late, us, traffic.period_us) for late, us in places]
         if self._columns is None:
             self._loads = _sums(sender.load for sender in self._starts[0].senders)
             frames_us: Iterator[Points] = (stream.frame_us for stream in reversed(self._ranked))

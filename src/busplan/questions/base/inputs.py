@@ -64,6 +64,29 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     return override(loaded, new)
 
 
+def with_cycle(profile: Profile, *, question: str, instead: str = "") -> Profile:
+    """The profile, where it has a cycle.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    question
+        What asks for a cycle, in words.
+    instead
+        Advice; by default the commands that judge messages.
+
+    Raises
+    ------
+    BusplanError
+        A network of messages alone.
+    """
+    if profile.has_cycle:
+        return profile
+    advice = instead or "capacity, latency, check, plan, sweep and diff judge messages"
+    raise BusplanError(f"{profile.name}: messages alone have no cycle, and {question} asks for one; {advice}")
+
+
 def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str, object]:
     """New values by dotted key, converted from NumPy.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
+from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several, with_cycle
 from busplan.questions.capacity.verdict import Verdict, verdicts
 from busplan.questions.fit import figures as analysis
 from busplan.questions.fit.certainty import FITS, VerdictWord
@@ -136,6 +136,8 @@ def capacity(
     'idle'
     """
     network = load_profile(profile)
+    if sensitivity:
+        with_cycle(network, question="the effect of small changes on its margin")
     result = analysis.capacity(
         network,
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),

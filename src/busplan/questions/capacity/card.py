@@ -44,12 +44,15 @@ def card(verdict: Verdict, profile: Profile, *, is_brief: bool = False) -> Card:
         Whether lines that are the same for every period are left out.
     """
     figures, bus = verdict.deciding, bus_of(profile)
-    at_period = override(profile, {PERIOD: verdict.period_us})
-    counts = (plural(figures.nodes, "node"), plural(figures.axes, "axis"), period(verdict.period_us))
+    counts = [plural(number, noun) for number, noun in bus.counted(network_of(profile))]
+    at_period = profile
+    if profile.has_cycle:
+        at_period = override(profile, {PERIOD: verdict.period_us})
+        counts.append(period(verdict.period_us))
     subject = Sentence((Code(profile.name), f"  {bus.title}, {', '.join(counts)}"))
     lines = [
         *_reasons(verdict, at_period),
-        *_times(figures, at_period),
+        *(_times(figures, at_period) if profile.has_cycle else ()),
         *_bus_lines(at_period),
         *_room(verdict, at_period),
     ]
@@ -66,7 +69,9 @@ def _verdict(verdict: Verdict) -> Words:
     return Words(f"{word}{but}", state)
 
 
-def _gauge(figures: CapacityFigures, profile: Profile) -> Gauge:
+def _gauge(figures: CapacityFigures, profile: Profile) -> Gauge | None:
+    if not profile.has_cycle:
+        return _load_gauge(figures, profile)
     available_us, whole_us = figures.available_us, max(figures.period_us, _used_us(figures))
     return Gauge(
         used=_used_us(figures) / whole_us,
@@ -75,6 +80,16 @@ def _gauge(figures: CapacityFigures, profile: Profile) -> Gauge:
         most=available_us / whole_us,
         state="passes" if figures.verdict == FITS else "fails",
     )
+
+
+def _load_gauge(figures: CapacityFigures, profile: Profile) -> Gauge | None:
+    """The load of a bus without a cycle; None of a kind without a limit of it."""
+    limit, network = bus_of(profile).limit("load"), network_of(profile)
+    if limit is None:
+        return None
+    load, most = plain(limit.value(network)), plain(limit.most(network))
+    whole = max(1.0, load)
+    return Gauge(load / whole, 0.0, most / whole, 1 / whole, "passes" if figures.verdict == FITS else "fails")
 
 
 def _used_us(figures: CapacityFigures) -> float:
@@ -144,7 +159,7 @@ def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
         )
         yield "room for", Sentence((listed([*rooms], "or"),))
         return
-    if verdict.all_well:
+    if verdict.all_well and profile.has_cycle:
         yield "room for", Sentence(("no more nodes",))
     change, label = verdict.change, "one more" if verdict.all_well else "cure"
     if change is None:
@@ -154,7 +169,8 @@ def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     meanings = change_meanings(bus_of(profile))
     settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
     after = change.figures
-    left = f", which leaves {_us(after.margin_corrected_us or 0.0, after.uncertainty_us)} us"
+    has_margin = after.margin_corrected_us is not None
+    left = f", which leaves {_us(after.margin_corrected_us or 0.0, after.uncertainty_us)} us" if has_margin else ""
     untested = "; this changes the circle" if change.circle_is_untested else ""
     yield label, joined(settings, Sentence((f"{left}{untested}",)), by="")
 
@@ -162,11 +178,10 @@ def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
 def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     """The largest part, and what the verdict assumes, leaves out, or rests on without a test."""
     figures, bus = verdict.deciding, bus_of(profile)
-    largest: Term = max(figures.terms, key=lambda term: plain(term.us))
-    yield (
-        "largest part",
-        Sentence((f"{bus.figures.term_label(largest.name)}, {_us(plain(largest.us), figures.uncertainty_us)} us",)),
-    )
+    if figures.terms:
+        largest: Term = max(figures.terms, key=lambda term: plain(term.us))
+        us = _us(plain(largest.us), figures.uncertainty_us)
+        yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
     for assumption in heavy_assumptions(figures, profile):
         them = "it" if len(assumption.keys) == 1 else "them"
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
@@ -179,7 +194,7 @@ def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
             None,
             (
                 ", ".join(f"{part} ({by})" for part, by in tested.parts.items()),
-                f"not tested: {', '.join(tested.untested)}" if tested.untested else "",
+                f"not tested: {', '.join(tested.untested)}" if tested.untested and profile.has_cycle else "",
             ),
         )
     )

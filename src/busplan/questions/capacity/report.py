@@ -76,16 +76,21 @@ def capacity_table(result: Capacity) -> Table:
         The capacity.
     """
     profile, first, bus = result.profile, result.results[0], bus_of(result.profile)
-    setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network_of(profile))),) if words)
+    network = network_of(profile)
+    setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network)),) if words)
+    counts = bus.counted(network)
     caption = sentence(
-        "{} " + nouns(first.nodes, "node") + ", {} " + nouns(first.axes, "axis") + setup,
-        count_value(first.nodes, "nodes"),
-        count_value(first.axes, "axes"),
+        f"{', '.join(f'{{}} {nouns(number, noun)}' for number, noun in counts)}{setup}",
+        *(count_value(number, nouns(2, noun)) for number, noun in counts),
     )
     owners = list(_owners(result))
-    shown = {*_DECIDES, *(term.key for figures in result.results for term in figures.terms if term.us)}
+    rows, shown = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)], _DECIDES
+    if not profile.has_cycle:
+        rows = [row for row in rows if any(getattr(figures, row[0].key) is not None for figures in result.results)]
+        shown |= {figure.key for figure in bus.figures.table}
+    shown |= {term.key for figures in result.results for term in figures.terms if term.us}
     return figure_table(
-        [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)],
+        rows,
         owners,
         caption=caption,
         hides_equations=True,

@@ -67,14 +67,15 @@ def verdict_sentences(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
         The network.
     """
     figures = verdict.deciding
-    yield from refused_circle(override(profile, {PERIOD: verdict.period_us}))
+    if profile.has_cycle:
+        yield from refused_circle(override(profile, {PERIOD: verdict.period_us}))
     yield from _missed_limits(verdict, profile)
     yield _headline(verdict, profile)
     yield from not_in_it(profile)
     yield from evidence_sentence(bus_of(profile))
     yield from _other_models(verdict, profile)
     yield from reset_sentence(verdict.after_reset, profile)
-    if not broken_limits(figures, profile):
+    if figures.terms and not broken_limits(figures, profile):
         largest = max(figures.terms, key=lambda term: plain(term.us))
         label = by_key(bus_of(profile).figures.terms)[largest.key].label
         yield sentence(
@@ -82,9 +83,11 @@ def verdict_sentences(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
             ShownValue(largest.us, largest.key, "us", 3),
             attribute_value(REQUIRED, figures),
         )
-    yield _carries(figures)
+    if figures.counts:
+        yield _carries(figures)
     has_room = verdict.all_well and any((count.safe_nodes or 0) > count.nodes for count in figures.counts)
-    if not has_room and (verdict.change is not None or not (verdict.all_well and profile.group)):
+    is_full = profile.has_cycle and not profile.group
+    if not has_room and (verdict.change is not None or is_full or not verdict.all_well):
         yield _advice(verdict, profile)
     yield from _assumed(figures, profile)
     yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
@@ -112,7 +115,8 @@ def _assumed(figures: CapacityFigures, profile: Profile) -> Iterator[Sentence]:
 def _headline(verdict: Verdict, profile: Profile) -> Sentence:
     is_more = verdict.deciding.circle_refused_by or verdict.missed_limits
     alone = ", the bus alone: " if is_more else ": "
-    subject = (Code(profile.name), " at ", period_value(verdict.period_us), alone)
+    at = (" at ", period_value(verdict.period_us)) if profile.has_cycle else ()
+    subject = (Code(profile.name), *at, alone)
     parts = (*subject, *verdict_story(verdict.deciding, profile).parts)
     return Sentence(parts, state_of(verdict.all_well))
 
@@ -136,7 +140,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
     why = f", {'; '.join(limits)}" if limits else ""
     state = state_of(figures.verdict == FITS and figures.safe)
     said = sentence(f"{{}}{{}}{why}.", attribute_value(VERDICT, figures)._replace(state=state), Words(safe, state))
-    if limits and figures.verdict == DOES_NOT_FIT:
+    if figures.margin_corrected_us is None or (limits and figures.verdict == DOES_NOT_FIT):
         return said  # whatever the time is
     sentences = [said, _margin(figures, bus_of(profile))]
     largest = next(iter(uncertainty_parts(figures)), None)
@@ -250,8 +254,10 @@ def _advice(verdict: Verdict, profile: Profile) -> Sentence:
         carried = _nodes(change.figures.safe_nodes or 0, change.figures.safe_axes or 0).parts
         return Sentence((*way, *carried, untested, "."))
     purpose = "make it fit" if figures.verdict != FITS else "pass `check`" if figures.safe else "make it safe"
-    way = (f"{first}Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ")
-    return Sentence((*way, *margin_parts(change.figures), untested, "."))
+    way = (f"{first}Cheapest way to {purpose}: ", *settings)
+    if change.figures.margin_corrected_us is None:
+        return Sentence((*way, "."))
+    return Sentence((*way, ", which leaves a margin of ", *margin_parts(change.figures), untested, "."))
 
 
 def period_must_change(profile: Profile) -> str:

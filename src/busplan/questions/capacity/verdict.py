@@ -14,6 +14,7 @@ class Verdict(NamedTuple):
     """Verdict on one period, and the change that makes the cycle fit or carries another node."""
 
     period_us: float
+    """None of a network without a cycle."""
     deciding: CapacityFigures
     """Figures of the timing model that decides, whatever was asked for."""
     others: tuple[CapacityFigures, ...]
@@ -46,7 +47,9 @@ def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:
 
 
 def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
-    profile = override(capacity.profile, {"cycle.period_us": results[0].period_us})
+    profile = capacity.profile
+    if profile.has_cycle:
+        profile = override(profile, {"cycle.period_us": results[0].period_us})
     model = bus_of(profile).deciding_model
     deciding = next((result for result in results if result.timing_model == model), None) or figures(
         profile, model=model

@@ -7,7 +7,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several
+from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, with_cycle
 from busplan.questions.compare import kinds as analysis
 from busplan.questions.compare.kinds import KindComparison, MachineOnKind, NotOnKind
 
@@ -105,7 +105,7 @@ def compare(
     >>> [term.key for term in answer.on("can").assumed if term.source == "new profile"]
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
-    network = load_profile(profile)
+    network = with_cycle(load_profile(profile), question="compare")
     kinds = None
     if buses is not None:
         kinds = analysis.checked_kinds([str(kind) for kind in one_or_several(buses, name="buses")], option="buses")

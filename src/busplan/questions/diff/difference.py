@@ -267,7 +267,7 @@ def _cycle(profile: Profile, model: str) -> _Figures:
 def _compared(part: str, measures: Sequence[Figure], a: _Figures, b: _Figures) -> Iterator[ComparedFigure]:
     for measure in measures:
         of_a, of_b = a.get(measure.key), b.get(measure.key)
-        noise = 0.0 if measure.scale is None else ROUNDING * max(side.get(measure.scale, 0.0) for side in (a, b))
+        noise = 0.0 if measure.scale is None else ROUNDING * max(side.get(measure.scale) or 0.0 for side in (a, b))
         change = of_b - of_a if _is_number(of_a) and _is_number(of_b) else None
         yield ComparedFigure(
             part=part,

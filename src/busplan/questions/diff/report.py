@@ -352,7 +352,7 @@ def _sides(difference: Difference, arguments: Arguments) -> Table:
                 side,
                 Code(argument),
                 Code(profile.name),
-                figure_value(PERIOD, profile.cycle.period_us),
+                figure_value(PERIOD, profile.cycle.period_us if profile.has_cycle else None),
                 profile.bus.timing_model,
             )
         )

@@ -132,6 +132,8 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
         **{key: number for key, number in cycle.figures().items() if number is not None},
         **numeric_figures(cycle),
     }
+    if not profile.has_cycle:
+        numbers = {key: number for key, number in numbers.items() if getattr(plain, key) is not None}
     known = by_key(bus.figures.capacity)
     named = {
         key: remembered(if_finite(number), key, known[key].symbol) for key, number in numbers.items() if key in known
@@ -139,12 +141,12 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     if network.is_uniform:
         named |= _most(network, plain, model=model)
     else:
-        parts = (named["required_us"], named["available_us"])
+        why, parts = _NO_CYCLE, _limits(bus, network)
+        if profile.has_cycle:
+            why, parts = _OF_GROUPS, (named["required_us"], named["available_us"])
         certain = known.keys() if model == bus.deciding_model else known.keys() - by_key(CERTAINTY).keys()
         named |= {
-            key: result_of(None, _OF_GROUPS, parts)
-            for key in certain
-            if key not in named and getattr(plain, key) is None
+            key: result_of(None, why, parts) for key in certain if key not in named and getattr(plain, key) is None
         }
     named |= {
         key: result_of(None, "none for this network", (named["required_us"],))
@@ -157,7 +159,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     named["circle_refused_by"] = result_of(
         list(plain.circle_refused_by),
         "what of the period, the servo, the circle and the delivery does not go together",
-        (named["period_us"], traced(profile, STEP)),
+        (named["period_us"], traced(profile, STEP)) if profile.has_cycle else (),
     )
     for key, number in named.items():
         number.named(key, known[key].symbol)
@@ -165,6 +167,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
 
 
 _OF_GROUPS: Final = "each group of nodes has its own: see the groups of capacity"
+_NO_CYCLE: Final = "none: messages alone have no cycle"
 
 
 def _most(network: Network, plain: CapacityFigures, *, model: str) -> dict[str, Traced]:
@@ -200,6 +203,11 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
     if network.is_uniform:
         named |= _most_safe(network, plain)
     limits = _limits(bus, network)
+    if not profile.has_cycle:
+        return {
+            "not_shown": result_of(list(plain.not_shown or ()), "which limits are not shown to be kept", limits),
+            "verdict": result_of(plain.verdict, "fits where no limit is broken", limits),
+        }
     named["not_shown"] = Traced(
         list(plain.not_shown or ()),
         formula="which limits are neither broken nor shown to be kept, time among them",
@@ -260,6 +268,9 @@ def _words(
     named: dict[str, Traced], plain: CapacityFigures, terms: tuple[Term, ...], limits: tuple[Number, ...]
 ) -> dict[str, Traced]:
     """Figures that are words or truth values."""
+    if not plain.terms:
+        broken = result_of(list(plain.exceeded), "which limits are broken", limits)
+        return {"exceeded": broken, "fits": result_of(plain.fits, "no limit is broken", limits)}
     required, available = named["required_us"], named["available_us"]
     sizes = tuple(named[term.key] for term in terms)
     broken = Traced(

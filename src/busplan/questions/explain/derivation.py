@@ -140,7 +140,8 @@ class Derivation(NamedTuple):
     timing_model: str
     transaction: str | None
     """Transaction of a figure of `latency`; None for others."""
-    period_us: float
+    period_us: float | None
+    """None of a network without a cycle."""
     value: object
     """Value as in the command's JSON."""
     steps: tuple[Step, ...]
@@ -229,7 +230,7 @@ def explain(
                             shown,
                             model,
                             kind,
-                            where.cycle.period_us,
+                            where.cycle.period_us if where.has_cycle else None,
                             traced.value,
                             steps,
                             tuple(inputs(traced)),
@@ -249,7 +250,8 @@ def explained_figures(profile: Profile) -> Iterator[tuple[CommandName, Figure]]:
     bus = bus_of(profile)
     has_bias = bus.cycle(network_of(profile), model=bus.deciding_model).bias_us() is not None
     for command, figures in figures_of(bus).items():
-        yield from ((command, figure) for figure in figures.values() if has_bias or figure != BIAS)
+        if command != "circle-test" or profile.has_cycle:
+            yield from ((command, figure) for figure in figures.values() if has_bias or figure != BIAS)
 
 
 def assumptions(profile: Profile) -> tuple[Input, ...]:

@@ -184,7 +184,9 @@ def _with_words(derivation: Derivation, explanation: Explanation) -> Derivation:
     key = derivation.figure.key
     if key not in (*OF_DOCUMENT, *OF_SENSITIVITY, "text", "warnings", "cheapest_change"):
         return derivation
-    result = capacity(explanation.profile, periods_us=[derivation.period_us])
+    result = capacity(
+        explanation.profile, periods_us=None if derivation.period_us is None else [derivation.period_us]
+    )
     if key in OF_SENSITIVITY:
         answer = sensitivity_document(result, verdicts(result), sensitivities(result))
     else:
@@ -251,7 +253,8 @@ def _section(derivation: Derivation, profile: str, below: Block) -> Chapter:
     kind = f"{derivation.transaction}, " if derivation.transaction else ""
     title = Sentence(
         (
-            *(Code(figure.key), " of ", Code(profile), " at ", period_value(derivation.period_us)),
+            *(Code(figure.key), " of ", Code(profile)),
+            *(() if derivation.period_us is None else (" at ", period_value(derivation.period_us))),
             *(f", {kind}{derivation.timing_model} model: ", *_result_parts(derivation)),
         )
     )

@@ -47,6 +47,8 @@ def refusals(profile: Profile) -> tuple[Refused, ...]:
     >>> [cause.name for cause in refusals(override(load("paper-1ms").profile, {"servo.step_us": 300.0}))]
     ['servo.step_us']
     """
+    if not profile.has_cycle:
+        return (Refused("bus.nodes", "none", "messages alone have no axes that could move"),)
     causes = loop_refusals(profile)
     of_run = run_refusals(profile, causes)
     return causes + of_run if of_run and _fits(profile) else causes

@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
+from math import inf
 from typing import Any, Final, NamedTuple
 
 from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
-from busplan.buses.figure import CERTAINTY
+from busplan.buses.figure import BIAS, CERTAINTY, MARGIN_CORRECTED, SAFE_MIN_PERIOD, SAFE_REQUIRED, UNCERTAINTY
 from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
@@ -107,7 +108,8 @@ class GroupCapacity:
 class CapacityFigures(NamedTuple):
     """Capacity at one period under one timing model; the `figures` of its bus say what each figure means.
 
-    Figures that only its kind of bus has, terms and numbers of nodes are attributes like all others.
+    Figures that only its kind of bus has, terms and numbers of nodes are attributes like all others. A network of
+    messages alone has no cycle: then every figure of the cycle, its period among them, is None.
     """
 
     kind: str
@@ -162,8 +164,8 @@ class CapacityFigures(NamedTuple):
     @property
     def _whole(self) -> GroupCapacity | None:
         """The nodes, where all are alike; groups have figures of their own, and those of the whole are None."""
-        first = self.counts[0]
-        return None if first.name else first
+        first = self.counts[0] if self.counts else None
+        return None if first is None or first.name else first
 
     @property
     def max_nodes(self) -> int | None:
@@ -198,6 +200,8 @@ class CapacityFigures(NamedTuple):
     def __getattr__(self, key: str) -> Any:
         # Figures of the kind and terms are attributes as all others are; only what is no field comes here.
         if not key.startswith("_"):
+            if not self.terms and any(key == figure.key for figure in kind_named(self.kind).figures.terms):
+                return None
             if key in self.own:
                 return self.own[key]
             for term in self.terms:
@@ -277,7 +281,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     cycle = bus.cycle(network, model=model)
     numbers: dict[str, Any] = {key: existing(number) for key, number in numeric_figures(cycle).items()}
     own = FigureValues({key: None if number is None else plain(number) for key, number in cycle.figures().items()})
-    overruns = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
+    overruns = profile.has_cycle and not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     codes = limit_codes(network)
     broken = tuple(key for key, code in codes.items() if code == BROKEN)
     exceeded = (*broken, *((TIME,) if overruns else ()))
@@ -290,8 +294,8 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
         kind=bus.kind,
         timing_model=model,
         **numbers,
-        terms=cycle.terms,
-        binding_term=max(cycle.terms, key=lambda term: plain(term.us)).name,
+        terms=cycle.terms if profile.has_cycle else (),
+        binding_term=max(cycle.terms, key=lambda term: plain(term.us)).name if profile.has_cycle else None,
         exceeded=exceeded,
         fits=not exceeded,
         circle_refused_by=tuple(cause.name for cause in circle_refusals(profile)),
@@ -333,6 +337,8 @@ def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number |
     cycle
         The cycle under the timing model that decides.
     """
+    if not cycle.network.groups:
+        return {figure.key: None for figure in (BIAS, MARGIN_CORRECTED, UNCERTAINTY, SAFE_REQUIRED, SAFE_MIN_PERIOD)}
     return {
         "bias_us": weighed.bias_us,
         "margin_corrected_us": weighed.margin_corrected_us,
@@ -340,6 +346,20 @@ def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number |
         "safe_required_us": weighed.safe_required_us,
         "safe_min_period_us": shortest_period_us(cycle.network, weighed.safe_required_us, is_shown=True),
     }
+
+
+_OF_CYCLE: Final = (
+    "period_us",
+    "available_us",
+    "required_us",
+    "time_slice_us",
+    "required_time_slice_us",
+    "utilisation",
+    "margin_us",
+    "min_period_us",
+    "min_slice_ratio",
+)
+"""Figures that a network without a cycle does not have."""
 
 
 def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
@@ -353,8 +373,10 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
     Returns
     -------
     dict
-        By the names of `CapacityFigures`.
+        By the names of `CapacityFigures`; infinite what does not exist, as figures of a cycle without nodes.
     """
+    if not cycle.network.groups:
+        return {"nodes": 0, "axes": 0, **dict.fromkeys(_OF_CYCLE, inf)}
     network = cycle.network
     period_us, ratio, nodes = network.period_us, network.slice_ratio, network.nodes
     given_us, required_us = available_us(network), cycle.required_us

@@ -8,7 +8,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_profile
+from busplan.questions.base.inputs import ProfileLike, load_profile, with_cycle
 from busplan.questions.map import trade_off as analysis
 from busplan.questions.map.direction import Direction, checked_direction
 from busplan.questions.map.trade_off import TradeOff
@@ -95,6 +95,8 @@ def map_(
     """
     require_executor(executor, circle=circle)
     network = load_profile(profile)
+    if x is None or y is None:
+        with_cycle(network, question="a map of period and axes", instead="give x and y, each a key with values")
     return MapAnswer(
         *analysis.trade_off(
             network,

@@ -10,7 +10,16 @@ from busplan.profile.keys import flat
 from busplan.profile.write import whole as as_whole
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, finite, from_numpy, items, load_profile, values_by_key, whole
+from busplan.questions.base.inputs import (
+    ProfileLike,
+    finite,
+    from_numpy,
+    items,
+    load_profile,
+    values_by_key,
+    whole,
+    with_cycle,
+)
 from busplan.questions.circle.check import CircleCheck
 from busplan.questions.plan import planning as analysis
 from busplan.questions.plan.constraints import nodes_for_axes
@@ -113,6 +122,8 @@ def plan(
     True
     """
     network = load_profile(profile)
+    if nodes is not None or axes is not None:
+        with_cycle(network, question=f"a plan for {'nodes' if axes is None else 'axes'}")
     if nodes is not None and axes is not None:
         raise BusplanError(f"nodes {nodes} and axes {axes}: give one of them")
     own = {

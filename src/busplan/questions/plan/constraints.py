@@ -222,6 +222,8 @@ CONSTRAINTS: Final[tuple[Callable[[Profile], Iterator[Need]], ...]] = (verdict, 
 
 def missed_limits(profile: Profile) -> tuple[Need, ...]:
     """Needs of [limits] that the slice of a profile does not meet; the verdict is not among them."""
+    if not profile.has_cycle:
+        return ()
     cycle = profile.cycle
     asked = (need for constraint in CONSTRAINTS[1:] for need in constraint(profile))
     missed = (need for need in asked if not within(need.period_us(cycle.slice_ratio), cycle.period_us))

@@ -151,6 +151,8 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
         Freedom(setting.name, setting.label, setting.cost, setting.keys, partial(_of_bus, setting.name))
         for setting in bus_of(profile).settings(network)
     )
+    if not profile.has_cycle:
+        return tuple(sorted(own, key=lambda freedom: freedom.cost))
     freedoms_known = (
         *own,
         *(() if goes_with_step(profile, profile.cycle.period_us) else (_STEP_OF_CIRCLE,)),
@@ -173,7 +175,8 @@ def freed(
     profile
         The network.
     names
-        Names of freedoms; None for those of the bus's registers, the slice ratio and the period.
+        Names of freedoms; None for those of the bus's registers, the slice ratio and the period; of a network without a
+        cycle all.
     asked
         Keys with a value that was asked for, which stays.
     option
@@ -187,7 +190,7 @@ def freed(
     known = freedoms(profile)
     still = [freedom for freedom in known if not set(freedom.keys) <= set(asked)]
     if names is None:
-        return tuple(freedom for freedom in still if freedom.cost in DEFAULT_COSTS)
+        return tuple(freedom for freedom in still if freedom.cost in DEFAULT_COSTS or not profile.has_cycle)
     said = ", ".join(freedom.name for freedom in known)
     kind = f"{profile.bus.kind} with groups" if profile.group else profile.bus.kind
     unknown = [

@@ -105,7 +105,7 @@ def plan(
     levels = freed(goal, free, asked=kept)
     search = Search(goal, circle=circle, kept=kept, max_circles=max_circles)
     steps = [*_steps(search, levels)]
-    offers = [*steps, *frontier(goal, search, levels)]
+    offers = [*steps, *(frontier(goal, search, levels) if goal.has_cycle else ())]
     has_plan = any(isinstance(step, Option) and step.recommended for step in steps)
     return Plan(
         profile=profile,

@@ -45,7 +45,7 @@ from busplan.questions.words.sentences import (
     warning_sentences,
 )
 from busplan.sections.profile import Profile
-from busplan.sections.transactions import TRANSACTION_KINDS
+from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 
 def plan_report(plan: Plan) -> Report:
@@ -103,8 +103,8 @@ def _headline(plan: Plan) -> Sentence:
         return Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
     judged = plan.goal.tolerance.judges_contour
     circle = (" and passes the circle" if judged else ", and its circle is not judged") if plan.with_circle else ""
-    margin = margin_parts(option.deciding)
-    result = (Words("fits", "passes"), " with a margin of ", *margin, f"{circle}.")
+    margin = (" with a margin of ", *margin_parts(option.deciding)) if plan.goal.has_cycle else ()
+    result = (Words("fits", "passes"), *margin, f"{circle}.")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
     first = (
@@ -139,6 +139,8 @@ def _label(plan: Plan, name: str) -> str:
 def _goal(plan: Plan) -> tuple[Part, ...]:
     """The goal of the plan."""
     goal, network = plan.goal, network_of(plan.goal)
+    if not goal.has_cycle:
+        return (Code(goal.name),)
     nodes, axes = int(network.nodes), int(network.axes)
     return (
         *(Code(goal.name), " with "),
@@ -173,15 +175,20 @@ def _record(plan: Plan, option: Option) -> Record:
         **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
         "fits_other_model": all(model.fits for model in others) if others else None,
         "margin_us": figures.margin_us,
-        "margin_other_model_us": min((model.margin_us for model in others), default=None),
+        "margin_other_model_us": min((model.margin_us for model in others if model.margin_us is not None), default=None),
         **fields(figures, "bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
         **fields(option, "passes", "held_by", "proven", "circle_passed"),
         "circle_failures": list(option.circle_failures or ()),
         **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
-        "slice_ratio": profile.cycle.slice_ratio,
+        "slice_ratio": profile.cycle.slice_ratio if profile.has_cycle else None,
         **fields(figures, *bus_of(profile).figures.planned),
-        **{f"{kind}_bytes": int(getattr(network_of(profile).groups[0], f"{kind}_bytes")) for kind in TRANSACTION_KINDS},
+        **{f"{kind}_bytes": _payload_bytes(profile, kind) for kind in TRANSACTION_KINDS},
     }
+
+
+def _payload_bytes(profile: Profile, kind: TransactionKind) -> int | None:
+    """Payload of the first nodes in one direction [bytes]; None without nodes."""
+    return next((int(alike.bytes_of(kind)) for alike in profile.alike_nodes), None)
 
 
 def plan_records(plan: Plan) -> list[Record]:
@@ -239,7 +246,7 @@ def _row(option: Option) -> TableRow:
         option.title,
         "*" * option.recommended + "?" * (not option.proven),
         _short(option.profile, option.changes),
-        bus_of(option.profile).figures.term_label(option.deciding.binding_term),
+        bus_of(option.profile).figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
         ShownValue(option.held_by, "held_by"),
         circle,
         *option_margin(option),

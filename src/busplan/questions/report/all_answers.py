@@ -31,16 +31,17 @@ class AllAnswers(NamedTuple):
     profile: Profile
     capacity: Capacity
     verdict: Verdict
-    sensitivity: Sensitivity
+    sensitivity: Sensitivity | None
+    """This, schedule, steps, periods and map are None or empty of a network without a cycle."""
     latency: LatencyResult
     schedule: Schedule | None
     no_schedule: tuple[str, ...]
     """Why there is no schedule."""
     steps: tuple[NodeSteps, ...]
     """Nodes over the period, under each timing model; empty where nodes are in groups."""
-    periods: Capacity
+    periods: Capacity | None
     """Capacity at several periods around and including the profile's own."""
-    trade_off: TradeOff
+    trade_off: TradeOff | None
     """Period against axes, without circle tests."""
     circle: CircleTest | None
     """The test with its contributions but without its simulation, which `contour` condenses."""
@@ -70,6 +71,23 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
         As for `circle_test`.
     """
     bus = capacity(profile)
+    if not profile.has_cycle:
+        return AllAnswers(
+            profile=profile,
+            capacity=bus,
+            verdict=verdicts(bus)[0],
+            sensitivity=None,
+            latency=latency(profile),
+            schedule=None,
+            no_schedule=(),
+            steps=(),
+            periods=None,
+            trade_off=None,
+            circle=None,
+            contour=None,
+            no_circle=(),
+            assumptions=assumptions(profile),
+        )
     own_us = profile.cycle.period_us
     near_us = (own_us * factor for factor in _PERIOD_FACTORS if MIN_STEP_US <= own_us * factor <= MAX_TIME_US)
     periods_us = [us for us in near_us if us == own_us or bus_of(profile).periods.allows(us)]

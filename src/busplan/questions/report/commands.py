@@ -63,25 +63,32 @@ def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[s
 
     # Neither latency nor the list of explain takes --period.
     elsewhere = KeyChanges(tuple(change for change in changes.each if change.option != "--period"))
-    add(
-        "capacity",
-        "verdict, timing models, terms, what moves the margin",
-        lambda: sensitivity_document(answer.capacity, (answer.verdict,), (answer.sensitivity,)),
-        "--sensitivity",
-    )
+    sensitivity = answer.sensitivity
+    if sensitivity is None:
+        add("capacity", "verdict and loads", lambda: capacity_document(answer.capacity, (answer.verdict,)))
+    else:
+        add(
+            "capacity",
+            "verdict, timing models, terms, what moves the margin",
+            lambda: sensitivity_document(answer.capacity, (answer.verdict,), (sensitivity,)),
+            "--sensitivity",
+        )
     add("latency", "latencies, part by part", lambda: latency_document(answer.latency), own=elsewhere)
     schedule, circle = answer.schedule, answer.circle
     if schedule is not None:
         add("timeline", "the cycle event by event", lambda: timeline_document(schedule))
-    add(
-        "axes",
-        "axes against period",
-        lambda: capacity_document(answer.periods, verdicts(answer.periods)),
-        *(word for (figures, *_) in answer.periods.periods for word in period_option(figures.period_us)),
-        command="capacity",
-        own=changes.without(key="cycle.period_us"),
-    )
-    add("map", "period against axes, cell by cell", lambda: map_document(answer.trade_off))
+    periods, trade_off = answer.periods, answer.trade_off
+    if periods is not None:
+        add(
+            "axes",
+            "axes against period",
+            lambda: capacity_document(periods, verdicts(periods)),
+            *(word for (figures, *_) in periods.periods for word in period_option(figures.period_us)),
+            command="capacity",
+            own=changes.without(key="cycle.period_us"),
+        )
+    if trade_off is not None:
+        add("map", "period against axes, cell by cell", lambda: map_document(trade_off))
     if circle is not None:
         purpose = "the circle and its error sources"
         add("circle", purpose, lambda: circle_document(circle), "--contributions", command="circle-test")

@@ -33,7 +33,7 @@ from busplan.forms.blocks import (
     Words,
     attribute_value,
 )
-from busplan.forms.numbers import MISSING, plural
+from busplan.forms.numbers import MISSING, nouns, plural
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.questions.base.shell import shell_word
 from busplan.questions.capacity.card import card
@@ -41,7 +41,7 @@ from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.circle.report import verdict_words
 from busplan.questions.explain.report import assumptions_table
 from busplan.questions.fit.assumed import heavy_assumptions
-from busplan.questions.fit.network import bus_of
+from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.report.all_answers import AllAnswers
 from busplan.questions.report.commands import Sources, sources
 from busplan.questions.report.parts import (
@@ -132,7 +132,8 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     if answer.profile.description.strip():
         yield Sentence((" ".join(answer.profile.description.split()),))
     yield _facts(subject)
-    verdicts: tuple[Block, ...] = (card(answer.verdict, answer.profile), circle_question(answer))
+    circle = (circle_question(answer),) if answer.profile.has_cycle else ()
+    verdicts: tuple[Block, ...] = (card(answer.verdict, answer.profile), *circle)
     if answer.no_circle:
         verdicts = verdicts[::-1]  # the cause first
     lines = (sources_[name].line for name in ("capacity", "circle") if name in sources_)
@@ -169,11 +170,12 @@ def _facts(subject: _Subject) -> Facts:
         unit = "us" if figure.unit == "us" else ""
         return name, ShownValue(getattr(figures, figure.key), figure.key, unit)
 
+    network = network_of(subject.answer.profile)
     return Facts(
         (
-            *(item("nodes", NODES), item("axes", AXES)),
+            *((nouns(2, noun), ShownValue(number, nouns(2, noun))) for number, noun in bus.counted(network)),
             *(item(figure_.label, figure_) for figure_ in setup),
-            *(item("period", PERIOD), item("slice", AVAILABLE)),
+            *((item("period", PERIOD), item("slice", AVAILABLE)) if network.groups else ()),
             ("deciding model", ShownValue(subject.answer.verdict.deciding.timing_model, TIMING_MODEL.key)),
             ("profile", Code(subject.origin)),
         )

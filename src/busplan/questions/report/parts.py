@@ -73,6 +73,8 @@ def parts(answer: AllAnswers, sources: Sources) -> Iterator[Chapter]:
     several = len(bus_of(answer.profile).timing_models) > 1
     by_groups = bool(answer.profile.group)
     yield part("models", f"The timing model{'s, side by side' if several else ''}", _models(answer, sources))
+    if answer.sensitivity is None or answer.trade_off is None:
+        return  # the rest is of a cycle
     yield part("timeline", "The cycle to scale", _timeline(answer, sources))
     yield part("terms", "Where the microseconds go", _terms(answer, sources))
     moves = (*sensitivity_blocks(answer.sensitivity), sources["capacity"].line)
@@ -195,7 +197,7 @@ def _over_period(
 ) -> Table:
     """A row for each period; `shown` gives figures under a timing model, each with what has it."""
     rows = []
-    for results in answer.periods.periods:
+    for results in () if answer.periods is None else answer.periods.periods:
         cells = [attribute_value(PERIOD, results[0])]
         cells += (attribute_value(figure, owner) for figures in results for figure, owner in shown(figures))
         rows.append(TableRow(tuple(cells), highlighted=results[0].period_us == answer.profile.cycle.period_us))

@@ -6,6 +6,7 @@ axis of their own, so that a figure is computed only over the keys that it depen
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, lru_cache, partial
+from math import inf
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -191,7 +192,8 @@ def _columns(where: Profile, model: str, *, axes: int, with_counts: bool) -> dic
     bus, network = bus_of(where), network_of(where)
     cycle = bus.cycle(network, model=model)
     figures = numeric_figures(cycle)
-    numbers = {**figures, **cycle.figures(), **{term.key: term.us for term in cycle.terms}}
+    terms = {term.key: term.us if network.groups else inf for term in cycle.terms}
+    numbers = {**figures, **cycle.figures(), **terms}
     limits = limits_with_time(network, model=model)
     late = np.logical_not(np.asarray(fits_in(figures["required_us"], available_us=figures["available_us"])))
     codes = limit_codes(network)
@@ -201,7 +203,9 @@ def _columns(where: Profile, model: str, *, axes: int, with_counts: bool) -> dic
     words = {
         **(_counts(network, limits, model=model) if with_counts else {}),
         "timing_model": Column(np.zeros((), np.uint8), (model,)),
-        "binding_term": Column(_largest([term.us for term in cycle.terms]), tuple(term.name for term in cycle.terms)),
+        "binding_term": Column(_largest([*terms.values()]), tuple(term.name for term in cycle.terms))
+        if network.groups
+        else _NO_WORD,
         "exceeded": exceeded,
         **own,
     }

@@ -8,7 +8,7 @@ from typing import Final, NoReturn
 
 import numpy as np
 
-from busplan.buses.figure import CIRCLE_REFUSED_BY, TIMING_MODEL, Figure
+from busplan.buses.figure import CIRCLE_REFUSED_BY, EXCEEDED, TIMING_MODEL, VERDICT, Figure
 from busplan.errors import BusplanError
 from busplan.forms.blocks import (
     Code,
@@ -58,7 +58,12 @@ SUMMARY_COLUMNS: Final = (
 
 
 def default_columns(sweep: Sweep) -> tuple[str, ...]:
-    """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole."""
+    """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole.
+
+    A network without a cycle has what its kind adds to a table, and the limits that are broken.
+    """
+    if not sweep.profile.has_cycle:
+        return (*(figure.key for figure in bus_of(sweep.profile).figures.table), EXCEEDED.key, VERDICT.key)
     of_circle = (key for key in (*CIRCLE_COLUMNS, *SUMMARY_COLUMNS) if key in sweep.columns)
     if not sweep.profile.group:
         return (*_RANKS, *of_circle)

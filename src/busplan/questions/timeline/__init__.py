@@ -7,7 +7,7 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole
+from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole, with_cycle
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.timeline.events import Schedule, Total, schedule, totals, zoom
 from busplan.sections.profile import Profile
@@ -90,7 +90,7 @@ def timeline(
     >>> [(event.kind, round(event.duration_us, 3)) for event in answer.events][1:4]
     [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.733)]
     """
-    network = load_profile(profile)
+    network = with_cycle(load_profile(profile), question="timeline")
     asked = None if transaction is None else _transaction(transaction, network)
     model = None if timing_model is None else checked_models([timing_model], network)[0]
     window = zoom(

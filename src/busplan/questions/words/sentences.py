@@ -121,7 +121,9 @@ def execution_grades(profile: Profile) -> str | None:
 def broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
     """Say by how much each limit of the bus is broken, or why it is not shown to be kept."""
     broken = map(bus_of(profile).limit, limits_behind(figures))
-    network = network_of(profile)._replace(period_us=figures.period_us)
+    network = network_of(profile)
+    if profile.has_cycle:
+        network = network._replace(period_us=figures.period_us)
     return [limit.words(network) for limit in broken if limit is not None]
 
 
