@@ -151,4 +151,3 @@ def _payloads(alike: AlikeNodes, place: int) -> Iterator[tuple[str, int, str]]:
     for kind in TRANSACTION_KINDS:
         key, size = alike.payload.key_of(kind), int(alike.bytes_of(kind))
         yield f"{section}.{key}", size, (f"makes {size} bytes, which " if key.endswith("_per_axis") else "")
-

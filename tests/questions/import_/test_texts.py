@@ -146,14 +146,29 @@ def test_messages_of_a_database_go_beside_the_nodes_of_a_dcf(name: str, message:
     assert message in lines[int(place.rpartition(":")[2]) - 1]
 
 
-def test_a_database_alone_says_what_is_missing() -> None:
+def test_a_database_alone_is_a_network_of_messages() -> None:
+    answer = imported("machine.dbc")
+    profile: Any = answer.profile
+    assert not profile.has_cycle
+    assert profile.bus.bit_rate_kbit_s == 500
+    assert [(each.name, each.identifier, each.payload_bytes, each.period_us) for each in profile.message] == [
+        ("Pressure", 0x100, 8, 20_000),
+        ("Foreign", 0x18FEF1FE, 8, 100_000),
+    ]
+    left_out, alone = answer.remarks
+    assert left_out.endswith(": Door")
+    assert alone.startswith("Messages alone, without a cycle")
+    assert busplan.capacity(profile).verdict == "fits"
+
+
+def test_a_database_without_a_period_is_refused_with_what_was_left_out(tmp_path: Path) -> None:
+    text = (FILES / "machine.dbc").read_text(encoding="utf-8")
+    (tmp_path / "none.dbc").write_text("".join(line for line in text.splitlines(True) if "CycleTime" not in line))
     with pytest.raises(busplan.BusplanError) as refused:
-        imported("machine.dbc")
-    first, nodes, period, *left_out = refused.value.problems
-    assert "2 messages with a period, and no profile yet" in first
-    assert nodes.startswith("the nodes of the cycle and their PDOs: give the EDS or DCF")
-    assert period == "cycle.period_us: the period of SYNC"
-    assert [each.rpartition(": ")[2] for each in left_out] == ["Door"]
+        imported(str(tmp_path / "none.dbc"))
+    first, left_out = refused.value.problems
+    assert first.endswith("no message with a period, and no node with PDOs")
+    assert "no file says its period" in left_out
 
 
 def fd_database(folder: Path, *, rate: str = 'BA_ "BaudrateCANFD" 5000000;\n') -> Path:
@@ -179,13 +194,10 @@ def test_messages_of_can_fd_are_brought_in(tmp_path: Path) -> None:
     assert "left out, over the 8 bytes of a frame, and no file says that it is CAN FD: Parts" in answer.remarks
 
 
-def test_a_database_that_does_not_say_the_data_bit_rate_is_missing_it(tmp_path: Path) -> None:
+def test_a_data_bit_rate_that_no_file_says_is_assumed(tmp_path: Path) -> None:
     path = fd_database(tmp_path, rate="")
-    with pytest.raises(busplan.BusplanError) as refused:
-        busplan.import_profile(path)
-    assert "bus.data_bit_rate_kbit_s: the data bit rate of CAN FD messages" in refused.value.problems
-    answer = imported("axis-5.dcf", str(path))
-    assert {row.dotted for row in answer.rows if row.fact.grade == "assumed"} >= {"bus.data_bit_rate_kbit_s"}
+    for answer in (busplan.import_profile(path), imported("axis-5.dcf", str(path))):
+        assert {row.dotted for row in answer.rows if row.fact.grade == "assumed"} >= {"bus.data_bit_rate_kbit_s"}
     classical = tmp_path / "axis.toml"
     classical.write_text(imported("axis-5.dcf").text, encoding="utf-8")
     with pytest.raises(busplan.BusplanError, match=r"message\.Long\.fd = true: asks for bus\.data_bit_rate"):

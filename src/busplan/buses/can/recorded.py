@@ -179,6 +179,8 @@ class _Seen:
 
     def _cycle(self) -> Iterator[RecordedFigure]:
         """The last PDO behind its SYNC."""
+        if not self.cycle.traffic.has_cycle:
+            return
         sync = next(stream for stream in self.streams if stream.name == SYNC)
         known = self.by_identifier.get((_whole(sync.first), sync.identifier_bits > BASE_BITS))
         pdos = [

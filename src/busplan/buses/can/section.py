@@ -286,7 +286,7 @@ class CanProfile(Profile):
     def _says_nothing_of_a_cycle(self) -> Self:
         if self.has_cycle:
             return self
-        keys = [name for name in CIRCLE_SECTIONS if name in self.model_fields_set]
+        keys: list[str] = [name for name in CIRCLE_SECTIONS if name in self.model_fields_set]
         keys += (
             f"{section}.{name}"
             for section, names in _OF_CYCLE.items()

@@ -315,7 +315,8 @@ def _whole(number: Points) -> Points:
 
 def last_identifier(each: Iterable[Stream]) -> Points:
     """The largest identifier of some streams; 0 of none."""
-    return reduce(larger, (choose(stream.identifiers > 0, stream.last, 0) for stream in each), 0)
+    none: Points = 0
+    return reduce(larger, (choose(stream.identifiers > 0, stream.last, 0) for stream in each), none)
 
 
 def last_place(each: Iterable[Stream]) -> Points:

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, cast
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several, with_cycle
+from busplan.questions.base.inputs import (
+    Models,
+    Periods,
+    ProfileLike,
+    checked_models,
+    load_profile,
+    one_or_several,
+    with_cycle,
+)
 from busplan.questions.capacity.verdict import Verdict, verdicts
 from busplan.questions.fit import figures as analysis
 from busplan.questions.fit.certainty import FITS, VerdictWord

@@ -75,7 +75,7 @@ def capacity_table(result: Capacity) -> Table:
     result
         The capacity.
     """
-    profile, first, bus = result.profile, result.results[0], bus_of(result.profile)
+    profile, bus = result.profile, bus_of(result.profile)
     network = network_of(profile)
     setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network)),) if words)
     counts = bus.counted(network)

@@ -201,7 +201,8 @@ def explain(
     """
     command, asked = figure_named(figure, bus=bus_of(profile))
     if (command, asked) not in explained_figures(profile):
-        raise BusplanError(f"{asked.key}: no bias is known for this bus, {bus_of(profile).title}")
+        why = f"no bias is known for this bus, {bus_of(profile).title}" if asked == BIAS else "messages have no circle"
+        raise BusplanError(f"{asked.key}: {why}")
     deciding = bus_of(profile).deciding_model
     is_decided = command == "circle-test" or asked in CERTAINTY
     has_one_model = is_decided or asked.key in VERDICT_KEYS

@@ -184,9 +184,7 @@ def _with_words(derivation: Derivation, explanation: Explanation) -> Derivation:
     key = derivation.figure.key
     if key not in (*OF_DOCUMENT, *OF_SENSITIVITY, "text", "warnings", "cheapest_change"):
         return derivation
-    result = capacity(
-        explanation.profile, periods_us=None if derivation.period_us is None else [derivation.period_us]
-    )
+    result = capacity(explanation.profile, periods_us=None if derivation.period_us is None else [derivation.period_us])
     if key in OF_SENSITIVITY:
         answer = sensitivity_document(result, verdicts(result), sensitivities(result))
     else:

@@ -109,7 +109,7 @@ class CapacityFigures(NamedTuple):
     """Capacity at one period under one timing model; the `figures` of its bus say what each figure means.
 
     Figures that only its kind of bus has, terms and numbers of nodes are attributes like all others. A network of
-    messages alone has no cycle: then every figure of the cycle, its period among them, is None.
+    messages alone has no cycle: then every figure of the cycle, its period among them, is None, whatever its type says.
     """
 
     kind: str
@@ -286,6 +286,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     broken = tuple(key for key, code in codes.items() if code == BROKEN)
     exceeded = (*broken, *((TIME,) if overruns else ()))
     decides = model == bus.deciding_model
+    terms = cycle.terms if profile.has_cycle else ()
     counts = (
         GroupCapacity(alike.name, int(alike.nodes), int(alike.nodes) * alike.node.axes, alike.node.axes, model, profile)
         for alike in profile.alike_nodes
@@ -294,8 +295,8 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
         kind=bus.kind,
         timing_model=model,
         **numbers,
-        terms=cycle.terms if profile.has_cycle else (),
-        binding_term=max(cycle.terms, key=lambda term: plain(term.us)).name if profile.has_cycle else None,
+        terms=terms,
+        binding_term=max(terms, key=lambda term: plain(term.us)).name if terms else _NO_TERM,
         exceeded=exceeded,
         fits=not exceeded,
         circle_refused_by=tuple(cause.name for cause in circle_refusals(profile)),
@@ -306,6 +307,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     )
 
 
+_NO_TERM: Final[Any] = None
 _UNDECIDED: Final[dict[str, Any]] = {
     **{figure.key: None for figure in CERTAINTY if figure.key not in COUNTS},
     "doubts": (),

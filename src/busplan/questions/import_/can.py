@@ -19,6 +19,10 @@ _MOST_PDOS: Final = 4
 _HEARTBEAT_ID: Final = 0x700
 _BIT_RATE: Final = "bit_rate_kbit_s"
 _DATA_BIT_RATE: Final = "data_bit_rate_kbit_s"
+_USUAL_BIT_RATE: Final = 1000
+"""Of machines [kbit/s]."""
+_USUAL_OF_CARS: Final = 500
+"""Of networks of messages alone [kbit/s]."""
 _LISTED: Final = 8
 
 
@@ -37,53 +41,44 @@ class _Node(NamedTuple):
 
 
 def rows(machine: Reading) -> Iterator[ProfileLine]:
-    """Lines of the profile, without its head.
+    """Lines of the profile, without its head: of messages alone, where no node has PDOs with SYNC both ways.
 
     Raises
     ------
     BusplanError
-        No node has PDOs with SYNC in both directions: a profile has no cycle then.
+        There are no messages either.
     """
     bus = machine.bus
-    period = _period(machine)
     nodes = list(_nodes(machine))
     messages = list(message_rows(machine))
-    if not nodes:
-        raise BusplanError(*_lacking(machine, messages))
+    if not (nodes or messages):
+        raise BusplanError(f"{machine.file}: no message with a period, and no node with PDOs", *machine.remarks)
     yield ProfileLine("bus", "kind", Fact("can", machine.place(1)))
-    yield ProfileLine(
-        "bus", _BIT_RATE, bus.get(_BIT_RATE) or Fact(1000, "", "assumed", "no file says it; the cable decides")
-    )
+    usual = _USUAL_BIT_RATE if nodes else _USUAL_OF_CARS
+    assumed = "no file says it; the cable decides" if nodes else "no file says it, and all times follow from it"
+    yield ProfileLine("bus", _BIT_RATE, bus.get(_BIT_RATE) or Fact(usual, "", "assumed", assumed))
     if has_fd(messages):
-        assumed = "no file says it; SYNC and PDOs are FD frames with it, too"
+        assumed = f"no file says it{'; SYNC and PDOs are FD frames with it, too' if nodes else ''}"
         yield ProfileLine("bus", _DATA_BIT_RATE, bus.get(_DATA_BIT_RATE) or Fact(2000, "", "assumed", assumed))
-    for key in ("sync_identifier", "sync_counter"):
-        if key in bus:
-            yield ProfileLine("bus", key, bus[key])
-    yield ProfileLine("bus", "pipeline_cycles", Fact(1, "", "assumed", "the host computes in the next cycle"))
-    yield ProfileLine("cycle", "period_us", period)
-    taken: set[str] = set()
-    for _, alike in groupby(enumerate(nodes), lambda item: _alike(item[0], item[1])):
-        yield from _group([node for _, node in alike], taken)
+    if nodes:
+        yield from _cycle(machine, nodes)
+    else:
+        machine.remarks.append(
+            "Messages alone, without a cycle of SYNC and PDOs: the EDS or DCF of each node beside the file adds it"
+        )
     yield from messages
 
 
-def _lacking(machine: Reading, messages: list[ProfileLine]) -> Iterator[str]:
-    """What is missing to a profile, for messages alone."""
-    count = sum(row.key == "identifier" for row in messages)
-    what = f"{count} message{'s' * (count != 1)} with a period"
-    yield f"{machine.file}: {what}, and no profile yet: a profile of CAN has a cycle of SYNC and PDOs; what is missing:"
-    yield (
-        "the nodes of the cycle and their PDOs: give the EDS or DCF of each node beside it, or --update PROFILE to "
-        "bring the messages into a profile that has nodes, as busplan init --bus can writes one"
-    )
-    if _BIT_RATE not in machine.bus:
-        yield f"bus.{_BIT_RATE}: the bit rate"
-    if has_fd(messages) and _DATA_BIT_RATE not in machine.bus:
-        yield f"bus.{_DATA_BIT_RATE}: the data bit rate of CAN FD messages"
-    if "period_us" not in machine.bus:
-        yield "cycle.period_us: the period of SYNC"
-    yield from machine.remarks
+def _cycle(machine: Reading, nodes: list[_Node]) -> Iterator[ProfileLine]:
+    """SYNC, its period, and the nodes in groups."""
+    for key in ("sync_identifier", "sync_counter"):
+        if key in machine.bus:
+            yield ProfileLine("bus", key, machine.bus[key])
+    yield ProfileLine("bus", "pipeline_cycles", Fact(1, "", "assumed", "the host computes in the next cycle"))
+    yield ProfileLine("cycle", "period_us", _period(machine))
+    taken: set[str] = set()
+    for _, alike in groupby(enumerate(nodes), lambda item: _alike(item[0], item[1])):
+        yield from _group([node for _, node in alike], taken)
 
 
 def has_fd(messages: list[ProfileLine]) -> bool:

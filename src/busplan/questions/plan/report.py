@@ -175,7 +175,7 @@ def _record(plan: Plan, option: Option) -> Record:
         **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
         "fits_other_model": all(model.fits for model in others) if others else None,
         "margin_us": figures.margin_us,
-        "margin_other_model_us": min((model.margin_us for model in others if model.margin_us is not None), default=None),
+        "margin_other_model_us": min((model.margin_us for model in others if profile.has_cycle), default=None),
         **fields(figures, "bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
         **fields(option, "passes", "held_by", "proven", "circle_passed"),
         "circle_failures": list(option.circle_failures or ()),

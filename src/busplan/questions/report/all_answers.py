@@ -32,14 +32,14 @@ class AllAnswers(NamedTuple):
     capacity: Capacity
     verdict: Verdict
     sensitivity: Sensitivity | None
-    """This, schedule, steps, periods and map are None or empty of a network without a cycle."""
+    """This, the schedule and the map are None of a network without a cycle."""
     latency: LatencyResult
     schedule: Schedule | None
     no_schedule: tuple[str, ...]
     """Why there is no schedule."""
     steps: tuple[NodeSteps, ...]
     """Nodes over the period, under each timing model; empty where nodes are in groups."""
-    periods: Capacity | None
+    periods: Capacity
     """Capacity at several periods around and including the profile's own."""
     trade_off: TradeOff | None
     """Period against axes, without circle tests."""
@@ -81,7 +81,7 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
             schedule=None,
             no_schedule=(),
             steps=(),
-            periods=None,
+            periods=bus,
             trade_off=None,
             circle=None,
             contour=None,

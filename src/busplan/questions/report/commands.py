@@ -77,17 +77,16 @@ def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[s
     schedule, circle = answer.schedule, answer.circle
     if schedule is not None:
         add("timeline", "the cycle event by event", lambda: timeline_document(schedule))
-    periods, trade_off = answer.periods, answer.trade_off
-    if periods is not None:
+    trade_off = answer.trade_off
+    if trade_off is not None:
         add(
             "axes",
             "axes against period",
-            lambda: capacity_document(periods, verdicts(periods)),
-            *(word for (figures, *_) in periods.periods for word in period_option(figures.period_us)),
+            lambda: capacity_document(answer.periods, verdicts(answer.periods)),
+            *(word for (figures, *_) in answer.periods.periods for word in period_option(figures.period_us)),
             command="capacity",
             own=changes.without(key="cycle.period_us"),
         )
-    if trade_off is not None:
         add("map", "period against axes, cell by cell", lambda: map_document(trade_off))
     if circle is not None:
         purpose = "the circle and its error sources"

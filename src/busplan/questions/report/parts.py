@@ -197,7 +197,7 @@ def _over_period(
 ) -> Table:
     """A row for each period; `shown` gives figures under a timing model, each with what has it."""
     rows = []
-    for results in () if answer.periods is None else answer.periods.periods:
+    for results in answer.periods.periods:
         cells = [attribute_value(PERIOD, results[0])]
         cells += (attribute_value(figure, owner) for figures in results for figure, owner in shown(figures))
         rows.append(TableRow(tuple(cells), highlighted=results[0].period_us == answer.profile.cycle.period_us))
