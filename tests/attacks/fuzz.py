@@ -106,7 +106,7 @@ class Maker:
         rng, data = self.rng, self.machine()
         if rng.random() < 0.5:
             for section in ("servo", "circle"):
-                del data[section]
+                data.pop(section, None)
         for _ in range(rng.choice((0, 1, 3, 10, 30))):
             changed = self.changed(data)
             if is_valid(changed):
@@ -119,7 +119,17 @@ class Maker:
         nodes = rng.choice((1, 2, 3, 5, 8, 16, 19, 40))
         axes = nodes * rng.choice((1, 2, 4)) + rng.choice((0, 0, 1))
         machine = Machine(shared_out(axes, nodes=nodes), rng.choice(PERIODS_US), rng.choice((1, 2, 4, 8, 12)))
-        return tomllib.loads(machine_text(machine, kind=self.kind, name="a machine", file=FILE))
+        data = tomllib.loads(machine_text(machine, kind=self.kind, name="a machine", file=FILE))
+        return self.messages_alone(data) if self.kind == "can" and rng.random() < 0.25 else data
+
+    def messages_alone(self, data: Data) -> Data:
+        """A network of messages alone, with the bus of a machine."""
+        bus = {key: data["bus"][key] for key in ("kind", "bit_rate_kbit_s")}
+        messages = [
+            {"name": f"m{number}", "identifier": number, "payload_bytes": 8, "period_us": 10_000 * number}
+            for number in range(1, self.rng.choice((2, 4, 30, 70)))
+        ]
+        return {key: data[key] for key in ("schema_version", "name")} | {"bus": bus, "message": messages}
 
     def changed(self, data: Data) -> Data:
         """A copy with another value somewhere."""
@@ -348,7 +358,10 @@ def words_of(annotation: Any) -> Iterator[str]:
         yield from (one,) if isinstance(one, str) else words_of(one)
 
 
-VARIED: Final = ("cycle.period_us=100,1000,1e9", "cycle.slice_ratio=0.1:1:0.1", "limits.reserve=0,0.5")
+VARIED: Final = (
+    *("cycle.period_us=100,1000,1e9", "cycle.slice_ratio=0.1:1:0.1", "limits.reserve=0,0.5"),
+    "bus.bit_rate_kbit_s=20,125,500",
+)
 NEEDED: Final[Mapping[str, Callable[[random.Random], tuple[str, ...]]]] = {
     "sweep": lambda rng: ("--vary", rng.choice(VARIED)),
     "diff": lambda rng: (rng.choice((FILE, "paper-1ms", "can-servo-8")),),

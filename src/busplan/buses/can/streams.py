@@ -166,7 +166,11 @@ def columns_of(each: Iterable[Stream]) -> "NDArray[Any]":
     import numpy as np  # of many streams alone
 
     rows = [(*own.sender(), own.frame_us, own.deadline_us, own.block, own.last_place) for own in each]
-    return np.array(rows, dtype=float).T
+    return np.array(rows, dtype=float).reshape(len(rows), _COLUMNS).T
+
+
+_COLUMNS: Final = 7
+"""Numbers of a stream in `columns_of`."""
 
 
 def message_streams(traffic: Traffic, *, is_stuffed: bool) -> MessageStreams:

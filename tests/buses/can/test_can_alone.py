@@ -1,0 +1,283 @@
+"""Networks of messages alone, as a car's: no nodes, no SYNC, no cycle; loads, response times and deadlines."""
+
+import json
+from collections.abc import Callable, Sequence
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import busplan
+from busplan.buses.can.section import CanProfile
+from busplan.buses.can.streams import streams
+from busplan.buses.can.traffic import traffic_of_profile
+from busplan.errors import BusplanError
+from busplan.profile.document import Document
+from busplan.profile.toml import override, validate
+
+Run = Callable[..., Any]
+CAR = """\
+schema_version = 1
+name = "car"
+
+[bus]
+kind = "can"
+bit_rate_kbit_s = 33.3
+identifier_bits = 29
+
+[[message]]
+name = "wake"
+identifier = 0x100
+identifier_bits = 11
+payload_bytes = 0
+period_us = 1000000
+
+[[message]]
+name = "lights"
+identifier = 0x10024040
+payload_bytes = 2
+period_us = 100000
+jitter_us = 2000
+
+[[message]]
+name = "doors"
+identifier = 0x10030060
+payload_bytes = 6
+period_us = 100000
+deadline_us = 50000
+"""
+
+
+def car(**changes: Any) -> Any:
+    return override(validate(Document("car.toml", CAR)), changes)
+
+
+def network(
+    *messages: dict[str, Any], bit_rate_kbit_s: float = 500, data_bit_rate_kbit_s: float | None = None
+) -> CanProfile:
+    data = {} if data_bit_rate_kbit_s is None else {"data_bit_rate_kbit_s": data_bit_rate_kbit_s}
+    named = [{"name": f"m{number}", **message} for number, message in enumerate(messages)]
+    bus = {"kind": "can", "bit_rate_kbit_s": bit_rate_kbit_s, **data}
+    return CanProfile.model_validate({"schema_version": 1, "name": "alone", "bus": bus, "message": named})
+
+
+def responses(own: Any) -> list[float | None]:
+    answers = busplan.latency(own, timing_model="worst-stuffing").transactions
+    return [answer.worst_response_us for answer in answers]
+
+
+# --- outside oracles --------------------------------------------------------------------------------------------------
+
+
+def test_a_published_network_of_five_messages() -> None:
+    """A series on robot communication, part 10: 500 kbit/s, A 420, D and E 1230 us, a load of 13.9 %."""
+    sizes, periods_us = (2, 8, 8, 8, 8), (10_000, 5000, 5000, 20_000, 100_000)
+    own = network(
+        *(
+            {"identifier": number, "payload_bytes": size, "period_us": us}
+            for number, (size, us) in enumerate(zip(sizes, periods_us, strict=True), start=1)
+        )
+    )
+    us = responses(own)
+    assert (us[0], us[3], us[4]) == (420, 1230, 1230)
+    assert busplan.capacity(own).verdicts[0].deciding.bus_load == pytest.approx(0.139, abs=5e-4)
+
+
+def test_the_worst_instance_is_not_the_first() -> None:
+    """Davis, Burns, Bril and Lukkien 2007, Table 2: 2000, 3000 and 3500 us at 125 kbit/s."""
+    periods_us = (2500, 3500, 3500)
+    own = network(
+        *({"identifier": number, "payload_bytes": 7, "period_us": us} for number, us in enumerate(periods_us)),
+        bit_rate_kbit_s=125,
+    )
+    assert responses(own) == [2000, 3000, 3500]
+
+
+def simulated(own: CanProfile) -> list[float]:
+    """The longest response of each message by an arbiter, from its critical instant to the end of its busy period.
+
+    All messages of higher priorities are queued at once, as late as they may be and then as early, just after the
+    longest frame of a lower priority has started.
+    """
+    each = streams(traffic_of_profile(own), is_stuffed=True)
+    bit_us = 1000 / own.bus.bit_rate_kbit_s
+    return [_simulated(stream, each, bit_us) for stream in each]
+
+
+def _simulated(own: Any, each: Sequence[Any], bit_us: float) -> float:
+    lower = [stream.frame_us for stream in each if stream.first_place > own.first_place]
+    rivals = sorted((stream for stream in each if stream.first_place <= own.first_place), key=lambda it: it.first_place)
+    now_us, sent, longest_us = max(lower, default=0.0), dict.fromkeys(range(len(rivals)), 0), 0.0
+    for _ in count():
+        # What is queued within a bit of the start still takes part in the arbitration; our own frame is the last.
+        for number, stream in enumerate(rivals):
+            queued_us = max(sent[number] * stream.period_us - stream.jitter_us, 0.0) if sent[number] else 0.0
+            if queued_us < now_us + bit_us - 1e-9 if stream is not own else queued_us <= now_us + 1e-9:
+                break
+        else:
+            return longest_us
+        now_us += stream.frame_us
+        if stream is own:
+            due_us = sent[number] * stream.period_us - stream.jitter_us
+            longest_us = max(longest_us, now_us - due_us)
+        sent[number] += 1
+    raise AssertionError
+
+
+MESSAGES = st.lists(
+    st.fixed_dictionaries(
+        {
+            "identifier": st.integers(0, 0x7FF),
+            "payload_bytes": st.integers(0, 8),
+            "period_us": st.sampled_from([2000, 2500, 3500, 5000, 10_000, 100_000]),
+            "jitter_us": st.sampled_from([0, 0, 300, 1900]),
+            "identifier_bits": st.sampled_from([11, 29]),
+            "fd": st.booleans(),
+        }
+    ),
+    min_size=1,
+    max_size=8,
+    unique_by=lambda message: (message["identifier"], message["identifier_bits"]),
+)
+
+
+@given(MESSAGES, st.sampled_from([125, 500]))
+@settings(max_examples=150, deadline=None)
+def test_a_simulated_arbiter_never_takes_longer_and_reaches_the_bound(
+    messages: list[dict[str, Any]], rate: float
+) -> None:
+    own = network(*messages, bit_rate_kbit_s=rate, data_bit_rate_kbit_s=2000)
+    bounds = responses(own)
+    if None in bounds:
+        return
+    for bound, us in zip(bounds, simulated(own), strict=True):
+        assert us == pytest.approx(bound)
+
+
+# --- what each question says ------------------------------------------------------------------------------------------
+
+
+def test_the_verdict_is_by_load_and_deadlines() -> None:
+    answer = busplan.capacity(car())
+    figures = answer.verdicts[0].deciding
+    bits = ((1000 / 33.3) * length for length in (55, 80 + 20, 80 + 60))
+    load = sum(us / period_us for us, period_us in zip(bits, (1e6, 1e5, 1e5), strict=True))
+    assert (figures.bus_load, figures.verdict, figures.nodes) == (pytest.approx(load), "fits", 0)
+    for key in (
+        "period_us",
+        "required_us",
+        "margin_us",
+        "safe_nodes",
+        "binding_term",
+        "cycle_sync_us",
+        "uncertainty_us",
+    ):
+        assert getattr(figures, key) is None
+    late = busplan.capacity(car(**{"message.doors.deadline_us": 8000}))
+    assert late.verdicts[0].deciding.exceeded == ("deadline",)
+    assert late.verdicts[0].change is not None
+    assert [*late.verdicts[0].change.changes] == ["bus.bit_rate_kbit_s"]
+    full = busplan.capacity(car(**{"limits.max_load": 0.05}))
+    assert full.verdicts[0].deciding.exceeded == ("load",)
+
+
+def test_a_card_says_loads_and_the_latest_message_and_nothing_of_a_cycle(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "car.toml").write_text(CAR, encoding="utf-8")
+    said = run("capacity", "car.toml", cwd=tmp_path).stdout
+    assert said.startswith("car  CAN, 3 messages")
+    assert "latest message  doors, 8858.9 us of 50000" in said
+    for word in ("period", "free", "nodes", "axes", "None", "inf", "nan"):
+        assert word not in said
+    document = json.loads(run("capacity", "car.toml", "--format", "json", cwd=tmp_path).stdout)
+    assert document["results"][0]["available_us"] is None
+
+
+def test_plan_raises_the_bit_rate_to_the_first_that_is_enough() -> None:
+    own = car(**{"message.doors.deadline_us": 8000})
+    answer = busplan.plan(own)
+    assert answer.recommended_changes == {"bus.bit_rate_kbit_s": 50}
+    fits = busplan.capacity(busplan.load_profile(own, changes=answer.recommended_changes))
+    assert fits.verdict == "fits"
+    none = busplan.plan(car(**{"message.doors.deadline_us": 100}))
+    assert none.recommended is None
+
+
+def test_a_sweep_and_a_map_agree_with_capacity_point_by_point() -> None:
+    rates, deadlines_us = [20.0, 33.3, 50.0, 125.0], [5000.0, 10_000.0, 50_000.0]
+    vary = {"bus.bit_rate_kbit_s": rates, "message.doors.deadline_us": deadlines_us}
+    rows = busplan.sweep(car(), vary=vary).to_dict()["rows"]
+    pictured = busplan.map_(car(), x={"bus.bit_rate_kbit_s": rates}, y={"message.doors.deadline_us": deadlines_us})
+    for row in rows:
+        own = car(**{key: row[key] for key in vary})
+        (figures,) = busplan.capacity(own, timing_model=row["timing_model"]).results
+        for key, value in figures.by_key().items():
+            assert row[key] == (pytest.approx(value) if isinstance(value, float) else value), key
+        if figures.verdict is not None:
+            cell = pictured.rows[deadlines_us.index(row["message.doors.deadline_us"])]
+            assert cell[rates.index(row["bus.bit_rate_kbit_s"])].state == figures.verdict
+
+
+@pytest.mark.parametrize("number", [3, 49, 50, 400])
+def test_many_messages_are_answered_as_few_are(number: int) -> None:
+    """From 50 messages on they are computed in arrays."""
+    messages = [
+        {"identifier": own, "payload_bytes": own % 9, "period_us": 30_000 * (1 + own % 7), "jitter_us": own}
+        for own in range(number)
+    ]
+    own = network(*messages, bit_rate_kbit_s=1000)
+    each = streams(traffic_of_profile(own), is_stuffed=True)
+    assert sum(stream.sender().load for stream in each) < 1
+    us = responses(own)
+    for place_ in {0, number // 2, number - 1}:
+        bit_us = 1.0
+        assert us[place_] == pytest.approx(_simulated(each[place_], each, bit_us))
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (busplan.timeline, "messages alone have no cycle, and timeline asks for one"),
+        (busplan.compare, "messages alone have no cycle, and compare asks for one"),
+        (busplan.map_, "give x and y, each a key with values"),
+        (lambda own: busplan.capacity(own, sensitivity=True), "messages alone have no cycle"),
+        (lambda own: busplan.capacity(own, period_us=4000), "messages alone have no cycle"),
+        (lambda own: busplan.plan(own, axes=4), "a plan for axes asks for one"),
+        (busplan.circle_test, "messages alone have no axes that could move"),
+        (lambda own: busplan.explain(own, "circle-test.passed"), "messages have no circle"),
+        (lambda own: busplan.sweep(own, vary={"cycle.period_us": [1000]}), "no figure of capacity depends on it"),
+    ],
+)
+def test_what_asks_for_a_cycle_refuses_them(ask: Callable[[Any], Any], words: str) -> None:
+    with pytest.raises(BusplanError, match=words):
+        ask(car())
+
+
+@pytest.mark.parametrize(
+    ("more", "place_", "words"),
+    [
+        ("[cycle]\nperiod_us = 4000\n", "cycle", "has no nodes; add bus.nodes, [node] and [payload], or remove it"),
+        ("[servo]\nstep_us = 100\n", "servo", "asks for nodes, and a network of messages alone has none"),
+        ("[limits]\nreserve = 0.1\n", "limits.reserve", "asks for nodes, and a network of messages alone has none"),
+        (
+            '[[message]]\nname="b"\nidentifier=1\npayload_bytes=1\nperiod_us=1e6\nper_node=true\n',
+            "per_node",
+            "asks for nodes",
+        ),
+        ("[payload]\nread_bytes = 8\nwrite_bytes = 8\n", "", "missing section [node]"),
+    ],
+)
+def test_keys_of_a_cycle_are_refused_where_they_stand(more: str, place_: str, words: str) -> None:
+    with pytest.raises(BusplanError) as refused:
+        validate(Document("car.toml", CAR + more))
+    assert any(words in problem and place_ in problem for problem in refused.value.problems)
+
+
+def test_the_report_has_no_part_of_a_cycle(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "car.toml").write_text(CAR, encoding="utf-8")
+    page = run("report", "car.toml", cwd=tmp_path).stdout
+    assert "car" in page
+    for word in ("The cycle to scale", "against period", "Is the circle", ">None<", "nan"):
+        assert word not in page
