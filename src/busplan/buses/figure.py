@@ -83,6 +83,8 @@ class Figure(NamedTuple):
         Whether a share of it means something.
     ink, letter
         How it is drawn, where it is a part of the slice.
+    is_hexadecimal
+        Whether tables write it as 0x1f.
     """
 
     key: str
@@ -98,6 +100,7 @@ class Figure(NamedTuple):
     relative: bool = True
     ink: Ink = "idle"
     letter: str = ""
+    is_hexadecimal: bool = False
 
     @property
     def unit(self) -> str:

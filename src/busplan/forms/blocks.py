@@ -39,6 +39,8 @@ class ShownValue(NamedTuple):
     """If True, always round to `decimals`: a number too small for them is written as zero."""
     grouped: bool = False
     """If True, commas separate the thousands of a number without `decimals`."""
+    hexadecimal: bool = False
+    """If True, a whole number is written as 0x1f."""
 
 
 class Words(NamedTuple):
@@ -373,7 +375,14 @@ def figure_value(figure: Figure, value: Any) -> ShownValue:
     """Value with the unit and decimals of a registered figure; False fails where True is better."""
     fails = figure.sort == "truth" and figure.better == "more" and value is False
     decimals = figure.decimals if figure.sort == "number" else None
-    return ShownValue(value, figure.key, figure.column or figure.unit, decimals, state="fails" if fails else "neutral")
+    return ShownValue(
+        value,
+        figure.key,
+        figure.column or figure.unit,
+        decimals,
+        state="fails" if fails else "neutral",
+        hexadecimal=figure.is_hexadecimal,
+    )
 
 
 def attribute_value(figure: Figure, owner: object) -> ShownValue:

@@ -48,12 +48,16 @@ def figure_text(value: ShownValue) -> str:
     ('2.388, 4000', '0.000')
     >>> figure_text(ShownValue(1234567)), figure_text(ShownValue(1234567, grouped=True))
     ('1234567', '1,234,567')
+    >>> figure_text(ShownValue(0x181, hexadecimal=True))
+    '0x181'
     """
     match value.value:
         case None:
             return MISSING
         case bool():
             return "yes" if value.value else "no"
+        case int() if value.hexadecimal:
+            return f"{value.value:#x}"
         case int() | float():
             return _number(value)
         case list() | tuple():

@@ -216,8 +216,8 @@ def test_a_sweep_and_a_map_agree_with_capacity_point_by_point() -> None:
         for key, value in figures.by_key().items():
             assert row[key] == (pytest.approx(value) if isinstance(value, float) else value), key
         if figures.verdict is not None:
-            cell = pictured.rows[deadlines_us.index(row["message.doors.deadline_us"])]
-            assert cell[rates.index(row["bus.bit_rate_kbit_s"])].state == figures.verdict
+            cells: Any = pictured.rows[deadlines_us.index(row["message.doors.deadline_us"])]
+            assert cells[rates.index(row["bus.bit_rate_kbit_s"])].state == figures.verdict
 
 
 @pytest.mark.parametrize("number", [3, 49, 50, 400])

@@ -73,7 +73,15 @@ TERMS: Final = (
 """In the order of the wire."""
 
 LATENCY_TABLE: Final = (
-    Figure("identifier", "id", "profile", "identifier of the last frame", "identifier", sort="count"),
+    Figure(
+        "identifier",
+        "id",
+        "profile",
+        "identifier of the last frame",
+        "identifier",
+        sort="count",
+        is_hexadecimal=True,
+    ),
     Figure("data_bytes", "s", "profile", "data of the last frame", "data, bytes", sort="count"),
     Figure("jitter_us", "J", "profile", "how late it may be queued", "jitter J"),
     Figure("blocking_us", "B", _DAVIS, "longest frame of a lower priority", "blocking B"),

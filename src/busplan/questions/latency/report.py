@@ -71,10 +71,14 @@ def latency_tables(result: LatencyResult) -> Iterator[Table]:
 def _by_transaction(result: LatencyResult, figures: Sequence[Figure], subject: str) -> Iterator[Table]:
     """One row for each transaction; one table for each payload and timing model.
 
-    A time and its deadline come first. Of many transactions those closest to their deadlines are shown.
+    A time and its deadline come first. Of many transactions those closest to their deadlines are shown. What is 0 for
+    all has no column.
     """
     first = bus_of(result.profile).figures.deadlines or ()
-    figures = sorted(figures, key=lambda figure: figure.key not in first)
+    figures = [
+        figure for figure in figures if any(transaction.phases[figure.key] for transaction in result.transactions)
+    ]
+    figures.sort(key=lambda figure: figure.key not in first)
     columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
     tables: dict[tuple[int, str], list[Transaction]] = {}
     for number, transaction in _numbered(result.transactions):
