@@ -21,6 +21,8 @@ from busplan.sections.transactions import TRANSACTION_KINDS
 
 _KIND, _NODES, _SHOWN_FIRST = "kind", "nodes", "timing_model"
 _SIZES = ("read_bytes", "write_bytes")
+_EVERY = "every"
+"""Rate of a group, on kinds that have several."""
 
 
 class AssumedKey(NamedTuple):
@@ -74,6 +76,7 @@ def converted(profile: Profile, kind: str) -> Conversion:
         # The other kind may have no default for it.
         table.setdefault("execution", group.execution.model_dump(exclude_none=True))
     machine, left_out = _common(data)
+    left_out = _with_rates(machine, profile, left_out, kind=kind)
     _say_payloads(machine, profile)
     # The host keeps its share of the period, whatever each kind has by default.
     machine["cycle"]["slice_ratio"] = profile.cycle.slice_ratio
@@ -94,6 +97,17 @@ def converted(profile: Profile, kind: str) -> Conversion:
     new_profile = profile_of(_merged(machine, new))
     given = [*raised, *(AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}")]
     return Conversion(new_profile, (*given, *_defaults(new_profile)), (*left_out, *empty))
+
+
+def _with_rates(machine: TomlTable, profile: Profile, left_out: tuple[str, ...], *, kind: str) -> tuple[str, ...]:
+    """Keep the rates of groups on a kind that has such; returns what is left out without them."""
+    (groups,) = models_of(kind_named(kind).profile_model().model_fields["group"].annotation)
+    if _EVERY not in groups.model_fields:
+        return left_out
+    for table, group in zip(machine.get("group", ()), profile.group, strict=True):
+        if _EVERY in group.model_fields_set:
+            table[_EVERY] = getattr(group, _EVERY)
+    return tuple(key for key in left_out if not (key.startswith("group.") and key.endswith(f".{_EVERY}")))
 
 
 def _say_payloads(machine: TomlTable, profile: Profile) -> None:

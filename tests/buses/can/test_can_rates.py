@@ -198,4 +198,16 @@ def test_every_question_takes_a_machine_of_two_rates(run: Run, tmp_path: Path) -
     said = run("sweep", "arm.toml", "--vary", "group.io.every=1,2,4", "--vary", "group.io.nodes=2,6", cwd=tmp_path)
     assert said.returncode == 0
     assert run("sweep", "arm.toml", "--vary", "group.io.every=1,241", cwd=tmp_path).returncode == 2
-    assert "group.io.every" in converted(mixed(), "sercos3").left_out
+
+
+def test_rates_of_groups_go_along_where_the_other_kind_has_them() -> None:
+    own = mixed()
+    without, rates = converted(own, "sercos3"), converted(own, "ethercat")
+    assert "group.io.every" in without.left_out
+    assert not any(key.endswith(".every") for key in rates.left_out)
+    assert [group.every for group in network_of(rates.profile).groups] == [
+        group.every for group in network_of(own).groups
+    ]
+    back = converted(rates.profile, "can").profile
+    assert [group.every for group in network_of(back).groups] == [group.every for group in network_of(own).groups]
+    assert "Data at a slower rate go in every cycle there" in str(busplan.compare(own))

@@ -171,7 +171,13 @@ def _left_out(comparison: KindComparison) -> Iterator[Sentence]:
             titles.setdefault(machine.left_out, []).append(bus_of(machine.profile).title)
     for left_out, names in titles.items():
         keys = joined(*(Sentence((Code(key),)) for key in left_out), by=", ")
-        yield Sentence((f"Left out on {listed(names, 'and')}: ", *keys.parts, "."))
+        rates = " Data at a slower rate go in every cycle there." if any(map(_is_rate, left_out)) else ""
+        yield Sentence((f"Left out on {listed(names, 'and')}: ", *keys.parts, f".{rates}"))
+
+
+def _is_rate(key: str) -> bool:
+    """Whether a key is the rate of a group, or of all nodes."""
+    return key.startswith(("group.", "payload.")) and key.endswith(".every")
 
 
 def _obstacles(machine: MachineOnKind) -> Iterator[Sentence]:
