@@ -212,14 +212,13 @@ def test_the_largest_device_counts_whatever_its_cycle() -> None:
 def test_the_timeline_lists_the_cycles_of_the_common_multiple() -> None:
     one = profile([(1, 1, 100, 0), (2, 1, 400, 0), (2, 1, 200, 0)])
     us = [20 + 3 * E_BUS_US + BYTE_US * (52 + size) for size in (500, 300)]
-    (words,) = cycle_of(one, model="last-byte").other_cycles()
-    assert words.endswith(f"Cycles 1: g0, g1 ({us[0]:.3f} us); 2: g0, g2 ({us[1]:.3f} us).")
-    assert words in str(busplan.timeline(one))
-    (many,) = cycle_of(override(one, {"group.g1.every": 65}), model="last-byte").other_cycles()
-    assert many.endswith("every 130 cycles; this is the fullest. More than 64 cycles are not listed.")
-    assert cycle_of(profile([(1, 1, 100, 0)]), model="last-byte").other_cycles() == ()
+    said = "The groups meet every 2 cycles; this is the fullest. "
+    assert f"{said}Cycles 1: g0, g1 ({us[0]:.3f} us); 2: g0, g2 ({us[1]:.3f} us).\n" in str(busplan.timeline(one))
+    many = str(busplan.timeline(override(one, {"group.g1.every": 65})))
+    assert "every 130 cycles; this is the fullest. More than 64 cycles are not listed.\n" in many
+    assert "cycles" not in str(busplan.timeline(profile([(1, 1, 100, 0)])))
     _, vendors = busplan.capacity(one).results
-    assert f"({vendors.required_us:.3f} us)" in cycle_of(one, model="vendors").other_cycles()[0]
+    assert f"({vendors.required_us:.3f} us)" in str(busplan.timeline(one, timing_model="vendors"))
 
 
 def test_an_array_of_rates_computes_as_each_rate() -> None:
