@@ -1,7 +1,7 @@
 """Groups at several rates against all cycles of their common multiple, each written byte by byte."""
 
 from collections.abc import Sequence
-from itertools import product
+from itertools import accumulate, product
 from math import lcm
 from statistics import fmean
 from typing import Any, Final
@@ -109,6 +109,29 @@ def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
     assert sum(event.duration_us for event in events if event.term) == pytest.approx(found.required_us, rel=1e-12)
 
 
+@settings(max_examples=40)
+@given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans())
+def test_a_timeline_draws_each_cycle_of_the_common_multiple(groups: list[Rated], units: str, clocks: bool) -> None:
+    own, first = profile(groups, units=units, distributed_clocks=clocks), placed(groups, units)
+    ends = [*accumulate(nodes for _, nodes, _, _ in groups)]
+    for cycle, us in enumerate(written_us(groups, first, clocks=clocks)):
+        drawn = busplan.timeline(own, timing_model="last-byte", cycle=cycle + 1)
+        assert drawn.required_us == pytest.approx(us, rel=1e-12)
+        assert sum(event.duration_us for event in drawn.cycle_events if event.term) == pytest.approx(us, rel=1e-12)
+        due = [(cycle - start) % every == 0 for (every, *_), start in zip(groups, first, strict=True)]
+        assert {event.node for event in drawn.cycle_events if event.kind == "data"} == {
+            device
+            for end, (_, nodes, *_), is_due in zip(ends, groups, due, strict=True)
+            for device in range(end - nodes + 1, end + 1)
+            if is_due
+        }
+        (alike,) = (alike for alike in drawn.to_dict()["distinct_cycles"] if cycle + 1 in alike["numbers"])
+        assert alike["groups"] == [f"g{place}" for place, is_due in enumerate(due) if is_due]
+        assert alike["required_us"] == drawn.required_us
+    whole = busplan.timeline(own)
+    assert whole.cycle_events == busplan.timeline(own, cycle=whole.to_dict()["cycle"]).cycle_events
+
+
 @given(GROUPS)
 def test_together_the_fullest_cycle_is_that_without_rates(groups: list[Rated]) -> None:
     without = deciding(profile([(1, nodes, read, write) for _, nodes, read, write in groups]))
@@ -116,6 +139,15 @@ def test_together_the_fullest_cycle_is_that_without_rates(groups: list[Rated]) -
     assert found.required_us == without.required_us
     assert found.process_bytes == without.process_bytes
     assert found.uncertainty_us == pytest.approx(without.uncertainty_us, rel=1e-12)
+
+
+def test_a_cycle_without_process_data_sends_no_frame() -> None:
+    own = profile([(2, 1, 100, 0)])
+    last_byte, vendors = (busplan.timeline(own, timing_model=model, cycle=2) for model in ("last-byte", "vendors"))
+    assert {event.kind for event in vendors.cycle_events} == {"master", "device", "idle"}
+    assert vendors.required_us == last_byte.required_us == 20 + E_BUS_US
+    (found,) = busplan.capacity(own, timing_model=["vendors"]).results
+    assert found.mean_utilisation == pytest.approx((found.required_us + vendors.required_us) / 2 / 500)
 
 
 @given(st.lists(st.integers(1, 100), min_size=2, max_size=5), st.integers(2, 4))

@@ -123,7 +123,8 @@ class EthercatCycle(BusCycle):
         """The last frame once more, where it is counted [us]."""
         if not self.counts_reception:
             return 0.0
-        last_us = sending_us(frame_bytes(self.packing.last_bytes))
+        is_empty = self.number is not None and not self.packing.frames
+        last_us = 0.0 if is_empty else sending_us(frame_bytes(self.packing.last_bytes))
         return choose(self.network.profile.bus.mailbox_polls > 0, mailbox_frame_us(self.network), last_us)
 
     @property

@@ -130,10 +130,11 @@ def mean_wire_bytes(network: Network, *, with_last: bool) -> Number:
 
     def plainly(*numbers: float) -> float:
         cycles = _unit_cycles(network, numbers)
-        each = [
-            (len(cycle.numbers), cycle.wire_bytes + (plain(frame_bytes(cycle.last_bytes)) if with_last else 0.0))
-            for cycle in cycles
-        ]
+        each = []
+        for cycle in cycles:
+            # A cycle without process data may have no frame.
+            last_bytes = plain(frame_bytes(cycle.last_bytes)) if with_last and cycle.last_bytes else 0.0
+            each.append((len(cycle.numbers), cycle.wire_bytes + last_bytes))
         return sum(number * own_bytes for number, own_bytes in each) / sum(number for number, _ in each)
 
     return pointwise(
