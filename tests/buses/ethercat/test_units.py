@@ -128,6 +128,8 @@ def test_a_timeline_draws_each_cycle_of_the_common_multiple(groups: list[Rated],
         (alike,) = (alike for alike in drawn.to_dict()["distinct_cycles"] if cycle + 1 in alike["numbers"])
         assert alike["groups"] == [f"g{place}" for place, is_due in enumerate(due) if is_due]
         assert alike["required_us"] == drawn.required_us
+        mean = (cycle_of(own, model="vendors").at(number).figures()["mean_utilisation"] for number in (1, cycle + 1))
+        assert next(mean) == pytest.approx(next(mean), rel=1e-12)
     whole = busplan.timeline(own)
     assert whole.cycle_events == busplan.timeline(own, cycle=whole.to_dict()["cycle"]).cycle_events
 
@@ -139,6 +141,12 @@ def test_together_the_fullest_cycle_is_that_without_rates(groups: list[Rated]) -
     assert found.required_us == without.required_us
     assert found.process_bytes == without.process_bytes
     assert found.uncertainty_us == pytest.approx(without.uncertainty_us, rel=1e-12)
+
+
+def test_the_fullest_cycle_has_its_number() -> None:
+    whole = busplan.timeline(profile([(2, 1, 100, 0), (4, 1, 90, 0), (4, 1, 60, 0), (4, 1, 50, 0)]))
+    assert whole.to_dict()["cycle"] == 4
+    assert {event.node for event in whole.events if event.kind == "data"} == {3, 4}
 
 
 def test_a_cycle_without_process_data_sends_no_frame() -> None:
