@@ -66,8 +66,6 @@ class Schedule(NamedTuple):
     """End of the window [us]."""
     required_us: float
     """Closed form of the time that the cycle needs [us]."""
-    margin_us: float
-    """What it leaves of its slice [us]."""
     number: int | None = None
     """Which cycle of the common multiple of the rates was asked for, from 1; None for that of the verdict."""
 
@@ -81,6 +79,11 @@ class Schedule(NamedTuple):
         """End of the last event that is not idle: the required time as a sum of events [us]."""
         last = self.cycle_events[-1]
         return last.start_us if last.kind == IDLE.key else last.end_us
+
+    @property
+    def margin_us(self) -> float:
+        """Time that the cycle leaves of its slice [us]."""
+        return plain(margin_us(self.required_us, available_us=self.figures.available_us))
 
     @property
     def is_whole(self) -> bool:
@@ -168,7 +171,6 @@ def schedule(profile: Profile, *, model: str | None = None, number: int | None =
         from_us=0.0,
         to_us=events[-1].end_us,
         required_us=plain(cycle.required_us),
-        margin_us=plain(margin_us(cycle)),
         number=number,
     )
 

@@ -31,9 +31,13 @@ class ModelBar(NamedTuple):
 
     timing_model: str
     required_us: float
-    margin_us: float
     available_us: float
     period_us: float
+
+    @property
+    def margin_us(self) -> float:
+        """Time that it leaves of the slice [us]."""
+        return plain(margin_us(self.required_us, available_us=self.available_us))
 
     @property
     def words(self) -> str:
@@ -66,8 +70,7 @@ def model_bars(schedule: Schedule) -> tuple[ModelBar, ...]:
     figures, bars = schedule.figures, []
     for model in model_names(schedule.profile):
         cycle = drawn_cycle(schedule.profile, model=model, number=schedule.number)
-        times_us = plain(cycle.required_us), plain(margin_us(cycle))
-        bars.append(ModelBar(model, *times_us, figures.available_us, figures.period_us))
+        bars.append(ModelBar(model, plain(cycle.required_us), figures.available_us, figures.period_us))
     return tuple(bars)
 
 
