@@ -90,6 +90,9 @@ def test_an_overrun_is_a_report_and_exits_0(busplan: Run, tmp_path: Path) -> Non
         (["-o", "cycle.doc"], "cycle.doc: expected a name ending in .txt, .md, .html, .csv, .json, .svg, .png"),
         (["-o", "no/such/cycle.svg"], "there is no folder"),
         (["--timing", "both"], "both"),
+        (["--cycle", "0"], "--cycle 0: expected a whole number from 1"),
+        (["--cycle", "-1"], "--cycle -1: expected a whole number from 1"),
+        (["--cycle", "first"], "invalid value for '--cycle': must be a valid integer"),
     ],
 )
 def test_what_cannot_be_done_is_said_and_leaves_nothing(
@@ -123,3 +126,41 @@ def test_a_drawing_takes_the_width_of_its_terminal(program: Path, tmp_path: Path
     assert run.wait(60) == 0
     bars = [line for line in shown.decode().splitlines() if line.count("|") == 2]
     assert {len(line) for line in bars} == {117}
+
+
+def test_a_cycle_of_groups_with_rates_of_their_own(busplan: Run, tmp_path: Path) -> None:
+    slow = """
+[[group]]
+name = "io"
+nodes = 2
+axes = 1
+every = 3
+read_bytes = 8
+write_bytes = 8
+[group.execution]
+kind = "linear"
+grade = "measured"
+base_us = 40.0
+per_byte_us = 1.0
+"""
+    drives = slow.replace('"io"', '"drives"').replace("every = 3\n", "")
+    head = (
+        'schema_version = 1\nname = "arm"\n[bus]\nkind = "can"\nbit_rate_kbit_s = 1000\n[cycle]\nperiod_us = 4000.0\n'
+    )
+    (tmp_path / "arm.toml").write_text(head + drives + slow, encoding="utf-8")
+    fullest, second = (
+        json.loads(busplan("timeline", "arm.toml", *asked, "--format", "json", cwd=tmp_path).stdout)
+        for asked in ((), ("--cycle", "5", "--transaction", "command:2"))
+    )
+    needs_us = 55 + 8 * 135 + 2 * 48, 55 + 4 * 135 + 2 * 48
+    distinct = [
+        {"numbers": [1], "groups": ["drives", "io"], "nodes": 4, "required_us": needs_us[0]},
+        {"numbers": [2, 3], "groups": ["drives"], "nodes": 2, "required_us": needs_us[1]},
+    ]
+    for document, number, us in ((fullest, 1, needs_us[0]), (second, 2, needs_us[1])):
+        assert (document["cycle"], document["common_multiple"]) == (number, 3)
+        assert document["distinct_cycles"] == distinct
+        assert document["required_us"] == document["margins"][0]["required_us"] == us
+        assert document["margin_us"] == 4000 - us
+    (command,) = second["events"]
+    assert command["end_us"] == needs_us[1] - 48

@@ -202,6 +202,8 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         "changes [1]: expected new values by key",
     ),
     "keys that are none": (lambda: busplan.sweep("paper-4ms", vary={1: [2]}), "vary {1: [2]}: expected keys"),  # type: ignore[dict-item]
+    "a cycle before the first": (lambda: busplan.timeline("paper-4ms", cycle=0), "cycle 0: expected a whole number"),
+    "a cycle that is no number": (lambda: busplan.timeline("paper-4ms", cycle=True), "cycle True: expected a whole"),
     "a window from nowhere": (lambda: busplan.timeline("paper-4ms", from_us=float("nan")), "from_us nan: expected"),
     "a window to no float": (lambda: busplan.timeline("paper-4ms", to_us=10**400), "to_us 1"),
     "a window of words": (lambda: busplan.timeline("paper-4ms", from_us="4ms"), "from_us '4ms': expected a finite"),  # type: ignore[arg-type]

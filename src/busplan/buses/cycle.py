@@ -12,6 +12,7 @@ from typing import ClassVar, Final, Literal, NamedTuple, TypeAlias
 
 from busplan.buses.figure import REQUIRED, Figure, term_name
 from busplan.buses.network import Group, Network
+from busplan.buses.rates import Rate
 from busplan.elementwise import Number, is_off, plain, total
 
 Rounds: TypeAlias = Literal["all", "first", "but first"]
@@ -152,11 +153,27 @@ class BusCycle(ABC):
     """
 
     network: Network
+    number: int | None = None
+    """Which cycle of the common multiple of the rates it is, from 1; None for the one that the verdict is for."""
     term_figures: ClassVar[tuple[Figure, ...]]
     """One for each term, in their order."""
     command_events: ClassVar[tuple[tuple[str | None, str], ...]] = ()
     """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
     cycle. Events of no node of its own are the command of all."""
+
+    @property
+    def rates(self) -> tuple[Rate, ...]:
+        """In which cycles the data of each group go; of plain numbers."""
+        return tuple(Rate(1) for _ in self.network.groups)
+
+    @property
+    def fullest(self) -> int:
+        """The first cycle of the common multiple in which most is sent, from 1; of plain numbers."""
+        return 1
+
+    def at(self, number: int) -> "BusCycle":  # noqa: ARG002 - most kinds have a single rate
+        """The cycle of the common multiple with a number, from 1, by a bound of its own; of plain numbers."""
+        return self
 
     @abstractmethod
     def written(self) -> Iterator[BusEvent | Run]:
@@ -294,10 +311,6 @@ class BusCycle(ABC):
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
         """Lines that only this kind has on the card of a verdict: labels and words; of plain numbers."""
-        return ()
-
-    def other_cycles(self) -> tuple[str, ...]:
-        """Sentences on the cycles beside this one, where nodes have rates of their own; of plain numbers."""
         return ()
 
     def latencies(self) -> tuple[BusLatency, ...]:

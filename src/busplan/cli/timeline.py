@@ -47,6 +47,14 @@ def timeline_command(
             "all of them]",
         ),
     ] = None,
+    cycle: Annotated[
+        int | None,
+        option(
+            "--cycle N",
+            "Show the N-th cycle, from 1, of groups with rates of their own (every = n, on CAN and EtherCAT); beyond "
+            "their common multiple the cycles repeat.  [default: the fullest, which the verdict is for]",
+        ),
+    ] = None,
     changes: KeyChanges = NO_CHANGES,
     timing: Annotated[
         str | None,
@@ -79,13 +87,14 @@ def timeline_command(
         from busplan.questions.timeline import timeline
 
         loaded = load_changed(profile, changes)
-        with naming_option("transaction"):
+        with naming_option("transaction", "cycle"):
             return timeline(
                 loaded,
                 timing_model=None if timing is None else timing_model(timing, loaded),
                 from_us=from_us,
                 to_us=to_us,
                 transaction=transaction,
+                cycle=cycle,
             )
 
     show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)

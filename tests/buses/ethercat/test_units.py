@@ -1,7 +1,7 @@
 """Groups at several rates against all cycles of their common multiple, each written byte by byte."""
 
 from collections.abc import Sequence
-from itertools import product
+from itertools import accumulate, product
 from math import lcm
 from statistics import fmean
 from typing import Any, Final
@@ -109,6 +109,31 @@ def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
     assert sum(event.duration_us for event in events if event.term) == pytest.approx(found.required_us, rel=1e-12)
 
 
+@settings(max_examples=40)
+@given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans())
+def test_a_timeline_draws_each_cycle_of_the_common_multiple(groups: list[Rated], units: str, clocks: bool) -> None:
+    own, first = profile(groups, units=units, distributed_clocks=clocks), placed(groups, units)
+    ends = [*accumulate(nodes for _, nodes, _, _ in groups)]
+    for cycle, us in enumerate(written_us(groups, first, clocks=clocks)):
+        drawn = busplan.timeline(own, timing_model="last-byte", cycle=cycle + 1)
+        assert drawn.required_us == pytest.approx(us, rel=1e-12)
+        assert sum(event.duration_us for event in drawn.cycle_events if event.term) == pytest.approx(us, rel=1e-12)
+        due = [(cycle - start) % every == 0 for (every, *_), start in zip(groups, first, strict=True)]
+        assert {event.node for event in drawn.cycle_events if event.kind == "data"} == {
+            device
+            for end, (_, nodes, *_), is_due in zip(ends, groups, due, strict=True)
+            for device in range(end - nodes + 1, end + 1)
+            if is_due
+        }
+        (alike,) = (alike for alike in drawn.to_dict()["distinct_cycles"] if cycle + 1 in alike["numbers"])
+        assert alike["groups"] == [f"g{place}" for place, is_due in enumerate(due) if is_due]
+        assert alike["required_us"] == drawn.required_us
+        mean = (cycle_of(own, model="vendors").at(number).figures()["mean_utilisation"] for number in (1, cycle + 1))
+        assert next(mean) == pytest.approx(next(mean), rel=1e-12)
+    whole = busplan.timeline(own)
+    assert whole.cycle_events == busplan.timeline(own, cycle=whole.to_dict()["cycle"]).cycle_events
+
+
 @given(GROUPS)
 def test_together_the_fullest_cycle_is_that_without_rates(groups: list[Rated]) -> None:
     without = deciding(profile([(1, nodes, read, write) for _, nodes, read, write in groups]))
@@ -116,6 +141,21 @@ def test_together_the_fullest_cycle_is_that_without_rates(groups: list[Rated]) -
     assert found.required_us == without.required_us
     assert found.process_bytes == without.process_bytes
     assert found.uncertainty_us == pytest.approx(without.uncertainty_us, rel=1e-12)
+
+
+def test_the_fullest_cycle_has_its_number() -> None:
+    whole = busplan.timeline(profile([(2, 1, 100, 0), (4, 1, 90, 0), (4, 1, 60, 0), (4, 1, 50, 0)]))
+    assert whole.to_dict()["cycle"] == 4
+    assert {event.node for event in whole.events if event.kind == "data"} == {3, 4}
+
+
+def test_a_cycle_without_process_data_sends_no_frame() -> None:
+    own = profile([(2, 1, 100, 0)])
+    last_byte, vendors = (busplan.timeline(own, timing_model=model, cycle=2) for model in ("last-byte", "vendors"))
+    assert {event.kind for event in vendors.cycle_events} == {"master", "device", "idle"}
+    assert vendors.required_us == last_byte.required_us == 20 + E_BUS_US
+    (found,) = busplan.capacity(own, timing_model=["vendors"]).results
+    assert found.mean_utilisation == pytest.approx((found.required_us + vendors.required_us) / 2 / 500)
 
 
 @given(st.lists(st.integers(1, 100), min_size=2, max_size=5), st.integers(2, 4))
@@ -212,14 +252,13 @@ def test_the_largest_device_counts_whatever_its_cycle() -> None:
 def test_the_timeline_lists_the_cycles_of_the_common_multiple() -> None:
     one = profile([(1, 1, 100, 0), (2, 1, 400, 0), (2, 1, 200, 0)])
     us = [20 + 3 * E_BUS_US + BYTE_US * (52 + size) for size in (500, 300)]
-    (words,) = cycle_of(one, model="last-byte").other_cycles()
-    assert words.endswith(f"Cycles 1: g0, g1 ({us[0]:.3f} us); 2: g0, g2 ({us[1]:.3f} us).")
-    assert words in str(busplan.timeline(one))
-    (many,) = cycle_of(override(one, {"group.g1.every": 65}), model="last-byte").other_cycles()
-    assert many.endswith("every 130 cycles; this is the fullest. More than 64 cycles are not listed.")
-    assert cycle_of(profile([(1, 1, 100, 0)]), model="last-byte").other_cycles() == ()
+    said = "The groups meet every 2 cycles; this is the fullest. "
+    assert f"{said}Cycles 1: g0, g1 ({us[0]:.3f} us); 2: g0, g2 ({us[1]:.3f} us).\n" in str(busplan.timeline(one))
+    many = str(busplan.timeline(override(one, {"group.g1.every": 65})))
+    assert "every 130 cycles; this is the fullest. More than 64 cycles are not listed.\n" in many
+    assert "cycles" not in str(busplan.timeline(profile([(1, 1, 100, 0)])))
     _, vendors = busplan.capacity(one).results
-    assert f"({vendors.required_us:.3f} us)" in cycle_of(one, model="vendors").other_cycles()[0]
+    assert f"({vendors.required_us:.3f} us)" in str(busplan.timeline(one, timing_model="vendors"))
 
 
 def test_an_array_of_rates_computes_as_each_rate() -> None:

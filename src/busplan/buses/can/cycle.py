@@ -21,11 +21,12 @@ from busplan.buses.can.streams import (
     streams,
 )
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import messages, pending_us, response, sync_spread_us, waits
+from busplan.buses.can.waiting import messages, pending_us, response, sent_in, sync_spread_us, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
 from busplan.buses.parts import EventKind
+from busplan.buses.rates import Rate
 from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, named, plain, pointwise, rounded_up, total
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
@@ -66,9 +67,33 @@ class CanCycle(BusCycle):
     term_figures = TERMS
     command_events = (("command", "command_frame"),)
 
-    def __init__(self, network: Network, model: str) -> None:
+    def __init__(self, network: Network, model: str, number: int | None = None) -> None:
         self.network = network
+        self.model = model
+        self.number = number
         self.is_stuffed = model == WORST
+
+    @property
+    def rates(self) -> tuple[Rate, ...]:
+        """The rate of each group; all count from the same SYNC."""
+        return tuple(Rate(int(plain(group.every))) for group in self.network.groups)
+
+    def at(self, number: int) -> "CanCycle":
+        """A cycle of the common multiple of the rates; other messages are all there."""
+        return CanCycle(self.network, self.model, number)
+
+    @cached_property
+    def _groups(self) -> tuple[Group, ...]:
+        """Groups whose PDOs are in it."""
+        if self.number is None:
+            return self.network.groups
+        both = zip(self.network.groups, self.rates, strict=True)
+        return tuple(group for group, rate in both if rate.is_due(self.number))
+
+    @cached_property
+    def _due(self) -> frozenset[str] | None:
+        """Their names; None for the cycle that the verdict is for, which no other exceeds."""
+        return None if self.number is None else frozenset(group.name for group in self._groups)
 
     @cached_property
     def traffic(self) -> Traffic:
@@ -131,12 +156,16 @@ class CanCycle(BusCycle):
 
     def _wait_us(self, kind: TransactionKind, *, uncertainties: int = 0) -> Number:
         """The slowest execution of any node, with some standard uncertainties of each [us]."""
-        return reduce(larger, (_execution_us(group, kind, uncertainties) for group in self.network.groups))
+        if not self._groups:
+            return 0.0
+        return reduce(larger, (_execution_us(group, kind, uncertainties) for group in self._groups))
 
     def _frames(self, kind: TransactionKind) -> Iterator[Run]:
         """All PDOs of one direction, node by node; a timeline shows their frames."""
         name, own = NAMES[kind], (pair for pair in self._pdos if pair[0].kind == kind)
         for number, (pdos, us) in enumerate(own):
+            if self._due is not None and pdos.group not in self._due:
+                continue
             pdo = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
             yield Run((pdo,), pdos.pdos, number, partial(self._of_pdo, pdo, pdos))
 
@@ -153,7 +182,8 @@ class CanCycle(BusCycle):
     @cached_property
     def _feedback(self) -> tuple[Run, ...]:
         """All feedback, and the host."""
-        host = BusEvent("host", "cycle_host_us", self.traffic.host_us, "host", rests_on="bus.host_us")
+        host_us = self.traffic.host_us if self._groups else 0.0
+        host = BusEvent("host", "cycle_host_us", host_us, "host", rests_on="bus.host_us")
         return (*self._frames("read"), Run((host,)))
 
     @cached_property
@@ -180,7 +210,7 @@ class CanCycle(BusCycle):
 
     def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
         """Some of the frames of lower priorities: before SYNC, before the feedback, or behind it."""
-        waited = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
+        waited = waits(self.traffic, plain(self._on_bus_us), self._due, is_stuffed=self.is_stuffed)
         for message in islice(waited.blocks(), first, end):
             label = f"message {message.name} of a lower priority"
             yield blocking._replace(us=plain(message.frame_us), label=label)
@@ -230,7 +260,7 @@ class CanCycle(BusCycle):
         others_us = named(others_us, "others_us", "others")
 
         def figure(key: str, words: str) -> Number:
-            return self._sent.of(partial(_waits, self.is_stuffed, key), others_us, words=words)
+            return self._sent.of(partial(_waits, self.is_stuffed, key, self._due), others_us, words=words)
 
         words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
         lasts_us = named(figure("lasts_us", words), "busy_us", "w")
@@ -264,7 +294,7 @@ class CanCycle(BusCycle):
     def _last(self) -> Number:
         """The largest identifier of SYNC and all PDOs."""
         sent, words = Sent(without_times(self.traffic)), "the largest identifier of SYNC and all PDOs"
-        return named(sent.of(_last, words=words), "last_identifier", "id_last")
+        return named(sent.of(partial(_last, self._due), words=words), "last_identifier", "id_last")
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """Growth of the cycle if its nodes take longer: more messages may arrive, too [us]."""
@@ -453,9 +483,9 @@ def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Nu
     return slowest_us + uncertainties * doubt_us
 
 
-def _waits(is_stuffed: bool, key: str, traffic: Traffic, others_us: Number) -> Number:
+def _waits(is_stuffed: bool, key: str, due: frozenset[str] | None, traffic: Traffic, others_us: Number) -> Number:
     """One figure of what a cycle waits for."""
-    number: Number = getattr(waits(traffic, others_us, is_stuffed=is_stuffed), key)
+    number: Number = getattr(waits(traffic, others_us, due, is_stuffed=is_stuffed), key)
     return number
 
 
@@ -469,9 +499,9 @@ def _of_all(message: Message, number: Number) -> Number:
     return number if is_off(message.senders - 1) else message.senders * number
 
 
-def _last(traffic: Traffic) -> Number:
-    cyclic = (stream for stream in streams(traffic, is_stuffed=True) if not stream.is_message)
-    last: Number = last_identifier(cyclic)
+def _last(due: frozenset[str] | None, traffic: Traffic) -> Number:
+    cyclic = [stream for stream in streams(traffic, is_stuffed=True) if not stream.is_message]
+    last: Number = last_identifier(cyclic if due is None else sent_in(cyclic, due))
     return last
 
 

@@ -1,7 +1,7 @@
 """Waits of a cycle for other messages, and the worst-case response of each stream."""
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from functools import cached_property, reduce
 from itertools import accumulate, chain, islice, repeat
 from math import inf
@@ -43,16 +43,18 @@ class Waits(NamedTuple):
     """Messages of a lower priority than SYNC and all PDOs, the longest first."""
     excess_us: Points = 0.0
     """Part of `blocking_us` by which a cycle with fewer PDOs, where more messages block, lasts longer [us]."""
+    most: int = int(MOST_BLOCKS)
+    """Frames of a lower priority that it waits for, at most [1]."""
 
     def blocks(self) -> Iterator[Stream]:
         """One of them for each frame that goes, of plain numbers."""
         counts = (int(plain(_frames_within(stream, self.lasts_us))) for stream in self.lower)
         each = (repeat(stream, count) for stream, count in zip(self.lower, counts, strict=True))
-        return islice(chain.from_iterable(each), int(MOST_BLOCKS))
+        return islice(chain.from_iterable(each), self.most)
 
 
 @remembered(maxsize=256)
-def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
+def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None, *, is_stuffed: bool) -> Waits:
     """Find how long a cycle lasts with the frames of other messages.
 
     Parameters
@@ -61,6 +63,8 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
         What is sent, as `Sent.of` gives it.
     others_us
         SYNC, the wait for the slowest feedback, all PDOs and the host's own time [us].
+    due
+        Names of the groups whose PDOs are in the cycle; without it the fullest cycle, and no other lasts longer.
     is_stuffed
         Whether the stuff bits of the worst case are counted.
 
@@ -76,8 +80,11 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     PDOs that are not in every cycle are all due in the fullest. In a cycle with fewer of them, messages between these
     and the last one are of a lower priority, and may take longer than the missing PDOs would.
     """
-    each = streams(traffic, is_stuffed=is_stuffed)
-    cyclic = [stream for stream in each if not stream.is_message]
+    cyclic = [stream for stream in streams(traffic, is_stuffed=is_stuffed) if not stream.is_message]
+    if due is not None:
+        # Without PDOs it ends with SYNC, which waits for a single frame.
+        most = int(MOST_BLOCKS) if due else 1
+        return _waits(traffic, others_us, last_place(sent_in(cyclic, due)), is_stuffed=is_stuffed, most=most)
     fullest = _waits(traffic, others_us, last_place(cyclic), is_stuffed=is_stuffed)
     lasts_us = fullest.lasts_us
     for missing_us, last in _with_fewer(cyclic, traffic):
@@ -85,6 +92,11 @@ def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
         lasts_us = larger(lasts_us, _waits(traffic, some_us, last, is_stuffed=is_stuffed).lasts_us)
     excess_us = lasts_us - fullest.lasts_us
     return fullest._replace(blocking_us=fullest.blocking_us + excess_us, excess_us=excess_us)
+
+
+def sent_in(cyclic: Sequence[Stream], due: Container[str]) -> list[Stream]:
+    """SYNC and the PDOs of some groups."""
+    return [stream for stream in cyclic if stream.name == SYNC or stream.group in due]
 
 
 def _with_fewer(cyclic: Sequence[Stream], traffic: Traffic) -> Iterator[tuple[dict[str, Points], Points]]:
@@ -122,7 +134,9 @@ def pending_us(each: Iterable[Stream], traffic: Traffic) -> Points:
     return reduce(larger, frames_us) - reduce(smaller, frames_us)
 
 
-def _waits(traffic: Traffic, others_us: Points, last: Points, *, is_stuffed: bool) -> Waits:
+def _waits(
+    traffic: Traffic, others_us: Points, last: Points, *, is_stuffed: bool, most: int = int(MOST_BLOCKS)
+) -> Waits:
     """The same of a cycle with some PDOs, to the last place of them."""
     bit = bit_us(traffic.bit_rate_kbit_s) + pending_us(streams(traffic, is_stuffed=is_stuffed), traffic)
     sent = message_streams(traffic, is_stuffed=is_stuffed)
@@ -136,10 +150,10 @@ def _waits(traffic: Traffic, others_us: Points, last: Points, *, is_stuffed: boo
 
     def blocking_us(span_us: Points) -> Points:
         blocked: Points = 0.0
-        left: Points = int(MOST_BLOCKS)
+        left: Points = most
         for stream in lower:
             count = choose(stream.last_place > last, smaller(_frames_within(stream, span_us), left), 0)
-            for number in range(int(MOST_BLOCKS)):
+            for number in range(most):
                 blocked = blocked + choose(count > number, stream.frame_us, 0.0)
             left = left - count
             if is_everywhere(left == 0):
@@ -147,7 +161,7 @@ def _waits(traffic: Traffic, others_us: Points, last: Points, *, is_stuffed: boo
         return blocked
 
     lasts_us = settled_us(others_us, higher, more_us=blocking_us)
-    return Waits(lasts_us, blocking_us(lasts_us), lower)
+    return Waits(lasts_us, blocking_us(lasts_us), lower, most=most)
 
 
 def _frames_within(stream: Stream, span_us: Points) -> Points:

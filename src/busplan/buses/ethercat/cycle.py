@@ -21,6 +21,7 @@ from busplan.buses.ethercat.traffic import (
     cables_us,
     cycles_of,
     devices,
+    devices_at,
     devices_doubts,
     devices_us,
     frames,
@@ -30,11 +31,13 @@ from busplan.buses.ethercat.traffic import (
     mean_wire_bytes,
     packing,
     process_us,
+    rates,
 )
 from busplan.buses.ethercat.units import UnitCycle
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind
+from busplan.buses.rates import Rate
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, is_everywhere, larger, named, plain, total
 
@@ -70,22 +73,34 @@ _LEFT_OUT: Final = {
 """Keys of [bus] that a cycle lacks where they are 0."""
 
 
-_MOST_LISTED: Final = 64
-"""Cycles of a common multiple that are listed [1]."""
-
-
 class EthercatCycle(BusCycle):
     """The master's time and jitter, frames, devices and cables there and back, and the window."""
 
     term_figures = TERMS
 
-    def __init__(self, network: Network, model: str) -> None:
+    def __init__(self, network: Network, model: str, number: int | None = None) -> None:
         self.network = network
+        self.model = model
+        self.number = number
         self.counts_reception = model == VENDORS
+
+    @property
+    def rates(self) -> tuple[Rate, ...]:
+        """The rate of each group with its first cycle."""
+        return rates(self.network)
+
+    def at(self, number: int) -> "EthercatCycle":
+        """A cycle of the common multiple of the rates."""
+        return EthercatCycle(self.network, self.model, number)
+
+    @property
+    def fullest(self) -> int:
+        """The first cycle with the most bytes on the wire."""
+        return cycles_of(self.network)[0].numbers[0]
 
     @cached_property
     def _devices(self) -> tuple[Devices, ...]:
-        return devices(self.network)
+        return devices(self.network) if self.number is None else devices_at(self.network, self.number)
 
     @cached_property
     def packing(self) -> Packing:
@@ -108,7 +123,8 @@ class EthercatCycle(BusCycle):
         """The last frame once more, where it is counted [us]."""
         if not self.counts_reception:
             return 0.0
-        last_us = sending_us(frame_bytes(self.packing.last_bytes))
+        is_empty = self.number is not None and not self.packing.frames
+        last_us = 0.0 if is_empty else sending_us(frame_bytes(self.packing.last_bytes))
         return choose(self.network.profile.bus.mailbox_polls > 0, mailbox_frame_us(self.network), last_us)
 
     @property
@@ -168,7 +184,7 @@ class EthercatCycle(BusCycle):
         """Each frame: everything but its data, then the data of each device that it carries."""
         sizes = [plain(alike.data_bytes) for alike in self._devices for _ in range(int(plain(alike.number)))]
         number = 0
-        for run in frames(self.network):
+        for run in frames(self.network, self._devices):
             for carried in run.each():
                 number += 1
                 overhead = plain(frame_bytes(run.datagrams_bytes)) - sum(sizes[device - 1] for device in carried)
@@ -212,21 +228,6 @@ class EthercatCycle(BusCycle):
         names = (group.name for group, due in zip(self.network.groups, cycle.due, strict=True) if due)
         return ", ".join(names) or "no group"
 
-    def other_cycles(self) -> tuple[str, ...]:
-        """The cycles of the common multiple of the rates, the fullest first, where groups have rates of their own."""
-        if not has_rates(self.network):
-            return ()
-        cycles = cycles_of(self.network)
-        number = sum(len(cycle.numbers) for cycle in cycles)
-        said = f"The groups meet every {number} cycles; this is the fullest"
-        if number > _MOST_LISTED:
-            return (f"{said}. More than {_MOST_LISTED} cycles are not listed.",)
-        each = (
-            f"{', '.join(map(str, cycle.numbers))}: {self._names(cycle)} ({self._needed_us(cycle):.3f} us)"
-            for cycle in cycles
-        )
-        return (f"{said}. Cycles {'; '.join(each)}.",)
-
     @property
     def _given_us(self) -> Number:
         network = self.network
@@ -249,12 +250,11 @@ class EthercatCycle(BusCycle):
     @property
     def _beside_us(self) -> Number:
         """What every cycle needs beside its frames of process data [us]."""
-        return self.required_us - process_us(self.network) - (self._receive_us if self._is_last_again else 0.0)
-
-    def _needed_us(self, cycle: UnitCycle) -> float:
-        """What a cycle needs [us]."""
-        last_bytes = plain(frame_bytes(cycle.last_bytes)) if self._is_last_again else 0.0
-        return plain(self._beside_us) + plain(sending_us(cycle.wire_bytes + last_bytes))
+        return (
+            self.required_us
+            - process_us(self.network, self._devices)
+            - (self._receive_us if self._is_last_again else 0.0)
+        )
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
         """Where groups have rates of their own: the cycle of the verdict, and the mean of all."""

@@ -147,4 +147,5 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
                 yield Frames(first, each, headers + each * size, full)
             first, held, opened = first + full * each, left - full * each, 0.0
             filled = held * size
-    yield Frames(first, held, opened + bool(filled) * headers + filled)
+    if opened or filled:
+        yield Frames(first, held, opened + bool(filled) * headers + filled)

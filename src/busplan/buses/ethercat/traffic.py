@@ -1,6 +1,6 @@
 """Frames of a network in a cycle, and their way through the devices."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate, chain
 from typing import NamedTuple
 
@@ -25,8 +25,9 @@ from busplan.buses.ethercat.equations import (
     sending_us,
 )
 from busplan.buses.ethercat.packing import Devices, Frames, Packing, frames_of, pack
-from busplan.buses.ethercat.units import Unit, UnitCycle, unit_cycles
+from busplan.buses.ethercat.units import Unit, UnitCycle, unit_cycles, unit_rates
 from busplan.buses.network import Group, Network
+from busplan.buses.rates import Rate
 from busplan.elementwise import (
     Number,
     alike,
@@ -105,6 +106,20 @@ def devices(network: Network, *, beside: int | None = None) -> tuple[Devices, ..
     )
 
 
+def devices_at(network: Network, number: int) -> tuple[Devices, ...]:
+    """All devices in their order, as a cycle of the common multiple has them, from 1; of plain numbers."""
+    return tuple(
+        own if rate.is_due(number) else own._replace(data_bytes=0)
+        for own, rate in zip(_each(network), rates(network), strict=True)
+    )
+
+
+def rates(network: Network) -> tuple[Rate, ...]:
+    """The rate of each group with its first cycle; of plain numbers."""
+    _, units = _units(map(plain, _of_units(network, _each(network))))
+    return unit_rates(units, is_spread=network.profile.bus.units == "spread")
+
+
 def has_rates(network: Network) -> bool:
     """Whether a group does not go in every cycle."""
     return any(group.is_slower for group in network.groups)
@@ -115,10 +130,11 @@ def mean_wire_bytes(network: Network, *, with_last: bool) -> Number:
 
     def plainly(*numbers: float) -> float:
         cycles = _unit_cycles(network, numbers)
-        each = [
-            (len(cycle.numbers), cycle.wire_bytes + (plain(frame_bytes(cycle.last_bytes)) if with_last else 0.0))
-            for cycle in cycles
-        ]
+        each = []
+        for cycle in cycles:
+            # A cycle without process data may have no frame.
+            last_bytes = plain(frame_bytes(cycle.last_bytes)) if with_last and cycle.last_bytes else 0.0
+            each.append((len(cycle.numbers), cycle.wire_bytes + last_bytes))
         return sum(number * own_bytes for number, own_bytes in each) / sum(number for number, _ in each)
 
     return pointwise(
@@ -142,13 +158,18 @@ def _of_units(network: Network, each: Sequence[Devices]) -> tuple[Number, ...]:
     return (housekeeping_bytes(network), *chain.from_iterable(units))
 
 
-def _unit_cycles(network: Network, numbers: Sequence[float]) -> tuple[UnitCycle, ...]:
+def _units(numbers: Iterable[float]) -> tuple[float, tuple[Unit, ...]]:
+    """The datagrams of the master [bytes], and the units, of numbers as `_of_units` has them."""
     first_bytes, *each = numbers
+    return first_bytes, tuple(
+        Unit(int(rate), int(nodes), size) for rate, nodes, size in zip(each[::3], each[1::3], each[2::3], strict=True)
+    )
+
+
+def _unit_cycles(network: Network, numbers: Iterable[float]) -> tuple[UnitCycle, ...]:
+    first_bytes, units = _units(numbers)
     return unit_cycles(
-        tuple(
-            Unit(int(rate), int(nodes), size)
-            for rate, nodes, size in zip(each[::3], each[1::3], each[2::3], strict=True)
-        ),
+        units,
         is_spread=network.profile.bus.units == "spread",
         datagrams=datagrams(network),
         first_bytes=first_bytes,
@@ -179,15 +200,10 @@ def packing(network: Network, each: Sequence[Devices]) -> Packing:
     )
 
 
-def frames(network: Network, *, beside: int | None = None) -> tuple[Frames, ...]:
-    """The same frames in their order, of plain numbers; `beside` as `devices` has it."""
-    return tuple(
-        frames_of(
-            devices(network, beside=beside),
-            datagrams=datagrams(network),
-            first_bytes=plain(housekeeping_bytes(network)),
-        )
-    )
+def frames(network: Network, each: Sequence[Devices]) -> tuple[Frames, ...]:
+    """The same frames in their order, of plain numbers."""
+    first_bytes = plain(housekeeping_bytes(network))
+    return tuple(frames_of(each, datagrams=datagrams(network), first_bytes=first_bytes))
 
 
 def hop(group: Group) -> Hop:
@@ -220,9 +236,9 @@ def cables_us(network: Network) -> Number:
     return total(step.nodes * step.cable_us for step in map(hop, network.groups))
 
 
-def process_us(network: Network) -> Number:
-    """All frames of process data on the wire [us]."""
-    packed = packing(network, devices(network))
+def process_us(network: Network, each: Sequence[Devices] | None = None) -> Number:
+    """All frames of process data on the wire, of all its devices; without them of the fullest cycle [us]."""
+    packed = packing(network, devices(network) if each is None else each)
     wire_bytes = packed.frames * overhead_bytes(packed.frames) + packed.datagrams_bytes + packed.padding_bytes
     return named(sending_us(wire_bytes), "sending_us", "sending")
 
@@ -255,7 +271,7 @@ def arrival_us(network: Network, device: int) -> float:
     sent_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
     ends = accumulate(int(plain(group.nodes)) for group in network.groups)
     own = next(place for place, end in enumerate(ends) if device <= end)
-    for run in frames(network, beside=own):
+    for run in frames(network, devices(network, beside=own)):
         frame_us, before = plain(sending_us(frame_bytes(run.datagrams_bytes))), device - run.first
         if before < run.devices * run.frames:
             sent_us += (before // run.devices + 1) * frame_us

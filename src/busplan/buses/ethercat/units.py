@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses.ethercat.equations import overhead_bytes
 from busplan.buses.ethercat.packing import Devices, pack
+from busplan.buses.rates import Rate, numbers_by_due
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 
@@ -78,6 +79,12 @@ def starts(units: Sequence[Unit], *, is_spread: bool) -> tuple[int, ...]:
     return tuple(found)
 
 
+def unit_rates(units: Sequence[Unit], *, is_spread: bool) -> tuple[Rate, ...]:
+    """The rate of each unit with its first cycle."""
+    first = starts(units, is_spread=is_spread)
+    return tuple(Rate(unit.every, start + 1) for unit, start in zip(units, first, strict=True))
+
+
 @lru_cache(maxsize=1 << 12)
 def unit_cycles(
     units: tuple[Unit, ...], *, is_spread: bool, datagrams: int, first_bytes: float
@@ -98,18 +105,13 @@ def unit_cycles(
     BusplanError
         The rates meet too seldom.
     """
-    first = starts(units, is_spread=is_spread)
-    numbers: dict[tuple[bool, ...], list[int]] = {}
-    for cycle in range(common_multiple([unit.every for unit in units])):
-        due = tuple((cycle - start) % unit.every == 0 for unit, start in zip(units, first, strict=True))
-        numbers.setdefault(due, []).append(cycle + 1)
     packed = []
-    for due, own_numbers in numbers.items():
+    for due, numbers in numbers_by_due(unit_rates(units, is_spread=is_spread)).items():
         own = [Devices(unit.devices, unit.data_bytes * is_due) for unit, is_due in zip(units, due, strict=True)]
         frames = pack(own, datagrams=datagrams, first_bytes=first_bytes)
         wire_bytes = plain(
             frames.frames * overhead_bytes(frames.frames) + frames.datagrams_bytes + frames.padding_bytes
         )
         data_bytes = plain(sum(one.number * one.data_bytes for one in own))
-        packed.append(UnitCycle(due, tuple(own_numbers), wire_bytes, plain(frames.last_bytes), data_bytes))
+        packed.append(UnitCycle(due, numbers, wire_bytes, plain(frames.last_bytes), data_bytes))
     return tuple(sorted(packed, key=lambda cycle: (-cycle.wire_bytes, -cycle.data_bytes)))

@@ -382,7 +382,6 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
     network = cycle.network
     period_us, ratio, nodes = network.period_us, network.slice_ratio, network.nodes
     given_us, required_us = available_us(network), cycle.required_us
-    spare_us = given_us - required_us
     return {
         "period_us": period_us,
         "nodes": nodes,
@@ -392,11 +391,18 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "time_slice_us": time_slice_us(period_us, slice_ratio=ratio, nodes=nodes),
         "required_time_slice_us": required_time_slice_us(required_us, nodes=nodes),
         "utilisation": required_us / given_us,
-        # What fits by rounding alone has no margin, and no negative one either.
-        "margin_us": choose(spare_us < 0, choose(fits_in(required_us, available_us=given_us), 0.0, spare_us), spare_us),
+        "margin_us": margin_us(required_us, available_us=given_us),
         "min_period_us": shortest_period_us(network, required_us),
         "min_slice_ratio": required_us / period_us,
     }
+
+
+def margin_us(required_us: Number, *, available_us: Number) -> Number:
+    """What a cycle leaves of its share of the period [us]."""
+    spare_us = available_us - required_us
+    # What fits by rounding alone has no margin, and no negative one either.
+    fits = fits_in(required_us, available_us=available_us)
+    return choose(spare_us < 0, choose(fits, 0.0, spare_us), spare_us)
 
 
 def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = False) -> Number:

@@ -55,6 +55,7 @@ def timeline(
     from_us: float | None = None,
     to_us: float | None = None,
     transaction: tuple[str, int] | str | None = None,
+    cycle: int | None = None,
 ) -> TimelineAnswer:
     """Show one communication cycle as events, node by node.
 
@@ -68,6 +69,9 @@ def timeline(
         Start and end of the window, from the start of the cycle [us]; by default the whole cycle.
     transaction
         One transaction of one node with its gaps: ("read", 1) or "read:1".
+    cycle
+        Number of a cycle of the common multiple of the rates of groups, from 1; beyond it they repeat. By default the
+        fullest, which the verdict is for.
 
     Returns
     -------
@@ -77,7 +81,7 @@ def timeline(
     Raises
     ------
     BusplanError
-        Not a profile, too many nodes, an unknown timing model, no such transaction, or an empty window.
+        Not a profile, too many nodes, an unknown timing model, no such transaction or cycle, or an empty window.
 
     References
     ----------
@@ -94,7 +98,7 @@ def timeline(
     asked = None if transaction is None else _transaction(transaction, network)
     model = None if timing_model is None else checked_models([timing_model], network)[0]
     window = zoom(
-        schedule(network, model=model),
+        schedule(network, model=model, number=None if cycle is None else whole(cycle, name="cycle")),
         from_us=None if from_us is None else finite(from_us, name="from_us"),
         to_us=None if to_us is None else finite(to_us, name="to_us"),
         transaction=asked,

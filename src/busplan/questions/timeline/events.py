@@ -9,13 +9,13 @@ from itertools import islice
 from math import fsum
 from typing import Final, NamedTuple
 
-from busplan.buses.cycle import BusEvent
+from busplan.buses.cycle import BusCycle, BusEvent
 from busplan.buses.figure import Figure
 from busplan.buses.parts import IDLE
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import cycle_of, fits_in
-from busplan.questions.fit.figures import CapacityFigures, figures
+from busplan.questions.fit.figures import CapacityFigures, figures, margin_us
 from busplan.questions.fit.network import bus_of, leading_model, network_of
 from busplan.sections.profile import Profile
 
@@ -57,13 +57,17 @@ class Schedule(NamedTuple):
 
     profile: Profile
     figures: CapacityFigures
-    """Closed form: time needed, time available, and whether the cycle fits."""
+    """Closed form of the cycle that the verdict is for: time needed, time available, and whether it fits."""
     cycle_events: tuple[Event, ...]
     """Events of the whole cycle, and the idle rest of its slice."""
     from_us: float
     """Start of the window [us]."""
     to_us: float
     """End of the window [us]."""
+    required_us: float
+    """Closed form of the time that the cycle needs [us]."""
+    number: int | None = None
+    """Which cycle of the common multiple of the rates was asked for, from 1; None for that of the verdict."""
 
     @property
     def end_us(self) -> float:
@@ -75,6 +79,11 @@ class Schedule(NamedTuple):
         """End of the last event that is not idle: the required time as a sum of events [us]."""
         last = self.cycle_events[-1]
         return last.start_us if last.kind == IDLE.key else last.end_us
+
+    @property
+    def margin_us(self) -> float:
+        """Time that the cycle leaves of its slice [us]."""
+        return plain(margin_us(self.required_us, available_us=self.figures.available_us))
 
     @property
     def is_whole(self) -> bool:
@@ -101,7 +110,13 @@ class Total(NamedTuple):
     """Share of the window, 0..1."""
 
 
-def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
+def drawn_cycle(profile: Profile, *, model: str, number: int | None) -> BusCycle:
+    """The cycle that a timeline shows under a timing model; parameters as `schedule` has them."""
+    cycle = cycle_of(profile, model=model)
+    return cycle if number is None else cycle.at(number)
+
+
+def schedule(profile: Profile, *, model: str | None = None, number: int | None = None) -> Schedule:
     """Lay out one communication cycle, node by node.
 
     The events of the bus, then the idle rest of the slice. There are no events of zero duration.
@@ -112,6 +127,8 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
         The network.
     model
         Timing model; without it the one whose figures lead.
+    number
+        Cycle of the common multiple of the rates of groups, from 1; without it the cycle that the verdict is for.
 
     Raises
     ------
@@ -139,15 +156,23 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
         where = "bus.nodes" if network.is_uniform else "nodes of all groups"
         raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
     model = leading_model(profile) if model is None else model
-    closed = figures(profile, model=model)
-    events = list(islice(_laid_out(cycle_of(profile, model=model).events()), MOST_EVENTS + 1))
+    closed, cycle = figures(profile, model=model), drawn_cycle(profile, model=model, number=number)
+    events = list(islice(_laid_out(cycle.events()), MOST_EVENTS + 1))
     if len(events) > MOST_EVENTS:
         raise BusplanError(f"a timeline shows up to {MOST_EVENTS:,} events, and this cycle has more")
     end_us = events[-1].end_us
     # A rest that is only float rounding is no idle time.
     if not fits_in(closed.available_us, available_us=end_us):
         events.append(Event(IDLE.key, None, None, None, end_us, closed.available_us, "", IDLE.label))
-    return Schedule(profile, closed, tuple(events), from_us=0.0, to_us=events[-1].end_us)
+    return Schedule(
+        profile,
+        closed,
+        tuple(events),
+        from_us=0.0,
+        to_us=events[-1].end_us,
+        required_us=plain(cycle.required_us),
+        number=number,
+    )
 
 
 def zoom(

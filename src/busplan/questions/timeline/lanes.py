@@ -6,7 +6,9 @@ from typing import Final, NamedTuple
 from busplan.buses.parts import EventKind
 from busplan.forms.blocks import Sentence, ShownValue, count_value, figure_value, joined, sentence
 from busplan.forms.numbers import figure_text, nouns
+from busplan.questions.fit.certainty import fits_in
 from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.timeline.cycles import CommonMultiple
 from busplan.questions.timeline.events import TOTAL, Event, Schedule
 from busplan.sections.profile import Profile
 
@@ -48,10 +50,12 @@ def time_text(time_us: float) -> str:
 
 def subject(schedule: Schedule) -> Sentence:
     """Say what is shown: the number of nodes, and the part of the cycle."""
-    nodes = schedule.figures.nodes
+    nodes, common, cycle = schedule.figures.nodes, CommonMultiple(schedule), "the cycle"
+    if schedule.number is not None and common.cycles > 1:
+        cycle = f"cycle {common.number} of {common.cycles}"
     setup = ", ".join((nouns(nodes, "node"), *bus_of(schedule.profile).setup_words(network_of(schedule.profile))))
     return sentence(
-        f"{{}} {setup}; {{}} to {{}} of the cycle",
+        f"{{}} {setup}; {{}} to {{}} of {cycle}",
         count_value(nodes, "nodes"),
         ShownValue(schedule.from_us, "from_us", "", TOTAL.decimals),
         ShownValue(schedule.to_us, "to_us", "us", TOTAL.decimals),
@@ -67,7 +71,7 @@ def charged(schedule: Schedule) -> Sentence:
 
 def overruns(schedule: Schedule) -> bool:
     """Whether the cycle takes more than its slice."""
-    return "time" in schedule.figures.exceeded
+    return not fits_in(schedule.required_us, available_us=schedule.figures.available_us)
 
 
 def shows_overrun(window: Schedule) -> bool:

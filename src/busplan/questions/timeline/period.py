@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, REQUIRED
+from busplan.elementwise import plain
 from busplan.forms.blocks import figure_value
 from busplan.forms.numbers import with_unit
-from busplan.questions.fit.figures import CapacityFigures, figures
+from busplan.questions.fit.figures import margin_us
 from busplan.questions.fit.network import model_names
-from busplan.questions.timeline.events import Event, Schedule
+from busplan.questions.timeline.events import Event, Schedule, drawn_cycle
 from busplan.questions.timeline.lanes import overruns, time_text
 
 REST: Final = "rest of the period"
@@ -26,29 +27,36 @@ class PeriodPart(NamedTuple):
 
 
 class ModelBar(NamedTuple):
-    """Time of the slice that a timing model needs."""
+    """Time of the slice that a timing model needs for the cycle that is drawn."""
 
     timing_model: str
-    figures: CapacityFigures
+    required_us: float
+    available_us: float
+    period_us: float
+
+    @property
+    def margin_us(self) -> float:
+        """Time that it leaves of the slice [us]."""
+        return plain(margin_us(self.required_us, available_us=self.available_us))
 
     @property
     def words(self) -> str:
         """Time needed and margin, as "207.117 us needed, margin 1792.883 us"."""
-        needed = with_unit(figure_value(REQUIRED, self.figures.required_us))
-        if self.figures.margin_us < 0:
-            return f"{needed} needed, {with_unit(figure_value(MARGIN, -self.figures.margin_us))} short"
-        return f"{needed} needed, margin {with_unit(figure_value(MARGIN, self.figures.margin_us))}"
+        needed = with_unit(figure_value(REQUIRED, self.required_us))
+        if self.margin_us < 0:
+            return f"{needed} needed, {with_unit(figure_value(MARGIN, -self.margin_us))} short"
+        return f"{needed} needed, margin {with_unit(figure_value(MARGIN, self.margin_us))}"
 
     @property
     def spans(self) -> Iterator[PeriodPart]:
         """The time needed, what is left of the slice or goes beyond it, and the rest of the period."""
-        needed_us, slice_us = self.figures.required_us, self.figures.available_us
+        needed_us, slice_us = self.required_us, self.available_us
         yield PeriodPart(NEEDED, 0.0, min(needed_us, slice_us))
         used_us = max(needed_us, slice_us)
         if used_us > min(needed_us, slice_us):
             yield PeriodPart(LEFT if slice_us > needed_us else BEYOND, min(needed_us, slice_us), used_us)
-        if self.figures.period_us > used_us:
-            yield PeriodPart(REST, used_us, self.figures.period_us)
+        if self.period_us > used_us:
+            yield PeriodPart(REST, used_us, self.period_us)
 
 
 def model_bars(schedule: Schedule) -> tuple[ModelBar, ...]:
@@ -59,16 +67,16 @@ def model_bars(schedule: Schedule) -> tuple[ModelBar, ...]:
     schedule
         The cycle, under one of them.
     """
-    drawn = schedule.figures
-    return tuple(
-        ModelBar(model, drawn if model == drawn.timing_model else figures(schedule.profile, model=model))
-        for model in model_names(schedule.profile)
-    )
+    figures, bars = schedule.figures, []
+    for model in model_names(schedule.profile):
+        cycle = drawn_cycle(schedule.profile, model=model, number=schedule.number)
+        bars.append(ModelBar(model, plain(cycle.required_us), figures.available_us, figures.period_us))
+    return tuple(bars)
 
 
 def period_end_us(schedule: Schedule, bars: tuple[ModelBar, ...]) -> float:
     """End of the period, or of a cycle that takes longer [us]."""
-    return max(schedule.figures.period_us, schedule.end_us, *(bar.figures.required_us for bar in bars))
+    return max(schedule.figures.period_us, schedule.end_us, *(bar.required_us for bar in bars))
 
 
 def rest(schedule: Schedule) -> Event | None:

@@ -28,9 +28,10 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import period_value, sentence_text
-from busplan.questions.fit.certainty import FITS, cycle_of
+from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.network import bus_of
 from busplan.questions.timeline.characters import timeline_lines
+from busplan.questions.timeline.cycles import CommonMultiple
 from busplan.questions.timeline.events import EVENTS, SHARE, TOTAL, Schedule, Total, totals
 from busplan.questions.timeline.lanes import charged, drawn_window, kind_of, overruns
 from busplan.questions.timeline.period import model_bars
@@ -57,19 +58,19 @@ def _blocks(schedule: Schedule) -> Iterator[Block]:
     yield headline(schedule)
     yield from (Sentence((words,), "warns") for words in _warnings(schedule))
     yield margins_sentence(schedule)
-    cycle = cycle_of(schedule.profile, model=schedule.figures.timing_model)
-    yield from (Sentence((words,)) for words in cycle.other_cycles())
+    yield from (Sentence((words,)) for words in CommonMultiple(schedule).sentences())
     yield timeline_chart(schedule)
     yield totals_table(schedule)
 
 
 def headline(schedule: Schedule) -> Sentence:
-    """Say what the cycle leaves of its slice under its timing model, and the verdict if this model decides."""
+    """Say what the fullest cycle leaves of its slice by its timing model, and the verdict if this model decides."""
     figures = schedule.figures
     parts: tuple[Part, ...] = (
         *(Code(schedule.profile.name), " at ", period_value(figures.period_us), ": "),
         *story(figures, schedule.profile),
         f" by the {figures.timing_model} model",
+        *((" in the fullest cycle",) if schedule.number is not None and CommonMultiple(schedule).cycles > 1 else ()),
     )
     if figures.verdict is None:
         return Sentence((*parts, ", which does not affect the verdict."), state_of(figures.fits and figures.safe))
@@ -109,7 +110,7 @@ def _most(window: Schedule) -> Sentence:
 def margins_sentence(schedule: Schedule) -> Sentence:
     """Say what each timing model leaves of the slice."""
     margins = (
-        sentence(f"{{}} by the {bar.timing_model} model", figure_value(MARGIN, bar.figures.margin_us))
+        sentence(f"{{}} by the {bar.timing_model} model", figure_value(MARGIN, bar.margin_us))
         for bar in model_bars(schedule)
     )
     return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
@@ -146,8 +147,8 @@ def _warnings(schedule: Schedule) -> list[str]:
 
 
 def _facts(schedule: Schedule) -> JsonDocument:
-    """The document without events: figures of the whole cycle, and the window."""
-    figures = schedule.figures
+    """The document without events: the cycle that is drawn, the verdict, the cycles that differ, and the window."""
+    figures, common = schedule.figures, CommonMultiple(schedule)
     return document(
         "timeline",
         profile=schedule.profile.name,
@@ -155,9 +156,12 @@ def _facts(schedule: Schedule) -> JsonDocument:
         period_us=figures.period_us,
         nodes=figures.nodes,
         **{key: getattr(figures, key) for key in bus_of(schedule.profile).figures.headings},
-        required_us=figures.required_us,
+        cycle=common.number,
+        common_multiple=common.cycles,
+        distinct_cycles=None if common.distinct is None else [alike._asdict() for alike in common.distinct],
+        required_us=schedule.required_us,
         available_us=figures.available_us,
-        margin_us=figures.margin_us,
+        margin_us=schedule.margin_us,
         exceeded=list(figures.exceeded),
         not_shown=None if figures.not_shown is None else list(figures.not_shown),
         fits=figures.fits,
@@ -173,7 +177,7 @@ def _facts(schedule: Schedule) -> JsonDocument:
 def timeline_document(schedule: Schedule) -> JsonDocument:
     """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
     margins = [
-        {"timing_model": bar.timing_model, REQUIRED.key: bar.figures.required_us, MARGIN.key: bar.figures.margin_us}
+        {"timing_model": bar.timing_model, REQUIRED.key: bar.required_us, MARGIN.key: bar.margin_us}
         for bar in model_bars(schedule)
     ]
     totals_ = [total._asdict() for total in totals(schedule)]
