@@ -279,5 +279,5 @@ def test_the_report_has_no_part_of_a_cycle(run: Run, tmp_path: Path) -> None:
     (tmp_path / "car.toml").write_text(CAR, encoding="utf-8")
     page = run("report", "car.toml", cwd=tmp_path).stdout
     assert "car" in page
-    for word in ("The cycle to scale", "against period", "Is the circle", ">None<", "nan"):
+    for word in ("The cycle to scale", "against period", "Is the circle", "execution time", ">None<", "nan"):
         assert word not in page

@@ -109,13 +109,13 @@ def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterato
 
 
 def execution_grades(profile: Profile) -> str | None:
-    """Grade of the execution time; where groups differ, each with the groups that have it. None without a grade."""
+    """Grade of the execution time; where groups differ, each with the groups that have it. None without any."""
     names: dict[str, list[str]] = {}
     for alike in profile.alike_nodes:
         names.setdefault(alike.node.execution.grade or "without a grade", []).append(alike.name)
     if len(names) == 1:
         return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
-    return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items())
+    return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items()) or None
 
 
 def broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
