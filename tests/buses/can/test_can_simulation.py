@@ -406,6 +406,26 @@ def test_a_burst_of_messages_meets_slow_pdos_twice() -> None:
     assert response_us <= own.responses_us["low13"] <= response_us + 55 + 8 * FRAME_US
 
 
+def test_a_message_between_pdos_makes_no_cycle_longer_than_the_fullest() -> None:
+    pdos = (
+        Pdos("read", "fast", 0x181, 1, 1),
+        Pdos("read", "slow", 0x7F0, 1, 1, every=2),
+        Pdos("write", "fast", 0x201, 1, 1),
+        Pdos("write", "slow", 0x7F1, 1, 1, every=2),
+    )
+    between = Message("between", 0x300, 8, 2000, 0, 2000)
+    own = judged(drives(2, between, host_us=20)._replace(pdos=pdos), nodes=2, write_us=0, slack_us=0)
+    assert own is not None
+    assert own.lasts_us == 55 + 150 + 4 * 65 + 20 + FRAME_US
+    longest_us = [0] * CYCLES
+    for start_us in range(2000):
+        each = (tuple(range(start_us, CYCLES * own.period_us, 2000)),)
+        at = Moments(((150,) * CYCLES,) * 2, (20,) * CYCLES, each, each, 0)
+        longest_us = [max(us) for us in zip(longest_us, run(own, at).cycles_us, strict=True)]
+    for number, us in enumerate(longest_us):
+        assert us == own.lasts_us if number % 2 == FULL else us < own.lasts_us
+
+
 if __name__ == "__main__":
     for kind in ("", *KINDS):
         for name, found in attacked(*map(int, sys.argv[1:]), runs=150, kind=kind).items():
