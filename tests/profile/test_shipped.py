@@ -248,10 +248,10 @@ def test_the_shipped_can_networks_are_those_that_they_say() -> None:
     (nodes,) = arm.alike_nodes
     assert (nodes.bytes_of("read"), nodes.bytes_of("write")) == (16, 4)
     assert all(message.fd for message in arm.message)
-    # Frames of 4 and 16 bytes: 33 nominal bits, and 75 and 195 data bits.
+    # Frames of 4 and 16 bytes: 32 nominal bits, and 75 and 195 data bits.
     (found,) = busplan.capacity(arm, timing_model=["worst-stuffing"]).results
     us = {term.name: term.us for term in found.terms}
-    assert (us["command"], us["feedback"]) == (7 * (33 + 75 / 5), 7 * (33 + 195 / 5))
+    assert (us["command"], us["feedback"]) == (7 * (32 + 75 / 5), 7 * (32 + 195 / 5))
     assert (machine.bus.nodes, machine.bus.data_bit_rate_kbit_s) == (6, None)
     assert [message.per_node for message in machine.message] == [True] * 3
     for profile in (arm, machine):

@@ -232,10 +232,10 @@ def test_an_fd_bus_sends_sync_and_pdos_as_fd_frames() -> None:
     own = profile(bus=FD, payload={"read_bytes": 20, "write_bytes": 64})
     (found,) = busplan.capacity(own, timing_model=[WORST]).results
     us = {term.name: plain(term.us) for term in found.terms}
-    # 33 nominal bits, and at 5 Mbit/s 35, 240 and 680 data bits.
-    assert us["sync"] == pytest.approx(33 + 35 / 5)
-    assert us["feedback"] == pytest.approx(3 * (33 + (5 + 160 + 4 + 21 + 7 + 1 + 42) / 5))
-    assert us["command"] == pytest.approx(3 * (33 + 680 / 5))
+    # 32 nominal bits, and at 5 Mbit/s 35, 240 and 680 data bits.
+    assert us["sync"] == pytest.approx(32 + 35 / 5)
+    assert us["feedback"] == pytest.approx(3 * (32 + (5 + 160 + 4 + 21 + 7 + 1 + 42) / 5))
+    assert us["command"] == pytest.approx(3 * (32 + 680 / 5))
     pdos = profile(bus=FD, payload={"feedback_pdos": [12, 48], "command_pdos": [64, 64, 64, 64]})
     sizes = [(one.first, one.data_bytes) for one in streams(traffic_of_profile(pdos), is_stuffed=True)]
     assert sizes == [(0x80, 0), (0x181, 12), (0x281, 48), *((0x201 + 0x100 * number, 64) for number in range(4))]
@@ -249,9 +249,9 @@ def test_a_message_says_whether_it_is_fd() -> None:
         bus=FD,
     )
     us = {stream.name: plain(stream.frame_us) for stream in _messages(own)}
-    assert us == {"classical": 135, "fd": 33 + 115 / 5, "long": pytest.approx(56 + 520 / 5)}
+    assert us == {"classical": 135, "fd": 32 + 115 / 5, "long": pytest.approx(56 + 520 / 5)}
     # The first 11 bits of the long identifier are 0; the FD message blocks.
-    assert responses(own)["classical"] == us["long"] + us["fd"] + 40 + 6 * us["fd"] + us["classical"]
+    assert responses(own)["classical"] == us["long"] + us["fd"] + 39 + 6 * us["fd"] + us["classical"]
 
 
 @pytest.mark.parametrize(

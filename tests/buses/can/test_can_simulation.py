@@ -424,6 +424,59 @@ def test_a_burst_of_messages_meets_slow_pdos_twice() -> None:
     assert response_us <= own.responses_us["low13"] <= response_us + 55 + 8 * FRAME_US
 
 
+def test_a_message_between_pdos_makes_no_cycle_longer_than_the_fullest() -> None:
+    pdos = (
+        Pdos("read", "fast", 0x181, 1, 1),
+        Pdos("read", "slow", 0x7F0, 1, 1, every=2),
+        Pdos("write", "fast", 0x201, 1, 1),
+        Pdos("write", "slow", 0x7F1, 1, 1, every=2),
+    )
+    between = Message("between", 0x300, 8, 2000, 0, 2000)
+    own = judged(drives(2, between, host_us=20)._replace(pdos=pdos), nodes=2, write_us=0, slack_us=0)
+    assert own is not None
+    assert own.lasts_us == 55 + 150 + 4 * 65 + 20 + FRAME_US
+    longest_us = [0] * CYCLES
+    for start_us in range(2000):
+        each = (tuple(range(start_us, CYCLES * own.period_us, 2000)),)
+        at = Moments(((150,) * CYCLES,) * 2, (20,) * CYCLES, each, each, 0)
+        longest_us = [max(us) for us in zip(longest_us, run(own, at).cycles_us, strict=True)]
+    for number, us in enumerate(longest_us):
+        assert us == own.lasts_us if number % 2 == FULL else us < own.lasts_us
+
+
+def mixed(*, is_fd: bool) -> Traffic:
+    """Messages of both formats behind the PDOs of a node, of CAN FD some with two bit rates, the first goes first."""
+    bases = ((0x300, 11, 8), (0x300 << 18, 29, 8), (0x301, 11, 64), ((0x301 << 18) + 5, 29, 0), (0x302 << 18, 29, 12))
+    sent = [
+        Message(f"m{number}", identifier, size if is_fd else min(size, 8), 50_000, 0, 50_000)._replace(
+            identifier_bits=bits, data_bit_rate_kbit_s=1000 if is_fd and size > 8 else 0.0
+        )
+        for number, (identifier, bits, size) in enumerate((*bases, (0x303, 11, 1)))
+    ]
+    own = drives(1, *sent, read_us=0)
+    if not is_fd:
+        return own
+    pdos = tuple(pdo._replace(frame_bytes=(64,), most_bytes=256, payload_bytes=20) for pdo in own.pdos)
+    return own._replace(bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=pdos)
+
+
+@pytest.mark.parametrize("place", range(6))
+@pytest.mark.parametrize("is_fd", [False, True])
+def test_each_of_mixed_messages_reaches_its_response_time(place: int, *, is_fd: bool) -> None:
+    own = judged(mixed(is_fd=is_fd), nodes=1, write_us=0, slack_us=5000)
+    assert own is not None
+    start_us, frames_us = own.period_us, [sent.us for _, sent in own.senders]
+    # All that go before it come with SYNC, and the longest of those behind it has just started. Others come later.
+    moments_us = [start_us] * (place + 1) + [3 * start_us] * (len(frames_us) - place - 1)
+    blocking_us = max(frames_us[place + 1 :], default=0)
+    if blocking_us:
+        moments_us[frames_us.index(blocking_us, place + 1)] = start_us - VERGE_US
+    each = tuple((us,) for us in moments_us)
+    found = run(own, Moments(((0,) * CYCLES,), (0,) * CYCLES, each, each, 0))
+    (response_us,) = found.responses_us[place]
+    assert response_us == own.responses_us[f"m{place}"] - (VERGE_US if blocking_us else 0)
+
+
 if __name__ == "__main__":
     for kind in ("", *KINDS):
         for name, found in attacked(*map(int, sys.argv[1:]), runs=150, kind=kind).items():

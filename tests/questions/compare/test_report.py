@@ -89,7 +89,10 @@ def test_what_is_left_out_untested_and_in_the_way_is_said_of_each_kind() -> None
     assert "Left out on CAN: bus.speed, bus.gap_count, bus.charge_hops, group.io.write_response." in said(GANTRY)
     assert "Execution times are assumed to be as long as on IEEE 1394; here they are: from SYNC to a queued" in note
     assert "Model of CAN (kind can): published figures set expected load (8 frames that hardware" in note
-    assert "; independent figures test lengths of classical frames (2 sizes), bounds of their stuff bits" in note
+    assert (
+        "; independent figures test lengths of classical frames (2 sizes), lengths of FD frames (1 size), bounds"
+        in note
+    )
     assert note.endswith("; not tested: the cycle.")
     reset = "After a bus reset, with bus.gap_count = 63 until it is set again, the verdict is: not shown to fit."
     assert any(line.startswith(f"IEEE 1394: {reset}") for line in said(GANTRY))

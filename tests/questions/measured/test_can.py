@@ -178,7 +178,7 @@ def test_frames_of_can_fd_are_in_the_load_with_the_most_stuff_bits(tmp_path: Pat
     answer = of_log("".join(lines), tmp_path, plan="can-fd-arm-7")
     assert "2,000 frames of CAN FD: in the load with the most stuff bits." in answer.remarks
     plan: Any = busplan.load_profile("can-fd-arm-7")
-    us = 33 * 1000 / plan.bus.bit_rate_kbit_s + (5 + 96 + 4 + 17 + 6 + 1 + 26) * 1000 / plan.bus.data_bit_rate_kbit_s
+    us = 32 * 1000 / plan.bus.bit_rate_kbit_s + (5 + 96 + 4 + 17 + 6 + 1 + 26) * 1000 / plan.bus.data_bit_rate_kbit_s
     assert figure(answer, "load ").recorded == pytest.approx(us / 1000, rel=0.01)
 
 

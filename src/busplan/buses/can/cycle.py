@@ -21,7 +21,7 @@ from busplan.buses.can.streams import (
     streams,
 )
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import messages, pending_us, response, sent_in, sync_spread_us, waits
+from busplan.buses.can.waiting import messages, response, sent_in, sync_spread_us, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
@@ -214,9 +214,6 @@ class CanCycle(BusCycle):
         for message in islice(waited.blocks(), first, end):
             label = f"message {message.name} of a lower priority"
             yield blocking._replace(us=plain(message.frame_us), label=label)
-        if end is None and plain(waited.excess_us):
-            label = "messages of a lower priority, where a cycle with fewer PDOs lasts longer"
-            yield blocking._replace(us=plain(waited.excess_us), label=label)
 
     @cached_property
     def _own(self) -> dict[str, Number]:
@@ -270,9 +267,6 @@ class CanCycle(BusCycle):
     def _higher(self, lasts_us: Number) -> Iterator[Number]:
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
-        if self.traffic.has_rates:
-            words = "the longest of SYNC and PDOs less the shortest"
-            window_us = window_us + self._sent.of(partial(_pending_us, self.is_stuffed), words=words)
         for message, _ in self._before:
             count = _of_all(message, rounded_up((window_us + message.jitter_us) / message.period_us))
             yield choose(self._goes_before_last(message), count, 0)
@@ -487,11 +481,6 @@ def _waits(is_stuffed: bool, key: str, due: frozenset[str] | None, traffic: Traf
     """One figure of what a cycle waits for."""
     number: Number = getattr(waits(traffic, others_us, due, is_stuffed=is_stuffed), key)
     return number
-
-
-def _pending_us(is_stuffed: bool, traffic: Traffic) -> Number:
-    us: Number = pending_us(streams(traffic, is_stuffed=is_stuffed), traffic)
-    return us
 
 
 def _of_all(message: Message, number: Number) -> Number:

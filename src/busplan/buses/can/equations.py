@@ -82,19 +82,19 @@ def fd_frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bo
     Returns
     -------
     tuple
-        Bits at the nominal bit rate, a + 12 with a = 17 or 36, and with stuffing floor((a - 1) / 4) more; bits at the
+        Bits at the nominal bit rate, a + 12 with a = 17 or 36, and with stuffing floor((a - 2) / 4) more; bits at the
         data bit rate, d + t + ceil(t / 4) + 1 with d = 5 + 8 p and t = 4 + 17, or 4 + 21 over 16 bytes, and with
-        stuffing floor((d + 3) / 4) more [bits]. The longest frames have 1 nominal and 1 to 3 data bits less, for some
-        bits of the header are fixed.
+        stuffing floor((d + 3) / 4) more [bits]. The longest frames have 1 to 3 data bits less, and with 29 bits of
+        identifier 1 nominal bit less, for some bits of the header are fixed.
 
     References
     ----------
-    ISO 11898-1:2015. No worked figure is published.
+    ISO 11898-1:2015. The sum of both is that of Linux 6.5, include/linux/can/length.h.
 
     Examples
     --------
     >>> fd_frame_bits(64, identifier_bits=11, is_stuffed=True), fd_frame_bits(10, identifier_bits=29, is_stuffed=False)
-    ((33.0, 680.0), (48.0, 129.0))
+    ((32.0, 680.0), (48.0, 129.0))
     """
     opening = choose(identifier_bits > BASE_BITS, FD_OPENING_BITS_EXTENDED, FD_OPENING_BITS)
     padded_bytes = next_entry(FD_LENGTHS, data_bytes, words="the next length of a DLC")
@@ -104,9 +104,9 @@ def fd_frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bo
     data_bits: Number = stuffable + tail + rounded_up(tail / STUFF_STEP_BITS) + FD_DELIMITER_BITS
     if not is_stuffed:
         return nominal_bits, data_bits
-    # A stuff bit may come at once: the bits before it may be those of the opening.
+    # A stuff bit behind the last bit of the opening has the data bit rate.
     return (
-        nominal_bits + rounded_down((opening - 1) / STUFF_STEP_BITS),
+        nominal_bits + rounded_down((opening - 2) / STUFF_STEP_BITS),
         data_bits + rounded_up(stuffable / STUFF_STEP_BITS),
     )
 
@@ -151,7 +151,7 @@ def frame_us(
     >>> frame_us(8, identifier_bits=11, bit_rate_kbit_s=500, is_stuffed=True)
     270.0
     >>> frame_us(8, identifier_bits=11, bit_rate_kbit_s=500, data_bit_rate_kbit_s=2000, is_stuffed=True)
-    123.5
+    121.5
     """
     if not is_off(data_bit_rate_kbit_s):
         nominal, data = fd_frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)

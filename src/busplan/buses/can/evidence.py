@@ -27,6 +27,15 @@ def frame_bits(cycle: object, *, payload_bytes: int, identifier_bits: int, stuff
     return stuffed(cycle, least=least, most=most, stuffing=stuffing)
 
 
+def fd_frame_bits(cycle: object, *, payload_bytes: int, identifier_bits: int, stuffing: Stuffing) -> float:
+    """Length of a CAN FD frame at both bit rates, the space of 3 bits behind it included [bits]."""
+    least, most = (
+        plain(sum(equations.fd_frame_bits(payload_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)))
+        for is_stuffed in (False, True)
+    )
+    return stuffed(cycle, least=least, most=most, stuffing=stuffing)
+
+
 def response_us(
     _cycle: object, *, message: int, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]
 ) -> float | None:
@@ -51,4 +60,4 @@ def _senders(bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequ
     return [Sender(plain(equations.frame_us(size, **wire)), each_us) for size, each_us in sizes]
 
 
-FUNCTIONS: Final = {function.__name__: function for function in (stuffed, frame_bits, response_us, load)}
+FUNCTIONS: Final = {function.__name__: function for function in (stuffed, frame_bits, fd_frame_bits, response_us, load)}

@@ -41,8 +41,6 @@ class Waits(NamedTuple):
     """Frames of a lower priority than SYNC and all PDOs that go where these leave the bus idle [us]."""
     lower: tuple[Stream, ...]
     """Messages of a lower priority than SYNC and all PDOs, the longest first."""
-    excess_us: Points = 0.0
-    """Part of `blocking_us` by which a cycle with fewer PDOs, where more messages block, lasts longer [us]."""
     most: int = int(MOST_BLOCKS)
     """Frames of a lower priority that it waits for, at most [1]."""
 
@@ -51,6 +49,11 @@ class Waits(NamedTuple):
         counts = (int(plain(_frames_within(stream, self.lasts_us))) for stream in self.lower)
         each = (repeat(stream, count) for stream, count in zip(self.lower, counts, strict=True))
         return islice(chain.from_iterable(each), self.most)
+
+
+def sent_in(cyclic: Sequence[Stream], due: Container[str]) -> list[Stream]:
+    """SYNC and the PDOs of some groups."""
+    return [stream for stream in cyclic if stream.name == SYNC or stream.group in due]
 
 
 @remembered(maxsize=256)
@@ -73,74 +76,30 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     SYNC, the feedback of the slowest node and the commands each meet an idle bus, or a bus that has just become busy. A
     frame of a lower priority may have started then: three such frames, the longest that can be there. One of a message
     whose deadline D is kept ends within it, so ceil((w + D) / T) of them are there in w. Frames that go before the last
-    PDO go whenever they are queued: ceil((w + J + bit) / T). That holds with what is still pending from the cycle
-    before, too: the last frame of that cycle started as long before its end as the last frame of this cycle does, or
-    with PDOs at several rates by `pending_us` longer.
+    PDO go whenever they are queued: ceil((w + J + bit) / T).
 
-    PDOs that are not in every cycle are all due in the fullest. In a cycle with fewer of them, messages between these
-    and the last one are of a lower priority, and may take longer than the missing PDOs would.
+    Nothing of that is still pending from the cycle before: all that was queued by w behind its start has been sent by
+    then, and w is within the period.
+
+    PDOs that are not in every cycle are all due in the fullest, and no other cycle lasts longer: it has fewer PDOs, and
+    no more of the messages before the last PDO of the fullest. These may block its own PDOs, but each goes once.
     """
     cyclic = [stream for stream in streams(traffic, is_stuffed=is_stuffed) if not stream.is_message]
-    if due is not None:
-        # Without PDOs it ends with SYNC, which waits for a single frame.
-        most = int(MOST_BLOCKS) if due else 1
-        return _waits(traffic, others_us, last_place(sent_in(cyclic, due)), is_stuffed=is_stuffed, most=most)
-    fullest = _waits(traffic, others_us, last_place(cyclic), is_stuffed=is_stuffed)
-    lasts_us = fullest.lasts_us
-    for missing_us, last in _with_fewer(cyclic, traffic):
-        some_us = others_us - total(missing_us.values())
-        lasts_us = larger(lasts_us, _waits(traffic, some_us, last, is_stuffed=is_stuffed).lasts_us)
-    excess_us = lasts_us - fullest.lasts_us
-    return fullest._replace(blocking_us=fullest.blocking_us + excess_us, excess_us=excess_us)
-
-
-def sent_in(cyclic: Sequence[Stream], due: Container[str]) -> list[Stream]:
-    """SYNC and the PDOs of some groups."""
-    return [stream for stream in cyclic if stream.name == SYNC or stream.group in due]
-
-
-def _with_fewer(cyclic: Sequence[Stream], traffic: Traffic) -> Iterator[tuple[dict[str, Points], Points]]:
-    """Cycles without a slow group and all that end behind it: PDOs missing by name [us], and the last place left."""
-    if not traffic.has_rates:
-        return
-    groups = {stream.group: [own for own in cyclic if own.group == stream.group] for stream in cyclic[1:]}
-    lasts = {name: last_place(own) for name, own in groups.items()}
-    for name, own in groups.items():
-        if (own[0].period_us > traffic.period_us) is False:
-            continue
-        missing_us: dict[str, Points] = dict.fromkeys(NAMES.values(), 0.0)
-        last = cyclic[0].last_place
-        for beside, rest in groups.items():
-            is_due = (rest[0].period_us <= traffic.period_us) | (lasts[beside] < lasts[name])
-            last = larger(last, choose(is_due, lasts[beside], 0))
-            for stream in rest:
-                missing_us[stream.name] = missing_us[stream.name] + choose(is_due, 0.0, stream.sender().frames_us)
-        yield missing_us, last
-
-
-def pending_us(each: Iterable[Stream], traffic: Traffic) -> Points:
-    """How much longer the last frame of a cycle may be than that of the next, where PDOs are at several rates [us].
-
-    Parameters
-    ----------
-    each
-        All streams.
-    traffic
-        What they are of.
-    """
-    if not traffic.has_rates:
-        return 0.0
-    frames_us = [stream.frame_us for stream in each if not stream.is_message]
-    return reduce(larger, frames_us) - reduce(smaller, frames_us)
-
-
-def _waits(
-    traffic: Traffic, others_us: Points, last: Points, *, is_stuffed: bool, most: int = int(MOST_BLOCKS)
-) -> Waits:
-    """The same of a cycle with some PDOs, to the last place of them."""
-    bit = bit_us(traffic.bit_rate_kbit_s) + pending_us(streams(traffic, is_stuffed=is_stuffed), traffic)
+    fullest = last_place(cyclic)
+    # Without PDOs a cycle ends with SYNC, which waits for a single frame.
+    most = int(MOST_BLOCKS) if due is None or due else 1
+    last = fullest if due is None else last_place(sent_in(cyclic, due))
+    bit = bit_us(traffic.bit_rate_kbit_s)
     sent = message_streams(traffic, is_stuffed=is_stuffed)
     before, lower = sent.around(last)
+    if due is not None:
+        # Of messages before the last PDO of the fullest cycle nothing is pending at SYNC.
+        lower = tuple(
+            stream._replace(deadline_us=smaller(stream.deadline_us, stream.jitter_us + bit))
+            if stream.last_place <= fullest
+            else stream
+            for stream in lower
+        )
     higher = [
         Sender(
             choose(stream.first_place <= last, stream.sender().frames_us, 0.0), stream.period_us, stream.jitter_us + bit
@@ -176,14 +135,7 @@ def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> 
     us = {name: total(stream.sender().frames_us for stream in cyclic if stream.name == name) for name in _CYCLIC}
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
     commands_us = waits(traffic, others_us, is_stuffed=is_stuffed).lasts_us - us[_COMMAND]
-    late_us = {_FEEDBACK: commands_us - traffic.host_us - us[_FEEDBACK], _COMMAND: commands_us}
-    for missing_us, last in _with_fewer(cyclic, traffic):
-        some_us = others_us - total(missing_us.values())
-        lasts_us = _waits(traffic, some_us, last, is_stuffed=is_stuffed).lasts_us
-        commands_us = lasts_us - us[_COMMAND] + missing_us[_COMMAND]
-        queued = commands_us - traffic.host_us - us[_FEEDBACK] + missing_us[_FEEDBACK], commands_us
-        late_us = {name: larger(late_us[name], own_us) for name, own_us in zip(late_us, queued, strict=True)}
-    return late_us
+    return {_FEEDBACK: commands_us - traffic.host_us - us[_FEEDBACK], _COMMAND: commands_us}
 
 
 class _Start:

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 from busplan.buses.network import Group
 from busplan.buses.rates import common_multiple, numbers_by_due
 from busplan.elementwise import plain
-from busplan.questions.fit.certainty import cycle_of, fits_in
+from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.timeline.events import Schedule
 
 MOST_LISTED: Final = 64
@@ -47,12 +47,10 @@ class CommonMultiple:
         return common_multiple(self._rates)
 
     @cached_property
-    def number(self) -> int | None:
-        """Which of them is drawn, from 1; None for an upper bound of them all."""
-        if self._schedule.number is not None:
-            return (self._schedule.number - 1) % self.cycles + 1
-        fullest_us = plain(self._cycle.at(self._cycle.fullest).required_us)
-        return self._cycle.fullest if fits_in(self._schedule.required_us, available_us=fullest_us) else None
+    def number(self) -> int:
+        """Which of them is drawn, from 1."""
+        asked = self._schedule.number
+        return self._cycle.fullest if asked is None else (asked - 1) % self.cycles + 1
 
     @cached_property
     def distinct(self) -> tuple[DistinctCycle, ...] | None:
@@ -86,8 +84,6 @@ class CommonMultiple:
     @property
     def _drawn(self) -> str:
         """The cycle that is drawn, in words."""
-        if self.number is None:
-            return "an upper bound of them all"
         if self._schedule.number is None:
             return "the fullest"
         due = self._due(self.number)
