@@ -284,7 +284,9 @@ def traffic_of_profile(profile: Any) -> Traffic:
 
 
 def without_times(traffic: Traffic) -> Traffic:
-    """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
+    """Traffic of the same identifiers, with all times alike: over arrays of times they are computed once."""
+    if traffic.is_plain:
+        return traffic
     own = traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, data_bit_rate_kbit_s=0.0, read_us=0.0, host_us=0.0)
     return own._replace(messages=traffic.messages.timeless)
 
