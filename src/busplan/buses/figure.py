@@ -5,6 +5,7 @@ module; a kind of bus adds its own.
 """
 
 from collections.abc import Callable, Iterable
+from functools import cache
 from typing import Final, Literal, NamedTuple
 
 from busplan.buses import time_slice
@@ -108,6 +109,7 @@ class Figure(NamedTuple):
         return unit_of(self.key)
 
 
+@cache
 def unit_of(key: str) -> str:
     """Unit by the end of a key's name; empty for counts, shares and words.
 

@@ -5,7 +5,7 @@ names file, line, column and value, and says what would be right.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import KeysView, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -23,6 +23,8 @@ MAX_FILE_BYTES: Final = 2_000_000
 _OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
 """Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
 PERIOD_KEY: Final = "cycle.period_us"
+_KINDS: Final = ("bus", "bus.kind")
+"""Keys whose change may ask for tables of another kind of bus."""
 _SOURCE: Final = "_source"
 """Attribute of a profile that holds its document and the keys changed since; no field, so no part of its value."""
 
@@ -167,11 +169,12 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     if not changes:
         return profile
     origin = origin or {}
-    data = profile.model_dump(exclude_unset=True)
+    kept = _unchanged_tables(profile, changes.keys())
+    data = profile.model_dump(exclude_unset=True, exclude=set(kept))
     for key, value in changes.items():
         table, last = holder(data, key, name=origin.get(key))
         table[last] = value
-    result = _checked(data)
+    result = _checked(data | kept)
     if isinstance(result, Profile):
         if _SOURCE in profile.__dict__:
             document, before = profile.__dict__[_SOURCE]
@@ -179,7 +182,17 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
         return result
     from busplan.profile.problems import refused_changes  # as above
 
+    data |= profile.model_dump(exclude_unset=True, include=set(kept))
     raise refused_changes(result, data, changes, origin)
+
+
+def _unchanged_tables(profile: Profile, changes: KeysView[str]) -> dict[str, object]:
+    """Arrays of tables that no change touches: there may be thousands of tables, which are valid as they are."""
+    if not changes.isdisjoint(_KINDS):
+        return {}
+    changed = {key.partition(".")[0] for key in changes}
+    values = {name: getattr(profile, name) for name in profile.model_fields_set - changed}
+    return {name: value for name, value in values.items() if isinstance(value, tuple)}
 
 
 def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Profile]:

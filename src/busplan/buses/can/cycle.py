@@ -379,6 +379,8 @@ class CanCycle(BusCycle):
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
+        if self._messages and self.traffic.is_plain:
+            messages(self.traffic, is_stuffed=self.is_stuffed).find_all()
         ends = ((SYNC, ""), *((pdos.name, pdos.group) for pdos in self.traffic.pdos)) if self.traffic.has_cycle else ()
         names = (*ends, *((message.name, "") for message in self.traffic.messages))
         each = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
@@ -507,5 +509,11 @@ def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:
 @lru_cache(maxsize=1024)
 def _answer(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[Stream, Response | None]:
     """The stream at a place among those that end a PDO or a message, with its response."""
-    own = next(islice((stream for stream in streams(traffic, is_stuffed=is_stuffed) if stream.is_end), place, None))
+    own = _ends(traffic, is_stuffed=is_stuffed)[place]
     return own, response(own, traffic, is_stuffed=is_stuffed)
+
+
+@lru_cache(maxsize=16)
+def _ends(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
+    """Streams that end a PDO or a message."""
+    return tuple(stream for stream in streams(traffic, is_stuffed=is_stuffed) if stream.is_end)

@@ -8,7 +8,15 @@ from typing import Any, Final
 from busplan.buses.can.constants import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.response import TooManyStepsError
-from busplan.buses.can.streams import Stream, collisions, has_format, identifiers_twice, last_identifier, streams
+from busplan.buses.can.streams import (
+    Stream,
+    collisions,
+    has_format,
+    identifiers_twice,
+    last_identifier,
+    remembered,
+    streams,
+)
 from busplan.buses.can.traffic import Sent, Traffic, pdos_of, traffic_of, without_times
 from busplan.buses.can.waiting import Messages, messages
 from busplan.buses.limits import NODE_LIMIT
@@ -23,10 +31,16 @@ def late_messages(traffic: Traffic) -> Iterator[tuple[str, str]]:
     return ((stream.name, _late(stream, share, traffic)) for stream, share in _late_streams(traffic))
 
 
-def _late_streams(traffic: Traffic) -> Iterator[tuple[Stream, float]]:
-    """Messages that miss their deadline, each with its response over its deadline."""
-    shares = {stream.name: (stream, plain(share)) for stream, share in _messages(traffic).deadline_shares()}
-    return ((stream, share) for message in traffic.messages for stream, share in (shares[message.name],) if share > 1)
+def _late_streams(traffic: Traffic) -> tuple[tuple[Stream, float], ...]:
+    """Messages of plain numbers that miss their deadline, in the order of the profile, with response over deadline."""
+    return _known_late(traffic, is_stuffed=True)
+
+
+@remembered(maxsize=16)
+def _known_late(traffic: Traffic, *, is_stuffed: bool) -> tuple[tuple[Stream, float], ...]:
+    each = messages(traffic, is_stuffed=is_stuffed).deadline_shares()
+    late = {stream.name: (stream, plain(share)) for stream, share in each if share > 1}
+    return tuple(late[message.name] for message in traffic.messages if message.name in late)
 
 
 def _all_late(traffic: Traffic) -> str:
@@ -106,7 +120,9 @@ def _late_points(traffic: Traffic, least: Any, most: Any) -> Number:
     asked = np.flatnonzero((least <= 1) & (most > 1))
     # Points of like loads take like numbers of steps.
     asked = asked[np.argsort(most[asked])]
-    waiting = [asked[first : first + _POINTS_AT_ONCE] for first in range(0, len(asked), _POINTS_AT_ONCE)]
+    # Few points of many messages are quicker one by one: then arrays are of messages.
+    size = 1 if len(asked) < len(traffic.messages) else _POINTS_AT_ONCE
+    waiting = [asked[first : first + size] for first in range(0, len(asked), size)]
     while waiting:
         some = waiting.pop()
         at = some if len(some) > 1 else some[0]
@@ -131,7 +147,8 @@ _POINTS_AT_ONCE: Final = 4096
 def _has_late(traffic: Traffic) -> Number:
     each, late = _messages(traffic), False
     if traffic.is_plain:
-        return any(plain(each.deadline_share(own, bound)) > 1 for own, bound in each.may_be_late())
+        worst = each.responses(own for own, _ in each.may_be_late())
+        return any(response is None or response.us / own.deadline_us > 1 for own, response in worst)
     for _, share in each.deadline_shares():
         late = late | (share > 1)
         if is_everywhere(late):

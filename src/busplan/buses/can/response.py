@@ -168,6 +168,12 @@ BELOW = 1 - 1e-9
 """A bound from below is taken so much lower, so that rounding does not put it above what it bounds."""
 
 
+def _added(rows: Points) -> Points:
+    """Sum of the rows of an array, added in their order."""
+    # Of a row of numbers, `sum` adds pairs first; rows of several points it adds one after another.
+    return rows.sum(axis=0) if rows.size > len(rows) else rows.cumsum(axis=0)[-1]
+
+
 MANY = 50
 """Senders from which on arrays are faster."""
 _FEW_POINTS = 2000
@@ -203,11 +209,12 @@ class Demand:
 
     @classmethod
     def of_many(cls, senders: Sender) -> "Demand":
-        """Demand of senders of plain numbers, one or more, in arrays of all of them."""
+        """Demand of senders, one or more, in arrays of all of them; of a row of points each, where frames are so."""
         demand = cls(())
-        demand._known_rows[0] = senders
-        sums = (senders.load, senders.frames_us, senders.load * senders.jitter_us)
-        demand.load, demand.frames_us, demand._of_jitter_us = (float(each.cumsum()[-1]) for each in sums)
+        axes = senders.frames_us.ndim - 1
+        demand._known_rows[axes] = senders
+        sums = (_added(each) for each in (senders.load, senders.frames_us, senders.load * senders.jitter_us))
+        demand.load, demand.frames_us, demand._of_jitter_us = sums if axes else map(float, sums)
         return demand
 
     def behind(self, own: Sender) -> "Demand":
@@ -216,7 +223,10 @@ class Demand:
             return Demand((own, *self._senders))
         import numpy as np
 
-        return Demand.of_many(Sender(*(np.append(first, rest) for first, rest in zip(own, self._rows(0), strict=True))))
+        (rows,) = self._known_rows.values()
+        shape = np.shape(own.frames_us)
+        several = ((first, np.broadcast_to(rest, (len(rest), *shape))) for first, rest in zip(own, rows, strict=True))
+        return Demand.of_many(Sender(*(np.concatenate([[first], rest]) for first, rest in several)))
 
     def in_window_us(self, window_us: Points) -> Points:
         """Frames that arrive in a window of time, sum ceil((window + J) / T) C, added in their order [us]."""
@@ -227,7 +237,7 @@ class Demand:
             import numpy as np
 
             us, period_us, jitter_us = self._rows(getattr(window_us, "ndim", 0))
-            found_us: Points = np.cumsum(np.ceil((window_us + jitter_us) / period_us) * us, axis=0)[-1]
+            found_us: Points = _added(np.ceil((window_us + jitter_us) / period_us) * us)
             return float(found_us) if is_plain else found_us
         found_us = 0.0
         for frames_us, period_us, jitter_us in self._senders:

@@ -4,12 +4,13 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache, reduce
 from itertools import accumulate, chain, combinations, islice, product, repeat
+from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from busplan.buses.can.constants import BASE_BITS, MAX_IDENTIFIER, MOST_PDOS, PDO_STEP
 from busplan.buses.can.equations import frame_bits, frame_us
 from busplan.buses.can.response import Points, Sender
-from busplan.buses.can.traffic import FOLLOWS, SYNC, MessageList, Pdos, Traffic
+from busplan.buses.can.traffic import FOLLOWS, SYNC, Message, MessageList, Pdos, Traffic
 from busplan.elementwise import choose, larger, plain, smaller, total
 
 if TYPE_CHECKING:
@@ -180,20 +181,33 @@ def message_streams(traffic: Traffic, *, is_stuffed: bool) -> MessageStreams:
 
 
 def _made(messages: MessageList, bit_rate_kbit_s: Points, is_stuffed: bool) -> MessageStreams:
-    each = (
-        _stream(
-            message.name,
-            int(plain(message.identifier)),
-            int(plain(message.payload_bytes)),
-            bit_rate_kbit_s=bit_rate_kbit_s,
-            is_stuffed=is_stuffed,
-            is_message=True,
-            identifiers=_whole(message.senders),
-            **{key: getattr(message, key) for key in _OF_MESSAGE},
-        )
-        for message in messages
+    each = tuple(_of_message(message, bit_rate_kbit_s, is_stuffed) for message in messages)
+    return MessageStreams(each, is_stuffed=is_stuffed)
+
+
+def _of_message(message: Message, bit_rate_kbit_s: Points, is_stuffed: bool) -> Stream:
+    first, size, bits = int(plain(message.identifier)), int(plain(message.payload_bytes)), message.identifier_bits
+    us = frame_us(
+        size,
+        identifier_bits=bits,
+        bit_rate_kbit_s=bit_rate_kbit_s,
+        data_bit_rate_kbit_s=message.data_bit_rate_kbit_s,
+        is_stuffed=is_stuffed,
     )
-    return MessageStreams(tuple(each), is_stuffed=is_stuffed)
+    return Stream(
+        message.name,
+        group="",
+        block=place(first, bits),
+        first=first,
+        identifiers=_whole(message.senders),
+        data_bytes=size,
+        frame_us=us,
+        period_us=message.period_us,
+        jitter_us=message.jitter_us,
+        deadline_us=message.deadline_us,
+        identifier_bits=bits,
+        is_message=True,
+    )
 
 
 _known_messages: Callable[..., MessageStreams] = lru_cache(maxsize=8)(_made)
@@ -214,46 +228,30 @@ def _length(stream: Stream, *, is_stuffed: bool) -> float:
     )
 
 
-def _stream(
-    name: str,
-    block: int,
-    size: Points,
-    *,
-    bit_rate_kbit_s: Points,
-    data_bit_rate_kbit_s: Points,
-    identifier_bits: Points,
-    is_stuffed: bool,
-    **more: Any,
-) -> Stream:
-    us = frame_us(
-        size,
-        identifier_bits=identifier_bits,
-        bit_rate_kbit_s=bit_rate_kbit_s,
-        data_bit_rate_kbit_s=data_bit_rate_kbit_s,
-        is_stuffed=is_stuffed,
-    )
-    own: dict[str, Any] = {"group": "", "first": block, "identifiers": 1, "identifier_bits": identifier_bits, **more}
-    return Stream(name, **own, block=place(block, identifier_bits), data_bytes=size, frame_us=us)
-
-
 def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
     """SYNC and all PDOs; none of messages alone."""
     if not traffic.has_cycle:
         return
 
     def sent(name: str, block: int, size: Points, every: Points = 1, **more: Any) -> Stream:
-        return _stream(
-            name,
-            block,
+        us = frame_us(
             size,
+            identifier_bits=traffic.identifier_bits,
             bit_rate_kbit_s=traffic.bit_rate_kbit_s,
             data_bit_rate_kbit_s=traffic.data_bit_rate_kbit_s,
-            identifier_bits=traffic.identifier_bits,
             is_stuffed=is_stuffed,
+        )
+        own: dict[str, Any] = {"group": "", "first": block, "identifiers": 1, **more}
+        return Stream(
+            name,
+            block=place(block, traffic.identifier_bits),
+            data_bytes=size,
+            frame_us=us,
             period_us=traffic.period_us * every,
             jitter_us=0.0,
             deadline_us=traffic.period_us,
-            **more,
+            identifier_bits=traffic.identifier_bits,
+            **own,
         )
 
     yield sent(SYNC, int(plain(traffic.sync_identifier)), _whole(traffic.sync_bytes))
@@ -281,9 +279,6 @@ def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
             is_there = left_bytes > 0  # not at every point of an array
             yield own._replace(identifiers=choose(is_there, count, 0), frame_us=choose(is_there, own.frame_us, 0.0))
             left_bytes = left_bytes - most_bytes
-
-
-_OF_MESSAGE: Final = ("period_us", "jitter_us", "deadline_us", "identifier_bits", "data_bit_rate_kbit_s")
 
 
 def _most_bytes(pdos: Pdos) -> Iterator[int]:
@@ -342,18 +337,17 @@ def identifiers_twice(each: Sequence[Stream]) -> Points:
 def has_format(stream: Stream, identifier_bits: Points) -> bool:
     """Whether a stream has identifiers of a length; lengths that vary from point to point are alike."""
     bits = stream.identifier_bits, identifier_bits
-    return not all(isinstance(length, int | float) for length in bits) or bits[0] == bits[1]
+    return bits[0] is bits[1] or not all(isinstance(length, int | float) for length in bits) or bits[0] == bits[1]
 
 
 def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, int]]:
     """Pairs of streams of plain numbers that share identifiers, with the first they share, and how many."""
-    ordered = sorted(range(len(each)), key=lambda place: plain(each[place].first))
-    firsts = [plain(each[place].first) for place in ordered]
-    pairs = (
+    ordered = sorted((int(plain(stream.first)), place) for place, stream in enumerate(each))
+    pairs = [
         sorted((place, behind))
-        for number, place in enumerate(ordered)
-        for behind in ordered[number + 1 : bisect_right(firsts, each[place].last)]
-    )
+        for number, (_, place) in enumerate(ordered)
+        for _, behind in ordered[number + 1 : bisect_right(ordered, (each[place].last, inf), number)]
+    ]
     for early, late in sorted(pair for pair in pairs if has_format(each[pair[0]], each[pair[1]].identifier_bits)):
         first = max(each[early].first, each[late].first)
         yield each[early], each[late], first, min(each[early].last, each[late].last) - first + 1

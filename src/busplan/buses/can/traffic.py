@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache, reduce
 from itertools import islice
+from operator import is_
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.can.constants import (
@@ -147,8 +148,10 @@ class Traffic(NamedTuple):
         pdos = tuple(
             pdos._replace(**dict(zip(_OF_PDOS, islice(rest, len(_OF_PDOS)), strict=True))) for pdos in self.pdos
         )
-        count = len(Message._fields) - _MESSAGE_WORDS
-        messages = MessageList(Message(message.name, *islice(rest, count)) for message in self.messages)
+        messages = self.messages
+        if not messages.is_plain:
+            count = len(Message._fields) - _MESSAGE_WORDS
+            messages = MessageList(Message(message.name, *islice(rest, count)) for message in messages)
         return Traffic._make((*own, pdos, messages))
 
 
@@ -289,7 +292,9 @@ def traffic_of_profile(profile: Any) -> Traffic:
 
 
 def without_times(traffic: Traffic) -> Traffic:
-    """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
+    """Traffic of the same identifiers, with all times alike: over arrays of times they are computed once."""
+    if traffic.is_plain:
+        return traffic
     own = traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, data_bit_rate_kbit_s=0.0, read_us=0.0, host_us=0.0)
     return own._replace(messages=traffic.messages.timeless)
 
@@ -342,9 +347,9 @@ _known: tuple[tuple[Any, ...], MessageList, bool] | None = None
 def _messages(said: tuple[Any, ...], bus: Any, nodes: Number) -> MessageList:
     """Messages of a profile. The last result is remembered: searches change the nodes and times of a network."""
     global _known  # noqa: PLW0603 - a profile may hold arrays, and is told apart by identity alone
-    key = said, bus.identifier_bits, bus.data_bit_rate_kbit_s, nodes
-    if _known is not None:
-        *rest_same, has_same_nodes = (new is old for new, old in zip(key, _known[0], strict=True))
+    key = nodes, bus.identifier_bits, bus.data_bit_rate_kbit_s, *said
+    if _known is not None and len(key) == len(_known[0]):
+        has_same_nodes, *rest_same = map(is_, key, _known[0])
         if all(rest_same) and (has_same_nodes or not _known[2]):
             return _known[1]
     messages = MessageList(_message(message, bus, nodes) for message in said)

@@ -191,6 +191,12 @@ def _sums_of_array(numbers: Points) -> Points:
     return np.append(0.0, numbers.cumsum())
 
 
+_AT_ONCE: Final = 2**17
+"""Numbers of an array of messages and what goes before each, so that it stays in the processor's memory."""
+_LEAST_AT_ONCE: Final = 8
+"""Messages from which on arrays of them are faster."""
+
+
 class Messages:
     """All messages of a network: who goes before each, and its worst-case response.
 
@@ -220,6 +226,7 @@ class Messages:
             order = columns[_BLOCK].argsort(kind="stable")
             self._groups = np.append(np.arange(cyclic), cyclic + sent.groups)[order]
             self._columns = columns[:, order]
+            self._is_message = order >= cyclic
             self._ranked = [each[place] for place in order.tolist()]
         else:
             self._ranked = sorted(each, key=lambda stream: stream.block)
@@ -262,7 +269,7 @@ class Messages:
         frames_us, period_us, jitter_us = self._columns[:_FRAME]
         if late:
             jitter_us = jitter_us.copy()
-            jitter_us[[not stream.is_message for stream in self._ranked]] = [-us for us in offsets_us]
+            jitter_us[~self._is_message] = [-us for us in offsets_us]
         return _Start(Sender(frames_us, period_us, jitter_us), is_late, self._bit_us, self._groups)
 
     @cached_property
@@ -274,8 +281,7 @@ class Messages:
         """Of all messages of plain numbers, the lowest priority first: first rank behind, a single frame, deadline."""
         import numpy as np
 
-        is_message = [stream.is_message for stream in self._ranked]
-        _, period_us, jitter_us, frame_us, deadline_us, _, last = self._columns[:, is_message][:, ::-1]
+        _, period_us, jitter_us, frame_us, deadline_us, _, last = self._columns[:, self._is_message][:, ::-1]
         behind = np.searchsorted(self._columns[_BLOCK], last, side="right")
         return behind, Sender(frame_us, period_us, jitter_us), deadline_us
 
@@ -355,15 +361,70 @@ class Messages:
         for start in self._starts:
             yield Demand.of_many(Sender(of_groups_us, *(each[: len(of_groups_us)] for each in start.times_us)))
 
+    def responses(self, each: Iterable[Stream]) -> Iterator[tuple[Stream, Response | None]]:
+        """Several messages of plain numbers with their `response`; where they are many, of more and more at a time."""
+        waiting, size = iter(each), 1
+        while some := [*islice(waiting, size)]:
+            if self._columns is not None:
+                asked = sorted((own for own in some if own.name not in self._known), key=self._behind)
+                self._known.update(zip((own.name for own in asked), self._worst_of(asked), strict=True))
+                most = _AT_ONCE // (int(self._groups.max()) + 1)
+                size = min(4 * size, max(most, _LEAST_AT_ONCE))
+            yield from ((own, self.response(own)) for own in some)
+
+    def find_all(self) -> None:
+        """Find the responses of all messages of plain numbers together; `response` then knows them."""
+        for _ in self.responses(self.by_priority()):
+            pass
+
+    def _worst_of(self, each: Sequence[Stream]) -> list[Response | None]:
+        """Worst-case responses of messages, in the order of priorities; of several in arrays of all of them."""
+        if len(each) < _LEAST_AT_ONCE:
+            return [self._worst(own) for own in each]
+        try:
+            starts = [*self._responses_of(each)]
+        except TooManyStepsError:
+            middle = len(each) // 2
+            return [*self._worst_of(each[:middle]), *self._worst_of(each[middle:])]
+        known = [start for start in starts if start is not None]
+        if len(known) < len(starts):
+            return [None for _ in each]
+        rows = ([Response(*row) for row in zip(*(part.tolist() for part in start), strict=True)] for start in known)
+        worst = (max(row, key=lambda response: plain(response.us)) for row in zip(*rows, strict=True))
+        return [None if response.us == inf else response for response in worst]
+
+    def _responses_of(self, each: Sequence[Stream]) -> Iterator[Response | None]:
+        """The worst instances of several messages from each start of a busy period, as arrays of all of them."""
+        import numpy as np
+
+        behind = [self._behind(own) for own in each]
+        groups, place = np.unique(self._groups[: behind[-1]], return_inverse=True)
+        of_groups_us = np.zeros((len(groups), len(each)))
+        for number, (own, end) in enumerate(zip(each, behind, strict=True)):
+            frames_us = self._columns[0, :end].copy()
+            frames_us[self._ranks_by_name[own.name]] = (own.identifiers - 1) * own.frame_us
+            of_groups_us[:, number] = np.bincount(place[:end], frames_us, len(groups))
+        own_all = Sender(*np.array([own.sender(1) for own in each]).T)
+        for start in self._starts:
+            times_us = (times[groups, np.newaxis] for times in start.times_us)
+            yield worst_instance(
+                own_all,
+                Demand.of_many(Sender(of_groups_us, *times_us)),
+                blocking_us=self._longest_us[behind],
+                bit_us=self._bit_us,
+                first_us=start.first_us[behind],
+            )
+
     def latest(self) -> tuple[Stream, Response | None]:
         """The message of plain numbers with the largest response over its deadline, and its response."""
         # Bounds come in closed form: few exact responses are left to find.
         ranked = sorted(self.bounds(), key=lambda pair: plain(pair[1]), reverse=True)
         latest, largest = ranked[0][0], 0.0
-        for own, bound in ranked:
+        worst = self.responses(own for own, _ in ranked)
+        for _, bound in ranked:
             if bound <= largest:
                 break
-            response = self.response(own)
+            own, response = next(worst)
             share = inf if response is None else response.us / own.deadline_us
             if share > largest:
                 latest, largest = own, share
@@ -395,7 +456,13 @@ class Messages:
 
     def deadline_shares(self) -> Iterator[tuple[Stream, Points]]:
         """All messages, that of the lowest priority first, each with its `deadline_share`."""
-        return ((own, self.deadline_share(own, bound)) for own, bound in self.bounds())
+        each = [*self.bounds()]
+        if self._columns is not None:
+            worst = self.responses(own for own, bound in each if 1 < bound < inf)
+        for own, bound in each:
+            if self._columns is not None and 1 < bound < inf:
+                next(worst)  # which `deadline_share` then knows
+            yield own, self.deadline_share(own, bound)
 
     def deadline_share(self, own: Stream, bound: Points) -> Points:
         """Response over deadline, or its bound where that is no more than 1; infinite without a response [1].
