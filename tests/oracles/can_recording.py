@@ -25,6 +25,7 @@ class Queued(NamedTuple):
     identifier: int
     data: bytes
     extended: bool = False
+    fd: bool = False
 
 
 class Logged(NamedTuple):
@@ -35,10 +36,14 @@ class Logged(NamedTuple):
     data: bytes
     extended: bool
     bits: int
+    fd: bool = False
 
 
 def bits_of(frame: Queued | Logged) -> int:
-    """Length of a frame, interframe space included [bits]."""
+    """Length of a frame, interframe space included; of CAN FD without stuff bits, with data at four times the rate."""
+    if frame.fd:
+        size = len(frame.data)
+        return (48 if frame.extended else 29) + (5 + 8 * size + (28 if size <= 16 else 33)) // 4
     bits: int = _frames.written_bits(frame.identifier, frame.data, identifier_bits=29 if frame.extended else 11)
     return bits
 
@@ -58,7 +63,7 @@ def arbitrated(queued: list[Queued], *, bit_us: float = 1.0) -> list[Logged]:
         frame = heappop(waiting)[2]
         bits = bits_of(frame)
         now_us += bits * bit_us
-        logged.append(Logged(now_us - 3 * bit_us, frame.identifier, frame.data, frame.extended, bits))
+        logged.append(Logged(now_us - 3 * bit_us, frame.identifier, frame.data, frame.extended, bits, frame.fd))
     return logged
 
 
@@ -93,5 +98,7 @@ def candump(logged: list[Logged], *, start_s: float = 1_700_000_000, channel: st
     for frame in logged:
         time_us = round(start_s * 10**6 + frame.us)
         name = f"{frame.identifier:08X}" if frame.extended else f"{frame.identifier:03X}"
-        lines.append(f"({time_us // 10**6}.{time_us % 10**6:06d}) {channel} {name}#{frame.data.hex().upper()}\n")
+        lines.append(
+            f"({time_us // 10**6}.{time_us % 10**6:06d}) {channel} {name}#{'#1' * frame.fd}{frame.data.hex().upper()}\n"
+        )
     return "".join(lines)

@@ -10,6 +10,7 @@ import typer
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import STANDARD_OUTPUT
 from busplan.cli.output import emit_document, say
+from busplan.cli.progress import progress_bar
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
 from busplan.files import new_file
@@ -55,11 +56,12 @@ def import_command(
         ),
     ] = None,
 ) -> None:
-    """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS and others.
+    """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
 
     Several files of one machine are merged: an ENI has the frames, the text of `ethercat slaves -v` the measured delays
-    of devices, `ethercat pdos` their bytes. Each value has its grade, file and line in a comment; values in no file are
-    assumed, and named at the end with the verdict. `busplan manual import` lists what each format gives.
+    of devices, `ethercat pdos` their bytes; a CAN log has the messages of a network, a DBC their names. Each value has
+    its grade, file and line in a comment; values in no file are assumed, and named at the end with the verdict.
+    `busplan manual import` lists what each format gives.
 
     The profile goes to standard output or to the file of -o; an existing file stays, unless --force is given. Exits 0
     when the profile is written, with any verdict.
@@ -85,7 +87,9 @@ def import_command(
             files.enter_context(changing(update))
         from busplan.questions.import_ import import_profile
 
-        answer = import_profile(paths, update=update, take=take, name=None if new is None else new.stem)
+        name = None if new is None else new.stem
+        with progress_bar("recording") as progress:
+            answer = import_profile(paths, update=update, take=take, name=name, progress=progress)
         sentences = answer.sentences()
         if update is not None:
             rewrite(update, answer.text.encode())

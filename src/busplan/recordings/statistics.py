@@ -13,6 +13,10 @@ _BLOCK: Final = 500
 """Events over which a clock runs evenly."""
 _LEAST_BLOCKS: Final = 4
 _LEAST_ERROR_US: Final = 1e-6
+_ROUNDING_US: Final = 1e-3
+"""What the rounding of times may add to a jitter [us]."""
+_LEAST_STEP: Final = 1e-9
+"""Where a search by halves ends, as a share of the value."""
 _DRIFT_SIGMAS: Final = 10.0
 """How far beyond 1 the mean square of the distances of medians from a line, in their standard errors, is a drift."""
 _EARLY_SHARE: Final = 0.999
@@ -116,6 +120,51 @@ def grid(times_us: Floats) -> PeriodicEvents | None:
     doubt_us = hypot(float(np.std(late)) * sqrt(3 / len(late)), bend_us)
     missing = int(places[-1] - places[0]) + 1 - len(times_us)
     return PeriodicEvents(period_us + slope, error, late, doubt_us, missing)
+
+
+def sporadic_period(times_us: Floats, length_us: float) -> float:
+    """The longest period that events at no fixed times have with a jitter of no more than a period [us].
+
+    With the period T and the jitter J, k + 1 events take k T - J or longer. The period is also so short that one event
+    more than those fits into the length of the log.
+
+    Parameters
+    ----------
+    times_us
+        Ascending times, at least one [us].
+    length_us
+        How long events were recorded [us].
+
+    References
+    ----------
+    Richter 2005, standard event models: at most ceil((w + J) / T) events in a time w.
+
+    Examples
+    --------
+    Two events each second, the second one 10 ms behind the first:
+
+    >>> round(sporadic_period(np.array([0.0, 10e3, 1e6, 1.01e6, 2e6, 2.01e6]), 10e6))
+    502500
+    """
+    low, high = 0.0, length_us / (len(times_us) + 1)
+    if sporadic_jitter(times_us, high) <= high + _ROUNDING_US:
+        return high
+    while high - low > _LEAST_ERROR_US + _LEAST_STEP * high:
+        half = (low + high) / 2
+        low, high = (half, high) if sporadic_jitter(times_us, half) <= half + _ROUNDING_US else (low, half)
+    return low
+
+
+def sporadic_jitter(times_us: Floats, period_us: float) -> float:
+    """The least jitter with which events are those of a period: how much sooner than it they come [us].
+
+    Examples
+    --------
+    >>> float(sporadic_jitter(np.array([0.0, 100, 130, 300]), 100))
+    70.0
+    """
+    early = np.arange(len(times_us)) * period_us - times_us
+    return float((early - np.minimum.accumulate(early)).max())
 
 
 def _period(times_us: Floats) -> float:

@@ -44,6 +44,7 @@ frames = st.builds(
     st.integers(0, 0x7FF),
     st.binary(max_size=8) | st.sampled_from([bytes(8), b"\xff" * 8, b"\x0f" * 8, b"\xc3" * 5]),
     st.booleans(),
+    st.just(False),
 )
 
 

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,38 +18,16 @@ from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, Se
 from busplan.elementwise import plain
 from busplan.progress import Progress
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.statistics import Floats, PeriodicEvents, expanded, grid, lateness, quantile
+from busplan.recordings.can_messages import Sent, faults, listed, longest_stretch, sent_messages
+from busplan.recordings.statistics import Floats, expanded, lateness, quantile
 from busplan.recordings.words import counted
 
-_STEP_BACK_US: Final = -1000.0
-"""Stamps of neighbours are so far out of order only where a clock was set [us]."""
-_PERIODIC: Final = 0.15
-"""Largest standard deviation of a periodic message, as a share of its period."""
-_MISSING: Final = 0.1
-"""Most periods of a periodic message without a frame, as a share of its frames."""
-_SHOWN: Final = 6
-"""Most identifiers that a sentence lists."""
 _NOT_SHOWN: Final = (
     "Not shown by a log: the bit rate, frames that the recorder did not take, when a frame was queued, and the nodes' "
     "own time."
 )
 _GAP_BITS: Final = 3
 """Idle bits between two frames that still follow each other at once, beside the step of the stamps."""
-
-
-class _Sent(NamedTuple):
-    """Frames of an identifier."""
-
-    identifier: int
-    times_us: Floats
-    most_bytes: int
-    grid: PeriodicEvents | None
-    """Its periods, where it comes periodically."""
-
-    @property
-    def mean_us(self) -> float:
-        """Mean distance of its frames [us]."""
-        return float(self.times_us[-1] - self.times_us[0]) / (len(self.times_us) - 1)
 
 
 def recorded(network: Network, path: Path, *, share: float, progress: Progress) -> Recorded:
@@ -84,35 +62,13 @@ class _Seen:
         self.cycle = CanCycle(network, WORST)
         self.bit_us = plain(bit_us(self.cycle.traffic.bit_rate_kbit_s))
         self.edits: dict[str, Any] = {}
-        steps_back = np.flatnonzero(np.diff(frames.times_us) < _STEP_BACK_US) + 1
-        self.steps_back = len(steps_back)
-        # Of several stretches of the clock the longest is taken; queues may put neighbours out of order.
-        ends = np.concatenate(([0], steps_back, [len(frames.times_us)]))
-        longest = int(np.argmax(np.diff(ends)))
-        taken = np.arange(ends[longest], ends[longest + 1])
-        self.taken = taken[np.argsort(frames.times_us[taken], kind="stable")]
-        self.times_us = frames.times_us[self.taken]
+        self.stretch = longest_stretch(frames)
+        self.taken, self.times_us = self.stretch.taken, self.stretch.times_us
         self.stamp_us = float(np.diff(self.times_us)[np.diff(self.times_us) > 0].min(initial=np.inf))
-        self.by_identifier = self._by_identifier()
+        self.by_identifier = sent_messages(frames, self.stretch)
         self.streams = streams(self.cycle.traffic, is_stuffed=True)
         self.unplanned = dict(self.by_identifier)
         self.unseen: list[str] = []
-
-    def _by_identifier(self) -> Mapping[tuple[int, bool], _Sent]:
-        frames = self.frames
-        key = frames.identifiers[self.taken] * 2 + frames.extended[self.taken]
-        order = np.argsort(key, kind="stable")
-        ends = np.flatnonzero(np.diff(key[order])) + 1
-        found = {}
-        for places in np.split(order, ends):
-            value = int(key[places[0]])
-            times_us = self.times_us[places]
-            periods = grid(times_us)
-            if periods is not None and not _is_periodic(periods):
-                periods = None
-            most_bytes = int(frames.sizes[self.taken[places]].max())
-            found[value // 2, bool(value % 2)] = _Sent(value // 2, times_us, most_bytes, periods)
-        return found
 
     def figures(self) -> Iterator[RecordedFigure]:
         """All figures."""
@@ -125,7 +81,7 @@ class _Seen:
             response = responses.get((stream.group, stream.name))
             yield from self._stream(stream, label, _spread_us(stream, plain(least.frame_us), response))
         frames = sum(len(sent.times_us) for sent in self.unplanned.values())
-        note = _listed([*self.unplanned.values()])
+        note = listed([f"{sent.identifier:#x}" for sent in self.unplanned.values()])
         yield RecordedFigure("frames of no message of the plan", "1", 0, frames, None, "at most", frames, note=note)
 
     def _wire_us(self, *, is_stuffed: bool) -> Floats:
@@ -163,7 +119,12 @@ class _Seen:
             if is_fd.all():
                 return
             note, sense = f"{note}; without frames of CAN FD", "shown"
-        yield RecordedFigure("load", "share", plain(self.cycle.load), load, None, sense, count, note=note)
+        # A log begins and ends anywhere: it may have a frame more of each identifier than its length has periods.
+        _, each = np.unique(
+            self.frames.identifiers[self.taken] * 2 + self.frames.extended[self.taken], return_index=True
+        )
+        doubt = float(own_us[each].sum()) / span_us if sense == "at most" else None
+        yield RecordedFigure("load", "share", plain(self.cycle.load), load, doubt, sense, count, note=note)
         yield RecordedFigure("load, worst stuffing of these frames", "share", None, worst, None, "shown", count)
         yield RecordedFigure("load, no stuffing of these frames", "share", None, none, None, "shown", count)
         possible_us = float((worst_us - none_us)[~is_fd].sum())
@@ -210,7 +171,7 @@ class _Seen:
             len(last),
         )
 
-    def _of(self, stream: Stream) -> list[_Sent]:
+    def _of(self, stream: Stream) -> list[Sent]:
         """What was recorded of its identifiers."""
         is_extended = stream.identifier_bits > BASE_BITS
         first, last = _whole(stream.first), _whole(stream.last)
@@ -252,7 +213,7 @@ class _Seen:
         )
 
     def _period(
-        self, stream: Stream, label: str, sent: _Sent, key: str, spread_us: float | None, *, several: bool
+        self, stream: Stream, label: str, sent: Sent, key: str, spread_us: float | None, *, several: bool
     ) -> RecordedFigure:
         """Mean distance of the frames, of the identifier that comes most often."""
         planned_us, count = plain(stream.period_us), len(sent.times_us)
@@ -276,7 +237,7 @@ class _Seen:
         return figure
 
     def _scatter(
-        self, stream: Stream, label: str, each: list[_Sent], key: str, spread_us: float | None, *, several: bool
+        self, stream: Stream, label: str, each: list[Sent], key: str, spread_us: float | None, *, several: bool
     ) -> RecordedFigure:
         """Jitter of the arrival of a periodic message; of others the shortest distance."""
         planned_key = f"{key}.jitter_us" if key else ""
@@ -318,10 +279,7 @@ class _Seen:
     def remarks(self) -> Iterator[str]:
         """What the log has beside the figures."""
         frames = self.frames
-        if frames.broken:
-            yield f"The log is cut or damaged behind frame {len(frames.times_us):,}, read up to there: {frames.broken}."
-        if self.steps_back:
-            yield f"Its clock was set back {counted(self.steps_back, 'time')}: the longest stretch between is taken."
+        yield from faults(frames, self.stretch)
         if self.unseen:
             yield f"In the plan and not in the log: {', '.join(self.unseen)}."
         fd = int(np.count_nonzero(frames.is_fd))
@@ -363,16 +321,5 @@ def _finite(us: float) -> float | None:
     return us if isfinite(us) else None
 
 
-def _is_periodic(periods: PeriodicEvents) -> bool:
-    late_us = float(np.std(periods.late_us))
-    return late_us <= _PERIODIC * periods.period_us and periods.missing <= _MISSING * len(periods.late_us)
-
-
-def _named(sent: _Sent) -> str:
+def _named(sent: Sent) -> str:
     return f"identifier {sent.identifier:#x}"
-
-
-def _listed(each: list[_Sent]) -> str:
-    names = [f"{sent.identifier:#x}" for sent in each]
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(names[:_SHOWN]) + more

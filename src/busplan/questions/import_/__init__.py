@@ -9,6 +9,7 @@ from typing import Any, Literal
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.profile.toml import decode, validate
+from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, one_or_several
 from busplan.questions.import_ import can, ethercat
@@ -62,6 +63,7 @@ def import_profile(
     name: str | None = None,
     update: Path | None = None,
     take: Literal["file", "profile"] | None = None,
+    progress: Progress | None = None,
 ) -> ImportAnswer:
     """Make a profile of the files of one machine.
 
@@ -69,13 +71,16 @@ def import_profile(
     ----------
     paths
         The files, each recognised by its content: ENI, text of `ethercat slaves -v` or `ethercat pdos`, LinuxCNC's
-        ethercat-conf.xml, text of SOEM's slaveinfo, DBC, KCD, SYM, ARXML (with the extra `import`), EDS, DCF.
+        ethercat-conf.xml, text of SOEM's slaveinfo, EDS, DCF; with the extra `import` DBC, KCD, SYM, ARXML, and a log
+        of the CAN bus: `candump -l`, ASC, BLF, TRC.
     name
         Name of the profile; by default that of the first file.
     update
         A profile that new values go into; its comments stay. The file is not changed: write `text` into it.
     take
         Whose value to take where files and that profile differ: "file" or "profile".
+    progress
+        Called with the bytes read of a log and those of the file.
 
     Returns
     -------
@@ -86,7 +91,8 @@ def import_profile(
     ------
     BusplanError
         A file cannot be read or is of no known format, files are of different machines, what a profile must have is in
-        none of them, or files and profile differ and nothing says which to take.
+        none of them, files and profile differ and nothing says which to take, two files are logs, or a log is to go
+        into a profile.
 
     References
     ----------
@@ -103,12 +109,23 @@ def import_profile(
         raise BusplanError(f"paths {names!r}: expected files of one machine, each once")
     if take not in (None, "file", "profile"):
         raise BusplanError(f"take {take!r}: expected 'file' or 'profile'")
-    readings = machines(names)
+    readings = machines(names, progress=progress or (lambda _done, _total: None))
+    _require_one_log([reading.file for reading in readings if reading.is_log], update=update)
     machine = merged(readings)
     files = [(reading.file, reading.title) for reading in readings]
     if update is None:
         return _new(machine, name=name or stem_of(names), files=files)
     return _updated(machine, update=update, take=take)
+
+
+def _require_one_log(logs: list[str], *, update: Path | None) -> None:
+    if len(logs) > 1:
+        raise BusplanError(f"{logs[0]} and {logs[1]} are both logs; give the longer one")
+    if logs and update is not None:
+        raise BusplanError(
+            f"{logs[0]} is a log: `busplan measured {os.fspath(update)} {logs[0]} --apply` writes what it shows into a "
+            "profile"
+        )
 
 
 _ROWS: Mapping[str, Callable[[Reading], Iterator[ProfileLine]]] = {"ethercat": ethercat.rows, "can": can.rows}

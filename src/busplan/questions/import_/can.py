@@ -24,6 +24,8 @@ _USUAL_BIT_RATE: Final = 1000
 _USUAL_OF_CARS: Final = 500
 """Of networks of messages alone [kbit/s]."""
 _LISTED: Final = 8
+_BASE_BITS: Final = 11
+_EXTENDED_BITS: Final = 29
 
 
 class _Node(NamedTuple):
@@ -50,7 +52,8 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     """
     bus = machine.bus
     nodes = list(_nodes(machine))
-    messages = list(message_rows(machine))
+    usual_bits = _BASE_BITS if nodes else _usual_bits(machine)
+    messages = list(message_rows(machine, usual_bits=usual_bits, has_sync=bool(nodes)))
     if not (nodes or messages):
         raise BusplanError(f"{machine.file}: no message with a period, and no node with PDOs", *machine.remarks)
     yield ProfileLine("bus", "kind", Fact("can", machine.place(1)))
@@ -60,6 +63,8 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     if has_fd(messages):
         assumed = f"no file says it{'; SYNC and PDOs are FD frames with it, too' if nodes else ''}"
         yield ProfileLine("bus", _DATA_BIT_RATE, bus.get(_DATA_BIT_RATE) or Fact(2000, "", "assumed", assumed))
+    if usual_bits != _BASE_BITS:
+        yield ProfileLine("bus", "identifier_bits", Fact(usual_bits, machine.place(1), note="of most messages"))
     if nodes:
         yield from _cycle(machine, nodes)
     else:
@@ -160,19 +165,36 @@ def part_rows(machine: Reading) -> Iterator[ProfileLine]:
     yield from messages
 
 
-def message_rows(machine: Reading) -> Iterator[ProfileLine]:
-    """Every message that is in no cycle: of databases, PDOs that the cycle has not, heartbeats."""
+def _usual_bits(machine: Reading) -> int:
+    """Length of most identifiers of databases and logs [bits]."""
+    extended = sum(number >= EXTENDED for number in machine.messages)
+    return _EXTENDED_BITS if 2 * extended > len(machine.messages) else _BASE_BITS
+
+
+def message_rows(machine: Reading, *, usual_bits: int = _BASE_BITS, has_sync: bool = True) -> Iterator[ProfileLine]:
+    """Every message that is in no cycle: of databases and logs, PDOs that the cycle has not, heartbeats.
+
+    Parameters
+    ----------
+    machine
+        What the files say.
+    usual_bits
+        Length of identifiers that a message need not say [bits].
+    has_sync
+        Whether the profile has a SYNC, which is no message then.
+    """
     taken: set[str] = set()
-    used = {machine.bus["sync_identifier"].value if "sync_identifier" in machine.bus else 0x80}
     nodes = {node.number: node for node in _nodes(machine)}
+    used = {machine.bus["sync_identifier"].value if "sync_identifier" in machine.bus else 0x80} if has_sync else set()
     for node in nodes.values():
         used |= {pdo.identifier for pdos in node.sent.values() for pdo in pdos}
     left_out: dict[str, list[str]] = {}
     for number in sorted(machine.nodes):
         for found in _of_node(number, machine.nodes[number], nodes.get(number), _period(machine)):
-            yield from _message(found, used, taken, left_out)
+            yield from _message(found, used, taken, left_out, usual_bits=usual_bits)
     for identifier, facts in sorted(machine.messages.items()):
-        yield from _message({"identifier": Fact(identifier, facts["name"].place), **facts}, used, taken, left_out)
+        found = {"identifier": Fact(identifier, facts["name"].place), **facts}
+        yield from _message(found, used, taken, left_out, usual_bits=usual_bits)
     for reason, names in left_out.items():
         more = f" and {len(names) - _LISTED} more" if names[_LISTED:] else ""
         machine.remarks.append(f"left out, {reason}: {', '.join(names[:_LISTED])}{more}")
@@ -203,7 +225,9 @@ def _of_node(number: int, facts: Facts, node: _Node | None, period: Fact) -> Ite
         }
 
 
-def _message(found: Facts, used: set[int], taken: set[str], left_out: dict[str, list[str]]) -> Iterator[ProfileLine]:
+def _message(
+    found: Facts, used: set[int], taken: set[str], left_out: dict[str, list[str]], *, usual_bits: int
+) -> Iterator[ProfileLine]:
     identifier, name = found["identifier"], str(found["name"].value)
     reason = ""
     if identifier.value in used:
@@ -222,9 +246,18 @@ def _message(found: Facts, used: set[int], taken: set[str], left_out: dict[str, 
     number = identifier.value % EXTENDED
     note = ", ".join(filter(None, (f"0x{number:x}", identifier.note)))
     yield ProfileLine(section, "identifier", identifier._replace(value=number, note=note))
-    if identifier.value >= EXTENDED:
-        yield ProfileLine(section, "identifier_bits", Fact(29, identifier.place))
+    bits = _EXTENDED_BITS if identifier.value >= EXTENDED else _BASE_BITS
+    if bits != usual_bits:
+        yield ProfileLine(section, "identifier_bits", identifier._replace(value=bits, note=""))
     if is_fd:
         yield ProfileLine(section, "fd", found["is_fd"])
     yield ProfileLine(section, "payload_bytes", found["payload_bytes"])
-    yield ProfileLine(section, "period_us", found["period_us"])
+    period = found["period_us"]
+    yield ProfileLine(section, "period_us", period)
+    if "jitter_us" in found:
+        # Of a log; the period may be that of a database.
+        jitter = found["jitter_us"]
+        jitter = jitter._replace(value=min(jitter.value, period.value))
+        yield ProfileLine(section, "jitter_us", jitter)
+        if "deadline_us" in found:
+            yield ProfileLine(section, "deadline_us", found["deadline_us"]._replace(value=period.value + jitter.value))

@@ -77,8 +77,9 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
         facts = machine.messages[number] = {
             "name": Fact(message.name, place),
             "payload_bytes": Fact(message.length, place),
-            "is_fd": Fact(bool(message.is_fd), place),
         }
+        if message.is_fd:
+            facts["is_fd"] = Fact(True, place)
         if message.cycle_time:
             facts["period_us"] = Fact(message.cycle_time * _KILO, place)
     return machine

@@ -65,6 +65,8 @@ class Reading:
     """Messages of a CAN bus by their identifier."""
     lists_all: bool = True
     """Whether the file lists all devices of the machine."""
+    is_log: bool = False
+    """Whether the file is a recording of the bus."""
     remarks: list[str] = field(default_factory=list)
     """Sentences on what the file says and a profile cannot, or what the file leaves open."""
 

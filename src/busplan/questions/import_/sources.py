@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 from busplan.errors import BusplanError
 from busplan.profile.toml import read_bytes
+from busplan.progress import Progress
 from busplan.questions.import_.record import Reading
 from busplan.questions.import_.xml_tree import root_tag
 
@@ -33,6 +34,8 @@ class Format(NamedTuple):
     """Pattern of a line that only files of the format have, for text."""
     dialect: str = ""
     """Argument of a reader that reads several formats."""
+    head: bytes = b""
+    """Pattern of the first bytes, for recordings."""
 
 
 _IGH: Final = r"=== Master \d+, Slave \d+ ===|SM\d+: PhysAddr 0x"
@@ -46,6 +49,11 @@ FORMATS: Final = (
     Format("KCD (a root <NetworkDefinition>)", "can_database", roots=("NetworkDefinition",), dialect="kcd"),
     Format("ARXML (a root <AUTOSAR>)", "can_database", roots=("AUTOSAR",), dialect="arxml"),
     Format("CANopen EDS or DCF ([DeviceInfo])", "canopen", pattern=r"[ \t]*\[(?i:DeviceInfo)\]"),
+    Format(
+        "a CAN log (candump -l, ASC, BLF, TRC)",
+        "can_log",
+        head=rb"\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#|date \S|LOGG|;[^\[]{0,2000}?(\$FILEVERSION|Start time:)",
+    ),
 )
 _ELSEWHERE: Final = {
     "EtherCATInfo": "an ESI describes a kind of device and no machine; export the ENI of the machine",
@@ -53,25 +61,32 @@ _ELSEWHERE: Final = {
 }
 
 
-def machines(names: Sequence[str]) -> list[Reading]:
+def machines(names: Sequence[str], *, progress: Progress) -> list[Reading]:
     """Read files, in their order.
 
     Parameters
     ----------
     names
         The files; "-" is standard input.
+    progress
+        Called with the bytes read of a recording and those of its file.
 
     Raises
     ------
     BusplanError
         A file cannot be read, is of no known format or of two, or is not valid, with its place.
     """
-    return [_machine(name) for name in names]
+    return [_machine(name, progress) for name in names]
 
 
-def _machine(argument: str) -> Reading:
+def _machine(argument: str, progress: Progress) -> Reading:
     name = "<stdin>" if argument == "-" else argument
     content = read_bytes(Path(argument), name=name, limit=MOST_BYTES)
+    for known in FORMATS:
+        if known.head and re.match(known.head, content):
+            if argument == "-":
+                raise BusplanError(f"{name}: a recording is read from a file")
+            return _reader(known)(Path(argument), name, progress=progress)
     if len(content) > MOST_BYTES:
         raise BusplanError(f"{name}: is larger than {MOST_BYTES:,} bytes; no file of one machine is")
     if not content.strip(b"\0 \t\r\n\xef\xbb\xbf\xff\xfe"):

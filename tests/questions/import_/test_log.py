@@ -1,0 +1,370 @@
+"""`busplan import` of a CAN log: what a simulated bus was given is found again, and the log is within the profile."""
+
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import Any, Final, NamedTuple
+
+import can
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import busplan
+from busplan.errors import BusplanError
+from busplan.questions.import_ import ImportAnswer
+from busplan.recordings.statistics import sporadic_jitter, sporadic_period
+from tests.oracles.can_recording import Logged, Queued, arbitrated, bits_of, candump
+
+Run = Callable[..., Any]
+BIT_RATES: Final = (33.3, 50, 83.3, 100, 125, 250, 500, 800, 1000)
+
+
+class Network(NamedTuple):
+    """A bus of known messages."""
+
+    bit_rate_kbit_s: float
+    logged: list[Logged]
+    periods_us: dict[tuple[int, bool], float]
+    """Of each periodic message."""
+    fd: set[tuple[int, bool]]
+
+
+def random_network(seed: int, *, span_us: float = 3e6) -> Network:
+    """Periodic messages of either format, with jitter, some of CAN FD, and events in bursts."""
+    random = Random(seed)
+    bit_rate = random.choice(BIT_RATES)
+    slow = max(1.0, 500 / bit_rate)
+    queued: list[Queued] = []
+    periods: dict[tuple[int, bool], float] = {}
+    load, most, fd_share = 0.0, random.uniform(0.1, 0.6), random.choice([0, 0, 0.5, 1])
+    aligned, zero = random.random() < 0.3, random.random() < 0.3
+    while load < most:
+        extended = random.random() < 0.4
+        identifier = random.randrange(1 << 29 if extended else 1 << 11)
+        fd = random.random() < fd_share
+        size = random.choice([3, 8, 16, 48]) if fd else random.randint(0, 8)
+        period = random.choice([5, 10, 13.7, 20, 50, 100, 200]) * 1000 * slow * (1 + random.uniform(-5e-5, 5e-5))
+        if (identifier, extended) in periods:
+            continue
+        load += 160_000 / bit_rate / period
+        jitter, start = random.choice([0, 0.01, 0.1]) * period, 0 if aligned else random.uniform(0, period)
+        periods[identifier, extended] = period
+        while start < span_us * slow:
+            data = bytes(size) if zero else random.randbytes(size)
+            queued.append(Queued(start + random.uniform(0, jitter), identifier, data, extended, fd))
+            start += period
+    for identifier in random.sample(range(1 << 11), 2):
+        start = random.uniform(0, span_us * slow)
+        while start < span_us * slow and (identifier, False) not in periods:
+            queued += [
+                Queued(start + k * 700, identifier, random.randbytes(8)) for k in range(random.choice([1, 1, 2]))
+            ]
+            start += random.expovariate(1 / random.choice([1e5, 1e6]))
+    fd_messages = {(frame.identifier, frame.extended) for frame in queued if frame.fd}
+    return Network(bit_rate, arbitrated(queued, bit_us=1000 / bit_rate), periods, fd_messages)
+
+
+def imported(text: str, folder: Path, *beside: str) -> ImportAnswer:
+    (folder / "drive.log").write_text(text, encoding="utf-8")
+    return busplan.import_profile([folder / "drive.log", *(folder / name for name in beside)])
+
+
+def can_profile(answer: ImportAnswer) -> Any:
+    """The profile, with the keys of CAN."""
+    return answer.profile
+
+
+def keys_of(answer: ImportAnswer) -> dict[tuple[int, bool], Any]:
+    """Messages by identifier, and whether it has 29 bits."""
+    profile = can_profile(answer)
+    usual = profile.bus.identifier_bits
+    return {(message.identifier, (message.identifier_bits or usual) == 29): message for message in profile.message}
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_the_log_is_within_the_profile_that_is_made_of_it(seed: int, tmp_path: Path) -> None:
+    network = random_network(seed)
+    answer = imported(candump(network.logged), tmp_path)
+    seen = busplan.measured(answer.profile, tmp_path / "drive.log")
+    assert [figure.quantity for figure in seen.outside] == []
+    messages = keys_of(answer)
+    assert set(messages) == {(frame.identifier, frame.extended) for frame in network.logged}
+    assert {key for key, message in messages.items() if message.fd} == network.fd
+    doubts = {row.section: row.fact.note for row in answer.rows if row.key == "period_us"}
+    periodic = 0
+    for key, period_us in network.periods_us.items():
+        if key not in messages:
+            continue
+        note = doubts[f"message.{messages[key].name}"]
+        if ", U " in note:
+            periodic += 1
+            uncertainty_us = float(note.rpartition(", U ")[2].removesuffix(" us"))
+            assert messages[key].period_us == pytest.approx(period_us, abs=uncertainty_us)
+    assert periodic > len(network.periods_us) / 3
+
+
+def test_each_value_says_where_it_is_from(tmp_path: Path) -> None:
+    random = Random(1)
+    queued = [Queued(k * 10_000.0, 0x18FEF1FE, random.randbytes(8), extended=True) for k in range(200)]
+    queued += [Queued(k * 20_000.0 + 40, 0x0CF00400, random.randbytes(3), extended=True) for k in range(100)]
+    queued += [Queued(700_300.0, 0x80, b"")]
+    text = imported(candump(arbitrated(queued, bit_us=4)), tmp_path).text
+    assert text.partition("\n\n")[2].splitlines() == [
+        "[bus]",
+        'kind = "can"               # published: drive.log:1',
+        "bit_rate_kbit_s = 250      # assumed: frames of the log follow each other at once by it",
+        "identifier_bits = 29       # published: of most messages, drive.log:1",
+        "",
+        "[[message]]",
+        'name = "id-0x80"',
+        "identifier = 128           # measured: 0x80, drive.log",
+        "identifier_bits = 11       # measured: drive.log",
+        "payload_bytes = 0          # measured: the most seen, drive.log",
+        "period_us = 995010         # measured: 1 frame, not periodic: as close as they came, drive.log",
+        "",
+        "[[message]]",
+        'name = "id-0xcf00400"',
+        "identifier = 217056256     # measured: 0xcf00400, drive.log",
+        "payload_bytes = 3          # measured: the most seen, drive.log",
+        "period_us = 20000          # measured: 100 frames, U 4.8 us, drive.log",
+        "jitter_us = 210            # measured: of the arrival, the wait for other frames in it, drive.log",
+        "",
+        "[[message]]",
+        'name = "id-0x18fef1fe"',
+        "identifier = 419361278     # measured: 0x18fef1fe, drive.log",
+        "payload_bytes = 8          # measured: the most seen, drive.log",
+        "period_us = 10000          # measured: 200 frames, U 1.2 us, drive.log",
+        "jitter_us = 25             # measured: of the arrival, the wait for other frames in it, drive.log",
+    ]
+
+
+events = st.lists(st.integers(0, 10_000), min_size=1, max_size=12).map(sorted)
+
+
+@given(events, st.integers(0, 5000))
+def test_no_time_of_a_log_has_more_events_than_period_and_jitter_allow(each: list[int], more: int) -> None:
+    times_us, length_us = np.array(each, dtype=np.float64), float(each[-1] - each[0] + more + 1)
+    period_us = sporadic_period(times_us, length_us)
+    jitter_us = sporadic_jitter(times_us, period_us)
+    apart = [(j - i, each[j] - each[i]) for j in range(len(each)) for i in range(j)]
+    assert 0 <= jitter_us <= period_us + 2e-3
+    assert period_us <= length_us / (len(each) + 1)
+    assert jitter_us == pytest.approx(max([0.0, *(k * period_us - us for k, us in apart)]), abs=1e-6)
+    # Any longer period needs a jitter of more than that.
+    longest_us = min([length_us / (len(each) + 1), *(us / (k - 1) for k, us in apart if k > 1)])
+    assert period_us == pytest.approx(longest_us, abs=2e-3)
+
+
+@pytest.mark.parametrize("bit_rate", BIT_RATES)
+def test_frames_at_once_behind_each_other_show_the_bit_rate(bit_rate: float, tmp_path: Path) -> None:
+    random = Random(5)
+    periods = {0x100 + k: 1000 * random.choice([5, 10, 20]) * max(1, 500 / bit_rate) for k in range(12)}
+    queued = [
+        Queued(k * period + random.uniform(0, 500), identifier, random.randbytes(8))
+        for identifier, period in periods.items()
+        for k in range(150)
+    ]
+    answer = imported(candump(arbitrated(queued, bit_us=1000 / bit_rate)), tmp_path)
+    assert can_profile(answer).bus.bit_rate_kbit_s == bit_rate
+    assert f"The bit rate is {bit_rate:g} kbit/s by frames of the log that follow each other at once" in answer.remarks
+
+
+FRAME: Final = Logged(0, 0x2AA, b"\xa5" * 8, extended=False, bits=0)
+
+
+def spaced(gaps_us: list[float]) -> str:
+    """Frames of 111 bits so far from each other."""
+    assert bits_of(FRAME) == 111
+    return candump([FRAME._replace(us=us) for us in np.cumsum(gaps_us)])
+
+
+@pytest.mark.parametrize(
+    ("gaps_us", "bit_rate", "least"),
+    [
+        # 111 bits in 180 us are 617 kbit/s, less the step of 1 us 613: too much for 500.
+        ([180, 4001] * 40, 800, "613"),
+        # Nine stamps may be wrong.
+        ([4001, 180] * 9 + [2000] * 100, 500, "55.6"),
+        # A driver hands several frames over at once: the load alone says something.
+        ([10, 11, 10, 4000] * 40, 500, "109"),
+        # Frames as close as by 125, and as many a little later: chance.
+        ([888, 4001] * 12 + [*range(910, 980)], 500, "125"),
+        # Stamps of a step of 1 ms.
+        ([5000.0, 0, 4000] * 300, 500, "111"),
+        ([5000.0, 6000] * 300, 500, ""),
+    ],
+)
+def test_frames_do_not_overlap(gaps_us: list[float], bit_rate: float, least: str, tmp_path: Path) -> None:
+    answer = imported(spaced(gaps_us), tmp_path)
+    assert can_profile(answer).bus.bit_rate_kbit_s == bit_rate
+    said = [remark for remark in answer.remarks if "bit rate" in remark]
+    assert said == (
+        [f"The bit rate is no less than {least} kbit/s by the log, for frames do not overlap"] * bool(least)
+    )
+
+
+def test_periods_without_a_frame_do_not_make_a_period_longer(tmp_path: Path) -> None:
+    frames = [Logged(k * 10_000.0 + k % 3, 0x181, bytes(8), False, 0) for k in range(300) if k % 20 != 7]
+    (message,) = can_profile(imported(candump(frames), tmp_path)).message
+    assert message.period_us == 10_000
+    assert 2 <= message.jitter_us <= 3
+
+
+def test_a_log_may_end_with_a_frame_more_than_its_length_has_periods(tmp_path: Path) -> None:
+    queued = [Queued(k * 10_000.0 + start, 0x180 + start, bytes(8), fd=True) for k in range(20) for start in (0, 1000)]
+    answer = imported(candump(arbitrated(queued)), tmp_path)
+    load, *_ = busplan.measured(answer.profile, tmp_path / "drive.log").figures
+    assert load.recorded > load.planned  # type: ignore[operator]
+    assert load.within
+
+
+DATABASE = """VERSION ""
+BO_ 257 Engine: 8 ECU
+BO_ 258 Door: 8 ECU
+BO_ 128 Wake: 2 ECU
+BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
+BA_DEF_DEF_ "GenMsgCycleTime" 0;
+BA_ "GenMsgCycleTime" BO_ 257 20;
+BA_ "GenMsgCycleTime" BO_ 128 100;
+"""
+
+
+def test_a_database_gives_names_and_periods_and_the_log_the_rest(tmp_path: Path) -> None:
+    (tmp_path / "car.dbc").write_text(DATABASE)
+    random = Random(2)
+    # The engine sends in pairs: no more than a period of the database is taken as its jitter.
+    starts = [k * 70_000.0 + near for k in range(50) for near in (0, 200)]
+    queued = [Queued(us, 257, random.randbytes(8)) for us in starts]
+    queued += [Queued(k * 50_000.0, 258, random.randbytes(4)) for k in range(60)]
+    queued += [Queued(k * 50_000.0 + 9, 300, random.randbytes(12), fd=True) for k in range(60)]
+    text = candump(arbitrated(queued))
+    for files in (["drive.log", "car.dbc"], ["car.dbc", "drive.log"]):
+        (tmp_path / "drive.log").write_text(text)
+        answer = busplan.import_profile([tmp_path / name for name in files])
+        messages: dict[str, Any] = {message.name: message for message in can_profile(answer).message}
+        assert sorted(messages) == ["Door", "Engine", "Wake", "id-0x12c"]
+        engine, door = messages["Engine"], messages["Door"]
+        assert (engine.period_us, engine.jitter_us, engine.deadline_us) == (20_000, 20_000, 40_000)
+        assert (door.payload_bytes, door.period_us) == (8, 50_000)
+        assert messages["id-0x12c"].fd
+        assert messages["Wake"].period_us == 100_000
+        assert any("message 257: period_us is 20000 at car.dbc:2 and " in remark for remark in answer.remarks)
+
+
+def test_0x80_is_sync_in_a_profile_with_nodes_alone(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "car.dbc").write_text(DATABASE)
+    run("init", "line", "--bus", "can", "--nodes", 2, "--axes", 2, cwd=tmp_path)
+    assert run("import", "car.dbc", "--update", "line.toml", cwd=tmp_path).returncode == 0
+    line: Any = busplan.load_profile(tmp_path / "line.toml")
+    assert [message.name for message in line.message] == ["Engine"]
+    run("import", "car.dbc", "-o", "car.toml", cwd=tmp_path)
+    car: Any = busplan.load_profile(tmp_path / "car.toml")
+    assert [message.name for message in car.message] == ["Wake", "Engine"]
+
+
+@pytest.mark.parametrize("ending", ["asc", "blf", "trc"])
+def test_every_format_of_a_log_is_known_by_its_content(ending: str, tmp_path: Path, run: Run) -> None:
+    random = Random(3)
+    with can.Logger(str(tmp_path / f"bus.{ending}")) as writer:
+        for k in range(60):
+            for identifier, extended in ((0x181, False), (0x18FEF1FE, True)):
+                stamp = 1_700_000_000 + k * 0.01 + extended * 0.001
+                data = random.randbytes(8)
+                writer(
+                    can.Message(
+                        timestamp=stamp, arbitration_id=identifier, is_extended_id=extended, data=data, channel=0
+                    )
+                )
+    (tmp_path / f"bus.{ending}").rename(tmp_path / "bus.txt")
+    done = run("import", "bus.txt", "-o", "bus.toml", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "The log has 120 frames of 2 identifiers in 0.591 s" in done.stderr.splitlines()
+    loaded: Any = busplan.load_profile(tmp_path / "bus.toml")
+    assert [message.period_us for message in loaded.message] == [10_000, 10_000]
+    measured = run("measured", "bus.toml", "bus.txt", cwd=tmp_path)
+    assert ": 8 of 8 figures within the plan." in measured.stdout
+
+
+LINE = "(1700000000.{:06d}) can0 {}\n"
+LINES = "".join(LINE.format(k * 1000, "181#0011") for k in range(40))
+REFUSED = {
+    "one frame": (LINE.format(0, "181#00"), "drive.log: has 1 frame at one time, so no period"),
+    "one time": (LINE.format(7, "181#00") * 9, "drive.log: has 9 frames at one time, so no period"),
+    "errors alone": (LINE.format(0, "20000080#0000000000000000"), "has no CAN frame but 1 error frame"),
+    "two channels": (
+        LINES + LINES.replace("can0", "can1"),
+        "has frames of 2 channels: can0 (40 frames), can1 (40 frames); keep those of one bus",
+    ),
+    "cut at once": ("(1700000000.000000) can0 181#", "drive.log: has 1 frame at one time, so no period"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_log_without_periods_is_refused(case: str, tmp_path: Path) -> None:
+    text, words = REFUSED[case]
+    with pytest.raises(BusplanError) as refused:
+        imported(text, tmp_path)
+    assert words in str(refused.value)
+
+
+LAST = "".join(LINES.splitlines(keepends=True)[-9:])
+SAID = {
+    "cut": (LINES + "(17000", "The log is cut or damaged behind frame 40, read up to there: ValueError"),
+    "clock": (
+        LAST + LINES,
+        "Its clock was set back 1 time: the longest stretch between is taken.",
+    ),
+    "errors": (LINES + LINE.format(99_000, "20000080#0000000000000000"), "1 error frame: in no load"),
+    "remote": (LINES + LINE.format(99_000, "182#R8"), "1 remote frame: taken with the data of the length code"),
+    "seldom": (
+        LINES + LINE.format(99_000, "182#"),
+        "fewer than 10 frames, so a longer log knows the period better: 0x182",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", SAID)
+def test_what_a_log_hides_is_said(case: str, tmp_path: Path) -> None:
+    text, words = SAID[case]
+    answer = imported(text, tmp_path)
+    assert any(remark.startswith(words) for remark in answer.remarks), answer.remarks
+    assert busplan.measured(answer.profile, tmp_path / "drive.log").outside == ()
+
+
+def test_messages_that_are_not_periodic_are_named_with_what_they_cost(tmp_path: Path) -> None:
+    starts = [k * 100_000.0 + near for k in range(50) for near in (0, 400, 800)]
+    lines = candump([Logged(us, 0x7E8, bytes(8), False, 0) for us in starts])
+    (remark,) = (remark for remark in imported(lines, tmp_path).remarks if remark.startswith("not periodic"))
+    assert remark.startswith("not periodic: 0x7e8; the closest frames of the log are planned for all time, 41 times as")
+
+
+def test_many_identifiers_and_any_bytes_are_no_crash(tmp_path: Path) -> None:
+    random = Random(4)
+    frames = [(k * 300, f"{random.randrange(1500):03X}#{random.randbytes(8).hex()}") for k in range(3300)]
+    answer = imported("".join(LINE.format(us, frame) for us, frame in frames), tmp_path)
+    assert len(can_profile(answer).message) > 1200
+    text = LINES.encode()
+    for _ in range(60):
+        damaged = bytearray(text)
+        for _ in range(random.randint(1, 4)):
+            damaged[random.randrange(len(damaged))] = random.randrange(256)
+        (tmp_path / "drive.log").write_bytes(damaged[: random.randrange(len(damaged))])
+        try:
+            busplan.import_profile(tmp_path / "drive.log")
+        except BusplanError as error:
+            assert len(error.problems) == 1  # noqa: PT017
+
+
+def test_a_log_does_not_go_into_a_profile_or_beside_another(tmp_path: Path, run: Run) -> None:
+    for name in ("a.log", "b.log"):
+        (tmp_path / name).write_text(LINES)
+    assert run("import", "a.log", "-o", "car.toml", cwd=tmp_path).returncode == 0
+    updated = run("import", "a.log", "--update", "car.toml", cwd=tmp_path)
+    words = "a.log is a log: `busplan measured car.toml a.log --apply` writes what it shows into a profile\n"
+    assert (updated.returncode, updated.stderr) == (2, words)
+    two = run("import", "a.log", "b.log", cwd=tmp_path)
+    assert (two.returncode, two.stderr) == (2, "a.log and b.log are both logs; give the longer one\n")
+    piped = run("import", "-", stdin=LINES, cwd=tmp_path)
+    assert (piped.returncode, piped.stderr) == (2, "<stdin>: a recording is read from a file\n")
