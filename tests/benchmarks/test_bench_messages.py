@@ -27,7 +27,7 @@ identifier_bits = 29
 """
 QUESTIONS: dict[str, Callable[[CanProfile], object]] = {
     "capacity": lambda profile: str(busplan.capacity(profile)),
-    "latency": lambda profile: str(busplan.latency(profile, timing_model="worst-stuffing")),
+    "latency": lambda profile: busplan.latency(profile, timing_model="worst-stuffing"),
     "check": lambda profile: busplan.check(profile, circle=False),
 }
 
