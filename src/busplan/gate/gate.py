@@ -217,7 +217,10 @@ def check_document(
         return FileResult(document.name, profile.name, (), {}, failure=failure)
     subject = Subject(LoadedProfile(profile, document), changes, circle_steps=circle_steps if with_circle else None)
     rules = cycle_rules(profile.bus.kind)
-    violations = [_placed(document, rule, problem) for rule in rules if rule.check for problem in rule.check(subject)]
+    known: dict[int, Any] = {}
+    violations = [
+        _placed(document, rule, problem, known) for rule in rules if rule.check for problem in rule.check(subject)
+    ]
     ran = {rule.code for rule in rules}
     problems = list(circle.circle_problems(subject))
     violations += [_placed(document, all_rules()[code], problem) for code, problem in problems]
@@ -261,9 +264,10 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
         yield finding_of(rule, RuleProblem(problem.key, words), spot, words=words)
 
 
-def _placed(document: Document, rule: Rule, problem: RuleProblem) -> Violation:
-    """Find the line of a problem's key, or of the table that should have it."""
-    spot = document.spot(path_of(document.data() if problem.key.count(".") > 1 else {}, problem.key))
+def _placed(document: Document, rule: Rule, problem: RuleProblem, known: dict[int, Any] | None = None) -> Violation:
+    """Find the line of a problem's key, or of the table that should have it; `known` as `path_of` takes it."""
+    path = path_of(document.data(), problem.key, known) if problem.key.count(".") > 1 else (*problem.key.split("."),)
+    spot = document.spot(path)
     return Violation(rule, problem, spot)
 
 

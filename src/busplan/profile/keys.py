@@ -7,6 +7,8 @@ from busplan.errors import BusplanError
 from busplan.sections.base import Section, value_at
 from busplan.sections.profile import Profile
 
+_Known: TypeAlias = dict[int, tuple[dict[str, dict[str, Any]], list[str]]]
+
 
 def default_of(profile: Profile, key: str) -> object:
     """Default value of a key that a profile has, as plain data; None if it has none.
@@ -92,18 +94,24 @@ def named_tables(value: object) -> dict[str, dict[str, Any]] | None:
     return tables if len(tables) == len(value) else None
 
 
-def path_of(data: Mapping[str, object], key: str) -> tuple[str | int, ...]:
+def path_of(data: Mapping[str, object], key: str, known: _Known | None = None) -> tuple[str | int, ...]:
     """Path of a dotted key, with the index of a table in its array instead of its name.
+
+    Parameters
+    ----------
+    data
+        The tables.
+    key
+        The key.
+    known
+        Remembers the names of arrays from one key of `data` to the next.
 
     Examples
     --------
     >>> path_of({"group": [{"name": "drives", "nodes": 2}]}, "group.drives.nodes")
     ('group', 0, 'nodes')
     """
-    return tuple(step for step, _ in _steps(data, key.split(".")))
-
-
-_Known: TypeAlias = dict[int, tuple[dict[str, dict[str, Any]], list[str]]]
+    return tuple(step for step, _ in _steps(data, key.split("."), known))
 
 
 def named_path(data: object, path: tuple[str | int, ...], known: _Known | None = None) -> tuple[str | int, ...]:

@@ -20,7 +20,7 @@ _SHOWN: Final = 6
 """Most identifiers that a sentence lists."""
 
 
-class Sent(NamedTuple):
+class SentFrames(NamedTuple):
     """Frames of an identifier."""
 
     identifier: int
@@ -39,7 +39,7 @@ class Sent(NamedTuple):
         return float(self.times_us[-1] - self.times_us[0]) / (len(self.times_us) - 1)
 
 
-class Stretch(NamedTuple):
+class ClockStretch(NamedTuple):
     """The longest part of a log in which its clock was not set back."""
 
     taken: npt.NDArray[np.int64]
@@ -50,17 +50,17 @@ class Stretch(NamedTuple):
     """How often the clock was set back in the whole log."""
 
 
-def longest_stretch(frames: CanFrames) -> Stretch:
+def longest_stretch(frames: CanFrames) -> ClockStretch:
     """Find the longest part without a clock that was set back; queues may put neighbours out of order."""
     steps_back = np.flatnonzero(np.diff(frames.times_us) < _STEP_BACK_US) + 1
     ends = np.concatenate(([0], steps_back, [len(frames.times_us)]))
     longest = int(np.argmax(np.diff(ends)))
     taken = np.arange(ends[longest], ends[longest + 1])
     taken = taken[np.argsort(frames.times_us[taken], kind="stable")]
-    return Stretch(taken, frames.times_us[taken], len(steps_back))
+    return ClockStretch(taken, frames.times_us[taken], len(steps_back))
 
 
-def sent_messages(frames: CanFrames, stretch: Stretch) -> Mapping[tuple[int, bool], Sent]:
+def sent_messages(frames: CanFrames, stretch: ClockStretch) -> Mapping[tuple[int, bool], SentFrames]:
     """Frames of each identifier, by the identifier and whether it has 29 bits, ascending."""
     key = frames.identifiers[stretch.taken] * 2 + frames.extended[stretch.taken]
     order = np.argsort(key, kind="stable")
@@ -71,7 +71,7 @@ def sent_messages(frames: CanFrames, stretch: Stretch) -> Mapping[tuple[int, boo
         periods = grid(times_us)
         if periods is not None and not _is_periodic(periods):
             periods = None
-        messages[identifier, bool(extended)] = Sent(
+        messages[identifier, bool(extended)] = SentFrames(
             identifier,
             bool(extended),
             times_us,
@@ -87,7 +87,7 @@ def _is_periodic(periods: PeriodicEvents) -> bool:
     return late_us <= _PERIODIC * periods.period_us and periods.missing <= _MISSING * len(periods.late_us)
 
 
-def faults(frames: CanFrames, stretch: Stretch) -> Iterator[str]:
+def faults(frames: CanFrames, stretch: ClockStretch) -> Iterator[str]:
     """Sentences on a log that is damaged, and on its clock."""
     if frames.broken:
         yield f"The log is cut or damaged behind frame {len(frames.times_us):,}, read up to there: {frames.broken}."

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
-from itertools import count
+from itertools import combinations, count
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses.can.section import CanProfile
-from busplan.buses.can.streams import streams
+from busplan.buses.can.streams import identifiers_twice, streams
 from busplan.buses.can.traffic import traffic_of_profile
 from busplan.errors import BusplanError
 from busplan.profile.document import Document
@@ -155,6 +155,38 @@ def test_a_simulated_arbiter_never_takes_longer_and_reaches_the_bound(
         return
     for bound, us in zip(bounds, simulated(own), strict=True):
         assert us == pytest.approx(bound)
+
+
+@given(
+    st.lists(st.tuples(st.integers(0x170, 0x210), st.sampled_from([11, 29]), st.booleans()), max_size=8),
+    st.one_of(st.none(), st.tuples(st.integers(1, 9), st.integers(1, 20))),
+)
+@settings(max_examples=200, deadline=None)
+def test_identifiers_that_stand_twice_are_counted_pair_by_pair(
+    said: list[tuple[int, int, bool]], machine: tuple[int, int] | None
+) -> None:
+    """With and without a cycle, against every pair of streams; PDOs of over 8 bytes have frames 256 apart."""
+    messages = [
+        {"identifier": own, "identifier_bits": bits, "payload_bytes": 1, "period_us": 1e6, "name": f"m{number}"}
+        | ({"per_node": True} if each and machine else {})
+        for number, (own, bits, each) in enumerate(said)
+    ]
+    data: dict[str, Any] = {"schema_version": 1, "name": "any", "message": messages}
+    data["bus"] = {"kind": "can", "bit_rate_kbit_s": 1000}
+    if machine is not None:
+        nodes, size = machine
+        execution = {"kind": "linear", "base_us": 1.0, "per_byte_us": 0.0}
+        data["bus"] |= {"nodes": nodes}
+        data |= {"node": {"axes": 1, "execution": execution}, "cycle": {"period_us": 1e5}}
+        data |= {"payload": {"read_bytes": size, "write_bytes": size}}
+    elif not messages:
+        return
+    traffic = traffic_of_profile(CanProfile.model_validate(data))
+    owners = [
+        {(number, stream.identifier_bits) for number in range(int(stream.first), int(stream.last) + 1)}
+        for stream in streams(traffic, is_stuffed=True)
+    ]
+    assert identifiers_twice(traffic) == sum(len(early & late) for early, late in combinations(owners, 2))
 
 
 # --- what each question says ------------------------------------------------------------------------------------------

@@ -189,11 +189,7 @@ def _from(first: int, shared: int) -> str:
 
 
 def _collisions(network: Network) -> Number:
-    def twice(traffic: Traffic) -> Number:
-        number: Number = identifiers_twice(streams(traffic, is_stuffed=True))
-        return number
-
-    return _of_identifiers(network, twice, words="identifiers that stand twice")
+    return _of_identifiers(network, identifiers_twice, words="identifiers that stand twice")
 
 
 def _largest_identifier(network: Network) -> Number:

@@ -18,7 +18,7 @@ from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, Se
 from busplan.elementwise import plain
 from busplan.progress import Progress
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.can_messages import Sent, faults, listed, longest_stretch, sent_messages
+from busplan.recordings.can_messages import SentFrames, faults, listed, longest_stretch, sent_messages
 from busplan.recordings.statistics import Floats, expanded, lateness, quantile
 from busplan.recordings.words import counted
 
@@ -171,7 +171,7 @@ class _Seen:
             len(last),
         )
 
-    def _of(self, stream: Stream) -> list[Sent]:
+    def _of(self, stream: Stream) -> list[SentFrames]:
         """What was recorded of its identifiers."""
         is_extended = stream.identifier_bits > BASE_BITS
         first, last = _whole(stream.first), _whole(stream.last)
@@ -213,7 +213,7 @@ class _Seen:
         )
 
     def _period(
-        self, stream: Stream, label: str, sent: Sent, key: str, spread_us: float | None, *, several: bool
+        self, stream: Stream, label: str, sent: SentFrames, key: str, spread_us: float | None, *, several: bool
     ) -> RecordedFigure:
         """Mean distance of the frames, of the identifier that comes most often."""
         planned_us, count = plain(stream.period_us), len(sent.times_us)
@@ -237,7 +237,7 @@ class _Seen:
         return figure
 
     def _scatter(
-        self, stream: Stream, label: str, each: list[Sent], key: str, spread_us: float | None, *, several: bool
+        self, stream: Stream, label: str, each: list[SentFrames], key: str, spread_us: float | None, *, several: bool
     ) -> RecordedFigure:
         """Jitter of the arrival of a periodic message; of others the shortest distance."""
         planned_key = f"{key}.jitter_us" if key else ""
@@ -321,5 +321,5 @@ def _finite(us: float) -> float | None:
     return us if isfinite(us) else None
 
 
-def _named(sent: Sent) -> str:
+def _named(sent: SentFrames) -> str:
     return f"identifier {sent.identifier:#x}"

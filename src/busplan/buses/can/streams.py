@@ -136,6 +136,12 @@ class MessageStreams:
         """Share of the bus, 0..1 [1]."""
         return total(stream.sender().load for stream in self.each)
 
+    @cached_property
+    def twice(self) -> int:
+        """Number of identifiers that stand twice among messages, without those that vary from point to point [1]."""
+        fixed = [stream for stream in self.each if isinstance(stream.last, int)]
+        return sum(shared for *_, shared in collisions(fixed))
+
     def around(self, last: Points) -> tuple[list[int], tuple[Stream, ...]]:
         """Numbers of messages that may go before a place in the arbitration, and those behind it, the longest first."""
         if not isinstance(last, int):
@@ -323,11 +329,24 @@ def last_place(each: Iterable[Stream]) -> Points:
     return reduce(larger, (choose(stream.identifiers > 0, stream.last_place, 0) for stream in each))
 
 
-def identifiers_twice(each: Sequence[Stream]) -> Points:
-    """Number of identifiers that stand twice or more often [1]."""
+def identifiers_twice(traffic: Traffic) -> Points:
+    """Number of identifiers that stand twice or more often [1].
+
+    Parameters
+    ----------
+    traffic
+        What is sent, as `Sent.of` gives it.
+    """
+    each, sent = streams(traffic, is_stuffed=True), message_streams(traffic, is_stuffed=True)
     fixed = [stream for stream in each if isinstance(stream.last, int)]
     varied = [stream for stream in each if not isinstance(stream.last, int)]
-    twice: Points = sum(shared for *_, shared in collisions(fixed))
+    cyclic = [stream for stream in fixed if not stream.is_message]
+    least, most = min((own.first for own in cyclic), default=0), max((own.last for own in cyclic), default=-1)
+    near = [own for own in fixed if own.is_message and own.first <= most and own.last >= least]
+    # Pairs of messages are the same whatever the nodes.
+    twice: Points = sent.twice + sum(
+        shared for early, late, _, shared in collisions([*cyclic, *near]) if not (early.is_message and late.is_message)
+    )
     for early, late in chain(combinations(varied, 2), product(varied, fixed)):
         if has_format(early, late.identifier_bits):
             twice = twice + larger(smaller(early.last, late.last) - larger(early.first, late.first) + 1, 0)

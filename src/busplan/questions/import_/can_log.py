@@ -13,7 +13,7 @@ from busplan.progress import Progress
 from busplan.questions.import_.can_database import EXTENDED
 from busplan.questions.import_.record import Fact, Reading
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.can_messages import Sent, Stretch, faults, listed, longest_stretch, sent_messages
+from busplan.recordings.can_messages import ClockStretch, SentFrames, faults, listed, longest_stretch, sent_messages
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, expanded, sporadic_jitter, sporadic_period, step
 from busplan.recordings.words import counted
 
@@ -39,7 +39,7 @@ _MOST_US: Final = 5e8
 class _Timing(NamedTuple):
     """When an identifier is sent."""
 
-    sent: Sent
+    sent: SentFrames
     period_us: float
     jitter_us: float
     uncertainty_us: float | None
@@ -79,7 +79,7 @@ def read(path: Path, name: str, *, progress: Progress) -> Reading:
     return machine
 
 
-def _timing(sent: Sent, length_us: float, step_us: float) -> _Timing:
+def _timing(sent: SentFrames, length_us: float, step_us: float) -> _Timing:
     """Period and jitter of an identifier: of its grid, or those that hold all its frames."""
     if sent.grid is not None:
         # The first frame and the last one lie no further beside their places than all do; the grid took off a slope.
@@ -132,7 +132,7 @@ def _jitter(timing: _Timing, place: str, note: str) -> Iterator[tuple[str, Fact]
         yield "jitter_us", Fact(timing.jitter_us, place, "measured", note)
 
 
-def _remarks(frames: CanFrames, stretch: Stretch, timings: list[_Timing], length_us: float) -> Iterator[str]:
+def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing], length_us: float) -> Iterator[str]:
     yield from faults(frames, stretch)
     number = counted(len(stretch.taken), "frame")
     yield f"The log has {number} of {counted(len(timings), 'identifier')} in {length_us / 1e6:.3g} s"
@@ -158,7 +158,7 @@ def _names(timings: Iterable[_Timing]) -> str:
     return listed([f"{timing.sent.identifier:#x}" for timing in timings])
 
 
-def _bit_rate(machine: Reading, frames: CanFrames, stretch: Stretch, step_us: float) -> None:
+def _bit_rate(machine: Reading, frames: CanFrames, stretch: ClockStretch, step_us: float) -> None:
     """The bit rate that frames behind each other show, or the least usual one that the log allows where 500 is too low.
 
     Frames do not overlap. They are stamped at their ends, or by some controllers at their starts: the shorter of two
