@@ -11,12 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
+from busplan.buses.can.limits import LIMITS
 from busplan.buses.can.section import CanProfile
 from busplan.buses.can.streams import identifiers_twice, streams
 from busplan.buses.can.traffic import traffic_of_profile
 from busplan.errors import BusplanError
 from busplan.profile.document import Document
 from busplan.profile.toml import override, validate
+from busplan.questions.fit.network import network_of
 
 Run = Callable[..., Any]
 CAR = """\
@@ -214,6 +216,16 @@ def test_the_verdict_is_by_load_and_deadlines() -> None:
     assert [*late.verdicts[0].change.changes] == ["bus.bit_rate_kbit_s"]
     full = busplan.capacity(car(**{"limits.max_load": 0.05}))
     assert full.verdicts[0].deciding.exceeded == ("load",)
+
+
+def test_the_limit_of_deadlines_is_the_largest_response_over_its_deadline() -> None:
+    (deadline,) = (limit for limit in LIMITS if limit.key == "deadline")
+    late = car(**{"message.doors.deadline_us": 8000, "message.lights.deadline_us": 10_000})
+    largest = max(us / own.deadline_us for us, own in zip(responses(late)[1:], late.message[1:], strict=True) if us)
+    assert largest > 1
+    assert deadline.value(network_of(late)) == pytest.approx(largest)
+    assert deadline.is_broken(network_of(late))
+    assert not deadline.is_broken(network_of(car()))
 
 
 def test_a_card_says_loads_and_the_latest_message_and_nothing_of_a_cycle(run: Run, tmp_path: Path) -> None:
