@@ -49,8 +49,13 @@ class PeriodicEvents(NamedTuple):
     """Each event behind its place in the period, the middle of them at 0, without the drift of clocks [us]."""
     doubt_us: float
     """Standard uncertainty of the places [us]."""
-    missing: int
-    """Periods without an event."""
+    places: npt.NDArray[np.int64]
+    """Number of the period of each event, from 0."""
+
+    @property
+    def missing(self) -> int:
+        """Periods without an event."""
+        return int(self.places[-1]) + 1 - len(self.places)
 
 
 def quantile(values: Floats, share: float) -> Quantile:
@@ -118,8 +123,7 @@ def grid(times_us: Floats) -> PeriodicEvents | None:
     late, slope, error, bend_us = _without_drift(places.astype(np.float64), late)
     # The places of the first and of the last event scatter as all do.
     doubt_us = hypot(float(np.std(late)) * sqrt(3 / len(late)), bend_us)
-    missing = int(places[-1] - places[0]) + 1 - len(times_us)
-    return PeriodicEvents(period_us + slope, error, late, doubt_us, missing)
+    return PeriodicEvents(period_us + slope, error, late, doubt_us, places)
 
 
 def sporadic_period(times_us: Floats, length_us: float) -> float:

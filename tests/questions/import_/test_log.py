@@ -217,7 +217,7 @@ def test_a_log_may_end_with_a_frame_more_than_its_length_has_periods(tmp_path: P
     answer = imported(candump(arbitrated(queued)), tmp_path)
     load, *_ = busplan.measured(answer.profile, tmp_path / "drive.log").figures
     assert load.recorded > load.planned  # type: ignore[operator]
-    assert load.within
+    assert load.verdict == "within"
 
 
 DATABASE = """VERSION ""

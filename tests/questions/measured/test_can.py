@@ -113,7 +113,7 @@ def test_what_is_planned_and_not_seen_and_seen_and_not_planned_is_said(tmp_path:
     assert "In the plan and not in the log: 1 of feedback, sdo-request, heartbeats." in answer.remarks
     unplanned = figure(answer, "frames of no message")
     # 0x181 of 29 bits is not the feedback of 11.
-    assert (unplanned.recorded, unplanned.note, unplanned.within) == (21, "0x181, 0x7fe, 0x7ff", False)
+    assert (unplanned.recorded, unplanned.note, unplanned.verdict) == (21, "0x181, 0x7fe, 0x7ff", "outside")
 
 
 def test_a_message_that_comes_more_often_or_longer_is_outside_and_measured(tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
     late = [frame._replace(us=frame.us + 1500 * (frame.identifier == 0x208)) for frame in servo_8(100)]
     shaken = arbitrated(servo_8(300, sync_jitter_us=900))
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").recorded == pytest.approx(900, abs=150)
-    assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").within is False
+    assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").verdict == "outside"
     answer = of_log(candump(arbitrated(late)), tmp_path)
     assert [found.quantity for found in answer.outside] == ["last PDO behind SYNC"]
 
@@ -159,7 +159,7 @@ def test_a_clock_that_is_set_back_is_said(tmp_path: Path) -> None:
     logged = [frame._replace(us=frame.us - (frame.us > middle) * 1e6) for frame in LOGGED]
     answer = of_log(candump(logged), tmp_path)
     assert "Its clock was set back 1 time: the longest stretch between is taken." in answer.remarks
-    assert figure(answer, "SYNC: period").within is True
+    assert figure(answer, "SYNC: period").verdict == "within"
     assert figure(answer, "SYNC: period").events in {200, 201}
 
 
@@ -216,7 +216,7 @@ def test_a_load_without_its_can_fd_frames_is_not_judged(tmp_path: Path) -> None:
     answer = of_log(fd, tmp_path)
     assert not [found for found in answer.figures if found.quantity.startswith("load")]
     mixed = of_log(candump(LOGGED) + fd, tmp_path)
-    assert figure(mixed, "load ").within is None
+    assert figure(mixed, "load ").verdict is None
     assert figure(mixed, "load ").note.endswith("without frames of CAN FD")
 
 

@@ -232,7 +232,7 @@ class _Seen:
             f"{key}.period_us" if key else "cycle.period_us",
             _named(sent) if several else "",
         )
-        if key and figure.within is False:
+        if key and figure.verdict == "outside":
             self.edits[f"{key}.period_us"] = round(sent.mean_us, 1)
         return figure
 
