@@ -21,7 +21,7 @@ _STEP_BACK_US: Final = -1000.0
 """Stamps of neighbours are so far out of order only where a clock was set [us]."""
 _PERIODIC: Final = 0.15
 """Largest standard deviation of a periodic message, as a share of its period."""
-_MISSING: Final = 0.5
+_MISSING: Final = 0.1
 """Most periods of a periodic message without a frame, as a share of its frames."""
 _SHOWN: Final = 6
 """Most identifiers that a sentence lists."""

@@ -43,6 +43,7 @@ _MADE_UP: Final = 10
 """Due cycles within which a PDO that is missing may still come."""
 _BLOCK: Final = 50
 """Due cycles over which PDOs of every n-th SYNC keep their place among the SYNCs."""
+_ROUNDING_US: Final = 1.0
 _TOO_FEW: Final = f"fewer than {LEAST_EVENTS} frames"
 
 
@@ -534,7 +535,7 @@ class _Seen:
             yield f"{counted(fd, 'frame')} of CAN FD: in the load with the most stuff bits{left}."
         if frames.remote:
             yield f"{counted(frames.remote, 'remote frame')}: the length code is shown as data."
-        if self.stamp_error_us > self.step_us:
+        if self.stamp_error_us > self.step_us + _ROUNDING_US:
             yield (
                 f"Frames come up to {self.stamp_error_us - self.step_us:.0f} us closer than the bus allows: stamps are "
                 "late, and U holds it."
