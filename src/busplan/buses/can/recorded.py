@@ -416,7 +416,7 @@ class _Seen:
         message = self._said(stream)
         if not message.fd:
             return "classical CAN"
-        return "CAN FD" if getattr(message, "brs", True) else "CAN FD without a switch of bit rate"
+        return "CAN FD" if message.brs else "CAN FD without a switch of bit rate"
 
     def _sync(self, stream: Stream, sent: SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
         """Period of SYNC, equal to that of the plan, and its jitter."""
@@ -508,7 +508,7 @@ class _Seen:
         """
         if response is None or not (stream.is_message or stream.name == SYNC):
             return None
-        burst = getattr(self._said(stream), "burst", 1) if stream.is_message else 1
+        burst = self._said(stream).burst if stream.is_message else 1
         together_us = (burst - 1) * plain(stream.period_us)
         return _finite(max(plain(response["worst_response_us"]) - least_us, 0.0) + together_us)
 
