@@ -8,15 +8,19 @@ import numpy as np
 import numpy.typing as npt
 
 from busplan.recordings.can import CanFrames
-from busplan.recordings.statistics import Floats, PeriodicEvents, ahead, grid
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, Quantile, ahead, grid
 from busplan.recordings.words import counted
 
 CAN_BIT_RATE: Final = 1000.0
 """No classical bus is faster [kbit/s]."""
 _WINDOWS: Final = (10, 20, 30)
 """Frames over which stamps show a bit rate: of two the stamps may be wrong."""
-_LATE_STAMPS: Final = 0.05
+_LATE_SHARE: Final = 0.05
 """What late stamps of some of these frames add to the rate, as a share."""
+_LATE_US: Final = 100.0
+"""How late a driver that takes each frame by itself may take one [us]."""
+_LEAST_US: Final = 1e-3
+_FEW: Final = 3
 _STEP_BACK_US: Final = -1000.0
 """Stamps of neighbours are so far out of order only where a clock was set [us]."""
 _PERIODIC: Final = 0.15
@@ -43,11 +47,21 @@ class SentFrames(NamedTuple):
     """Its periods, where it comes periodically."""
 
     @property
-    def mean_us(self) -> float:
-        """Mean distance of its frames, lost ones of a periodic message counted; of two frames or more [us]."""
-        if self.grid is not None:
-            return self.grid.period_us
-        return float(self.times_us[-1] - self.times_us[0]) / (len(self.times_us) - 1)
+    def mean(self) -> Quantile:
+        """Mean distance of its frames, of two or more, lost ones of a periodic message counted [us].
+
+        The first frame and the last one lie no further beside their places than all do.
+        """
+        span_us = float(self.times_us[-1] - self.times_us[0])
+        if self.grid is None:
+            return Quantile(span_us / (len(self.times_us) - 1), None)
+        return mean_period(self.times_us, self.grid)
+
+
+def mean_period(times_us: Floats, periods: PeriodicEvents) -> Quantile:
+    """The period of events over all of a recording, with its standard uncertainty [us]."""
+    number = int(periods.places[-1])
+    return Quantile(float(times_us[-1] - times_us[0]) / number, float(np.ptp(periods.late_us)) / number)
 
 
 class EventModel(NamedTuple):
@@ -134,25 +148,36 @@ def _is_periodic(periods: PeriodicEvents) -> bool:
 
 
 def step_us(stretch: ClockStretch) -> float:
-    """Step of the stamps: the time that all distances are multiples of [us]."""
-    apart_us = np.abs(np.diff(np.rint(stretch.times_us).astype(np.int64)))
-    return float(np.gcd.reduce(apart_us)) if len(apart_us) else 0.0
+    """Step of the stamps: the time that all distances are multiples of [us].
+
+    Few distances, none of them 0, are those of frames that come to the microsecond: then it is that of logs.
+    """
+    apart_us = np.unique(np.diff(np.rint(stretch.times_us).astype(np.int64)))
+    if len(apart_us) < _FEW and apart_us.all():
+        return 1.0
+    return float(np.gcd.reduce(apart_us))
 
 
 def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> float:
     """The bit rate that a bus has at least, for frames do not overlap; 0 where too few frames say it [kbit/s].
 
     Frames are stamped at their ends, or by some controllers at their starts: the smaller sum of bits lies between both
-    stamps in either case. The error of a stamp is its step; what late stamps add is taken off.
+    stamps in either case. A stamp may be wrong by its step and by what a late one takes to be taken. Where frames come
+    closer than on any bus, a driver took several at once, and only long windows tell.
     """
     bits, times_us = frames.bits[stretch.taken].astype(np.float64), stretch.times_us
-    sent, error_us, least = np.concatenate(([0.0], np.cumsum(bits))), step_us(stretch), 0.0
-    for count in _WINDOWS:
-        if len(bits) > count:
-            window_us = times_us[count:] - times_us[:-count] + error_us
-            between = np.minimum(sent[count + 1 :] - sent[1:-count], sent[count:-1] - sent[: -count - 1])
-            least = max(least, float(np.max(1000 * between / np.maximum(window_us, 1e-3))))
-    return least / (1 + _LATE_STAMPS)
+    sent, error_us = np.concatenate(([0.0], np.cumsum(bits))), step_us(stretch)
+
+    def rates(count: int, late_us: float) -> Floats:
+        window_us = times_us[count:] - times_us[:-count] + error_us + late_us
+        between = np.minimum(sent[count + 1 :] - sent[1:-count], sent[count:-1] - sent[: -count - 1])
+        return np.asarray(1000 * between / np.maximum(window_us, _LEAST_US), dtype=np.float64)
+
+    pairs = rates(1, 0.0) if len(bits) > 1 else np.zeros(0)
+    at_once = np.count_nonzero(pairs > CAN_BIT_RATE * (1 + _LATE_SHARE)) >= LEAST_EVENTS
+    windows = [(count, 0.0) for count in _WINDOWS] if at_once else [(count, _LATE_US) for count in (4, *_WINDOWS)]
+    least = max((float(rates(count, late_us).max()) for count, late_us in windows if len(bits) > count), default=0.0)
+    return least / (1 + _LATE_SHARE) if at_once else least
 
 
 def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:

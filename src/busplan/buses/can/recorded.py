@@ -26,6 +26,7 @@ from busplan.recordings.can_messages import (
     least_bit_rate,
     listed,
     longest_stretch,
+    mean_period,
     sent_messages,
     stamps_of_no_bus,
     step_us,
@@ -224,10 +225,10 @@ class _Seen:
         often = max(len(sent.times_us) for sent in self.by_identifier.values())
         if often < LEAST_EVENTS:
             yield f"no identifier comes {LEAST_EVENTS} times: the log is too short"
-        if reason := stamps_of_no_bus(self.least_bit_rate):
-            yield reason
         if not self.step_us:
             yield "all frames have one stamp"
+        elif reason := stamps_of_no_bus(self.least_bit_rate):
+            yield reason
         period_us = plain(self.cycle.traffic.period_us) if self.cycle.traffic.has_cycle else np.inf
         if 2 * self.step_us > period_us:
             yield f"its stamps have steps of {self.step_us:,.0f} us, and a cycle lasts {period_us:,.0f}"
@@ -422,15 +423,16 @@ class _Seen:
         """Period of SYNC, equal to that of the plan, and its jitter."""
         periods, planned_us, count = grid(sent.times_us), plain(stream.period_us), len(sent.times_us)
         if periods is None:
-            mean_us = sent.mean_us if count > 1 else None
+            mean_us = sent.mean.value if count > 1 else None
             yield RecordedFigure(
                 "SYNC: period", "us", planned_us, mean_us, None, "equal", count, "cycle.period_us", hidden=_TOO_FEW
             )
             return
         clocks_us = CLOCK_TOLERANCE * planned_us / 3**0.5
-        doubt = expanded(periods.uncertainty_us, float(clocks_us), self.stamp_error_us / count)
+        mean = mean_period(sent.times_us, periods)
+        doubt = expanded(mean.uncertainty, float(clocks_us), self.stamp_error_us / count)
         yield RecordedFigure(
-            "SYNC: period", "us", planned_us, periods.period_us, doubt, "equal", count, "cycle.period_us", is_mean=True
+            "SYNC: period", "us", planned_us, mean.value, doubt, "equal", count, "cycle.period_us", is_mean=True
         )
         late = lateness(periods, self.share)
         doubt = expanded(late.uncertainty or periods.doubt_us)
@@ -453,12 +455,12 @@ class _Seen:
         repeated = [sent for sent in each if len(sent.times_us) > 1]
         if not repeated:
             return
-        often = min(repeated, key=lambda sent: sent.mean_us)
+        often = min(repeated, key=lambda sent: sent.mean.value)
         count = len(often.times_us)
         scatter_us = planned_us if spread_us is None else spread_us
         clocks_us = float(CLOCK_TOLERANCE * planned_us / 3**0.5)
         # At worst the first frame was the latest that it may be, and the last one the earliest.
-        error_us = often.grid.uncertainty_us if often.grid else scatter_us / (count - 1) / 2
+        error_us = scatter_us / (count - 1) / 2 if often.mean.uncertainty is None else often.mean.uncertainty
         is_known = count >= LEAST_EVENTS
         notes = [_named(often) if several else "", "" if often.grid else "not periodic"]
         if often.grid and often.grid.missing:
@@ -467,7 +469,7 @@ class _Seen:
             f"{label}: period",
             "us",
             planned_us,
-            often.mean_us,
+            often.mean.value,
             expanded(error_us, clocks_us, self.stamp_error_us / (count - 1)) if is_known else None,
             "at least" if is_known else "shown",
             count,
@@ -476,7 +478,7 @@ class _Seen:
             is_mean=True,
         )
         if is_known and period.verdict == "outside":
-            self.edits[f"{key}.period_us"] = planned_us = round(often.mean_us, 1)
+            self.edits[f"{key}.period_us"] = planned_us = round(often.mean.value, 1)
         yield period
         own_period_us = planned_us * (1 - float(CLOCK_TOLERANCE))
         found = [(quantile(ahead(sent.times_us, own_period_us), self.share), sent) for sent in repeated]

@@ -30,7 +30,7 @@ from busplan.recordings.can_messages import (
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, expanded
 from busplan.recordings.words import counted
 
-_BIT_RATES: Final = (20.0, 33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
+_BIT_RATES: Final = (33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
 """Usual bit rates [kbit/s]."""
 _NEAR: Final = 0.02
 """How far beside a bit rate frames that follow each other at once may seem to be, by their stamps, as a share."""
@@ -101,30 +101,30 @@ def _require_times(stretch: ClockStretch, messages: Iterable[SentFrames], least_
             f"{name}: {counted(len(stretch.taken), 'frame')}, none of an identifier that comes {LEAST_EVENTS} times: "
             "too few for a plan; record for longer"
         )
-    reason = stamps_of_no_bus(least_kbit_s)
-    if reason:
-        raise BusplanError(f"{name}: {reason}; record the bus itself, as with `candump -l`")
-    fastest = min(often, key=lambda sent: sent.mean_us)
+    fastest = min(often, key=lambda sent: sent.mean.value)
     error_us = step_us(stretch)
-    # Where no stamp differs there is no step.
-    if not error_us or 2 * error_us > fastest.mean_us:
+    if not error_us or 2 * error_us > fastest.mean.value:
         steps = f"steps of {error_us:,.0f} us" if error_us else "one time for all frames"
         raise BusplanError(
             f"{name}: its stamps have {steps}, too coarse for {fastest.identifier:#x}, which comes every "
-            f"{fastest.mean_us:,.0f} us; record with finer stamps, as `candump -l` has them"
+            f"{fastest.mean.value:,.0f} us; record with finer stamps, as `candump -l` has them"
         )
+    reason = stamps_of_no_bus(least_kbit_s)
+    if reason:
+        raise BusplanError(f"{name}: {reason}; record the bus itself, as with `candump -l`")
 
 
-def _timing(sent: SentFrames, length_us: float, error_us: float) -> _Timing:
+def _timing(sent: SentFrames, length_us: float, stamp_error_us: float) -> _Timing:
     """Period, jitter and burst that hold all frames of an identifier."""
     if sent.grid is not None:
-        period_us = sent.grid.period_us
-        doubt = expanded(sent.grid.uncertainty_us, CLOCK_TOLERANCE * period_us / 3**0.5) or 0.0
+        period_us, error_us = sent.mean
+        doubt = expanded(error_us, CLOCK_TOLERANCE * period_us / 3**0.5) or 0.0
         period_us = _roundest(period_us, doubt / 2)
     else:
         # A frame more may lie in a log of this length.
         doubt, period_us = None, min(max(floor(length_us / (len(sent.times_us) + 1)), _LEAST_US), _MOST_US)
-    model = event_model(sent.times_us, period_us, stamp_error_us=error_us, tolerance=float(CLOCK_TOLERANCE))
+    stamp_error_us = stamp_error_us if len(sent.times_us) > 1 else 0.0
+    model = event_model(sent.times_us, period_us, stamp_error_us=stamp_error_us, tolerance=float(CLOCK_TOLERANCE))
     return _Timing(sent, period_us, model, doubt)
 
 
