@@ -302,6 +302,78 @@ def test_every_format_of_a_log_is_known_by_its_content(ending: str, tmp_path: Pa
     assert ": 10 of 10 figures within the plan." in measured.stdout
 
 
+def coarse(logged: list[Logged], step_us: float) -> list[Logged]:
+    """The frames with stamps of a step."""
+    return [frame._replace(us=frame.us // step_us * step_us) for frame in logged]
+
+
+def random_queue(*, jitter_us: float = 300.0) -> list[Queued]:
+    random = Random(8)
+    periods = {0x100 + 16 * k: random.choice([10_000, 20_000, 50_000]) for k in range(20)}
+    return [
+        Queued(k * period + random.uniform(0, jitter_us), identifier, random.randbytes(8))
+        for identifier, period in periods.items()
+        for k in range(3_000_000 // period)
+    ]
+
+
+def test_a_bus_of_250_kbit_s_is_not_taken_for_500_by_coarse_stamps(tmp_path: Path) -> None:
+    logged = coarse(arbitrated(random_queue(), bit_us=4.0), 100.0)
+    assert can_profile(imported(candump(logged), tmp_path)).bus.bit_rate_kbit_s <= 250
+
+
+@pytest.mark.parametrize("step_us", [1.0, 100.0, 1000.0])
+def test_no_response_is_below_the_delay_of_a_bus_with_coarse_stamps(step_us: float, tmp_path: Path) -> None:
+    queued = random_queue(jitter_us=800.0)
+    logged = arbitrated(queued, bit_us=2.0)
+    answer = imported(candump(coarse(logged, step_us)), tmp_path)
+    names = {message.identifier: message.name for message in can_profile(answer).message}
+    rows = [row for row in busplan.latency(answer.profile).transactions if row.timing_model == "worst-stuffing"]
+    responses: dict[str, Any] = {row.transaction: row.phases["worst_response_us"] for row in rows}
+    for identifier, name in names.items():
+        starts = sorted(frame.us for frame in queued if frame.identifier == identifier)
+        ends = [frame.us + 3 * 2.0 for frame in logged if frame.identifier == identifier]
+        # From the place of its period on, less the latest queueing: what the plan calls its response.
+        assert responses[name] >= max(end - start for start, end in zip(starts, ends, strict=True))
+    assert busplan.measured(answer.profile, tmp_path / "drive.log").outside == ()
+
+
+def test_stamps_of_whole_seconds_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(BusplanError, match="stamps have steps of 1,000,000 us, too coarse for 0x1") as refused:
+        imported(candump(coarse(arbitrated(random_queue()), 1e6)), tmp_path)
+    assert "record with finer stamps" in str(refused.value)
+
+
+def test_frames_that_no_bus_carries_are_refused(tmp_path: Path) -> None:
+    replayed = [frame._replace(us=27.0 * k) for k, frame in enumerate(arbitrated(random_queue())[:400])]
+    with pytest.raises(BusplanError, match="kbit/s, more than a CAN bus has: the stamps are not those of the bus"):
+        imported(candump(replayed), tmp_path)
+
+
+def test_fd_frames_without_a_switch_are_planned_without(tmp_path: Path) -> None:
+    queued = [Queued(k * 5000.0 + node * 400, 0x200 + node, bytes(64), fd=True) for k in range(100) for node in (1, 2)]
+    text = candump(arbitrated(queued)).replace("##1", "##0")
+    answer = imported(text, tmp_path)
+    assert all(message.fd and not message.brs for message in can_profile(answer).message)
+    assert can_profile(answer).bus.data_bit_rate_kbit_s is None
+    (figures, *_) = busplan.capacity(answer.profile).results
+    # Two frames of 64 bytes in 5 ms, all of it at the nominal rate.
+    us = 712 * 1000 / can_profile(answer).bus.bit_rate_kbit_s
+    assert figures.bus_load == pytest.approx(2 * us / 5000, rel=0.03)
+    assert busplan.measured(answer.profile, tmp_path / "drive.log").outside == ()
+    # A plan with a switch of bit rate is not that of this machine.
+    plan = answer.profile.model_dump(exclude_unset=True)
+    plan["bus"]["data_bit_rate_kbit_s"] = 2000
+    for message in plan["message"]:
+        del message["brs"]
+    outside = busplan.measured(type(answer.profile)(**plan), tmp_path / "drive.log").outside
+    assert [figure.quantity for figure in outside] == [
+        "load",
+        "id-0x201: frames of another format",
+        "id-0x202: frames of another format",
+    ]
+
+
 LINE = "(1700000000.{:06d}) can0 {}\n"
 LINES = "".join(LINE.format(k * 1000, "181#0011") for k in range(40))
 REFUSED = {

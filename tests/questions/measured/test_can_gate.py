@@ -141,8 +141,8 @@ def test_a_log_that_shows_nothing_fails_the_gate(tmp_path: Path) -> None:
 def test_pdos_that_come_in_their_order_are_those_of_their_syncs(every: int, late: list[float], lost: set[int]) -> None:
     """Each PDO is late by so many due periods, never before the one before it, the first and the last in time."""
     late = [0.1, 0.1, *late, 0.1, 0.1, 0.1, 0.1]
-    sync_us = np.arange(len(late) * every + 1) * 1000.0
-    due_us = np.arange(len(late)) * every * 1000.0
+    sync_us = np.arange(0.0, len(late) * every + 1) * 1000.0
+    due_us = np.arange(0.0, len(late)) * every * 1000.0
     times_us = np.maximum.accumulate(due_us + np.array(late) * every * 1000.0) + np.arange(len(late)) * 1e-3
     found = due_pdos(sync_us, times_us, every=every)
     if every == 1:
