@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 
 if TYPE_CHECKING:
+    from busplan.buses.network import Network
     from busplan.sections.profile import Profile
 
 Severity = Literal["error", "warning"]
@@ -40,6 +41,10 @@ class RuleSubject(Protocol):
         """The profile."""
 
     @property
+    def network(self) -> "Network":
+        """Its network."""
+
+    @property
     def deciding(self) -> RuleFigures:
         """Capacity under the timing model that decides."""
 
@@ -53,6 +58,9 @@ class RuleSubject(Protocol):
 
     def after(self, changes: Mapping[str, object]) -> RuleFigures:
         """Capacity under the timing model that decides, with other values by dotted key."""
+
+    def counts(self, changes: Mapping[str, object] = ...) -> Sequence[Any]:
+        """How many nodes of each group, or of all, fit and are shown to fit, with other values by dotted key."""
 
     def limit_words(self, key: str) -> str:
         """Say by how much a limit of the bus is broken, or why it is not shown to be kept."""

@@ -207,4 +207,4 @@ def _say_report(changes: KeyChanges, report: "Report") -> None:
     """Write the report to standard error: standard output has the profile."""
     from busplan.forms.terminal import block_lines
 
-    say(*(line.text for line in block_lines(report_with(changes, report).blocks())))
+    say(*(line.text for line in block_lines(report_with(changes, report).blocks)))

@@ -70,6 +70,6 @@ def render(report: "Report", form: Form) -> str:
         case "json":
             from busplan.printable import to_json
 
-            return to_json(report.document())
+            return to_json(report.document)
         case _:
             assert_never(form)

@@ -314,15 +314,15 @@ ALL_SHOWS: Final = "--all shows all."
 
 
 class Report(NamedTuple):
-    """An answer, ready for every form; each part is computed when a form needs it."""
+    """An answer, ready for every form; plain values."""
 
     title: Sentence
     """Title of a page."""
-    blocks: Callable[[], Sequence[Block]]
+    blocks: Sequence[Block]
     """Content for people."""
-    document: Callable[[], Mapping[str, Any]]
+    document: Mapping[str, Any] | None
     """Content for JSON: plain data, not blocks."""
-    records: Callable[[], Sequence[Record]] | None = None
+    records: Sequence[Record] | None = None
     """Rows for CSV; None if the answer is more than one table."""
     is_page: bool = False
     """If True, every form shows the title; other answers may be part of a page."""
@@ -393,9 +393,10 @@ def attribute_value(figure: Figure, owner: object) -> ShownValue:
     figure
         The figure.
     owner
-        Object with an attribute named `figure.key`.
+        Figures by key, or an object with an attribute named `figure.key`.
     """
-    return figure_value(figure, getattr(owner, figure.key))
+    value = owner[figure.key] if isinstance(owner, Mapping) else getattr(owner, figure.key)
+    return figure_value(figure, value)
 
 
 def count_value(value: float, key: str = "", *, grouped: bool = False) -> ShownValue:

@@ -85,4 +85,4 @@ def text(report: Report) -> str:
     """
     if report.records is None:
         raise BusplanError("--format csv: this answer has several tables and CSV holds one; use --format json")
-    return to_csv(report.records())
+    return to_csv(report.records)

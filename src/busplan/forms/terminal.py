@@ -44,7 +44,7 @@ def text(report: Report, *, width: int | None = None, height: int | None = None,
     styled
         If True, write the colours of a terminal.
     """
-    blocks = [*report.blocks()]
+    blocks = [*report.blocks]
     last = max((number for number, block in enumerate(blocks) if isinstance(block, Card)), default=None)
     if last is not None and width is not None:
         card = cast("Card", blocks[last])

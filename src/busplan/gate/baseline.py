@@ -15,6 +15,8 @@ from busplan.printable import to_json
 from busplan.profile.keys import default_of, flat
 from busplan.profile.toml import LoadedProfile, override, read_bytes
 from busplan.profile.write import value_text
+from busplan.questions.fit.figures import capacity_figures
+from busplan.questions.fit.network import model_names
 from busplan.sections.profile import Profile
 
 _SCHEMA: Final = 1
@@ -41,7 +43,8 @@ class Record(NamedTuple):
 def figures_of(subject: Subject) -> dict[str, float]:
     """Figures of a profile to record, by name."""
     figures: dict[str, float | None] = {}
-    for capacity in sorted((subject.deciding, *subject.others), key=lambda capacity: capacity.timing_model):
+    for model in sorted(model_names(subject.profile)):
+        capacity = capacity_figures(subject.network, model=model)
         for name in ("max_axes", "margin_us", "safe_axes", "margin_corrected_us"):
             figures[f"{capacity.timing_model}.{name}"] = getattr(capacity, name)
         for group in capacity.groups:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from busplan.buses.rule import Mending, Rule, RuleProblem, Severity
 from busplan.forms.numbers import listed
@@ -13,7 +13,7 @@ from busplan.profile.toml import LoadedProfile, override
 from busplan.profile.write import short_text
 from busplan.questions.circle.check import MOST_STEPS
 from busplan.questions.fit.certainty import available_us, cycle_of, fits_in
-from busplan.questions.fit.figures import CapacityFigures, figures
+from busplan.questions.fit.figures import FitFigures, GroupCapacity, figures, node_counts
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.plan.advice import UNTESTED_CIRCLE, changeable, cure
 from busplan.questions.plan.freedoms import PERIOD
@@ -80,6 +80,9 @@ def finding_of(rule: Rule, problem: RuleProblem, spot: Spot, *, words: str) -> F
     return Finding(rule.code, rule.name, rule.severity, message, problem.key, *spot, words, *mending)
 
 
+NO_VALUES: Final[Mapping[str, object]] = {}
+
+
 class Subject:
     """A profile with the figures that rules need, each computed once, at first use.
 
@@ -101,25 +104,26 @@ class Subject:
         circle_steps: int | None = MOST_STEPS,
     ) -> None:
         self.profile = loaded.profile
+        self.network = network_of(loaded.profile)
         self.circle_steps = circle_steps
         self.document = loaded.document
         self.origin = f" (with {changes.words})" if changes.words else ""
         """End of the messages: the changes, which the document does not show."""
 
     @cached_property
-    def deciding(self) -> CapacityFigures:
+    def deciding(self) -> FitFigures:
         """Capacity under the timing model that decides."""
-        return figures(self.profile, model=bus_of(self.profile).deciding_model)
+        return figures(self.network, model=bus_of(self.profile).deciding_model)
 
     @cached_property
-    def others(self) -> tuple[CapacityFigures, ...]:
+    def others(self) -> tuple[FitFigures, ...]:
         """Capacity under the other timing models."""
-        return tuple(figures(self.profile, model=model) for model in self._other_models)
+        return tuple(figures(self.network, model=model) for model in self._other_models)
 
     @property
     def others_fit(self) -> tuple[tuple[str, bool], ...]:
         """The other timing models, each with whether the cycle fits; no figures are computed for that."""
-        given_us = available_us(network_of(self.profile))
+        given_us = available_us(self.network)
         return tuple(
             (model, bool(fits_in(cycle_of(self.profile, model=model).required_us, available_us=given_us)))
             for model in self._other_models
@@ -130,14 +134,18 @@ class Subject:
         deciding = bus_of(self.profile).deciding_model
         return tuple(model for model in model_names(self.profile) if model != deciding)
 
-    def after(self, changes: Mapping[str, object]) -> CapacityFigures:
+    def after(self, changes: Mapping[str, object]) -> FitFigures:
         """Capacity under the timing model that decides, with new values by dotted key."""
-        return figures(override(self.profile, dict(changes)), model=self.deciding.timing_model)
+        return figures(network_of(override(self.profile, dict(changes))), model=self.deciding.timing_model)
+
+    def counts(self, changes: Mapping[str, object] = NO_VALUES) -> tuple[GroupCapacity, ...]:
+        """How many nodes of each group, or of all, fit and are shown to fit, with new values by dotted key."""
+        return node_counts(network_of(override(self.profile, dict(changes))), model=self.deciding.timing_model)
 
     def limit_words(self, key: str) -> str:
         """Say by how much a limit of the bus is broken, or why it is not shown to be kept."""
         limit = bus_of(self.profile).limit(key)
-        return "" if limit is None else limit.words(network_of(self.profile))
+        return "" if limit is None else limit.words(self.network)
 
     def cure(self) -> Mending:
         """The least change after which the profile holds every constraint of a plan; one for all rules."""

@@ -98,7 +98,7 @@ class Answer(ABC):
 
     def _headline(self) -> str:
         """The answer in one line."""
-        return " ".join(next(block_lines(self.report().blocks())).text.split())
+        return " ".join(next(block_lines(self.report().blocks)).text.split())
 
     def __str__(self) -> str:
         return render(self._shown(), "table").removesuffix("\n")
@@ -114,4 +114,4 @@ class Answer(ABC):
     def _repr_svg_(self) -> str | None:
         from busplan.forms.picture import first_picture
 
-        return first_picture(self.report().blocks())
+        return first_picture(self.report().blocks)

@@ -1,7 +1,6 @@
 """Answer of `busplan calibrate`."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Final
 
 from busplan.forms.blocks import (
@@ -115,9 +114,9 @@ def calibration_report(result: Calibration, *, source: str, applied_to: str | No
     name = result.profile.name
     return Report(
         Sentence(("Execution time of ", Code(name), " from ", Code(source))),
-        lambda: tuple(_blocks(result, source)),
-        partial(calibration_document, result, source=source, applied_to=applied_to),
-        lambda: with_profile(name, calibration_records(result)),
+        tuple(_blocks(result, source)),
+        calibration_document(result, source=source, applied_to=applied_to),
+        with_profile(name, calibration_records(result)),
     )
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
+from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
@@ -42,6 +43,7 @@ class CapacityAnswer(Answer):
     """
 
     profile: Profile
+    networks: tuple[Network, ...]
     periods: tuple[tuple[CapacityFigures, ...], ...]
     verdicts: tuple[Verdict, ...]
     sensitivities: "tuple[Sensitivity, ...]" = ()
@@ -87,7 +89,7 @@ class CapacityAnswer(Answer):
 
     @property
     def _capacity(self) -> Capacity:
-        return Capacity(self.profile, self.periods)
+        return Capacity(self.profile, self.networks, self.periods)
 
 
 def capacity(

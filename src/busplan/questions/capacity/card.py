@@ -5,21 +5,19 @@ from itertools import islice
 from math import ceil, floor, isfinite, log10
 from typing import TYPE_CHECKING, Final
 
+from busplan.buses.network import Network
 from busplan.buses.published import parts_tested
 from busplan.buses.rule import contradicts
 from busplan.elementwise import plain
 from busplan.forms.blocks import Card, Code, Gauge, Sentence, State, Words, joined
 from busplan.forms.numbers import listed, period, plural
-from busplan.profile.toml import override
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.assumed import heavy_assumptions
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
 from busplan.questions.fit.circle_refusal import circle_refusals
 from busplan.questions.fit.figures import CapacityFigures
-from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.plan.freedoms import PERIOD
+from busplan.questions.fit.network import bus_of
 from busplan.questions.words.sentences import broken_limits, change_meanings, settings_sentence, warnings
-from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
     from busplan.buses.cycle import Term
@@ -31,34 +29,31 @@ _ALMOST: Final = 1 - 1e-9
 _Line = tuple[str, Sentence]
 
 
-def card(verdict: Verdict, profile: Profile, *, is_brief: bool = False) -> Card:
+def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
     """Say the verdict, how full the period is, what is free, what would fit, and what the verdict rests on.
 
     Parameters
     ----------
     verdict
         The verdict on one period.
-    profile
-        The network.
     is_brief
         Whether lines that are the same for every period are left out.
     """
-    figures, bus = verdict.deciding, bus_of(profile)
-    counts = [plural(number, noun) for number, noun in bus.counted(network_of(profile))]
-    at_period = profile
+    figures, network, profile = verdict.deciding, verdict.network, verdict.network.profile
+    bus = bus_of(profile)
+    counts = [plural(number, noun) for number, noun in bus.counted(network)]
     if profile.has_cycle:
-        at_period = override(profile, {PERIOD: verdict.period_us})
         counts.append(period(verdict.period_us))
     subject = Sentence((Code(profile.name), f"  {bus.title}, {', '.join(counts)}"))
     lines = [
-        *_reasons(verdict, at_period),
-        *(_times(figures, at_period) if profile.has_cycle else ()),
-        *_bus_lines(at_period),
-        *_room(verdict, at_period),
+        *_reasons(verdict, network),
+        *(_times(figures, network) if profile.has_cycle else ()),
+        *_bus_lines(network),
+        *_room(verdict, network),
     ]
     if not is_brief:
-        lines += _rests_on(verdict, at_period)
-    return Card(subject, _verdict(verdict), _gauge(figures, at_period), tuple(lines))
+        lines += _rests_on(verdict, network)
+    return Card(subject, _verdict(verdict), _gauge(figures, network), tuple(lines))
 
 
 def _verdict(verdict: Verdict) -> Words:
@@ -69,22 +64,22 @@ def _verdict(verdict: Verdict) -> Words:
     return Words(f"{word}{but}", state)
 
 
-def _gauge(figures: CapacityFigures, profile: Profile) -> Gauge | None:
-    if not profile.has_cycle:
-        return _load_gauge(figures, profile)
+def _gauge(figures: CapacityFigures, network: Network) -> Gauge | None:
+    if not network.profile.has_cycle:
+        return _load_gauge(figures, network)
     available_us, whole_us = figures.available_us, max(figures.period_us, _used_us(figures))
     return Gauge(
         used=_used_us(figures) / whole_us,
         doubt=(figures.uncertainty_us or 0.0) / whole_us,
-        free_until=available_us * (1 - profile.limits.reserve) / whole_us,
+        free_until=available_us * (1 - network.profile.limits.reserve) / whole_us,
         most=available_us / whole_us,
         state="passes" if figures.verdict == FITS else "fails",
     )
 
 
-def _load_gauge(figures: CapacityFigures, profile: Profile) -> Gauge | None:
+def _load_gauge(figures: CapacityFigures, network: Network) -> Gauge | None:
     """The load of a bus without a cycle; None of a kind without a limit of it."""
-    limit, network = bus_of(profile).limit("load"), network_of(profile)
+    limit = bus_of(network.profile).limit("load")
     if limit is None:
         return None
     load, most = plain(limit.value(network)), plain(limit.most(network))
@@ -97,51 +92,51 @@ def _used_us(figures: CapacityFigures) -> float:
     return figures.available_us - (figures.margin_corrected_us or 0.0)
 
 
-def _reasons(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
+def _reasons(verdict: Verdict, network: Network) -> Iterator[_Line]:
     """Reasons beside time why the machine does not run as the profile has it."""
-    figures, bus = verdict.deciding, bus_of(profile)
-    for cause in circle_refusals(profile):
+    figures, bus = verdict.deciding, bus_of(network.profile)
+    for cause in circle_refusals(network.profile):
         yield "circle", Sentence((f"cannot be run: {cause.message}",), "fails")
-    for words in broken_limits(figures, profile):
+    for words in broken_limits(figures, network):
         yield "limit", Sentence((words,), "fails" if figures.verdict == DOES_NOT_FIT else "warns")
     if not figures.safe:
         yield "unsafe", Sentence((bus.safety.setting,), "fails")
     if figures.verdict == FITS:
         for need in verdict.missed_limits:
-            words = need.words(ratio=profile.cycle.slice_ratio, most_us=verdict.period_us)
+            words = need.words(ratio=network.profile.cycle.slice_ratio, most_us=verdict.period_us)
             yield "[limits]", Sentence((words,), "fails")
 
 
-def _times(figures: CapacityFigures, profile: Profile) -> Iterator[_Line]:
+def _times(figures: CapacityFigures, network: Network) -> Iterator[_Line]:
     doubt_us, margin_us = figures.uncertainty_us, (figures.margin_corrected_us or 0.0)
     of_us = _us(figures.available_us, None)
     share = f"{_used_us(figures) / figures.available_us:.0%}".replace("%", " %")
-    of = of_us if profile.cycle.slice_ratio == 1 else f"the {of_us} that the bus may use"
+    of = of_us if network.profile.cycle.slice_ratio == 1 else f"the {of_us} that the bus may use"
     yield "used", Sentence((f"{_us(_used_us(figures), doubt_us)} us of {of}, {share}",))
     doubt = "" if doubt_us is None else f", +/- {_us(doubt_us, doubt_us)}"
-    kept_us = figures.available_us * profile.limits.reserve
+    kept_us = figures.available_us * network.profile.limits.reserve
     kept = f"; {_us(kept_us, doubt_us)} must stay free" if kept_us else ""
     yield ("short by" if margin_us < 0 else "free"), Sentence((f"{_us(abs(margin_us), doubt_us)} us{doubt}{kept}",))
     fastest_us = figures.safe_min_period_us
-    broken = filter(None, map(bus_of(profile).limit, limits_behind(figures)))
+    broken = filter(None, map(bus_of(network.profile).limit, limits_behind(figures)))
     if not all(limit.is_of_period or limit.period or limit.kept_from_us for limit in broken):
         yield "fastest period", Sentence(("none: no period keeps the limit",), "fails")
     elif fastest_us is None:
         yield "fastest period", Sentence(("no period that the bus allows is long enough",), "fails")
     else:
-        yield "fastest period", Sentence((f"{period(_up(fastest_us, doubt_us))}{_kept_by(figures, profile)}",))
+        yield "fastest period", Sentence((f"{period(_up(fastest_us, doubt_us))}{_kept_by(figures, network)}",))
 
 
-def _bus_lines(profile: Profile) -> Iterator[_Line]:
+def _bus_lines(network: Network) -> Iterator[_Line]:
     """Lines that only this kind of bus has."""
-    bus = bus_of(profile)
-    lines = bus.cycle(network_of(profile), model=bus.deciding_model).card_lines()
+    bus = bus_of(network.profile)
+    lines = bus.cycle(network, model=bus.deciding_model).card_lines()
     return ((label, Sentence((words,))) for label, words in lines)
 
 
-def _kept_by(figures: CapacityFigures, profile: Profile) -> str:
+def _kept_by(figures: CapacityFigures, network: Network) -> str:
     """Say what keeps the period from being shorter, where that is not the time of the cycle."""
-    network, bus, fastest_us = network_of(profile), bus_of(profile), figures.safe_min_period_us or 0.0
+    bus, fastest_us = bus_of(network.profile), figures.safe_min_period_us or 0.0
     if plain(bus.periods.from_us((figures.safe_required_us or 0.0) / network.slice_ratio)) >= fastest_us:
         return ""
     limits = (limit for limit in bus.limits if limit.period is not None)
@@ -149,7 +144,7 @@ def _kept_by(figures: CapacityFigures, profile: Profile) -> str:
     return "".join(f", limited by {limit.key}" for limit in islice(holding, 1))
 
 
-def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
+def _room(verdict: Verdict, network: Network) -> Iterator[_Line]:
     """Room for more nodes; without it the change that makes room, or that mends what is wrong."""
     figures = verdict.deciding
     spare = [(count.name or "nodes", (count.safe_nodes or 0) - count.nodes) for count in figures.counts]
@@ -159,14 +154,14 @@ def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
         )
         yield "room for", Sentence((listed([*rooms], "or"),))
         return
-    if verdict.all_well and profile.has_cycle:
+    if verdict.all_well and network.profile.has_cycle:
         yield "room for", Sentence(("no more nodes",))
     change, label = verdict.change, "one more" if verdict.all_well else "cure"
     if change is None:
         if verdict.no_change:
             yield label, Sentence((f"none: {verdict.no_change}",))
         return
-    meanings = change_meanings(bus_of(profile))
+    meanings = change_meanings(bus_of(network.profile))
     settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
     after = change.figures
     has_margin = after.margin_corrected_us is not None
@@ -175,17 +170,17 @@ def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     yield label, joined(settings, Sentence((f"{left}{untested}",)), by="")
 
 
-def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
+def _rests_on(verdict: Verdict, network: Network) -> Iterator[_Line]:
     """The largest part, and what the verdict assumes, leaves out, or rests on without a test."""
-    figures, bus = verdict.deciding, bus_of(profile)
+    figures, bus = verdict.deciding, bus_of(network.profile)
     if figures.terms:
         largest: Term = max(figures.terms, key=lambda term: plain(term.us))
         us = _us(plain(largest.us), figures.uncertainty_us)
         yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
-    for assumption in heavy_assumptions(figures, profile):
+    for assumption in heavy_assumptions(figures, network):
         them = "it" if len(assumption.keys) == 1 else "them"
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
-    left_out = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
+    left_out = bus.cycle(network, model=bus.deciding_model).left_out()
     if left_out:
         yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in left_out)),))
     tested = parts_tested(bus.evidence_data)
@@ -194,7 +189,7 @@ def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
             None,
             (
                 ", ".join(f"{part} ({by})" for part, by in tested.parts.items()),
-                f"not tested: {', '.join(tested.untested)}" if tested.untested and profile.has_cycle else "",
+                f"not tested: {', '.join(tested.untested)}" if tested.untested and network.profile.has_cycle else "",
             ),
         )
     )
@@ -206,7 +201,7 @@ def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     if verdict.after_reset is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in bus.safety.after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
-    for warning in warnings(profile, nodes=figures.nodes, most=figures.safe_nodes or 0):
+    for warning in warnings(network, nodes=figures.nodes, most=figures.safe_nodes or 0):
         yield "beware", Sentence((warning,), "warns")
 
 

@@ -1,8 +1,7 @@
 """Answer of `busplan capacity`."""
 
-from collections.abc import Iterator, Sequence
-from functools import partial
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
 from busplan.buses import figure
 from busplan.buses.bus import Bus
@@ -31,7 +30,7 @@ from busplan.questions.capacity.sentences import uncertainty_parts, verdict_sent
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS, Capacity, CapacityFigures
-from busplan.questions.fit.network import bus_of, leading_model, network_of
+from busplan.questions.fit.network import bus_of, leading_model
 from busplan.questions.words.documents import Owner, document, fields, figure_table, with_profile
 from busplan.questions.words.sentences import safety_record, warnings
 
@@ -40,9 +39,9 @@ def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
     """Report of `capacity`."""
     return Report(
         Sentence(("Capacity of ", Code(result.profile.name))),
-        lambda: tuple(_blocks(result, verdicts)),
-        partial(capacity_document, result, verdicts),
-        lambda: with_profile(result.profile.name, capacity_records(result)),
+        tuple(_blocks(result, verdicts)),
+        capacity_document(result, verdicts),
+        with_profile(result.profile.name, capacity_records(result)),
         is_card_enough=True,
     )
 
@@ -50,8 +49,8 @@ def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
 def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
     for number, verdict in enumerate(verdicts, start=1):
-        yield card(verdict, result.profile, is_brief=number < len(verdicts))
-    said = [list(verdict_sentences(verdict, result.profile)) for verdict in verdicts]
+        yield card(verdict, is_brief=number < len(verdicts))
+    said = [list(verdict_sentences(verdict)) for verdict in verdicts]
     yield Detail(tuple(said[0] if len(said) == 1 else _of_all(said)))
     yield capacity_table(result)
     if result.profile.group:
@@ -76,7 +75,7 @@ def capacity_table(result: Capacity) -> Table:
         The capacity.
     """
     profile, bus = result.profile, bus_of(result.profile)
-    network = network_of(profile)
+    network = result.networks[0]
     setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network)),) if words)
     counts = bus.counted(network)
     caption = sentence(
@@ -86,7 +85,8 @@ def capacity_table(result: Capacity) -> Table:
     owners = list(_owners(result))
     rows, shown = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)], _DECIDES
     if not profile.has_cycle:
-        rows = [row for row in rows if any(getattr(figures, row[0].key) is not None for figures in result.results)]
+        found = [figures.values() for figures in result.results]
+        rows = [row for row in rows if any(values[row[0].key] is not None for values in found)]
         shown |= {figure.key for figure in bus.figures.table}
     shown |= {term.key for figures in result.results for term in figures.terms if term.us}
     return figure_table(
@@ -107,19 +107,20 @@ def _owners(result: Capacity) -> Iterator[Owner]:
         group = period(results[0].period_us) if several else ""
         for figures in sorted(results, key=lambda figures: figures.timing_model != leading):
             rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
-            yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures)
+            yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures.values())
 
 
-def _state(key: Figure, figures: CapacityFigures) -> State:
+def _state(key: Figure, values: Mapping[str, Any]) -> State:
     """State of a figure that, by itself, decides whether the cycle fits."""
     match key:
         case figure.VERDICT:
-            return "neutral" if figures.verdict is None else state_of(figures.verdict == FITS)
+            return "neutral" if values["verdict"] is None else state_of(values["verdict"] == FITS)
         case figure.MARGIN_CORRECTED:
-            is_short = figures.safe_required_us is not None and figures.safe_required_us > figures.available_us
+            needed_us = values["safe_required_us"]
+            is_short = needed_us is not None and needed_us > values["available_us"]
             return "fails" if is_short else "neutral"
         case figure.MARGIN:
-            return "fails" if TIME in figures.exceeded else "neutral"
+            return "fails" if TIME in values["exceeded"] else "neutral"
     return "neutral"
 
 
@@ -205,7 +206,7 @@ def _results(result: Capacity) -> Iterator[Record]:
     """As the rows, with a list of groups where the profile has some."""
     for figures in result.results:
         record: Record = figures.by_key()
-        yield {**record, "groups": [group.record() for group in figures.groups]} if figures.groups else record
+        yield {**record, "groups": [vars(group) for group in figures.groups]} if figures.groups else record
 
 
 def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocument:
@@ -220,7 +221,7 @@ def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocu
 
 def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
     change, figures, bus = verdict.change, verdict.deciding, bus_of(result.profile)
-    network = network_of(result.profile)
+    network = verdict.network
     left_out = bus.cycle(network, model=bus.deciding_model).left_out()
     unable = {model.name: bus.cannot_express(network, model=model.name) for model in bus.timing_models}
     return {
@@ -243,8 +244,8 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
             **fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
             "circle_is_untested": change.circle_is_untested,
         },
-        "warnings": warnings(result.profile, nodes=figures.nodes, most=figures.safe_nodes or 0),
-        "text": " ".join(map(sentence_text, verdict_sentences(verdict, result.profile))),
+        "warnings": warnings(network, nodes=figures.nodes, most=figures.safe_nodes or 0),
+        "text": " ".join(map(sentence_text, verdict_sentences(verdict))),
     }
 
 

@@ -76,7 +76,7 @@ def next_bottleneck(profile: Profile) -> NextBottleneck:
     cycles = (bus.cycle(relieved, model=bus.deciding_model) for relieved in _relieved(network))
     without = next((cycle for cycle in cycles if not _of(cycle, binding.key)), None)
     return NextBottleneck(
-        limits=tuple(_next_limit(profile, name) for name in network.names),
+        limits=tuple(_next_limit(network, name) for name in network.names),
         binding_term=binding,
         is_gone=without is not None,
         next_binding_term=_largest(without or cycle, but=binding.key),
@@ -84,9 +84,9 @@ def next_bottleneck(profile: Profile) -> NextBottleneck:
     )
 
 
-def _next_limit(profile: Profile, group: str) -> NextLimit:
-    nodes, limit = safe_nodes(profile, group=group)
-    return NextLimit(group, nodes, limit, *safe_nodes(profile, group=group, without=limit))
+def _next_limit(network: Network, group: str) -> NextLimit:
+    nodes, limit = safe_nodes(network, group=group)
+    return NextLimit(group, nodes, limit, *safe_nodes(network, group=group, without=limit))
 
 
 def _relieved(network: Network) -> Iterator[Network]:

@@ -1,7 +1,6 @@
 """Report of `busplan capacity --sensitivity`: sentences, a table and a chart for each period."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Any, Final
 from xml.etree.ElementTree import SubElement
 
@@ -214,9 +213,9 @@ def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], sensitivit
     """
     report = capacity_report(result, verdicts)
     return report._replace(
-        blocks=lambda: (*report.blocks(), *_of_periods(sensitivities)),
-        document=partial(sensitivity_document, result, verdicts, sensitivities),
-        records=lambda: with_profile(
+        blocks=(*report.blocks, *_of_periods(sensitivities)),
+        document=sensitivity_document(result, verdicts, sensitivities),
+        records=with_profile(
             result.profile.name, [row for sensitivity in sensitivities for row in _rows(sensitivity)]
         ),
         is_card_enough=False,

@@ -14,6 +14,7 @@ from busplan.buses.figure import (
     VERDICT,
     by_key,
 )
+from busplan.buses.network import Network
 from busplan.buses.rule import contradicts
 from busplan.elementwise import plain
 from busplan.forms.blocks import (
@@ -29,12 +30,11 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import listed, nouns, period_value
-from busplan.profile.toml import override
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.assumed import heavy_assumptions
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
 from busplan.questions.fit.figures import CapacityFigures, GroupCapacity
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.network import bus_of
 from busplan.questions.plan.advice import UNTESTED_CIRCLE, changeable
 from busplan.questions.plan.freedoms import PERIOD
 from busplan.questions.words.sentences import (
@@ -56,26 +56,24 @@ if TYPE_CHECKING:
     from busplan.buses.bus import Bus
 
 
-def verdict_sentences(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
+def verdict_sentences(verdict: Verdict) -> Iterator[Sentence]:
     """Say the verdict, what the bus carries, the advised change, and warnings.
 
     Parameters
     ----------
     verdict
         The verdict.
-    profile
-        The network.
     """
-    figures = verdict.deciding
+    figures, network, profile = verdict.deciding, verdict.network, verdict.network.profile
     if profile.has_cycle:
-        yield from refused_circle(override(profile, {PERIOD: verdict.period_us}))
+        yield from refused_circle(profile)
     yield from _missed_limits(verdict, profile)
     yield _headline(verdict, profile)
-    yield from not_in_it(profile)
+    yield from not_in_it(network)
     yield from evidence_sentence(bus_of(profile))
     yield from _other_models(verdict, profile)
     yield from reset_sentence(verdict.after_reset, profile)
-    if figures.terms and not broken_limits(figures, profile):
+    if figures.terms and not broken_limits(figures, network):
         largest = max(figures.terms, key=lambda term: plain(term.us))
         label = by_key(bus_of(profile).figures.terms)[largest.key].label
         yield sentence(
@@ -89,8 +87,8 @@ def verdict_sentences(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
     is_full = profile.has_cycle and not profile.group
     if not has_room and (verdict.change is not None or is_full or not verdict.all_well):
         yield _advice(verdict, profile)
-    yield from _assumed(figures, profile)
-    yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
+    yield from _assumed(figures, network)
+    yield from warning_sentences(network, nodes=figures.nodes, most=figures.safe_nodes or 0)
 
 
 def _missed_limits(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
@@ -102,9 +100,9 @@ def _missed_limits(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
         yield Sentence((*subject, words, "."), "fails")
 
 
-def _assumed(figures: CapacityFigures, profile: Profile) -> Iterator[Sentence]:
+def _assumed(figures: CapacityFigures, network: Network) -> Iterator[Sentence]:
     """Say which assumptions carry much of the cycle or of its doubt, and how its execution time is known."""
-    heavy = heavy_assumptions(figures, profile)
+    profile, heavy = network.profile, heavy_assumptions(figures, network)
     if heavy:
         said = (f"{listed(assumption.keys, 'and')}, which {assumption.carries}" for assumption in heavy)
         yield Sentence((f"Assumed: {'; '.join(said)}.",), "warns")
@@ -117,11 +115,11 @@ def _headline(verdict: Verdict, profile: Profile) -> Sentence:
     alone = ", the bus alone: " if is_more else ": "
     at = (" at ", period_value(verdict.period_us)) if profile.has_cycle else ()
     subject = (Code(profile.name), *at, alone)
-    parts = (*subject, *verdict_story(verdict.deciding, profile).parts)
+    parts = (*subject, *verdict_story(verdict.deciding, verdict.network).parts)
     return Sentence(parts, state_of(verdict.all_well))
 
 
-def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
+def verdict_story(figures: CapacityFigures, network: Network) -> Sentence:
     """Say the verdict with its margin, bias, uncertainty and largest doubt.
 
     Parameters
@@ -131,7 +129,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
     profile
         The network.
     """
-    limits = broken_limits(figures, profile)
+    profile, limits = network.profile, broken_limits(figures, network)
     safe = (
         ""
         if figures.safe or figures.verdict == DOES_NOT_FIT
@@ -182,10 +180,10 @@ def _margin(figures: CapacityFigures, bus: "Bus") -> Sentence:
     return sentence(f"Margin {{}} of {{}}; {unknown} is corrected and no uncertainty given.", margin, of)
 
 
-def not_in_it(profile: Profile) -> Iterator[Sentence]:
+def not_in_it(network: Network) -> Iterator[Sentence]:
     """Say what the verdict leaves out, with the key that would give it; nothing if it leaves nothing out."""
-    bus = bus_of(profile)
-    left = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
+    bus = bus_of(network.profile)
+    left = bus.cycle(network, model=bus.deciding_model).left_out()
     if left:
         yield Sentence((f"Not included: {', '.join(f'{missing.label} ({missing.key})' for missing in left)}.",))
 
@@ -201,7 +199,7 @@ def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
                 f"The {model.timing_model} model says otherwise: {{}} needed of {{}}. It does not affect the verdict."
             )
             yield sentence(text, needed, available, state="warns")
-    yield from not_applicable(profile)
+    yield from not_applicable(verdict.network)
 
 
 def _carries(figures: CapacityFigures) -> Sentence:
@@ -251,7 +249,7 @@ def _advice(verdict: Verdict, profile: Profile) -> Sentence:
             *settings,
             ", which carries ",
         )
-        carried = _nodes(change.figures.safe_nodes or 0, change.figures.safe_axes or 0).parts
+        carried = _nodes(change.safe_nodes or 0, change.safe_axes or 0).parts
         return Sentence((*way, *carried, untested, "."))
     purpose = "make it fit" if figures.verdict != FITS else "pass `check`" if figures.safe else "make it safe"
     way = (f"{first}Cheapest way to {purpose}: ", *settings)

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from busplan.profile.toml import override
+from busplan.buses.network import Network
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.figures import Capacity, CapacityFigures, after_reset, figures
+from busplan.questions.fit.figures import Capacity, CapacityFigures, FitFigures, after_reset, capacity_figures
 from busplan.questions.fit.network import bus_of
 from busplan.questions.plan.advice import Change, advice
 from busplan.questions.plan.constraints import Need, missed_limits
@@ -13,6 +13,8 @@ from busplan.questions.plan.constraints import Need, missed_limits
 class Verdict(NamedTuple):
     """Verdict on one period, and the change that makes the cycle fit or carries another node."""
 
+    network: Network
+    """The network at its period."""
     period_us: float
     """None of a network without a cycle."""
     deciding: CapacityFigures
@@ -21,7 +23,7 @@ class Verdict(NamedTuple):
     """Figures of the other models that were asked for."""
     missed_limits: tuple[Need, ...]
     """Needs of [limits] that the slice does not meet."""
-    after_reset: CapacityFigures | None
+    after_reset: FitFigures | None
     """Figures after a bus reset; None unless the cycle is shown to fit now and not after the reset."""
     change: Change | None
     """The least change after which every constraint of a plan holds; or, where all do already, one that carries another
@@ -43,19 +45,18 @@ class Verdict(NamedTuple):
 
 def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:
     """Judge each period of a capacity result, by the timing model that decides."""
-    return tuple(_judge(capacity, results) for results in capacity.periods)
+    return tuple(_judge(*at) for at in zip(capacity.networks, capacity.periods, strict=True))
 
 
-def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
-    profile = capacity.profile
-    if profile.has_cycle:
-        profile = override(profile, {"cycle.period_us": results[0].period_us})
+def _judge(network: Network, results: tuple[CapacityFigures, ...]) -> Verdict:
+    profile = network.profile
     model = bus_of(profile).deciding_model
-    deciding = next((result for result in results if result.timing_model == model), None) or figures(
-        profile, model=model
+    deciding = next((result for result in results if result.timing_model == model), None) or capacity_figures(
+        network, model=model
     )
     change, no_change = advice(profile, deciding)
     return Verdict(
+        network=network,
         period_us=deciding.period_us,
         deciding=deciding,
         others=tuple(result for result in results if result is not deciding),

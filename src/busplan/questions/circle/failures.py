@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 from busplan.elementwise import existing
 from busplan.questions.fit.certainty import FITS, TIME, limits_behind
-from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.fit.figures import FitFigures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
@@ -158,7 +158,7 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
     return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
 
 
-def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, ...]:
+def bus_failures(profile: Profile, capacity: FitFigures) -> tuple[Failure, ...]:
     """Tell which limits of the bus a cycle breaks, or that it is not shown to fit.
 
     Parameters

@@ -1,7 +1,6 @@
 """Answer of `busplan circle-test`: its verdict in sentences, tables and the drawing."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Final
 
 from busplan.forms.blocks import (
@@ -181,9 +180,9 @@ def circle_report(test: CircleTest) -> Report:
     """Report of `circle-test`."""
     return Report(
         Sentence(("Circle test of ", Code(test.profile.name))),
-        lambda: tuple(_blocks(test)),
-        partial(circle_document, test),
-        lambda: with_profile(test.profile.name, circle_records(test)),
+        tuple(_blocks(test)),
+        circle_document(test),
+        with_profile(test.profile.name, circle_records(test)),
     )
 
 

@@ -17,7 +17,7 @@ from busplan.questions.circle.failures import (
 from busplan.questions.circle.figures import CircleFigures, CircleTest
 from busplan.questions.circle.setup import Contribution, Setup, announce, bus, contributions, estimate, setup, sources
 from busplan.questions.fit.circle_refusal import loop_timing, path_setpoints, require_circle
-from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.fit.figures import FitFigures
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
@@ -159,7 +159,7 @@ class _Counter:
 
 def _test(
     profile: Profile,
-    capacity: CapacityFigures,
+    capacity: FitFigures,
     prepared: Setup | LoopTiming,
     without: Mapping[str, Setup] | None,
     *,
@@ -182,7 +182,7 @@ def _test(
 
 
 def _figures(
-    profile: Profile, timing: LoopTiming, capacity: CapacityFigures, run: CircleRun | None, *, settled: bool
+    profile: Profile, timing: LoopTiming, capacity: FitFigures, run: CircleRun | None, *, settled: bool
 ) -> CircleFigures:
     phase_deg, gain_db, crossover_hz = tightest_margins(run) if run else (None, None, None)
     contour = run.contour if run and settled else None

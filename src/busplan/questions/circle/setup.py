@@ -14,8 +14,8 @@ from busplan.questions.fit.circle_refusal import (
     path_settling_us,
     require_circle,
 )
-from busplan.questions.fit.figures import CapacityFigures, figures
-from busplan.questions.fit.network import bus_of
+from busplan.questions.fit.figures import FitFigures, figures
+from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun
 from busplan.servo.engine import compiled_kernel
@@ -151,9 +151,9 @@ def contributions(
     return tuple(sorted(ranked, key=lambda contribution: -contribution.removed_mm))
 
 
-def bus(profile: Profile) -> CapacityFigures:
+def bus(profile: Profile) -> FitFigures:
     """Capacity under the timing model that decides."""
-    return figures(profile, model=bus_of(profile).deciding_model)
+    return figures(network_of(profile), model=bus_of(profile).deciding_model)
 
 
 def setup(profile: Profile) -> Setup:

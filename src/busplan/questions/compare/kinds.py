@@ -13,9 +13,9 @@ from busplan.progress import Progress
 from busplan.questions.circle.check import ComputeCircleFigures, circle_tests
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.circle_refusal import STEP
-from busplan.questions.fit.figures import CapacityFigures, after_reset, figures
+from busplan.questions.fit.figures import FitFigures, after_reset, figures
 from busplan.questions.fit.inputs import given
-from busplan.questions.fit.network import varied_nodes
+from busplan.questions.fit.network import network_of, varied_nodes
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.questions.plan.freedoms import PERIOD
 from busplan.questions.plan.smallest_period import SmallestPeriod, needed_settings, smallest_period
@@ -64,9 +64,9 @@ class MachineOnKind(NamedTuple):
     assumed: tuple[AssumedKey, ...]
     left_out: tuple[str, ...]
     """Keys and sections that the profile sets and this kind does not have."""
-    figures: CapacityFigures
+    figures: FitFigures
     """Under the timing model that decides, at the profile's period."""
-    after_reset: CapacityFigures | None
+    after_reset: FitFigures | None
     """After a bus reset, where it is shown to fit as it is set and not then."""
     safe: SafeAxes
     """At the profile's period."""
@@ -187,7 +187,7 @@ def _on_kind(profile: Profile, kind: str) -> MachineOnKind | NotOnKind:
         assumed = (assumed for assumed in conversion.assumed if assumed.key not in needed)
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
         conversion = conversion._replace(profile=override(conversion.profile, dict(needed)), assumed=(*tried, *assumed))
-    capacity = figures(conversion.profile, model=kind_named(kind).deciding_model)
+    capacity = figures(network_of(conversion.profile), model=kind_named(kind).deciding_model)
     return MachineOnKind(
         profile=conversion.profile,
         is_own=kind == profile.bus.kind,
@@ -213,7 +213,7 @@ def most_safe_axes(profile: Profile) -> SafeAxes:
         The network.
     """
     varied = varied_nodes(profile)
-    nodes, limit = safe_nodes(profile, group=varied.name)
+    nodes, limit = safe_nodes(network_of(profile), group=varied.name)
     node_axes = int(varied.node.axes)
     axes_beside = sum(
         int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name

@@ -244,9 +244,9 @@ def compare_report(comparison: KindComparison) -> Report:
     """Report of `compare`."""
     return Report(
         Sentence((Code(comparison.profile.name), " on each kind of bus")),
-        lambda: tuple(_blocks(comparison)),
-        partial(compare_document, comparison),
-        lambda: compare_records(comparison),
+        tuple(_blocks(comparison)),
+        compare_document(comparison),
+        compare_records(comparison),
     )
 
 

@@ -15,8 +15,8 @@ from busplan.profile.keys import KeyValue, dotted_keys
 from busplan.questions.circle.check import ComputeCircleFigures
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.fit.certainty import FITS, VERDICTS
-from busplan.questions.fit.figures import CapacityFigures, figures
-from busplan.questions.fit.network import bus_of, model_names
+from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -253,14 +253,14 @@ def _counts(figures: CapacityFigures, figure: Figure) -> _Figures:
 
 def _plan(profile: Profile) -> _Figures:
     """Figures under the model that decides, whichever are asked for: no choice of models hides its verdict."""
-    deciding = figures(profile, model=bus_of(profile).deciding_model)
+    deciding = capacity_figures(network_of(profile), model=bus_of(profile).deciding_model)
     own = {SHOWN_TO_FIT.key: deciding.verdict == FITS}
     return {**deciding.by_key(), **own, **_counts(deciding, known.SAFE_NODES)}
 
 
 def _cycle(profile: Profile, model: str) -> _Figures:
     """Figures of one cycle by key: those of `capacity`, and others that the bus compares."""
-    cycle = figures(profile, model=model)
+    cycle = capacity_figures(network_of(profile), model=model)
     return {**cycle.by_key(), **cycle.own, **_counts(cycle, known.MAX_NODES)}
 
 

@@ -1,7 +1,6 @@
 """Answer of `busplan diff`: its headline, keys and figures that differ, and its document."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
 from itertools import takewhile
 from operator import eq
 from typing import Final
@@ -32,7 +31,7 @@ from busplan.profile.keys import KeyValue
 from busplan.profile.write import value_text
 from busplan.questions.diff.difference import CircleSide, ComparedFigure, Difference, Judgement, KeyDifference
 from busplan.questions.fit.circle_refusal import circle_refusals
-from busplan.questions.fit.network import bus_of, model_names
+from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.words.documents import document, fields
 from busplan.questions.words.sentences import execution_grades, not_applicable, refused_circle
 from busplan.sections.profile import Profile
@@ -284,9 +283,9 @@ def diff_report(difference: Difference, *, arguments: Arguments) -> Report:
     a, b = map(Code, arguments)
     return Report(
         Sentence(("Changes from ", a, " to ", b)),
-        lambda: tuple(_blocks(difference, arguments)),
-        partial(diff_document, difference, arguments=arguments),
-        lambda: diff_records(difference),
+        tuple(_blocks(difference, arguments)),
+        diff_document(difference, arguments=arguments),
+        diff_records(difference),
     )
 
 
@@ -364,7 +363,7 @@ def _sides(difference: Difference, arguments: Arguments) -> Table:
 def _notes(difference: Difference) -> Iterator[Sentence]:
     """Say why a circle fails or has no figures, and how well the inputs of the figures are known."""
     for side, profile in zip("AB", (difference.a, difference.b), strict=True):
-        yield from (joined(sentence(f"{side}:"), reason) for reason in not_applicable(profile))
+        yield from (joined(sentence(f"{side}:"), reason) for reason in not_applicable(network_of(profile)))
     executions = (execution_grades(difference.a), execution_grades(difference.b))
     yield from _graded("execution time behind these figures is", *executions)
     if difference.circles is None:

@@ -25,7 +25,7 @@ from busplan.profile.toml import override
 from busplan.progress import Progress
 from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.fit.figures import CapacityFigures, figures
+from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.sections.base import Section
 from busplan.sourced import Grade
@@ -202,7 +202,7 @@ class _Case:
 
     @cached_property
     def _figures(self) -> CapacityFigures:
-        return figures(self.profile, model=self.model)
+        return capacity_figures(network_of(self.profile), model=self.model)
 
     @cached_property
     def _cycle(self) -> BusCycle:
@@ -233,7 +233,7 @@ class _Case:
             transactions = {f"latency.{each.name}": each.phases for each in self._cycle.latencies()}
             value = transactions.get(source, {}).get(key)
         else:
-            value = getattr(self._figures, name, None)
+            value = self._figures.values().get(name)
         if not isinstance(value, (int, float)):
             raise BusplanError(f"figures: {name!r} is no number of {self.profile.name}, a bus of kind {self.bus.kind}")
         return value

@@ -13,7 +13,8 @@ from busplan.questions.capacity.verdict import verdicts
 from busplan.questions.explain.formulas import against, result_of
 from busplan.questions.fit.certainty import available_us, certainty
 from busplan.questions.fit.circle_refusal import STEP
-from busplan.questions.fit.figures import CapacityFigures, capacity, certainty_numbers, figures, numeric_figures
+from busplan.questions.fit import figures as analysis
+from busplan.questions.fit.figures import CapacityFigures, capacity, certainty_numbers, numeric_figures
 from busplan.questions.fit.inputs import traced, traced_profile
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.plan.advice import changeable
@@ -123,7 +124,8 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     dict
         By key, all figures of `capacity` except those of the verdict.
     """
-    bus, plain = bus_of(profile), figures(profile, model=model)
+    bus, plain = bus_of(profile), analysis.capacity_figures(network_of(profile), model=model)
+    values = plain.values()
     network = network_of(traced_profile(profile))
     cycle = bus.cycle(network, model=model)
     numbers: dict[str, Number] = {
@@ -133,7 +135,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
         **numeric_figures(cycle),
     }
     if not profile.has_cycle:
-        numbers = {key: number for key, number in numbers.items() if getattr(plain, key) is not None}
+        numbers = {key: number for key, number in numbers.items() if values[key] is not None}
     known = by_key(bus.figures.capacity)
     named = {
         key: remembered(if_finite(number), key, known[key].symbol) for key, number in numbers.items() if key in known
@@ -146,7 +148,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
             why, parts = _OF_GROUPS, (named["required_us"], named["available_us"])
         certain = known.keys() if model == bus.deciding_model else known.keys() - by_key(CERTAINTY).keys()
         named |= {
-            key: result_of(None, why, parts) for key in certain if key not in named and getattr(plain, key) is None
+            key: result_of(None, why, parts) for key in certain if key not in named and values[key] is None
         }
     named |= {
         key: result_of(None, "none for this network", (named["required_us"],))

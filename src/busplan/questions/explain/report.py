@@ -1,7 +1,6 @@
 """Answer of `busplan explain`: every step to a figure and its inputs; without one, assumptions and all figures."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Final
 
 from busplan.buses.bus import Bus
@@ -69,12 +68,12 @@ def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report
     caption = Sentence(("What the figures of ", Code(profile.name), " rest on, the least well known first"))
     return Report(
         Sentence(("The figures of ", Code(profile.name))),
-        lambda: (
+        (
             assumptions_table(assumptions)._replace(caption=caption),
             _figure_table(profile),
         ),
-        partial(assumptions_document, profile, assumptions),
-        lambda: figure_rows(profile),
+        assumptions_document(profile, assumptions),
+        figure_rows(profile),
     )
 
 
@@ -165,9 +164,9 @@ def explain_report(explanation: Explanation) -> Report:
     name = filled.profile.name
     return Report(
         Sentence(("Where ", Code(filled.derivations[0].figure.key), " of ", Code(name), " comes from")),
-        lambda: tuple(_sections(filled)),
-        partial(_explain_document, filled),
-        lambda: with_profile(
+        tuple(_sections(filled)),
+        _explain_document(filled),
+        with_profile(
             name, [record for derivation in filled.derivations for record in _step_records(derivation)]
         ),
     )

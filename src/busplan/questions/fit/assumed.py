@@ -7,7 +7,7 @@ from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleFigures
 from busplan.elementwise import plain
 from busplan.questions.fit.inputs import given
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.network import bus_of
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 from busplan.sourced import Sourced
@@ -42,7 +42,7 @@ class HeavyAssumption(NamedTuple):
         return any(key == covered or key.startswith(f"{covered}.") for covered in self.keys)
 
 
-def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssumption, ...]:
+def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssumption, ...]:
     """The assumptions that carry more than a quarter of the variance or of the required time.
 
     Parameters
@@ -52,6 +52,7 @@ def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssu
     profile
         The network.
     """
+    profile = network.profile
     variance = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     shares: list[_Share] = [
         ((doubt.key,), float(doubt.us) ** 2 / variance, "the variance") for doubt in figures.doubts if variance
@@ -59,7 +60,7 @@ def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssu
     shares += [((term.rests_on,), plain(term.us) / figures.required_us, "the required time") for term in figures.terms]
     # What is no key has no grade, and execution times are no term or doubt of one key.
     shares = [share for share in shares if share[1] > _MUCH and _is_assumed(profile, share[0][0])]
-    shares += _of_execution(figures, profile, variance)
+    shares += _of_execution(figures, network, variance)
     said: dict[tuple[str, ...], list[str]] = {}
     for keys, share, whole in shares:
         if share > _MUCH:
@@ -72,9 +73,9 @@ def _is_assumed(profile: Profile, key: str) -> bool:
     return isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed"
 
 
-def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> list[_Share]:
+def _of_execution(figures: RuleFigures, network: Network, variance: float) -> list[_Share]:
     """Shares of the assumed execution times: what of its terms goes without them, and their part of the variance."""
-    network, bus = network_of(profile)._replace(period_us=figures.period_us), bus_of(profile)
+    network, bus = network._replace(period_us=figures.period_us), bus_of(network.profile)
     assumed = [group for group in network.groups if _counts(group, network)]
     if not assumed:
         return []

@@ -1,7 +1,6 @@
 """Answer of `busplan latency`."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from itertools import groupby
 from math import inf
 from operator import itemgetter
@@ -31,9 +30,9 @@ def latency_report(result: LatencyResult) -> Report:
     """Report of `latency`."""
     return Report(
         Sentence(("Latency of ", Code(result.profile.name))),
-        lambda: tuple(_blocks(result)),
-        partial(latency_document, result),
-        lambda: with_profile(result.profile.name, latency_records(result)),
+        tuple(_blocks(result)),
+        latency_document(result),
+        with_profile(result.profile.name, latency_records(result)),
     )
 
 
@@ -43,10 +42,10 @@ def _blocks(result: LatencyResult) -> Iterator[Block]:
     yield from _deadline_sentence(result)
     yield from latency_tables(result)
     yield Sentence((Code(profile.name), f": {bus_of(profile).latency_subject(network)}."))
-    yield from not_applicable(profile)
+    yield from not_applicable(network)
     yield from execution_sentence(profile, of_latency=True)
     yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result))
-    yield from warning_sentences(profile, nodes=int(network.nodes), most=0)
+    yield from warning_sentences(network, nodes=int(network.nodes), most=0)
 
 
 def latency_tables(result: LatencyResult) -> Iterator[Table]:

@@ -44,9 +44,9 @@ def map_report(trade_off: TradeOff) -> Report:
     """Report of `map`."""
     return Report(
         Sentence(("Map of ", Code(trade_off.profile.name))),
-        lambda: tuple(_blocks(trade_off)),
-        partial(map_document, trade_off),
-        lambda: with_profile(trade_off.profile.name, map_document(trade_off)["cells"]),
+        tuple(_blocks(trade_off)),
+        map_document(trade_off),
+        with_profile(trade_off.profile.name, map_document(trade_off)["cells"]),
     )
 
 

@@ -5,8 +5,10 @@ from typing import Final, NamedTuple
 from busplan.buses.parts import Value
 from busplan.profile.toml import override
 from busplan.questions.circle.check import failures_within, rests_on
-from busplan.questions.fit.figures import CapacityFigures, figures
-from busplan.questions.fit.network import bus_of
+from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.figures import CapacityFigures, FitFigures, figures
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.node_limit import safe_nodes
 from busplan.questions.plan.constraints import with_nodes
 from busplan.questions.plan.freedoms import freed
 from busplan.questions.plan.search import Search
@@ -24,8 +26,12 @@ class Change(NamedTuple):
     """New value by dotted key, the dearest change first."""
     nodes: int
     """Nodes that the change is made for."""
-    figures: CapacityFigures
-    """The capacity after it, under the model that decides."""
+    figures: FitFigures
+    """Whether it fits after it, under the model that decides."""
+    safe_nodes: int | None
+    """Most nodes that are shown to fit after it; None where a person is not told of it: without further nodes, or where
+    there is room without a change."""
+    safe_axes: int | None
     circle_is_untested: bool
     """Whether the change alters the circle, which was not simulated."""
 
@@ -95,12 +101,16 @@ def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
     if nodes > MAX_COUNT:
         return None, f"{MAX_COUNT} nodes are the most of a profile"
     more = cure(override(profile, dict(with_nodes(nodes))))
-    return _change(profile, more, nodes=nodes), more.why
+    has_room = now.verdict == FITS and now.safe and not now.circle_refused_by and now.safe_nodes > now.nodes
+    return _change(profile, more, nodes=nodes, counts=not has_room), more.why
 
 
-def _change(profile: Profile, cure: Cure, *, nodes: int) -> Change | None:
+def _change(profile: Profile, cure: Cure, *, nodes: int, counts: bool = False) -> Change | None:
     if cure.changes is None:
         return None
     after = override(profile, dict(cure.changes))
-    decided = figures(after, model=bus_of(after).deciding_model)
-    return Change(cure.changes, nodes, decided, circle_is_untested=cure.circle_failures is None)
+    network = network_of(after)
+    fit = figures(network, model=bus_of(after).deciding_model)
+    most = safe_nodes(network)[0] if counts else None
+    axes = None if most is None else most * after.alike_nodes[0].node.axes
+    return Change(cure.changes, nodes, fit, most, axes, circle_is_untested=cure.circle_failures is None)

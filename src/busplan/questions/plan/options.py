@@ -8,7 +8,7 @@ from typing import NamedTuple
 from busplan.buses.parts import Cost, Value
 from busplan.profile.toml import override
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.figures import CapacityFigures, figures
+from busplan.questions.fit.figures import CapacityFigures, FitFigures, capacity_figures, figures
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.plan.constraints import CIRCLE, Changes, most_asking, with_nodes, with_payload
 from busplan.questions.plan.freedoms import (
@@ -35,7 +35,7 @@ class Option(NamedTuple):
     """The goal with the changes."""
     deciding: CapacityFigures
     """Capacity under the timing model that decides."""
-    others: tuple[CapacityFigures, ...]
+    others: tuple[FitFigures, ...]
     """Capacity under the other timing models."""
     passes: bool
     """Whether every constraint holds: shown to fit, safe, within [limits], and a circle that passes if it was run."""
@@ -79,15 +79,15 @@ def option(search: Search, title: str, changes: Changes, *, held_by: str | None 
         As in `Option`.
     """
     changed = search.profile(changes)
-    model = bus_of(changed).deciding_model
-    deciding = figures(changed, model=model)
+    model, network = bus_of(changed).deciding_model, network_of(changed)
+    deciding = capacity_figures(network, model=model)
     is_run = search.runs_circle and deciding.verdict == FITS and not deciding.circle_refused_by
     return Option(
         title=title,
         changes=dict(changes),
         profile=changed,
         deciding=deciding,
-        others=tuple(figures(changed, model=model_name) for model_name in model_names(changed) if model_name != model),
+        others=tuple(figures(network, model=model_name) for model_name in model_names(changed) if model_name != model),
         passes=search.passes(changes),
         held_by=held_by,
         circle_failures=search.circle_failures(changes) if is_run else None,

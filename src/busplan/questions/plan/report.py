@@ -1,7 +1,6 @@
 """Answer of `busplan plan`: its sentences, the table of its options, and its document."""
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Final
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES, UNCERTAINTY
@@ -52,9 +51,9 @@ def plan_report(plan: Plan) -> Report:
     """Report of `plan`."""
     return Report(
         Sentence(("Plan of ", Code(plan.profile.name))),
-        lambda: tuple(_blocks(plan)),
-        partial(plan_document, plan),
-        lambda: with_profile(plan.profile.name, plan_records(plan)),
+        tuple(_blocks(plan)),
+        plan_document(plan),
+        with_profile(plan.profile.name, plan_records(plan)),
     )
 
 
@@ -154,7 +153,7 @@ def _warnings(plan: Plan) -> Iterator[Sentence]:
     option = plan.recommended
     profile = plan.goal if option is None else option.profile
     nodes = int(network_of(profile).nodes)
-    yield from warning_sentences(profile, nodes=nodes, most=nodes)
+    yield from warning_sentences(network_of(profile), nodes=nodes, most=nodes)
     if option is not None:
         yield from reset_sentence(after_reset(option.profile, option.deciding), option.profile)
 
@@ -168,6 +167,7 @@ def _options(plan: Plan) -> list[Record]:
 
 def _record(plan: Plan, option: Option) -> Record:
     figures, profile, others = option.deciding, option.profile, option.others
+    values = figures.values()
     return {
         "title": option.title,
         "changes": plan.all_changes(option),
@@ -181,7 +181,7 @@ def _record(plan: Plan, option: Option) -> Record:
         "circle_failures": list(option.circle_failures or ()),
         **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
         "slice_ratio": profile.cycle.slice_ratio if profile.has_cycle else None,
-        **fields(figures, *bus_of(profile).figures.planned),
+        **{key: values[key] for key in bus_of(profile).figures.planned},
         **{f"{kind}_bytes": _payload_bytes(profile, kind) for kind in TRANSACTION_KINDS},
     }
 

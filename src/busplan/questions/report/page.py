@@ -99,8 +99,8 @@ def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None
     own = Code(subjects[0].name) if len(subjects) == 1 else plural(len(subjects), "profile")
     return Report(
         Sentence((own if title is None else title,)),
-        lambda: tuple(_blocks(subjects)),
-        lambda: _document(subjects),
+        tuple(_blocks(subjects)),
+        _document(subjects),
         is_page=True,
         is_whole=True,
     )
@@ -133,7 +133,7 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
         yield Sentence((" ".join(answer.profile.description.split()),))
     yield _facts(subject)
     circle = (circle_question(answer),) if answer.profile.has_cycle else ()
-    verdicts: tuple[Block, ...] = (card(answer.verdict, answer.profile), *circle)
+    verdicts: tuple[Block, ...] = (card(answer.verdict), *circle)
     if answer.no_circle:
         verdicts = verdicts[::-1]  # the cause first
     lines = (sources_[name].line for name in ("capacity", "circle") if name in sources_)
@@ -150,7 +150,7 @@ _MOST_NAMED: Final = 3
 
 def _assumed(answer: AllAnswers) -> Iterator[Sentence]:
     """Say which keys of the profile are assumed, before any figure that rests on them; those that carry most first."""
-    heavy = heavy_assumptions(answer.verdict.deciding, answer.profile)
+    heavy = heavy_assumptions(answer.verdict.deciding, answer.verdict.network)
     names = [given.name for given in answer.assumptions if given.grade == "assumed" and "." in given.name]
     names.sort(key=lambda name: not any(assumption.covers(name) for assumption in heavy))
     if names:
@@ -168,7 +168,7 @@ def _facts(subject: _Subject) -> Facts:
 
     def item(name: str, figure: Figure) -> tuple[str, ShownValue]:
         unit = "us" if figure.unit == "us" else ""
-        return name, ShownValue(getattr(figures, figure.key), figure.key, unit)
+        return name, ShownValue(figures.values()[figure.key], figure.key, unit)
 
     network = network_of(subject.answer.profile)
     return Facts(

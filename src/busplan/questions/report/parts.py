@@ -91,7 +91,7 @@ def parts(answer: AllAnswers, sources: Sources) -> Iterator[Chapter]:
 
 def _models(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     """Capacity and latencies, the timing models side by side."""
-    yield from verdict_sentences(answer.verdict, answer.profile)
+    yield from verdict_sentences(answer.verdict)
     yield capacity_table(answer.capacity)
     if answer.profile.group:
         yield groups_table(answer.capacity)
@@ -122,7 +122,7 @@ def _terms(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     words = (TableColumn("term", kind="words"), TableColumn("eq", kind="words"))
     rows = []
     for term in (*bus_of(answer.profile).figures.terms, LEFT):
-        under_each = (attribute_value(term, figures) for figures in results)
+        under_each = (attribute_value(term, figures.values()) for figures in results)
         rows.append(TableRow((Swatch(term.ink, term.letter, term.label), term.reference, *under_each)))
     columns = (*words, *(TableColumn(figures.timing_model) for figures in results))
     yield Table(columns, tuple(rows), Sentence(("Terms of the cycle, us",)))
@@ -132,11 +132,11 @@ def _terms(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 def _largest_term(answer: AllAnswers) -> Sentence:
     """Say which term takes most, by the model that decides."""
     deciding = answer.verdict.deciding
-    term = max(bus_of(answer.profile).figures.terms, key=lambda figure: getattr(deciding, figure.key))
+    term = max(bus_of(answer.profile).figures.terms, key=lambda figure: deciding.own[figure.key])
     return sentence(
         f"Of the {{}} that the cycle needs by the {deciding.timing_model} model, {term.label} takes the most, {{}}",
         attribute_value(REQUIRED, deciding),
-        attribute_value(term, deciding),
+        attribute_value(term, deciding.values()),
     )
 
 

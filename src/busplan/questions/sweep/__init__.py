@@ -175,7 +175,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
 
         report = self._shown()
         charts = [self._figure().chart()] if is_drawable(self.grid) else []
-        return fragment(report._replace(blocks=lambda: (*report.blocks(), *charts)))
+        return fragment(report._replace(blocks=(*report.blocks, *charts)))
 
     def _figure(self) -> FigureData:
         figure = FigureData(self.sweep)
@@ -198,7 +198,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         digest = Digest(self.sweep._replace(columns=tuple(shown)), top=_SHOWN)
         for block in self.blocks:
             digest.add(block)
-        return digest.report(document=lambda: json.loads(self.to_json()))
+        return digest.report(document=json.loads(self.to_json()))
 
 
 def _spelled(column: Column) -> Array:

@@ -1,7 +1,7 @@
 """Digest of a sweep for people: how many points fit, and the top rows."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from math import isnan
 from types import MappingProxyType
 from typing import Final, NoReturn
@@ -217,19 +217,19 @@ class Digest:
             words = "The circle is not judged at {}: no contour tolerance is asked for."
             yield sentence(words, count_value(self._counts["unjudged"], grouped=True), state="warns")
 
-    def report(self, document: Callable[[], JsonDocument] = _not_kept) -> Report:
+    def report(self, document: JsonDocument | None = None) -> Report:
         """The answer in blocks.
 
         Parameters
         ----------
         document
-            Function that returns the document with all rows; without it the answer has none.
+            The document with all rows; without it the answer has none.
         """
         return Report(
             Sentence(("Sweep of ", Code(self._sweep.profile.name))),
-            lambda: (*self.sentences(), self._shown(), self._table()),
+            (*self.sentences(), self._shown(), self._table()),
             document,
-            lambda: document()["rows"],
+            None if document is None else document["rows"],
         )
 
     def _shown(self) -> Sentence:

@@ -15,7 +15,7 @@ from busplan.buses.parts import IDLE
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import cycle_of, fits_in
-from busplan.questions.fit.figures import CapacityFigures, figures, margin_us
+from busplan.questions.fit.figures import FitFigures, figures, margin_us
 from busplan.questions.fit.network import bus_of, leading_model, network_of
 from busplan.sections.profile import Profile
 
@@ -56,7 +56,7 @@ class Schedule(NamedTuple):
     """A cycle, or the part of it inside a window."""
 
     profile: Profile
-    figures: CapacityFigures
+    figures: FitFigures
     """Closed form of the cycle that the verdict is for: time needed, time available, and whether it fits."""
     cycle_events: tuple[Event, ...]
     """Events of the whole cycle, and the idle rest of its slice."""
@@ -156,7 +156,7 @@ def schedule(profile: Profile, *, model: str | None = None, number: int | None =
         where = "bus.nodes" if network.is_uniform else "nodes of all groups"
         raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
     model = leading_model(profile) if model is None else model
-    closed, cycle = figures(profile, model=model), drawn_cycle(profile, model=model, number=number)
+    closed, cycle = figures(network, model=model), drawn_cycle(profile, model=model, number=number)
     events = list(islice(_laid_out(cycle.events()), MOST_EVENTS + 1))
     if len(events) > MOST_EVENTS:
         raise BusplanError(f"a timeline shows up to {MOST_EVENTS:,} events, and this cycle has more")

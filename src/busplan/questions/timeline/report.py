@@ -29,7 +29,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import period_value, sentence_text
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.network import bus_of
+from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.timeline.characters import timeline_lines
 from busplan.questions.timeline.cycles import CommonMultiple
 from busplan.questions.timeline.events import EVENTS, SHARE, TOTAL, Schedule, Total, totals
@@ -46,9 +46,9 @@ def timeline_report(schedule: Schedule) -> Report:
     """Report of `timeline`."""
     return Report(
         Sentence(("Timeline of ", Code(schedule.profile.name))),
-        lambda: tuple(_blocks(schedule)),
-        partial(timeline_document, schedule),
-        partial(timeline_records, schedule),
+        tuple(_blocks(schedule)),
+        timeline_document(schedule),
+        timeline_records(schedule),
     )
 
 
@@ -143,19 +143,20 @@ def _total_row(schedule: Schedule, total: Total) -> TableRow:
 
 
 def _warnings(schedule: Schedule) -> list[str]:
-    return warnings(schedule.profile, nodes=schedule.figures.nodes, most=0)
+    return warnings(network_of(schedule.profile), nodes=schedule.figures.nodes, most=0)
 
 
 def _facts(schedule: Schedule) -> JsonDocument:
     """The document without events: the cycle that is drawn, the verdict, the cycles that differ, and the window."""
     figures, common = schedule.figures, CommonMultiple(schedule)
+    values = figures.values()
     return document(
         "timeline",
         profile=schedule.profile.name,
         timing_model=figures.timing_model,
         period_us=figures.period_us,
         nodes=figures.nodes,
-        **{key: getattr(figures, key) for key in bus_of(schedule.profile).figures.headings},
+        **{key: values[key] for key in bus_of(schedule.profile).figures.headings},
         cycle=common.number,
         common_multiple=common.cycles,
         distinct_cycles=None if common.distinct is None else [alike._asdict() for alike in common.distinct],

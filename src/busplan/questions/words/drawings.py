@@ -12,7 +12,7 @@ from busplan.forms.blocks import Drawing
 from busplan.forms.numbers import decimals_of, period, plural
 from busplan.forms.scale import round_numbers, round_steps
 from busplan.forms.svg import LINE, Scale, anchor, drawing, markup, text_at
-from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.fit.figures import FitFigures
 from busplan.questions.fit.network import network_of
 from busplan.questions.fit.node_steps import NodeSteps, telling_periods
 from busplan.sections.profile import Profile
@@ -45,7 +45,7 @@ class TermsDrawing(Drawing):
         Figures of one period, one set for each timing model.
     """
 
-    def __init__(self, results: Sequence[CapacityFigures]) -> None:
+    def __init__(self, results: Sequence[FitFigures]) -> None:
         self._results = results
 
     def svg(self) -> str:
@@ -62,7 +62,7 @@ class TermsDrawing(Drawing):
         return markup(root)
 
 
-def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: int, end_us: float, thin: bool) -> int:
+def _bars(root: Element, results: Sequence[FitFigures], head: str, *, y: int, end_us: float, thin: bool) -> int:
     """Draw a bar for each model on one scale, and return the y below them."""
     text_at(root, head, x="0", y=y + 15, css="head")
     top = y = y + LINE
@@ -80,17 +80,17 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
     return scale.marks(area, top=top, bottom=y)
 
 
-def _drawn(figures: CapacityFigures, end_us: float) -> tuple[Figure, ...]:
+def _drawn(figures: FitFigures, end_us: float) -> tuple[Figure, ...]:
     """The terms, and the rest of the slice if the scale reaches its end."""
     terms = kind_named(figures.kind).figures.terms
     return (*terms, LEFT) if end_us >= figures.available_us else terms
 
 
-def _segments(figures: CapacityFigures, terms: Sequence[Figure]) -> Iterator[_Segment]:
+def _segments(figures: FitFigures, terms: Sequence[Figure]) -> Iterator[_Segment]:
     """The terms that take time, one after the other."""
-    start_us = 0.0
+    start_us, values = 0.0, figures.values()
     for term in terms:
-        size_us = getattr(figures, term.key)
+        size_us = values[term.key]
         if size_us > 0:
             yield _Segment(term, start_us, start_us + size_us)
             start_us += size_us

@@ -11,7 +11,8 @@ from busplan.forms.numbers import period_value
 from busplan.profile.write import value_text
 from busplan.questions.fit.certainty import TIME, limits_behind
 from busplan.questions.fit.circle_refusal import circle_refusals
-from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.fit.figures import FitFigures
+from busplan.buses.network import Network
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 
@@ -72,7 +73,7 @@ def refused_circle(profile: Profile) -> Iterator[Sentence]:
         yield Sentence((*subject, ": ", ", and ".join(cause.message for cause in causes), "."), "fails")
 
 
-def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
+def warnings(network: Network, *, nodes: int, most: int) -> list[str]:
     """Warnings, whatever the verdict.
 
     Parameters
@@ -84,12 +85,12 @@ def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
     most
         Largest number of nodes in the report [1]; 0 if it has none.
     """
-    return bus_of(profile).warnings(network_of(profile), nodes=[number for number in (nodes, most) if number])
+    return bus_of(network.profile).warnings(network, nodes=[number for number in (nodes, most) if number])
 
 
-def warning_sentences(profile: Profile, *, nodes: int, most: int) -> Iterator[Sentence]:
+def warning_sentences(network: Network, *, nodes: int, most: int) -> Iterator[Sentence]:
     """Warnings as sentences; see `warnings`."""
-    return (Sentence((words,), "warns") for words in warnings(profile, nodes=nodes, most=most))
+    return (Sentence((words,), "warns") for words in warnings(network, nodes=nodes, most=most))
 
 
 def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterator[Sentence]:
@@ -118,11 +119,10 @@ def execution_grades(profile: Profile) -> str | None:
     return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items()) or None
 
 
-def broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
+def broken_limits(figures: FitFigures, network: Network) -> list[str]:
     """Say by how much each limit of the bus is broken, or why it is not shown to be kept."""
-    broken = map(bus_of(profile).limit, limits_behind(figures))
-    network = network_of(profile)
-    if profile.has_cycle:
+    broken = map(bus_of(network.profile).limit, limits_behind(figures))
+    if network.groups:
         network = network._replace(period_us=figures.period_us)
     return [limit.words(network) for limit in broken if limit is not None]
 
@@ -141,16 +141,16 @@ def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
         yield Sentence((f"Model of {kind}: {'; '.join(phrases)}; not tested: {', '.join(tested.untested)}.",))
 
 
-def not_applicable(profile: Profile) -> Iterator[Sentence]:
+def not_applicable(network: Network) -> Iterator[Sentence]:
     """Say which timing models cannot express a profile, and why."""
-    bus = bus_of(profile)
+    bus = bus_of(network.profile)
     for model in bus.timing_models:
-        keys = bus.cannot_express(network_of(profile), model=model.name)
+        keys = bus.cannot_express(network, model=model.name)
         if keys:
             yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
 
 
-def reset_sentence(after: CapacityFigures | None, profile: Profile) -> Iterator[Sentence]:
+def reset_sentence(after: FitFigures | None, profile: Profile) -> Iterator[Sentence]:
     """Say that a cycle stops fitting at a bus reset; nothing if it does not."""
     if after is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in bus_of(profile).safety.after_reset.items())
@@ -158,7 +158,7 @@ def reset_sentence(after: CapacityFigures | None, profile: Profile) -> Iterator[
         yield sentence(text, state="warns")
 
 
-def story(figures: CapacityFigures, profile: Profile) -> tuple[Part, ...]:
+def story(figures: FitFigures, profile: Profile) -> tuple[Part, ...]:
     """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict.
 
     Parameters
@@ -173,13 +173,13 @@ def story(figures: CapacityFigures, profile: Profile) -> tuple[Part, ...]:
         used = attribute_value(UTILISATION, figures)._replace(decimals=1)
         return sentence("{} to spare, {} of {} used", attribute_value(MARGIN, figures), used, available).parts
     short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
-    reasons = [Sentence((words,)) for words in broken_limits(figures, profile)]
+    reasons = [Sentence((words,)) for words in broken_limits(figures, network_of(profile))]
     if TIME in figures.exceeded:
         reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
     return joined(*reasons, by=", and ").parts
 
 
-def margin_parts(figures: CapacityFigures) -> tuple[Part, ...]:
+def margin_parts(figures: FitFigures) -> tuple[Part, ...]:
     """A corrected margin with its uncertainty, as far as that is known.
 
     Parameters
@@ -191,7 +191,7 @@ def margin_parts(figures: CapacityFigures) -> tuple[Part, ...]:
     return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
 
 
-def safety_record(figures: CapacityFigures, profile: Profile) -> Record:
+def safety_record(figures: FitFigures, profile: Profile) -> Record:
     """Whether the settings of the bus are safe, by the key of its kind; empty if the kind has none."""
     safety = bus_of(profile).safety.figure
     return {} if safety is None else {safety.key: figures.safe}
