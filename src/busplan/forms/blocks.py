@@ -320,7 +320,7 @@ class Report(NamedTuple):
     """Title of a page."""
     blocks: Sequence[Block]
     """Content for people."""
-    document: Mapping[str, Any] | None
+    document: Mapping[str, Any]
     """Content for JSON: plain data, not blocks."""
     records: Sequence[Record] | None = None
     """Rows for CSV; None if the answer is more than one table."""

@@ -10,7 +10,6 @@ from busplan.forms.blocks import (
     Block,
     Cell,
     Code,
-    Detail,
     JsonDocument,
     Record,
     Report,
@@ -25,14 +24,13 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import nouns, period, sentence_text
-from busplan.questions.capacity.card import card
-from busplan.questions.capacity.sentences import uncertainty_parts, verdict_sentences
+from busplan.questions.capacity.lines import card, card_text, uncertainty_parts
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS, Capacity, CapacityFigures
 from busplan.questions.fit.network import bus_of, leading_model
 from busplan.questions.words.documents import Owner, document, fields, figure_table, with_profile
-from busplan.questions.words.sentences import safety_record, warnings
+from busplan.questions.words.sentences import safety_record
 
 
 def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
@@ -50,20 +48,9 @@ def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
     for number, verdict in enumerate(verdicts, start=1):
         yield card(verdict, is_brief=number < len(verdicts))
-    said = [list(verdict_sentences(verdict)) for verdict in verdicts]
-    yield Detail(tuple(said[0] if len(said) == 1 else _of_all(said)))
     yield capacity_table(result)
     if result.profile.group:
         yield groups_table(result)
-
-
-def _of_all(said: Sequence[Sequence[Sentence]]) -> Iterator[Sentence]:
-    """The sentences of each period, and at the end once those that are the same for all."""
-    texts = [{sentence_text(words) for words in sentences} for sentences in said]
-    common = set.intersection(*texts)
-    for sentences in said:
-        yield from (words for words in sentences if sentence_text(words) not in common)
-    yield from (words for words in said[0] if sentence_text(words) in common)
 
 
 def capacity_table(result: Capacity) -> Table:
@@ -221,13 +208,12 @@ def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocu
 
 def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
     change, figures, bus = verdict.change, verdict.deciding, bus_of(result.profile)
-    network = verdict.network
-    left_out = bus.cycle(network, model=bus.deciding_model).left_out()
-    unable = {model.name: bus.cannot_express(network, model=model.name) for model in bus.timing_models}
+    unable = {model.name: bus.cannot_express(verdict.network, model=model.name) for model in bus.timing_models}
+    words = card(verdict)
     return {
         "period_us": verdict.period_us,
-        **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
-        "missed_limits": [need.key for need in verdict.missed_limits],
+        **fields(figures, "timing_model", "verdict", "fits"),
+        "missed_limits": [key for key, _ in verdict.missed_limits],
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **safety_record(figures, result.profile),
@@ -235,17 +221,18 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
         **certainty_record(figures),
         "uncertainty_parts": uncertainty_parts(figures),
         "reserve": result.profile.limits.reserve,
-        "not_in_it": [missing.key for missing in left_out],
+        "not_in_it": [part.key for part in verdict.left_out],
         "not_applicable": {model: list(keys) for model, keys in unable.items() if keys},
         "cheapest_change": change
         and {
             "changes": change.changes,
             "nodes": change.nodes,
             **fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
-            "circle_is_untested": change.circle_is_untested,
         },
-        "warnings": warnings(network, nodes=figures.nodes, most=figures.safe_nodes or 0),
-        "text": " ".join(map(sentence_text, verdict_sentences(verdict))),
+        "fastest_period_us": verdict.fastest and verdict.fastest.us,
+        "warnings": list(verdict.warnings),
+        "text": card_text(words),
+        "lines": [{"label": label, "text": sentence_text(line)} for label, line in words.lines],
     }
 
 

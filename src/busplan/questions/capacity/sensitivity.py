@@ -93,7 +93,7 @@ def _relieved(network: Network) -> Iterator[Network]:
     """The network without each cause of a term that can be taken away."""
     yield without_execution(network)
     yield network._replace(nonperiodic_us=0.0)
-    for changes in bus_of(network.profile).term_removals:
+    for changes in network.bus.term_removals:
         yield network_of(override(network.profile, dict(changes)))
 
 
@@ -131,7 +131,7 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     Those of every kind of bus are 10 % more execution time, a node and an axis more of each group, four bytes more of
     every payload, and a bus reset; a kind has its own before the last.
     """
-    bus = bus_of(network.profile)
+    bus = network.bus
     yield _slower(network, if_nothing="" if bus.has_execution(network) else "no execution time is on the bus")
     yield from (_one_node_more(network, alike) for alike in network.alike)
     yield from (_one_axis_more(network, alike) for alike in network.alike)
@@ -293,7 +293,7 @@ def sensitivities(capacity: Capacity) -> tuple[Sensitivity, ...]:
 
 def standing(network: Network) -> Standing:
     """Compute where a network stands: what `capacity` says of a profile, of any network."""
-    bus = bus_of(network.profile)
+    bus = network.bus
     cycle = bus.cycle(network, model=bus.deciding_model)
     sure, codes = certainty(cycle), limit_codes(network)
     broken = tuple(key for key, code in codes.items() if code == BROKEN)

@@ -215,9 +215,7 @@ def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], sensitivit
     return report._replace(
         blocks=(*report.blocks, *_of_periods(sensitivities)),
         document=sensitivity_document(result, verdicts, sensitivities),
-        records=with_profile(
-            result.profile.name, [row for sensitivity in sensitivities for row in _rows(sensitivity)]
-        ),
+        records=with_profile(result.profile.name, [row for sensitivity in sensitivities for row in _rows(sensitivity)]),
         is_card_enough=False,
     )
 

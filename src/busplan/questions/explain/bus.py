@@ -11,9 +11,9 @@ from busplan.elementwise import Number, Traced, value_of
 from busplan.forms.numbers import listed
 from busplan.questions.capacity.verdict import verdicts
 from busplan.questions.explain.formulas import against, result_of
+from busplan.questions.fit import figures as analysis
 from busplan.questions.fit.certainty import available_us, certainty
 from busplan.questions.fit.circle_refusal import STEP
-from busplan.questions.fit import figures as analysis
 from busplan.questions.fit.figures import CapacityFigures, capacity, certainty_numbers, numeric_figures
 from busplan.questions.fit.inputs import traced, traced_profile
 from busplan.questions.fit.network import bus_of, model_names, network_of
@@ -147,9 +147,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
         if profile.has_cycle:
             why, parts = _OF_GROUPS, (named["required_us"], named["available_us"])
         certain = known.keys() if model == bus.deciding_model else known.keys() - by_key(CERTAINTY).keys()
-        named |= {
-            key: result_of(None, why, parts) for key in certain if key not in named and values[key] is None
-        }
+        named |= {key: result_of(None, why, parts) for key in certain if key not in named and values[key] is None}
     named |= {
         key: result_of(None, "none for this network", (named["required_us"],))
         for key, number in cycle.figures().items()
@@ -174,7 +172,7 @@ _NO_CYCLE: Final = "none: messages alone have no cycle"
 
 def _most(network: Network, plain: CapacityFigures, *, model: str) -> dict[str, Traced]:
     """The largest number of nodes, and what follows from it."""
-    bus = bus_of(network.profile)
+    bus = network.bus
     # It does not depend on the profile's own: replace that by a number that is no input.
     searched = network.with_nodes(Traced((plain.max_nodes or 0) + 1))
     needed_us = bus.cycle(searched, model=model).required_us
@@ -237,7 +235,7 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
 
 def _most_safe(network: Network, plain: CapacityFigures) -> dict[str, Traced]:
     """The largest number of nodes that is shown to fit, and what follows from it."""
-    bus = bus_of(network.profile)
+    bus = network.bus
     beyond = network.with_nodes(Traced((plain.safe_nodes or 0) + 1))
     needed_us = certainty(bus.cycle(beyond, model=bus.deciding_model)).safe_required_us
     most = result_of(

@@ -166,9 +166,7 @@ def explain_report(explanation: Explanation) -> Report:
         Sentence(("Where ", Code(filled.derivations[0].figure.key), " of ", Code(name), " comes from")),
         tuple(_sections(filled)),
         _explain_document(filled),
-        with_profile(
-            name, [record for derivation in filled.derivations for record in _step_records(derivation)]
-        ),
+        with_profile(name, [record for derivation in filled.derivations for record in _step_records(derivation)]),
     )
 
 

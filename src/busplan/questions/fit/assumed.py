@@ -75,7 +75,7 @@ def _is_assumed(profile: Profile, key: str) -> bool:
 
 def _of_execution(figures: RuleFigures, network: Network, variance: float) -> list[_Share]:
     """Shares of the assumed execution times: what of its terms goes without them, and their part of the variance."""
-    network, bus = network._replace(period_us=figures.period_us), bus_of(network.profile)
+    network, bus = network._replace(period_us=figures.period_us), network.bus
     assumed = [group for group in network.groups if _counts(group, network)]
     if not assumed:
         return []
@@ -91,7 +91,7 @@ def _of_execution(figures: RuleFigures, network: Network, variance: float) -> li
 
 def _counts(group: Group, network: Network) -> bool:
     is_assumed = group.node.execution.grade == "assumed"
-    return is_assumed and bus_of(network.profile).has_execution(network._replace(groups=(group,)))
+    return is_assumed and network.bus.has_execution(network._replace(groups=(group,)))
 
 
 def _at_once(group: Group) -> Group:

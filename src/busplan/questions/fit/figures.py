@@ -1,10 +1,9 @@
 """Capacity of a bus: does the cycle fit its period, with what margin, and how many nodes does it carry?"""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import chain
 from math import inf
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
@@ -13,7 +12,6 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, existing, larger, plain
-from busplan.profile.toml import at_periods, override
 from busplan.questions.fit.certainty import (
     FITS,
     TIME,
@@ -27,11 +25,8 @@ from busplan.questions.fit.certainty import (
     time_code,
     verdict_code,
 )
-from busplan.questions.fit.circle_refusal import circle_refusals
-from busplan.questions.fit.figure_values import FigureValues
-from busplan.questions.fit.network import bus_of, model_names, network_of
+from busplan.questions.fit.network import changed
 from busplan.questions.fit.node_limit import largest_nodes, safe_nodes
-from busplan.sections.profile import Profile
 
 COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
 """Figures that each group has for itself; where all nodes are alike, they are those of the whole."""
@@ -91,8 +86,6 @@ class FitFigures:
     """Keys of the limits that are broken."""
     fits: bool
     """Whether no limit is broken, time among them: required <= available, without bias and uncertainty."""
-    circle_refused_by: tuple[str, ...]
-    """Keys that prevent the profile's circle test from running."""
     bias_us: float | None
     """This and the figures below exist for the timing model that decides."""
     margin_corrected_us: float | None
@@ -107,7 +100,7 @@ class FitFigures:
     """Parts of the uncertainty."""
     safe: bool
     """Whether every safety limit of the bus is kept, as a gap count that is safe for the hops."""
-    own: FigureValues
+    own: Mapping[str, float | str | None]
     """Figures that only this kind of bus has, and its terms, by key."""
 
     def values(self) -> dict[str, Any]:
@@ -140,60 +133,6 @@ class CapacityFigures(FitFigures):
         return {key: list(value) if isinstance(value, tuple) else value for key, value in named.items()}
 
 
-class Capacity(NamedTuple):
-    """The profile as it was analysed, and for each period a set of figures for each timing model."""
-
-    profile: Profile
-    networks: tuple[Network, ...]
-    """The network at each period."""
-    periods: tuple[tuple[CapacityFigures, ...], ...]
-
-    @property
-    def results(self) -> tuple[CapacityFigures, ...]:
-        """All sets of figures, period by period."""
-        return tuple(chain.from_iterable(self.periods))
-
-
-def capacity(
-    profile: Profile,
-    *,
-    periods_us: Sequence[float] | None = None,
-    timing_models: Sequence[str] | None = None,
-) -> Capacity:
-    """Tell whether the cycle fits its period, and how many nodes would.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    periods_us
-        Communication periods T_s [us]; without them the profile's own.
-    timing_models
-        Which timing models, in this order; without them all of the kind of bus.
-
-    Returns
-    -------
-    Capacity
-        Figures for each period and model, in this nesting.
-
-    Raises
-    ------
-    BusplanError
-        A period that the profile's schema refuses.
-
-    References
-    ----------
-    Paper, equations (1), (2), (11).
-    """
-    models = model_names(profile) if timing_models is None else timing_models
-    networks = [network_of(variant) for variant in at_periods(profile, periods_us)]
-    return Capacity(
-        profile,
-        tuple(networks),
-        tuple(tuple(capacity_figures(network, model=model) for model in models) for network in networks),
-    )
-
-
 def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
     """Whether a network fits its own period under one timing model, and how many nodes would."""
     fit = figures(network, model=model)
@@ -205,7 +144,7 @@ def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
 
 def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
     """How many nodes of each group fit a network's period, and are shown to fit; of all where they are alike."""
-    decides = model == bus_of(network.profile).deciding_model
+    decides = model == network.bus.deciding_model
     counts = []
     for alike in network.profile.alike_nodes:
         most, limit = largest_nodes(network, model=model, group=alike.name)
@@ -228,19 +167,16 @@ def figures(network: Network, *, model: str) -> FitFigures:
     model
         Timing model.
     """
-    profile = network.profile
-    bus = bus_of(profile)
+    bus, has_cycle = network.bus, bool(network.groups)
     cycle = bus.cycle(network, model=model)
     numbers: dict[str, Any] = {key: existing(number) for key, number in numeric_figures(cycle).items()}
-    terms = cycle.terms if profile.has_cycle else ()
-    own = FigureValues(
-        {
-            **{key: None if number is None else plain(number) for key, number in cycle.figures().items()},
-            **dict.fromkeys(figure.key for figure in bus.figures.terms),
-            **{term.key: term.us for term in terms},
-        }
-    )
-    overruns = profile.has_cycle and not fits_in(numbers["required_us"], available_us=numbers["available_us"])
+    terms = cycle.terms if has_cycle else ()
+    own = {
+        **{key: None if number is None else existing(number) for key, number in cycle.figures().items()},
+        **dict.fromkeys(figure.key for figure in bus.figures.terms),
+        **{term.key: existing(term.us) for term in terms},
+    }
+    overruns = has_cycle and not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     codes = limit_codes(network)
     broken = tuple(key for key, code in codes.items() if code == BROKEN)
     exceeded = (*broken, *((TIME,) if overruns else ()))
@@ -253,7 +189,6 @@ def figures(network: Network, *, model: str) -> FitFigures:
         binding_term=max(terms, key=lambda term: plain(term.us)).name if terms else _NO_TERM,
         exceeded=exceeded,
         fits=not exceeded,
-        circle_refused_by=tuple(cause.name for cause in circle_refusals(profile)),
         **(_certainty_figures(cycle, codes) if decides else _UNDECIDED),
         safe=bus.is_safe(network),
         own=own,
@@ -370,7 +305,7 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     is_shown
         Whether limits must be shown to be kept; otherwise the uncertainty of their values plays no part.
     """
-    bus = bus_of(network.profile)
+    bus = network.bus
     period_us = bus.periods.from_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
         if limit.period is not None:
@@ -380,21 +315,21 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     return period_us
 
 
-def after_reset(profile: Profile, deciding: FitFigures) -> FitFigures | None:
+def after_reset(network: Network, deciding: FitFigures) -> FitFigures | None:
     """Figures of a network after a bus reset; None unless it is shown to fit now and not after the reset.
 
     Parameters
     ----------
-    profile
+    network
         The network.
     deciding
         Its figures under the model that decides.
     """
-    changes = bus_of(profile).safety.after_reset
+    changes = network.bus.safety.after_reset
     if deciding.verdict != FITS or not changes:
         return None
-    reset = override(profile, dict(changes))
-    if reset == profile:
+    reset = changed(network, changes)
+    if reset.profile == network.profile:
         return None
-    after = figures(network_of(reset), model=deciding.timing_model)
+    after = figures(reset, model=deciding.timing_model)
     return None if after.verdict == FITS else after

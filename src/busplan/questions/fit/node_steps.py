@@ -64,7 +64,11 @@ def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     bus = bus_of(profile)
     longest = override(profile, {"cycle.period_us": min(MAX_TIME_US, bus.periods.longest_us)})
     is_safe = model == bus.deciding_model
-    most, limit = safe_nodes(network_of(longest), group=group) if is_safe else largest_nodes(network_of(longest), model=model, group=group)
+    most, limit = (
+        safe_nodes(network_of(longest), group=group)
+        if is_safe
+        else largest_nodes(network_of(longest), model=model, group=group)
+    )
     network = network_of(profile).asking(group)
     counts = np.arange(1, most + 1)
     cycle = bus.cycle(network.with_nodes(counts), model=model)

@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from busplan.buses.cycle import BusLatency
 from busplan.elementwise import Number, existing
 from busplan.errors import BusplanError
-from busplan.questions.fit.figure_values import FigureValues
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.sections.base import with_unchecked
 from busplan.sections.execution import TableExecution
@@ -24,14 +23,8 @@ class Transaction(NamedTuple):
     """Of which group of nodes; empty where all are alike."""
     payload_bytes: int | None
     nodes: int
-    phases: FigureValues
+    phases: Mapping[str, float | None]
     """Figures by their key in the register of the bus."""
-
-    def __getattr__(self, key: str) -> Any:
-        # Phases are attributes as the fields are; only what is no field comes here.
-        if not key.startswith("_") and key in self.phases:
-            return self.phases[key]
-        raise AttributeError(f"{self.transaction} has no figure {key!r}")
 
 
 class LatencyResult(NamedTuple):
@@ -87,7 +80,7 @@ def latency(
                 bus_latency.group,
                 bus_latency.payload_bytes,
                 nodes,
-                FigureValues(_whole_bytes(bus_latency.phases)),
+                _whole_bytes(bus_latency.phases),
             )
             for variant in variants
             for alike in zip(*(_latencies(variant, model) for model in models), strict=True)

@@ -132,7 +132,7 @@ def _terms(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 def _largest_term(answer: AllAnswers) -> Sentence:
     """Say which term takes most, by the model that decides."""
     deciding = answer.verdict.deciding
-    term = max(bus_of(answer.profile).figures.terms, key=lambda figure: deciding.own[figure.key])
+    term = max(bus_of(answer.profile).figures.terms, key=lambda figure: float(deciding.own[figure.key] or 0))
     return sentence(
         f"Of the {{}} that the cycle needs by the {deciding.timing_model} model, {term.label} takes the most, {{}}",
         attribute_value(REQUIRED, deciding),

@@ -330,7 +330,7 @@ def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict
         "max_axes": _number(axes * most.nodes, "count"),
         "limited_by": Column(np.asarray(most.limit, np.uint8), tuple(limit.key for limit in limits)),
     }
-    if model != bus_of(network.profile).deciding_model:
+    if model != network.bus.deciding_model:
         return {**counted, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _NO_WORD}
     to_be_safe = limits_to_be_safe(network)
     # No more nodes are shown to fit than fit.

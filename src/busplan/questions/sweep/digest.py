@@ -228,7 +228,7 @@ class Digest:
         return Report(
             Sentence(("Sweep of ", Code(self._sweep.profile.name))),
             (*self.sentences(), self._shown(), self._table()),
-            document,
+            document or {},
             None if document is None else document["rows"],
         )
 

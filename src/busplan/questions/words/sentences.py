@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, UNCERTAINTY, UTILISATION
+from busplan.buses.network import Network
 from busplan.buses.parts import Value as BusValue
 from busplan.buses.published import parts_tested
 from busplan.forms.blocks import Code, Part, Record, Sentence, ShownValue, attribute_value, joined, sentence
@@ -12,7 +13,6 @@ from busplan.profile.write import value_text
 from busplan.questions.fit.certainty import TIME, limits_behind
 from busplan.questions.fit.circle_refusal import circle_refusals
 from busplan.questions.fit.figures import FitFigures
-from busplan.buses.network import Network
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 
@@ -85,7 +85,7 @@ def warnings(network: Network, *, nodes: int, most: int) -> list[str]:
     most
         Largest number of nodes in the report [1]; 0 if it has none.
     """
-    return bus_of(network.profile).warnings(network, nodes=[number for number in (nodes, most) if number])
+    return network.bus.warnings(network, nodes=[number for number in (nodes, most) if number])
 
 
 def warning_sentences(network: Network, *, nodes: int, most: int) -> Iterator[Sentence]:
@@ -121,7 +121,7 @@ def execution_grades(profile: Profile) -> str | None:
 
 def broken_limits(figures: FitFigures, network: Network) -> list[str]:
     """Say by how much each limit of the bus is broken, or why it is not shown to be kept."""
-    broken = map(bus_of(network.profile).limit, limits_behind(figures))
+    broken = map(network.bus.limit, limits_behind(figures))
     if network.groups:
         network = network._replace(period_us=figures.period_us)
     return [limit.words(network) for limit in broken if limit is not None]
@@ -143,7 +143,7 @@ def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
 
 def not_applicable(network: Network) -> Iterator[Sentence]:
     """Say which timing models cannot express a profile, and why."""
-    bus = bus_of(network.profile)
+    bus = network.bus
     for model in bus.timing_models:
         keys = bus.cannot_express(network, model=model.name)
         if keys:
