@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, Typ
 
 if TYPE_CHECKING:
     from busplan.buses.network import Network
+    from busplan.buses.parts import Value
     from busplan.sections.profile import Profile
 
 Severity = Literal["error", "warning"]
@@ -56,10 +57,10 @@ class RuleSubject(Protocol):
     def others_fit(self) -> Sequence[tuple[str, bool]]:
         """The other timing models, each with whether the cycle fits; cheaper than their figures."""
 
-    def after(self, changes: Mapping[str, object]) -> RuleFigures:
+    def after(self, changes: Mapping[str, "Value"]) -> RuleFigures:
         """Capacity under the timing model that decides, with other values by dotted key."""
 
-    def counts(self, changes: Mapping[str, object] = ...) -> Sequence[Any]:
+    def counts(self, changes: Mapping[str, "Value"] | None = None) -> Sequence[Any]:
         """How many nodes of each group, or of all, fit and are shown to fit, with other values by dotted key."""
 
     def limit_words(self, key: str) -> str:

@@ -43,7 +43,7 @@ class Record(NamedTuple):
 def figures_of(subject: Subject) -> dict[str, float]:
     """Figures of a profile to record, by name."""
     figures: dict[str, float | None] = {}
-    for model in sorted(model_names(subject.profile)):
+    for model in sorted(model_names(subject.network)):
         capacity = capacity_figures(subject.network, model=model)
         for name in ("max_axes", "margin_us", "safe_axes", "margin_corrected_us"):
             figures[f"{capacity.timing_model}.{name}"] = getattr(capacity, name)

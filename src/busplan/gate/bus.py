@@ -7,13 +7,12 @@ from busplan.buses.limits import NODE, busy_words, slow_groups
 from busplan.buses.rule import Mending, RuleProblem, RuleSubject, margin, overrun, told_apart
 from busplan.questions.fit.assumed import heavy_assumptions
 from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME, fits_in, limits_behind
-from busplan.questions.fit.network import bus_of
 from busplan.sections.execution import TableExecution
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle does not fit, whatever the uncertainty."""
-    deciding, bus = subject.deciding, bus_of(subject.profile)
+    deciding, bus = subject.deciding, subject.network.bus
     if deciding.verdict != DOES_NOT_FIT:
         return
     broken = [limit for limit in map(bus.limit, deciding.exceeded) if limit is not None]
@@ -26,7 +25,7 @@ def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle may fit, but the uncertainty leaves that open."""
-    deciding, reserve, bus = subject.deciding, subject.profile.limits.reserve, bus_of(subject.profile)
+    deciding, reserve, bus = subject.deciding, subject.profile.limits.reserve, subject.network.bus
     if deciding.verdict != NOT_SHOWN:
         return
     for limit in map(bus.limit, limits_behind(deciding)):
@@ -79,7 +78,7 @@ def _spare(counts: Any, spare: int, limit: int) -> str:
 
 def _room(subject: RuleSubject, counts: Any) -> Mending:
     """How to make room for more nodes."""
-    limit = bus_of(subject.profile).limit(counts.safe_limited_by)
+    limit = subject.network.bus.limit(counts.safe_limited_by)
     return subject.cure() if limit is None or limit.is_safety else Mending(limit.way_out)
 
 

@@ -11,6 +11,7 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.gate.baseline import Baseline, Record, load_baseline, record_of
+from busplan.gate.circle import MOST_STEPS
 from busplan.gate.gate import check_document, check_source
 from busplan.gate.recording import Recording
 from busplan.gate.report import CheckReport, Located, check_report, summary_sentence
@@ -20,7 +21,6 @@ from busplan.profile.document import Document
 from busplan.profile.write import profile_text
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, argument, items, key_changes
-from busplan.questions.circle.check import MOST_STEPS
 from busplan.sections.profile import Profile
 
 

@@ -8,6 +8,7 @@ from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
 from busplan.gate import circle
 from busplan.gate.baseline import Record, figures_of, keys_of, record_of, regression
+from busplan.gate.circle import MOST_STEPS
 from busplan.gate.finding import Finding, Subject, Violation, finding_of
 from busplan.gate.recording import Recording, beside_plan
 from busplan.gate.rules import (
@@ -25,7 +26,6 @@ from busplan.profile.collect import ProfileSource
 from busplan.profile.document import Document, Spot
 from busplan.profile.keys import path_of
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
-from busplan.questions.circle.check import MOST_STEPS
 
 MARK: Final = "busplan:"
 _ADDRESSED: Final = re.compile(r"#\s*busplan:")

@@ -198,9 +198,7 @@ def known_model(network: Network, model: str, *, name: str) -> str:
     bus = network.bus
     names = [model.name for model in bus.timing_models]
     if model not in names:
-        raise BusplanError(
-            f"{name} {model}: no timing model of bus.kind {bus.kind}; there are {', '.join(names)}"
-        )
+        raise BusplanError(f"{name} {model}: no timing model of bus.kind {bus.kind}; there are {', '.join(names)}")
     keys = bus.cannot_express(network, model=model)
     if keys:
         raise BusplanError(

@@ -6,12 +6,11 @@ from typing import Final
 
 from busplan.buses.published import parts_tested
 from busplan.elementwise import FIT_ROUNDING, plain
-from busplan.forms.blocks import Card, Code, Gauge, Sentence, State, Words, joined
+from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
 from busplan.forms.numbers import listed, period, plural, sentence_text
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
 from busplan.questions.fit.figures import CapacityFigures
-from busplan.questions.fit.network import bus_of
 from busplan.questions.words.sentences import change_meanings, settings_sentence
 
 _FIGURES: Final = 3
@@ -158,12 +157,12 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
     if verdict.left_out:
         yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in verdict.left_out)),))
     yield "checked against", Sentence((_tested(verdict),))
-    for model in verdict.contradicting:
-        needed = f"{_us(model.required_us, figures.uncertainty_us)} us needed of {_us(model.available_us, None)}"
-        yield f"{model.timing_model} model", Sentence((f"says otherwise, {needed}, but does not decide",), "warns")
+    for other in verdict.contradicting:
+        needed = f"{_us(other.required_us, figures.uncertainty_us)} us needed of {_us(other.available_us, None)}"
+        yield f"{other.timing_model} model", Sentence((f"says otherwise, {needed}, but does not decide",), "warns")
     for model in bus.timing_models:
-        if keys := bus.cannot_express(network, model=model.name):
-            yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(keys)}",))
+        if missing := bus.cannot_express(network, model=model.name):
+            yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
     if verdict.after_reset is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in bus.safety.after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
@@ -177,7 +176,7 @@ def _tested(verdict: Verdict) -> str:
     return "; ".join(filter(None, (known, never))) or "no published figures"
 
 
-def uncertainty_parts(figures: CapacityFigures) -> list[dict[str, object]]:
+def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
     """Parts of the uncertainty, the largest first."""
     whole = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     return [

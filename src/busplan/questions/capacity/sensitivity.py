@@ -8,7 +8,6 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Perturbation
 from busplan.elementwise import existing, plain
 from busplan.errors import BusplanError
-from busplan.profile.toml import override
 from busplan.questions.fit.certainty import (
     TIME,
     VERDICTS,
@@ -20,12 +19,10 @@ from busplan.questions.fit.certainty import (
     time_code,
     verdict_code,
 )
-from busplan.questions.fit.figures import Capacity
-from busplan.questions.fit.network import bus_of, network_of, with_execution, with_payloads, without_execution
+from busplan.questions.fit.network import changed, network_of, with_execution, with_payloads, without_execution
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.base import value_at, with_unchecked
-from busplan.sections.profile import Profile
 
 
 class NextLimit(NamedTuple):
@@ -59,7 +56,7 @@ class NextBottleneck(NamedTuple):
     """Corrected margin without the largest term; None where nothing takes it out."""
 
 
-def next_bottleneck(profile: Profile) -> NextBottleneck:
+def next_bottleneck(network: Network) -> NextBottleneck:
     """Find what binds a network once its first bottleneck is gone.
 
     A term is taken out at its cause, and the cycle is computed anew: without execution, for
@@ -67,10 +64,10 @@ def next_bottleneck(profile: Profile) -> NextBottleneck:
 
     Parameters
     ----------
-    profile
+    network
         The network.
     """
-    network, bus = network_of(profile), bus_of(profile)
+    bus = network.bus
     cycle = bus.cycle(network, model=bus.deciding_model)
     binding = _largest(cycle)
     cycles = (bus.cycle(relieved, model=bus.deciding_model) for relieved in _relieved(network))
@@ -94,7 +91,7 @@ def _relieved(network: Network) -> Iterator[Network]:
     yield without_execution(network)
     yield network._replace(nonperiodic_us=0.0)
     for changes in network.bus.term_removals:
-        yield network_of(override(network.profile, dict(changes)))
+        yield changed(network, changes)
 
 
 def _largest(cycle: BusCycle, *, but: str = "") -> Term:
@@ -138,7 +135,7 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     yield _more_bytes(network)
     own = bus.perturbations(network)
     reset = Perturbation("a bus reset", bus.safety.after_reset, if_nothing="it is set so already")
-    yield from (_with_keys(network.profile, change) for change in (*own, *((reset,) if bus.safety.after_reset else ())))
+    yield from (_with_keys(network, change) for change in (*own, *((reset,) if bus.safety.after_reset else ())))
 
 
 def _slower(network: Network, *, if_nothing: str) -> Perturbed:
@@ -157,15 +154,15 @@ def _slower(network: Network, *, if_nothing: str) -> Perturbed:
 
 def _one_node_more(network: Network, alike: AlikeNodes) -> Perturbed:
     more = alike.nodes + 1
-    changed = network.asking(alike.name).with_nodes(more)
-    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, changed, "")
+    then = network.asking(alike.name).with_nodes(more)
+    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, then, "")
 
 
 def _one_axis_more(network: Network, alike: AlikeNodes) -> Perturbed:
     key, axes = alike.node_key("axes"), alike.node.axes + 1
-    changed, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
+    then, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
     note = unknown or ("" if alike.payload.follows_axes else "no payload follows the axes")
-    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, changed, note)
+    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, then, note)
 
 
 def _more_bytes(network: Network) -> Perturbed:
@@ -185,19 +182,19 @@ def _more_bytes(network: Network) -> Perturbed:
     return Perturbed(f"payload +{_PAYLOAD_STEP_BYTES} bytes", "payload_bytes", before, after, changed, unknown)
 
 
-def _with_keys(profile: Profile, perturbation: Perturbation) -> Perturbed:
+def _with_keys(network: Network, perturbation: Perturbation) -> Perturbed:
     """A change that a kind of bus names by keys of the profile."""
     key, before, after = ", ".join(perturbation.changes), None, None
     if len(perturbation.changes) == 1:
         ((_, after),) = perturbation.changes.items()
-        before = value_at(profile, key)
+        before = value_at(network.profile, key)
     if perturbation.why_not:
         return Perturbed(perturbation.label, key, before, None, None, perturbation.why_not)
     try:
-        changed = network_of(override(profile, dict(perturbation.changes)))
+        then = changed(network, perturbation.changes)
     except BusplanError as error:
         return Perturbed(perturbation.label, key, before, after, None, "; ".join(error.problems))
-    return Perturbed(perturbation.label, key, before, after, changed, perturbation.if_nothing)
+    return Perturbed(perturbation.label, key, before, after, then, perturbation.if_nothing)
 
 
 def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:
@@ -254,7 +251,7 @@ class Effect(NamedTuple):
 class Sensitivity(NamedTuple):
     """Effects of small changes on the margin at one period, by the timing model that decides."""
 
-    profile: Profile
+    network: Network
     """At that period."""
     timing_model: str
     now: Standing
@@ -263,32 +260,18 @@ class Sensitivity(NamedTuple):
     next_bottleneck: NextBottleneck
 
 
-def sensitivity(profile: Profile) -> Sensitivity:
+def sensitivity_of(network: Network) -> Sensitivity:
     """Make every small change of a network, and compute its cycle anew.
 
     Parameters
     ----------
-    profile
+    network
         The network.
-
-    Examples
-    --------
-    >>> from busplan.profile.shipped import load
-    >>> result = sensitivity(load("paper-1ms").profile)
-    >>> [effect.change for effect in result.effects[:2]]
-    ['one node more', 'one busy retry more']
     """
-    network = network_of(profile)
     now = standing(network)
     effects = [_effect(change, now) for change in perturbed(network)]
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
-    return Sensitivity(profile, bus_of(profile).deciding_model, now, tuple(effects), next_bottleneck(profile))
-
-
-def sensitivities(capacity: Capacity) -> tuple[Sensitivity, ...]:
-    """Sensitivity at each period of a capacity result."""
-    periods_us = (results[0].period_us for results in capacity.periods)
-    return tuple(sensitivity(override(capacity.profile, {"cycle.period_us": period_us})) for period_us in periods_us)
+    return Sensitivity(network, network.bus.deciding_model, now, tuple(effects), next_bottleneck(network))
 
 
 def standing(network: Network) -> Standing:

@@ -11,7 +11,7 @@ from busplan.errors import BusplanError
 from busplan.questions.fit.assumed import HeavyAssumption, heavy_assumptions
 from busplan.questions.fit.certainty import FITS, limits_behind
 from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
-from busplan.questions.fit.network import bus_of, changed
+from busplan.questions.fit.network import changed
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.questions.plan.changes import NODES, Changes, cure
 from busplan.questions.plan.needs import SmallestPeriod, missed_limits, smallest_period
@@ -151,4 +151,3 @@ def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple
     most = safe_nodes(after)[0] if after.is_uniform else None
     axes = None if most is None else most * int(after.profile.node.axes)
     return Change(found.changes, int(plain(target.nodes)), figures(after, model=model), most, axes), ""
-

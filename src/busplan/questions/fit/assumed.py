@@ -7,7 +7,6 @@ from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleFigures
 from busplan.elementwise import plain
 from busplan.questions.fit.inputs import given
-from busplan.questions.fit.network import bus_of
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 from busplan.sourced import Sourced

@@ -14,7 +14,6 @@ from busplan.sections.base import Section, with_unchecked
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
 
-
 PERIOD: Final = "cycle.period_us"
 
 

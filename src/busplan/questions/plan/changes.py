@@ -12,7 +12,7 @@ from busplan.buses.network import Network
 from busplan.buses.parts import Cost, Value
 from busplan.elementwise import FIT_ROUNDING, plain
 from busplan.errors import BusplanError
-from busplan.questions.fit.network import PERIOD, at_period, bus_of, changed, network_of
+from busplan.questions.fit.network import PERIOD, at_period, changed
 from busplan.questions.plan.needs import Need, most_asking, rooms, smallest_period, to_be_shown, unmet
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.base import MAX_TIME_US
@@ -218,7 +218,11 @@ def _payloads(network: Network, kept: Collection[str]) -> Iterator[Changes]:
     sizes = [size for size in range(step, most + 1, step) if _within(profile, size, kept)]
     # No more bytes are needed where fewer are not enough, but where a table of execution times falls.
     fits = bisect_left(sizes, x=True, key=lambda size: not _holds(network, _within(profile, size, kept)))
-    yield from (change for size in (sizes[max(fits - 1, 0)], sizes[0]) if (change := _within(profile, size, kept))) if sizes else ()
+    yield from (
+        (change for size in (sizes[max(fits - 1, 0)], sizes[0]) if (change := _within(profile, size, kept)))
+        if sizes
+        else ()
+    )
 
 
 def _holds(network: Network, change: Changes | None) -> bool:

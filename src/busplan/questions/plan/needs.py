@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 from busplan.buses.network import Network
 from busplan.elementwise import plain, within
 from busplan.questions.fit.certainty import TIME, certainty
-from busplan.questions.fit.network import at_period, bus_of
+from busplan.questions.fit.network import at_period
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 
 _MOST_SLICE_US: Final = 1e12
@@ -134,7 +134,9 @@ def unmet(network: Network) -> list[Need]:
     """Needs that a network does not meet at its own period; empty where every constraint of a plan holds."""
     limits = network.bus.limits
     found = [
-        Need(inf, limit.key, limit.words(network)) for limit in limits if limit.is_of_period and limit.is_broken(network)
+        Need(inf, limit.key, limit.words(network))
+        for limit in limits
+        if limit.is_of_period and limit.is_broken(network)
     ]
     found += _unmet([*to_be_shown(network), *_of_limits(network)], network)
     if not found:

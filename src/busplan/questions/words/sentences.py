@@ -7,13 +7,10 @@ from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, 
 from busplan.buses.network import Network
 from busplan.buses.parts import Value as BusValue
 from busplan.buses.published import parts_tested
-from busplan.forms.blocks import Code, Part, Record, Sentence, ShownValue, attribute_value, joined, sentence
-from busplan.forms.numbers import period_value
+from busplan.forms.blocks import Part, Record, Sentence, ShownValue, attribute_value, joined, sentence
 from busplan.profile.write import value_text
 from busplan.questions.fit.certainty import TIME, limits_behind
-from busplan.questions.fit.circle_refusal import circle_refusals
 from busplan.questions.fit.figures import FitFigures
-from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -62,17 +59,6 @@ def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
     return ('"', shown, '"') if quotes and isinstance(value, str) else (shown,)
 
 
-def refused_circle(profile: Profile) -> Iterator[Sentence]:
-    """Say why the circle that a profile asks for cannot be run; nothing where it can.
-
-    It stands first in every answer with a verdict: a circle that cannot be run is said before the verdict.
-    """
-    causes = circle_refusals(profile)
-    if causes:
-        subject = ("The circle of ", Code(profile.name), " cannot be run at ", period_value(profile.cycle.period_us))
-        yield Sentence((*subject, ": ", ", and ".join(cause.message for cause in causes), "."), "fails")
-
-
 def warnings(network: Network, *, nodes: int, most: int) -> list[str]:
     """Warnings, whatever the verdict.
 
@@ -93,7 +79,7 @@ def warning_sentences(network: Network, *, nodes: int, most: int) -> Iterator[Se
     return (Sentence((words,), "warns") for words in warnings(network, nodes=nodes, most=most))
 
 
-def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterator[Sentence]:
+def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterator[Sentence]:
     """Say how the execution time behind the figures is known; nothing without a grade, or where none is in them.
 
     Parameters
@@ -103,8 +89,8 @@ def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterato
     of_latency
         Whether the figures are latencies, and not those of the cycle.
     """
-    grades, bus, network = execution_grades(profile), bus_of(profile), network_of(profile)
-    if grades is not None and bus.has_execution(network, of_latency=of_latency):
+    grades = execution_grades(network.profile)
+    if grades is not None and network.bus.has_execution(network, of_latency=of_latency):
         text = f"The execution time behind these figures is {grades}."
         yield sentence(text, state="warns" if "assumed" in grades else "neutral")
 
@@ -150,15 +136,15 @@ def not_applicable(network: Network) -> Iterator[Sentence]:
             yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
 
 
-def reset_sentence(after: FitFigures | None, profile: Profile) -> Iterator[Sentence]:
+def reset_sentence(after: FitFigures | None, network: Network) -> Iterator[Sentence]:
     """Say that a cycle stops fitting at a bus reset; nothing if it does not."""
     if after is not None:
-        keys = ", ".join(f"{key} = {value}" for key, value in bus_of(profile).safety.after_reset.items())
+        keys = ", ".join(f"{key} = {value}" for key, value in network.bus.safety.after_reset.items())
         text = f"After a bus reset, with {keys} until it is set again, the verdict is: {after.verdict}."
         yield sentence(text, state="warns")
 
 
-def story(figures: FitFigures, profile: Profile) -> tuple[Part, ...]:
+def story(figures: FitFigures, network: Network) -> tuple[Part, ...]:
     """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict.
 
     Parameters
@@ -173,7 +159,7 @@ def story(figures: FitFigures, profile: Profile) -> tuple[Part, ...]:
         used = attribute_value(UTILISATION, figures)._replace(decimals=1)
         return sentence("{} to spare, {} of {} used", attribute_value(MARGIN, figures), used, available).parts
     short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
-    reasons = [Sentence((words,)) for words in broken_limits(figures, network_of(profile))]
+    reasons = [Sentence((words,)) for words in broken_limits(figures, network)]
     if TIME in figures.exceeded:
         reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
     return joined(*reasons, by=", and ").parts
@@ -191,7 +177,7 @@ def margin_parts(figures: FitFigures) -> tuple[Part, ...]:
     return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
 
 
-def safety_record(figures: FitFigures, profile: Profile) -> Record:
+def safety_record(figures: FitFigures, network: Network) -> Record:
     """Whether the settings of the bus are safe, by the key of its kind; empty if the kind has none."""
-    safety = bus_of(profile).safety.figure
+    safety = network.bus.safety.figure
     return {} if safety is None else {safety.key: figures.safe}
