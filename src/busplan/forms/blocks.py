@@ -305,6 +305,8 @@ class Chapter(NamedTuple):
     """Name for the style sheet: the section has the CSS class `part-<kind>`."""
     key: str = ""
     """Anchor that links point to; empty if none does."""
+    is_folded: bool = False
+    """Whether a screen shows its title alone until it is opened; print shows all."""
 
 
 Block = Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Card | Detail | Chapter

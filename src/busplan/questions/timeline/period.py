@@ -68,8 +68,8 @@ def model_bars(schedule: Schedule) -> tuple[ModelBar, ...]:
         The cycle, under one of them.
     """
     figures, bars = schedule.figures, []
-    for model in model_names(schedule.profile):
-        cycle = drawn_cycle(schedule.profile, model=model, number=schedule.number)
+    for model in model_names(schedule.network):
+        cycle = drawn_cycle(schedule.network, model=model, number=schedule.number)
         bars.append(ModelBar(model, plain(cycle.required_us), figures.available_us, figures.period_us))
     return tuple(bars)
 
