@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal, Protocol
 
 import typer
 
-from busplan.cli.answering import answer, naming
+from busplan.cli.answering import answer
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file, output_option
 from busplan.cli.output import refuse_terminal, write_document
@@ -106,8 +106,7 @@ def show_drawn(
             from busplan.forms.raster import picture
 
             require_apart({"--output": output}, inputs=inputs)
-            with naming(changes):
-                write_document(picture(find().svg(note=_changes_words(changes)), form), output)
+            write_document(picture(find().svg(note=_changes_words(changes)), form), output)
         case _:
             with answer(form, output, inputs=inputs, changes=changes, is_whole=is_whole) as give:
                 give(find().report())

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from busplan.cli.answering import answer, naming_option, report_with
+from busplan.cli.answering import answer, report_with
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument, option
 from busplan.cli.output import PlanFailsError, emit_document, say
-from busplan.cli.progress import progress_bar
 from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.errors import BusplanError
 from busplan.files import NewFile, new_file
@@ -56,31 +55,11 @@ def plan_command(
         str | None,
         option(
             "--free NAMES",
-            "Settings that may change, with commas, in the order of their cost: step (of the circle, where it does "
-            "not divide the period), gap_count, slice_ratio, responses (reads concatenated, writes unified), schedule "
-            "(where the bus has one), payload (less), period, nodes (fewer).  [default: "
-            "step,gap_count,slice_ratio,period]",
+            "Settings that may change, with commas, in the order of their cost: gap_count, slice_ratio, responses "
+            "(reads concatenated, writes unified), schedule (where the bus has one), payload (less), period, nodes "
+            "(fewer).  [default: gap_count,slice_ratio,period]",
         ),
     ] = None,
-    circle: Annotated[
-        bool,
-        typer.Option(
-            "--circle/--no-circle",
-            help="Run the circle test, where the profile has a section for it (servo, circle, tolerance, ...), or "
-            "leave it out.",
-        ),
-    ] = True,
-    max_circles: Annotated[
-        int,
-        typer.Option(
-            "--max-circles",
-            metavar="N",
-            min=1,
-            max=100_000,
-            help="Most periods to test one by one for the nearest that passes the circle; then the steps double, and "
-            "the answer is marked as not proven.",
-        ),
-    ] = 50,  # search.MAX_CIRCLES, which --help must not load
     apply: Annotated[
         bool,
         typer.Option(
@@ -106,15 +85,13 @@ def plan_command(
 ) -> None:
     """Tell what to set for a number of nodes or axes: gap count, slice ratio, period, or several of them.
 
-    One plan is recommended. It changes cheap settings first, costlier ones only if needed and as little as possible;
-    --free lists them by cost. With it the goal is shown to fit with its reserve, at a safe gap count, within all
-    [limits], with a circle that passes and a period that servo.step_us divides. The slice ratio goes up to 0.9; the
+    It changes one thing at a time, the cheapest first and as little as possible, until the goal is shown to fit with
+    its reserve, at a safe gap count, within all [limits]; --free lists them by cost. The slice ratio goes up to 0.9; the
     period changes only if nothing cheaper is enough. Values given by an option are kept.
 
-    The table has the steps of the search, then the smallest period, the largest payload (of read and write) and the
-    most nodes, each with all cheaper settings free. Margins are in us, less the model's bias. Without a plan the answer
-    names what prevents it and what would be enough. `busplan manual plan` has more. Exits 0 when there is a plan, 1
-    when there is none.
+    The table has a row for each thing that was tried. Margins are in us, less the model's bias. Without a plan the
+    answer names what prevents it and what would be enough. `busplan manual plan` has more. Exits 0 when there is a
+    plan, 1 when there is none.
 
     Example: busplan plan paper-1ms --axes 16
     """
@@ -140,16 +117,12 @@ def plan_command(
         with ExitStack() as files:
             # Opened before the search, so that a path that cannot be written fails at once.
             file = files.enter_context(new_file(new, overwrite=force)) if new and not piped else None
-            with progress_bar("circle tests") as progress, naming_option("axes", "free"):
-                result = plan(
-                    loaded.profile,
-                    axes=axes,
-                    wanted=changes,
-                    free=None if free is None else [name.strip() for name in free.split(",")],
-                    circle=circle,
-                    max_circles=max_circles,
-                    progress=progress,
-                )
+            result = plan(
+                loaded.profile,
+                axes=axes,
+                wanted=changes,
+                free=None if free is None else [name.strip() for name in free.split(",")],
+            )
             if new is not None:
                 _write_profile(result, file)
         if result.recommended is None:

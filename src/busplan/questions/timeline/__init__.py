@@ -3,6 +3,8 @@
 import re
 from typing import Final
 
+from busplan.buses.network import Network
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
