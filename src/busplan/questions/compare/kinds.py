@@ -14,7 +14,7 @@ from busplan.questions.fit.figures import FitFigures, after_reset, figures
 from busplan.questions.fit.inputs import given
 from busplan.questions.fit.network import at_period, changed, network_of, varied_nodes
 from busplan.questions.fit.node_limit import safe_nodes
-from busplan.questions.plan.changes import needed_settings
+from busplan.questions.plan.changes import settings_to_be_carried
 from busplan.questions.plan.needs import SmallestPeriod, smallest_period
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
@@ -159,7 +159,7 @@ def _on_kind(network: Network, kind: str) -> MachineOnKind | NotOnKind:
     except BusplanError as error:
         return NotOnKind(kind, error.problems)
     on_kind, assumed = network_of(conversion.profile), conversion.assumed
-    needed = {} if kind == network.bus.kind else needed_settings(on_kind)
+    needed = {} if kind == network.bus.kind else settings_to_be_carried(on_kind)
     if needed:
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
         assumed = (*tried, *(each for each in assumed if each.key not in needed))

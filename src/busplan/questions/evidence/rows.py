@@ -26,7 +26,7 @@ from busplan.progress import Progress
 from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
-from busplan.questions.fit.network import model_names, network_of
+from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.sections.base import Section
 from busplan.sourced import Grade
 

@@ -32,6 +32,7 @@ from busplan.questions.plan.changes import (
     freedoms,
     nodes_for_axes,
     search,
+    settings_to_be_carried,
     stands_in_the_way,
 )
 from busplan.questions.plan.needs import Need, most_asking
@@ -140,6 +141,11 @@ class PlanAnswer(Answer):
         from busplan.questions.plan.report import plan_report
 
         return plan_report(self)
+
+
+def needed_settings(profile: Profile) -> Changes:
+    """The cheapest setting of the bus with which some slice carries a machine, where none does now; else empty."""
+    return settings_to_be_carried(network_of(profile))
 
 
 def plan(

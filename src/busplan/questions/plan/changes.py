@@ -330,7 +330,7 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
     return ceil(axes / int(alike.node.axes))
 
 
-def needed_settings(network: Network) -> Changes:
+def settings_to_be_carried(network: Network) -> Changes:
     """The cheapest setting of the bus with which some slice carries the network, where none does now; else empty."""
 
     def is_carried(trial: Network | None) -> bool:
