@@ -227,13 +227,6 @@ FITS: Final = Figure(
     sort="truth",
     better="more",
 )
-CIRCLE_REFUSED_BY: Final = Figure(
-    "circle_refused_by",
-    "refused",
-    "profile",
-    "keys that prevent the profile's circle test from running",
-    sort="words",
-)
 _CERTAINTY: Final = "JCGM 100"
 BIAS: Final = Figure("bias_us", "bias", "residual", "mean time that the bus takes beyond the timing model", "bias")
 MARGIN_CORRECTED: Final = Figure(
@@ -370,7 +363,7 @@ def capacity_figures(
         *terms,
         *(BINDING_TERM, UTILISATION, MARGIN),
         *counted,
-        *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS, CIRCLE_REFUSED_BY),
+        *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS),
         *CERTAINTY,
     )
 
