@@ -327,7 +327,7 @@ def simulated(machine: Machine) -> list[Logged]:
     )
 
 
-def recorded(machine: Machine) -> tuple[str, dict[str, float]]:
+def recorded(machine: Machine) -> tuple[bytes, dict[str, float]]:
     """A machine's log, which begins and ends anywhere in a cycle, and the truth of it."""
     random = Random(-machine.seed)
     start_us = (1 + random.random()) * machine.period_us
@@ -335,7 +335,7 @@ def recorded(machine: Machine) -> tuple[str, dict[str, float]]:
     logged = [frame for frame in simulated(machine) if start_us <= frame.us < end_us]
     stamped = list(_handed_over(logged, machine.latency_us, random)) if machine.latency_us else logged
     start_s = 1_700_000_000 + random.random()
-    return candump(stamped, start_s=start_s, step_us=machine.step_us), truth(machine, logged)
+    return candump(stamped, start_s=start_s, step_us=machine.step_us).encode(), truth(machine, logged)
 
 
 def truth(machine: Machine, logged: list[Logged]) -> dict[str, float]:
@@ -358,6 +358,11 @@ def truth(machine: Machine, logged: list[Logged]) -> dict[str, float]:
     for stream, each in own.items():
         found[f"{stream} data"] = max(len(frame.data) for frames in each.values() for frame in frames)
         late = [[frame.us - frame.queued.due_us for frame in frames] for frames in each.values()]
+        if stream == "SYNC" or stream in pdos:
+            numbers = [sorted(frame.queued.number for frame in frames) for frames in each.values()]
+            due = sum((own[-1] - own[0]) // pdos.get(stream, 1) + 1 for own in numbers)
+            found[f"{stream} missing"] = due - sum(len(set(own)) for own in numbers)
+            found[f"{stream} twice"] = sum(len(own) - len(set(own)) for own in numbers)
         periods = [
             pdos.get(stream, 1) * (after.due_us - before.due_us) / (after.number - before.number)
             for before, after in ((frames[0].queued, frames[-1].queued) for frames in each.values())
