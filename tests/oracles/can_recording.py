@@ -234,6 +234,7 @@ class _Host:
     def __init__(self, machine: Machine) -> None:
         self.machine, self.random, bus = machine, Random(machine.seed), machine.plan["bus"]
         self.nodes = tuple(nodes_of(machine.plan))
+        self.feedback = {pdo.stream for node in self.nodes for pdo in node.feedback}
         self.full = self.random.randrange(240)
         """So many cycles before the first one all PDOs went."""
         self.extended, self.fd = bus.get("identifier_bits") == 29, "data_bit_rate_kbit_s" in bus
@@ -241,13 +242,14 @@ class _Host:
         """When a host that computes in a cycle of its own sends commands, in the time of the slowest answer."""
         self.missing: dict[int, int] = {}
         """Feedback frames that have not arrived, by cycle."""
-        self.pools: dict[int, list[bytes]] = {}
+        self.values: dict[tuple[int, int], list[bytes]] = {}
 
     def data(self, identifier: int, size: int) -> bytes:
         """One of the eight values that a frame has."""
-        if identifier not in self.pools:
-            self.pools[identifier] = [self.random.randbytes(size) for _ in range(7)] + [bytes(size)]
-        return self.random.choice(self.pools[identifier])
+        values = self.values.setdefault((identifier, size), [])
+        if not values:
+            values += [self.random.randbytes(size) for _ in range(7)] + [bytes(size)]
+        return self.random.choice(values)
 
     def sent(self, us: float, pdo: Pdo, cycle: int) -> Queued:
         """A frame of the cycle."""
@@ -269,6 +271,7 @@ class _Host:
         for message in machine.plan.get("message", ()):
             manner = machine.manners.get(message["name"]) or random.choice(MANNERS)
             bits, fd = message.get("identifier_bits", bus.get("identifier_bits", 11)), message.get("fd", False)
+            # As many frames at once as a burst has, so that the mean period is the planned one.
             burst = message.get("burst", 1)
             for node in range(1, len(self.nodes) + 1) if message.get("per_node") else (0,):
                 identifier = message["identifier"] + node
@@ -300,7 +303,7 @@ class _Host:
                 slowest_us = max((node.execution_us + node.extra_us for node in due), default=0.0)
                 share = self.host_share * self.random.uniform(0.9, 1)
                 yield from self.commands(frame.us + share * slowest_us, cycle)
-        elif self.nodes and stream in {pdo.stream for node in self.nodes for pdo in node.feedback}:
+        elif stream in self.feedback:
             self.missing[cycle] -= 1
             if not self.missing[cycle] and not bus.get("pipeline_cycles", 0):
                 yield from self.commands(frame.us + self.random.uniform(0.5, 1) * bus.get("host_us", 0.0), cycle)
@@ -390,8 +393,7 @@ def candump(
     """A log of `candump -l`."""
     lines = []
     for frame in logged:
-        time_us = round((start_s * 10**6 + frame.us) // step_us * step_us) if step_us > 1 else 0
-        time_us = time_us or round(start_s * 10**6 + frame.us)
+        time_us = int((start_s * 10**6 + frame.us) // step_us * step_us)
         name = f"{frame.identifier:08X}" if frame.extended else f"{frame.identifier:03X}"
         data = f"{f'#{int(frame.queued.switched)}' * frame.fd}{frame.data.hex().upper()}"
         what = "20000088#0000000000000000" if frame.is_error else f"{name}#{data}"

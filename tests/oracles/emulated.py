@@ -192,10 +192,8 @@ def commands_late(subject: Subject, least: float, most: float) -> Any:
 def slow_commands_late(subject: Subject) -> Any:
     """The same of the nodes that are not due in every cycle."""
     slower = {number: node.every for number, node in enumerate(can.nodes_of(subject.plan)) if node.every > 1}
-    if not slower:
-        raise NoPlaceError
     machine = commands_late(subject, 0, 1.9)
-    late = dict.fromkeys(subject.some(max(slower.values())), max(machine.late.values()))
+    late = dict.fromkeys(subject.some(max(slower.values(), default=subject.cycles)), max(machine.late.values()))
     return replace(machine, late=late, late_nodes=frozenset(slower))
 
 
@@ -207,57 +205,46 @@ def sync_late(subject: Subject) -> Any:
     return replace(subject.machine(), sync_jitter_us=late_us)
 
 
-def of_plan(subject: Subject, **sections: Any) -> Any:
-    """A machine of a plan with other sections."""
-    return subject.machine(subject.plan | sections)
-
-
 def other_period(subject: Subject) -> Any:
     """A machine at another period."""
     if "cycle" not in subject.plan:
         raise NoPlaceError
     period_us = subject.plan["cycle"]["period_us"] * subject.random.choice((2.0, 1.05, 0.98))
-    return of_plan(subject, cycle={"period_us": period_us})
+    return subject.machine(subject.plan | {"cycle": {"period_us": period_us}})
 
 
-def most_frequent(subject: Subject) -> tuple[int, Plan]:
-    """Place and keys of the message with the shortest period, of which thirty come or so."""
-    messages = subject.plan["message"]
-    place = min(range(len(messages)), key=lambda place: float(messages[place]["period_us"]), default=None)
-    if place is None or messages[place]["period_us"] * 30 > subject.cycles * subject.machine().period_us:
+def most_frequent(subject: Subject) -> tuple[Plan, Plan]:
+    """A plan to be changed, and in it the message of the shortest period; thirty of it come or so."""
+    plan = deepcopy(subject.plan)
+    message: Plan | None = min(plan["message"], key=lambda own: float(own["period_us"]), default=None)
+    if message is None or message["period_us"] * 30 > subject.cycles * subject.machine().period_us:
         raise NoPlaceError
-    return place, messages[place]
-
-
-def with_message(subject: Subject, place: int, more: Plan) -> list[Plan]:
-    """All messages, one of them changed."""
-    messages = list(subject.plan["message"])
-    messages[place] = messages[place] | more
-    return messages
+    return plan, message
 
 
 def longer(subject: Subject) -> Any:
     """The most frequent message is longer by a byte, or by as many as a frame of FD has more."""
-    place, message = most_frequent(subject)
+    plan, message = most_frequent(subject)
     size = can.padded(message["payload_bytes"])
     if size == (64 if message.get("fd") else 8):
         raise NoPlaceError
-    return of_plan(subject, message=with_message(subject, place, {"payload_bytes": can.padded(size + 1)}))
+    message["payload_bytes"] = can.padded(size + 1)
+    return subject.machine(plan)
 
 
 def often(subject: Subject) -> Any:
     """The most frequent message comes twice as often."""
-    place, message = most_frequent(subject)
-    half_us = message["period_us"] / 2
-    more = {"period_us": half_us, "jitter_us": min(message["jitter_us"], half_us)}
-    return replace(of_plan(subject, message=with_message(subject, place, more)), manners={message["name"]: "periodic"})
+    plan, message = most_frequent(subject)
+    message["period_us"] /= 2
+    message["jitter_us"] = min(message["jitter_us"], message["period_us"])
+    return replace(subject.machine(plan), manners={message["name"]: "periodic"})
 
 
 def unplanned(subject: Subject) -> Any:
     """A message that is not planned, ten times."""
     period_us = subject.cycles * subject.machine().period_us / 10
     more = {"name": "unplanned", "identifier": 0x7EF, "identifier_bits": 11, "payload_bytes": 4, "period_us": period_us}
-    return of_plan(subject, message=[*subject.plan["message"], more])
+    return subject.machine(subject.plan | {"message": [*subject.plan["message"], more]})
 
 
 def late_starts(subject: Subject) -> Any:
@@ -334,6 +321,8 @@ class Tried(NamedTuple):
     recorder: str
     errors: list[str]
     """Of the machine without a fault."""
+    is_warned: bool
+    """Whether there is any word of it."""
     judged: list[tuple[str, bool]]
     faults: dict[str, tuple[float, ...]]
     """Whether there is an error, whether one names the fault, and the share of figures within U of the truth."""
@@ -361,7 +350,8 @@ def tried(kind: str, seed: int, said: argparse.Namespace) -> Tried:
             else:
                 hidden[fault.name] = bool(one.errors), bool(one.found)
         clean = subject.clean
-        return Tried(subject.recorder or subject.machine().form, clean.errors, list(clean.judged()), faults, hidden)
+        recorder, words = subject.recorder or subject.machine().form, bool(clean.found)
+        return Tried(recorder, clean.errors, words, list(clean.judged()), faults, hidden)
 
 
 def main() -> None:
@@ -382,7 +372,7 @@ def main() -> None:
             each = list(pool.map(partial(tried, kind, said=said), seeds))
         wrong = [seed for seed, one in zip(seeds, each, strict=True) if one.errors]
         write(f"\n{kind}: {len(each)} machines; {len(wrong)} without a fault have an error: {wrong}")
-        table("stamps", ("error",), ((one.recorder, (bool(one.errors),)) for one in each))
+        table("stamps", ("error", "any word"), ((one.recorder, (bool(one.errors), one.is_warned)) for one in each))
         table("error without a fault", (), ((quantity_of(words), ()) for one in each for words in one.errors))
         table("figure", ("within U",), ((name, (is_within,)) for one in each for name, is_within in one.judged))
         table("fault", ("error", "named", "within U"), (pair for one in each for pair in one.faults.items()))
