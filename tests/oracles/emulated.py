@@ -178,7 +178,12 @@ class Fault(NamedTuple):
     machine: Callable[[Subject], Any]
     """The machine that has it."""
     named: str
-    """What a finding that names it says, as a regular expression."""
+    """What an error that names it says, as a regular expression; empty where any word of the gate does."""
+
+    def is_named(self, recording: Recording) -> bool:
+        """Whether the gate names it."""
+        words = recording.errors if self.named else [words for _, words in recording.found]
+        return any(re.search(self.named, own) for own in words)
 
 
 def commands_late(subject: Subject, least: float, most: float) -> Any:
@@ -309,7 +314,7 @@ HIDDEN: Final = (
     Fault("ethercat", "stamps of no port", lambda s: replace(s.machine(), at_port=False), ""),
     Fault("ethercat", "dropped packets", lambda s: replace(s.machine(), form="pcapng ns", dropped=5), ""),
 )
-"""Recordings that do not show whether a machine keeps its plan: any word of the gate is right."""
+"""Recordings that do not show whether a machine keeps its plan."""
 
 
 # --- many machines ------------------------------------------------------------------------------------------
@@ -325,9 +330,7 @@ class Tried(NamedTuple):
     """Whether there is any word of it."""
     judged: list[tuple[str, bool]]
     faults: dict[str, tuple[float, ...]]
-    """Whether there is an error, whether one names the fault, and the share of figures within U of the truth."""
-    hidden: dict[str, tuple[float, ...]]
-    """Whether there is any word."""
+    """Whether there is an error, whether the fault is named, and the share of figures within U of the truth."""
 
 
 def tried(kind: str, seed: int, said: argparse.Namespace) -> Tried:
@@ -337,21 +340,12 @@ def tried(kind: str, seed: int, said: argparse.Namespace) -> Tried:
         folder.mkdir(parents=True, exist_ok=True)
         subject = Subject(kind, seed, folder, said.times, said.events)
         faults: dict[str, tuple[float, ...]] = {}
-        hidden: dict[str, tuple[float, ...]] = {}
         for fault in (*FAULTS, *HIDDEN):
-            if fault.kind != kind or said.fault not in fault.name:
-                continue
-            if (one := subject.with_fault(fault)) is None:
-                continue
-            within = [is_within for _, is_within in one.judged()] or [False]
-            is_named = any(re.search(fault.named, words) for words in one.errors)
-            if fault.named:
-                faults[fault.name] = bool(one.errors), is_named, sum(within) / len(within)
-            else:
-                hidden[fault.name] = bool(one.errors), bool(one.found)
-        clean = subject.clean
-        recorder, words = subject.recorder or subject.machine().form, bool(clean.found)
-        return Tried(recorder, clean.errors, words, list(clean.judged()), faults, hidden)
+            if fault.kind == kind and said.fault in fault.name and (one := subject.with_fault(fault)):
+                within = [is_within for _, is_within in one.judged()] or [False]
+                faults[fault.name] = bool(one.errors), fault.is_named(one), sum(within) / len(within)
+        clean, recorder = subject.clean, subject.recorder or subject.machine().form
+        return Tried(recorder, clean.errors, bool(clean.found), list(clean.judged()), faults)
 
 
 def main() -> None:
@@ -376,7 +370,6 @@ def main() -> None:
         table("error without a fault", (), ((quantity_of(words), ()) for one in each for words in one.errors))
         table("figure", ("within U",), ((name, (is_within,)) for one in each for name, is_within in one.judged))
         table("fault", ("error", "named", "within U"), (pair for one in each for pair in one.faults.items()))
-        table("nothing to see", ("error", "any word"), (pair for one in each for pair in one.hidden.items()))
 
 
 def quantity_of(words: str) -> str:

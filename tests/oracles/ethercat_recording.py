@@ -9,6 +9,7 @@ stands in `Machine`.
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from math import lcm
 from random import Random
 from typing import Any, Final, NamedTuple
@@ -206,22 +207,20 @@ def truth(machine: Machine, each: list[Trip]) -> dict[str, float]:
     whole = [own for own in by_cycle.values() if all(trip.returns for trip in own)]
     most_us = max(map(_wire_us, machine.in_turn))
     fullest = [own for own in whole if _wire_us([trip.frame for trip in own]) == most_us]
-    last = max(by_cycle)
-    due = [cycle for cycle in range(min(by_cycle), last + 1) if machine.in_turn[cycle % len(machine.in_turn)]]
+    cycles = range(min(by_cycle), max(by_cycle) + 1)
     starts = [own[0].late_us for own in by_cycle.values()]
-    hosts = {"whole": [own[-1].host_us for own in whole], "fullest": [own[-1].host_us for own in fullest]}
     back = [trip for trip in each if trip.returns]
     return {
         "period": machine.period_us * machine.clock * (1 + machine.bend),
         "latest start": max(starts) - min(starts),
         "round trip": max(own[-1].back_us - own[0].us for own in fullest),
-        "master, least": max(hosts["fullest"]),
-        "master, most": max(hosts["whole"]),
+        "master, least": max(own[-1].host_us for own in fullest),
+        "master, most": max(own[-1].host_us for own in whole),
         "frames in a cycle": max(map(len, machine.in_turn)),
         "datagrams": max(sum(size + 12 for frame in own for *_, size in frame.datagrams) for own in machine.in_turn),
         "lost": len(each) - len(back),
         "wrong": sum(trip.is_wrong for trip in back),
-        "without a frame": len(due) - len(by_cycle),
+        "without a frame": sum(bool(machine.in_turn[at % len(machine.in_turn)]) for at in cycles) - len(by_cycle),
     }
 
 
@@ -273,29 +272,24 @@ def frames_of(plan: dict[str, Any]) -> tuple[tuple[Frame, ...], ...]:
     groups = groups_of(plan)
     both = [(bytes_of(group, "read"), bytes_of(group, "write")) for group in groups]
     sizes = [max(pair) if layout == "LRW-shared" else sum(pair) for pair in both]
-    devices = sum(group["nodes"] for group in groups)
     totals = [size * group["nodes"] for size, group in zip(sizes, groups, strict=True)]
     first = first_cycles(groups, totals, is_spread=bus.get("units", "spread") == "spread")
+    each = list(zip(groups, first, both, sizes, accumulate(totals, initial=0x10000), strict=False))
+    added = tuple(housekeeping(bus, sum(group["nodes"] for group in groups)))
     headers = 24 if layout == "LRD-LWR" else 12
     cycles = []
     for cycle in range(lcm(*(group["every"] for group in groups))):
-        added = tuple(housekeeping(bus, devices))
         packed: list[list[tuple[int, int, int]]] = [[]]
-        room, address = MOST_BYTES - headers - sum(part[0][2] + 12 for part in added), 0
-        for group, start, (read, write), size in zip(groups, first, both, sizes, strict=True):
-            for _ in range(group["nodes"] if (cycle - start) % group["every"] == 0 and size else 0):
+        room = MOST_BYTES - headers - sum(size + 12 for (*_, size), _ in added)
+        for group, start, (read, write), size, address in each:
+            for device in range(group["nodes"] if (cycle - start) % group["every"] == 0 and size else 0):
                 if size > room:
                     packed.append([])
                     room = MOST_BYTES - headers
-                packed[-1].append((read, write, address))
-                room, address = room - size, address + size
-            address += 0 if (cycle - start) % group["every"] == 0 else size * group["nodes"]
-        frames = []
-        for place, own in enumerate(packed):
-            parts = [*(added if not place else ()), *_process(own, layout)]
-            if parts:
-                frames.append(Frame(*(tuple(column) for column in zip(*parts, strict=True))))
-        cycles.append(tuple(frames))
+                packed[-1].append((read, write, address + device * size))
+                room -= size
+        parts = [[*(() if place else added), *_process(own, layout)] for place, own in enumerate(packed)]
+        cycles.append(tuple(Frame(*(tuple(column) for column in zip(*own, strict=True))) for own in parts if own))
     return tuple(cycles)
 
 
@@ -304,7 +298,7 @@ def _process(own: list[tuple[int, int, int]], layout: str) -> Iterator[tuple[Dat
     if not own:
         return
     reads, writes = sum(bool(read) for read, *_ in own), sum(bool(write) for _, write, _ in own)
-    address = 0x10000 + own[0][2]
+    address = own[0][2]
     if layout == "LRD-LWR":
         yield (LRD, address, sum(read for read, *_ in own)), reads
         yield (LWR, address + 0x800000, sum(write for _, write, _ in own)), writes
