@@ -279,10 +279,11 @@ class _Host:
                 due_us, number = random.uniform(0, period_us), 0
                 while due_us < (machine.cycles + 3) * machine.period_us:
                     late_us = message.get("jitter_us", 0.0) * (number % 2 if manner == "pairs" else random.random())
-                    for _ in range(burst):
-                        size = message["payload_bytes"]
-                        data = self.data(identifier, padded(size) if fd else size)
-                        more = fd, message.get("brs", True), message["name"], number, due_us
+                    for place in range(number * burst, (number + 1) * burst):
+                        data = self.data(
+                            identifier, padded(message["payload_bytes"]) if fd else message["payload_bytes"]
+                        )
+                        more = fd, message.get("brs", True), message["name"], place, due_us
                         yield Queued(due_us + late_us, identifier, data, bits == 29, *more)
                     due_us += period_us + (random.expovariate(1 / period_us) if manner == "sporadic" else 0)
                     number += 1

@@ -1,6 +1,6 @@
 """Random machines that keep a random plan, and machines with a fault, held against their plans by busplan.
 
-    python -m tests.oracles.emulated --count 100 --seed 1 --kind can --fault "SYNC missing" --keep /tmp/missed
+    python -m tests.oracles.emulated --count 100 --seed 1 --kind can --fault "SYNC missing" --keep missed
 
 Of each machine a recording is written by `can_recording` or `ethercat_recording`, which know the truth of it. Said are:
 how many machines without a fault have an error of the gate; how many of the figures of `measured` lie within their U of
