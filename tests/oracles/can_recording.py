@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from heapq import heapify, heappop, heappush
-from itertools import count
+from itertools import accumulate, count
 from math import ceil
 from pathlib import Path
 from random import Random
@@ -344,38 +344,46 @@ def recorded(machine: Machine) -> tuple[bytes, dict[str, float]]:
 
 def truth(machine: Machine, logged: list[Logged]) -> dict[str, float]:
     """What a log has in truth, by the emulator's own words: times and periods in us, shares 0..1, counts."""
-    found: dict[str, float] = {"frames": len(logged), "error frames": sum(frame.is_error for frame in logged)}
+    sent = [frame for frame in logged if not frame.is_error]
+    streams: dict[str, dict[int, list[Logged]]] = defaultdict(lambda: defaultdict(list))
+    for frame in sent:
+        streams[frame.queued.stream][frame.identifier].append(frame)
+    syncs = {frame.queued.number: frame.us for frame in sent if frame.queued.stream == "SYNC"}
+    pdos = {pdo.stream: node.every for node in nodes_of(machine.plan) for pdo in node.feedback + node.command}
+    pdos["SYNC"] = 1
+    found: dict[str, float] = defaultdict(float, {"error frames": len(logged) - len(sent)})
     if len(logged) > 1:
         found["load"] = sum(frame.wire_us for frame in logged[1:]) / (logged[-1].us - logged[0].us)
-    own: dict[str, dict[int, list[Logged]]] = defaultdict(lambda: defaultdict(list))
-    for frame in logged:
-        if not frame.is_error:
-            own[frame.queued.stream][frame.identifier].append(frame)
-    syncs = {frame.queued.number: frame.us for frame in logged if frame.queued.stream == "SYNC"}
-    pdos = {pdo.stream: node.every for node in nodes_of(machine.plan) for pdo in node.feedback + node.command}
-    behind = [
-        frame.us - syncs[frame.queued.number]
-        for frame in logged
-        if frame.queued.stream in pdos and not frame.is_error and frame.queued.number in syncs
-    ]
-    found["last PDO"] = max(behind, default=0.0)
-    for stream, each in own.items():
-        found[f"{stream} data"] = max(len(frame.data) for frames in each.values() for frame in frames)
-        late = [[frame.us - frame.queued.due_us for frame in frames] for frames in each.values()]
-        if stream == "SYNC" or stream in pdos:
-            numbers = [sorted(frame.queued.number for frame in frames) for frames in each.values()]
-            due = sum((own[-1] - own[0]) // pdos.get(stream, 1) + 1 for own in numbers)
-            found[f"{stream} missing"] = due - sum(len(set(own)) for own in numbers)
-            found[f"{stream} twice"] = sum(len(own) - len(set(own)) for own in numbers)
-        periods = [
-            pdos.get(stream, 1) * (after.due_us - before.due_us) / (after.number - before.number)
-            for before, after in ((frames[0].queued, frames[-1].queued) for frames in each.values())
-            if after.number > before.number
-        ]
-        if periods:
-            found[f"{stream} jitter"] = max(max(own) - min(own) for own in late)
-            found[f"{stream} period"] = min(periods)
-    return found
+    of_syncs = (frame for frame in sent if frame.queued.stream in pdos and frame.queued.number in syncs)
+    found["last PDO"] = max((frame.us - syncs[frame.queued.number] for frame in of_syncs), default=0.0)
+    found |= {"SYNC missing": 0, "PDOs missing": 0, "PDOs twice": 0}
+    if syncs:
+        found["SYNC missing"] = max(syncs) + 1 - min(syncs) - len(syncs)
+    periods_us = {message["name"]: message["period_us"] for message in machine.plan.get("message", ())}
+    for stream, each in streams.items():
+        every = pdos.get(stream, 1)
+        for frames in each.values():
+            numbers, first, last = {frame.queued.number for frame in frames}, frames[0].queued, frames[-1].queued
+            found[f"{stream} data"] = max(found[f"{stream} data"], *(len(frame.data) for frame in frames))
+            late_us = [frame.us - frame.queued.due_us for frame in frames]
+            found[f"{stream} jitter"] = max(found[f"{stream} jitter"], max(late_us) - min(late_us))
+            if last.number > first.number:
+                period_us = every * (last.due_us - first.due_us) / (last.number - first.number)
+                found[f"{stream} period"] = min(found.get(f"{stream} period", period_us), period_us)
+            if stream in periods_us:
+                found[f"{stream} sooner"] = max(found[f"{stream} sooner"], _sooner_us(frames, periods_us[stream]))
+            elif stream != "SYNC":
+                # What the last SYNC asked for may come when the log has ended.
+                due = sorted(number for number in syncs if (number - first.number) % every == 0)[:-1]
+                found["PDOs missing"] += len(set(due) - numbers)
+                found["PDOs twice"] += len(frames) - len(numbers)
+    return dict(found)
+
+
+def _sooner_us(frames: list[Logged], period_us: float) -> float:
+    """How much sooner frames come than a period by a clock that is 100 ppm fast."""
+    early_us = [place * period_us * 0.9999 - frame.us for place, frame in enumerate(frames)]
+    return max(early - least for early, least in zip(early_us, accumulate(early_us, min), strict=True))
 
 
 def _handed_over(logged: list[Logged], latency_us: float, random: Random) -> Iterator[Logged]:

@@ -31,23 +31,21 @@ from tests.oracles.random_plans import PLANS, Plan, fitting
 TRUTHS: Final = (
     # CAN
     (r"load", ("load",)),
-    (r"last PDO behind SYNC", ("last PDO",)),
+    (r"last PDO (?:behind|after) SYNC", ("last PDO",)),
     (r"(.+): period", ("{} period",)),
     (r"(.+): jitter of the arrival", ("{} jitter",)),
+    (r"(.+): sooner than its period", ("{} sooner",)),
     (r"(.+): data", ("{} data",)),
-    (r"(.+): missing", ("{} missing",)),
-    (r"(.+): twice", ("{} twice",)),
+    (r"cycles without SYNC", ("SYNC missing",)),
+    (r"PDOs (missing|twice)", ("PDOs {}",)),
     (r"error frames", ("error frames",)),
     # EtherCAT
-    (r"period", ("period",)),
-    (r"latest start", ("latest start",)),
-    (r"round trip", ("round trip",)),
+    (r"(period|latest start)", ("{}",)),
+    (r"((?:round trip|frames in a cycle|datagrams of a cycle)(?: with .*)?)", ("{}",)),
     (r"master's time", ("master, least", "master, most")),
-    (r"frames in a cycle", ("frames in a cycle",)),
-    (r"datagrams of a cycle", ("datagrams",)),
     (r"lost frames", ("lost",)),
     (r"wrong working counters", ("wrong",)),
-    (r".*without a frame", ("without a frame",)),
+    (r"cycles without a frame", ("without a frame",)),
 )
 """What the emulator calls the truth of a figure, by its whole quantity; two names are ends of a range."""
 
@@ -117,9 +115,10 @@ class Subject:
         except NoPlaceError:
             return None
 
-    def beyond(self, quantity: str) -> float:
-        """A value some U beyond the planned one."""
-        figure = self.clean.figures.get(quantity)
+    def beyond(self, pattern: str) -> float:
+        """A value some U beyond the planned one, of the first figure of such a quantity."""
+        each = (figure for quantity, figure in self.clean.figures.items() if re.fullmatch(pattern, quantity))
+        figure = next(each, None)
         if figure is None or figure.planned is None:
             raise NoPlaceError
         return float(figure.planned + self.times_u * (figure.uncertainty or 0))
@@ -160,7 +159,7 @@ class Recording(NamedTuple):
             is_said = figure.uncertainty is not None or figure.unit in ("1", "bytes")
             if ends and is_said and figure.recorded is not None:
                 u = (figure.uncertainty or 0) + 1e-6
-                yield pattern.replace("(.+)", "…"), min(ends) - u <= figure.recorded <= max(ends) + u
+                yield quantity_of(quantity), min(ends) - u <= figure.recorded <= max(ends) + u
 
 
 class NoPlaceError(Exception):
@@ -188,7 +187,7 @@ class Fault(NamedTuple):
 
 def commands_late(subject: Subject, least: float, most: float) -> Any:
     """Commands so late, in periods, that the last PDO is surely behind its plan."""
-    late_us = max(subject.beyond("last PDO behind SYNC"), least * subject.machine().period_us)
+    late_us = max(subject.beyond("last PDO .*"), least * subject.machine().period_us)
     if late_us > most * subject.machine().period_us:
         raise NoPlaceError
     return replace(subject.machine(), late=dict.fromkeys(subject.some(), late_us))
@@ -261,7 +260,7 @@ def late_starts(subject: Subject) -> Any:
 def more_devices(subject: Subject) -> Any:
     """So many couplers more that the round trip is surely longer than planned."""
     machine = subject.machine()
-    more = ceil((subject.beyond("round trip") - subject.clean.truth["round trip"]) / (2 * ethercat.HOP_US))
+    more = ceil((subject.beyond("round trip( with .*)?") - subject.clean.truth["round trip"]) / (2 * ethercat.HOP_US))
     return replace(machine, line_us=machine.line_us + 2 * ethercat.HOP_US * max(more, 1))
 
 
@@ -281,7 +280,7 @@ def in_a_row(subject: Subject) -> frozenset[int]:
 ERRORS: Final = frozenset(range(40, 140, 20))
 """Places of error frames in the log."""
 BEHIND: Final = "last PDO|late"
-MISSED: Final = "missing|missed|without a frame|skipped"
+MISSED: Final = "missing|missed|without|skipped"
 FAULTS: Final = (
     Fault("can", "commands late", lambda s: commands_late(s, 0, 0.9), BEHIND),
     Fault("can", "commands behind the next SYNC", lambda s: commands_late(s, 1.1, 1.9), BEHIND),
@@ -373,8 +372,9 @@ def main() -> None:
 
 
 def quantity_of(words: str) -> str:
-    """What a finding is about, without its key and numbers, the same for all messages."""
-    return re.sub(r"^\S+: |[:,]? [\d.,]+ .*", "", re.sub(r"message-\w+", "…", words)) or words
+    """A figure, or what a finding is about, without key, names and numbers."""
+    words = re.sub(r"^\w+\.\S+: |^name: |[:,]? [\d.,]+ .*| with .*", "", words)
+    return re.sub(r".+(?=: (period|jitter|data|shortest|sooner))", "…", words)
 
 
 def table(name: str, columns: tuple[str, ...], rows: Iterable[tuple[str, tuple[float, ...]]]) -> None:

@@ -7,12 +7,14 @@ stands in `Machine`. Of 40 such captures tshark 4.0 dissects every datagram, and
 """
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
 from math import lcm
 from random import Random
-from typing import Any, Final, NamedTuple
+from types import MappingProxyType
+from typing import Any, Final, Literal, NamedTuple
 
 MASTER = bytes.fromhex("001122334455")
 BYTE_US = 0.08
@@ -20,88 +22,70 @@ COPY_US = 0.0035
 HOP_US = 0.698
 CABLE_US = 0.005
 """Of a metre."""
-NOP, APRD, APWR, FPRD, BRD, BWR, LRD, LWR, LRW, ARMW, FRMW = 0, 1, 2, 4, 7, 8, 10, 11, 12, 13, 14
-LOGICAL: Final = (LRD, LWR, LRW)
+NOP, APRD, APWR, FPRD, BRD, BWR, LRD, LWR, LRW, FRMW = 0, 1, 2, 4, 7, 8, 10, 11, 12, 14
 MOST_BYTES: Final = 1498
 """Of all datagrams of a frame."""
-Datagram = tuple[int, int, int]
-"""Command, address and data bytes."""
-
-
-class Frame(NamedTuple):
-    """A frame, and the working counters with which it returns."""
-
-    datagrams: tuple[Datagram, ...]
-    counters: tuple[int, ...]
-
-    @property
-    def process_bytes(self) -> int:
-        """Its process data."""
-        return sum(size for command, _, size in self.datagrams if command in LOGICAL)
+Datagrams = tuple[tuple[int, int, int], ...]
+"""Command, address and data bytes of each."""
 
 
 @dataclass
 class Machine:
-    """What the machine does. Numbers of cycles count from 0."""
+    """What the machine does. Cycles are numbered from 0."""
 
     period_us: float = 1000.0
     jitter_us: float = 20.0
-    """Start of a frame behind the planned one, 0..jitter."""
+    """Start of a frame behind the planned one, evenly 0..jitter, or of another shape with a spread of about that."""
+    shape: Literal["uniform", "normal", "exponential"] = "uniform"
+    clock_ppm: float = 0.0
+    """How much faster the recorder's clock runs."""
+    bend_ppm: float = 0.0
+    """How much faster it runs on average by the end."""
     host_us: float = 30.0
     host_spread_us: float = 10.0
     """The host takes host_us, and evenly 0..spread more."""
     devices: int = 4
-    datagrams: tuple[Datagram, ...] = ((LRW, 0x10000, 80), (FRMW, 0, 8))
+    datagrams: Datagrams = ((LRW, 0x10000, 80), (FRMW, 0, 8))
+    schedule: tuple[tuple[Datagrams, ...], ...] = ()
+    """Frames of each cycle, over and over; without it one of `datagrams`."""
+    names: tuple[str, ...] = ("",)
+    """What goes in each of them, as " with drives and valves"; empty where all cycles are alike."""
     counters: tuple[int, ...] = (12, 4)
-    """Of a machine with the same single frame in every cycle."""
+    """Working counters of the datagrams; empty for 3 in each."""
     lost: frozenset[int] = frozenset()
-    """Cycles whose last frame does not return."""
+    """Cycles whose frames do not return."""
     wrong: frozenset[int] = frozenset()
-    """Cycles whose first frame returns with working counters of 0."""
+    """Cycles whose frames return with working counters of 0."""
     skipped: frozenset[int] = frozenset()
     """Cycles in which the master sends nothing."""
     late: dict[int, float] = field(default_factory=dict)
     """Starts that are so much later [us]."""
     has_index: bool = True
     hop_us: float = HOP_US
-    frames: tuple[tuple[Frame, ...], ...] = ()
-    """Of each cycle in turn, instead of the single one."""
     line_us: float | None = None
     """All devices and cables there and back, instead of hop_us."""
     polls: int = 0
     """Frames on a mailbox behind those of process data, 0..polls in each cycle."""
     poll_bytes: int = 128
-    is_normal: bool = False
-    """Whether starts have a normal distribution about jitter / 2, else an even one."""
-    clock: float = 1.0
-    """Period of the master's clock, in those of the recorder's."""
-    bend: float = 0.0
-    """By what share of it that changes from the first cycle to the last one."""
     form: str = "pcapng ns"
     at_port: bool = True
     """Whether stamps are those of the port, else those of a program that copies frames as they come."""
     dropped: int | None = None
     """Packets that the recorder drops, and says so; None for one that says nothing."""
 
-    @property
-    def in_turn(self) -> tuple[tuple[Frame, ...], ...]:
-        """Frames of each cycle in turn."""
-        return self.frames or ((Frame(self.datagrams, self.counters),),)
+    def frames(self, cycle: int) -> tuple[Datagrams, ...]:
+        """Frames with process data of a cycle."""
+        return self.schedule[cycle % len(self.schedule)] if self.schedule else (self.datagrams,)
 
 
 class Trip(NamedTuple):
     """A frame that was sent."""
 
     cycle: int
-    frame: Frame
+    datagrams: Datagrams
     us: float
     back_us: float
-    late_us: float
-    """Start of its cycle behind the planned one."""
-    host_us: float
-    returns: bool = True
-    is_wrong: bool = False
-    is_poll: bool = False
+    is_poll: bool
 
 
 def wire_us(data_bytes: Sequence[int]) -> float:
@@ -109,39 +93,42 @@ def wire_us(data_bytes: Sequence[int]) -> float:
     return float(max(8 + 14 + 2 + sum(size + 12 for size in data_bytes) + 4 + 12, 84) * BYTE_US)
 
 
-def _wire_us(frames: Sequence[Frame]) -> float:
-    return sum(wire_us([size for *_, size in frame.datagrams]) for frame in frames)
+def starts_and_hosts(machine: Machine, cycles: int, *, seed: int = 1) -> list[tuple[float, float]]:
+    """How late each cycle starts, and what the host takes in it [us]."""
+    random = Random(seed)
+    shapes = {
+        "uniform": lambda: random.uniform(0, machine.jitter_us),
+        "normal": lambda: min(max(random.gauss(machine.jitter_us / 2, machine.jitter_us / 8), 0.0), machine.jitter_us),
+        "exponential": lambda: random.expovariate(6 / machine.jitter_us),
+    }
+    return [
+        (
+            shapes[machine.shape]() + machine.late.get(cycle, 0.0),
+            machine.host_us + random.uniform(0, machine.host_spread_us),
+        )
+        for cycle in range(cycles)
+    ]
 
 
 def trips(machine: Machine, cycles: int, *, seed: int = 1) -> Iterator[Trip]:
     """All frames of a number of cycles."""
-    random = Random(seed)
+    random = Random(f"polls {seed}")
     line_us = 2 * machine.devices * machine.hop_us if machine.line_us is None else machine.line_us
-    poll = Frame(((FPRD, 0, machine.poll_bytes),), (1,))
-    for cycle in range(cycles):
-        late = random.uniform(0, machine.jitter_us)
-        if machine.is_normal:
-            late = min(max(random.gauss(machine.jitter_us / 2, machine.jitter_us / 7), 0.0), machine.jitter_us)
-        late += machine.late.get(cycle, 0.0)
-        host = machine.host_us + random.uniform(0, machine.host_spread_us)
-        polls = random.randint(0, machine.polls) if machine.polls else 0
-        frames = machine.in_turn[cycle % len(machine.in_turn)]
+    for cycle, (late_us, host_us) in enumerate(starts_and_hosts(machine, cycles, seed=seed)):
         if cycle in machine.skipped:
             continue
-        start = cycle * machine.period_us * machine.clock * (1 + machine.bend * cycle / cycles) + late
-        copied = 0
-        for place, frame in enumerate([*frames, *[poll] * polls]):
-            own_us = _wire_us([frame])
-            copied += frame.process_bytes
-            returns = cycle not in machine.lost or place != len(frames) - 1
-            is_wrong = cycle in machine.wrong and not place
-            back = start + own_us + line_us + copied * COPY_US + host
-            yield Trip(cycle, frame, start, back, late, host, returns, is_wrong, is_poll=place >= len(frames))
-            start += own_us
+        faster = 1 + (machine.clock_ppm + machine.bend_ppm * cycle / cycles) / 1e6
+        us, way_us = cycle * machine.period_us * faster + late_us, line_us
+        frames = machine.frames(cycle)
+        polls = (((FPRD, 0, machine.poll_bytes),),) * random.randint(0, machine.polls)
+        for place, datagrams in enumerate((*frames, *polls)):
+            start_us, us = us, us + wire_us([size for *_, size in datagrams])
+            way_us += sum(size for command, _, size in datagrams if command in (LRD, LWR, LRW)) * COPY_US
+            yield Trip(cycle, datagrams, start_us, us + way_us + host_us, is_poll=place >= len(frames))
 
 
 def ethernet(
-    datagrams: tuple[Datagram, ...],
+    datagrams: Datagrams,
     *,
     index: int,
     counters: tuple[int, ...],
@@ -162,30 +149,24 @@ def ethernet(
 
 def simulated(machine: Machine, cycles: int, *, seed: int = 1) -> list[tuple[float, bytes]]:
     """Stamps [us] and packets of a number of cycles, in the order of time."""
-    return _packets(machine, list(trips(machine, cycles, seed=seed)))
-
-
-def _packets(machine: Machine, each: list[Trip]) -> list[tuple[float, bytes]]:
     packets = []
-    for number, trip in enumerate(each):
-        index = (trip.cycle if not machine.frames else number) % 256 if machine.has_index else 0
-        datagrams, counters = trip.frame
-        packets.append((trip.us, ethernet(datagrams, index=index, counters=counters)))
-        if trip.returns:
-            counters = (0,) * len(counters) if trip.is_wrong else counters
-            back = ethernet(datagrams, index=index, counters=counters, returned=True)
+    for trip in trips(machine, cycles, seed=seed):
+        index = trip.cycle % 256 if machine.has_index else 0
+        counters = (machine.counters if not trip.is_poll else ()) or (3,) * len(trip.datagrams)
+        packets.append((trip.us, ethernet(trip.datagrams, index=index, counters=counters)))
+        if trip.cycle not in machine.lost:
+            counters = (0,) * len(counters) if trip.cycle in machine.wrong else counters
+            back = ethernet(trip.datagrams, index=index, counters=counters, returned=True)
             # A program that copies frames stamps them as fast as it reads them, whatever their length.
-            back_us = trip.back_us if machine.at_port else trip.us + 2 + trip.host_us % 3
-            packets.append((back_us, back))
+            packets.append((trip.back_us if machine.at_port else trip.us + 2 + trip.back_us % 3, back))
     return sorted(packets, key=lambda packet: packet[0])
 
 
 def recorded(machine: Machine, cycles: int, *, seed: int = 1) -> tuple[bytes, dict[str, float]]:
     """A capture of a machine, which begins anywhere in its second cycle, and the truth of it."""
     random = Random(-seed)
-    each = list(trips(machine, cycles + 2, seed=seed))
     start_us = machine.period_us * (1 + random.random())
-    packets = [packet for packet in _packets(machine, each) if packet[0] >= start_us]
+    packets = [packet for packet in simulated(machine, cycles + 2, seed=seed) if packet[0] >= start_us]
     for _ in range(machine.dropped or 0):
         packets.pop(random.randrange(len(packets)))
     kind, step = machine.form.split()
@@ -194,57 +175,72 @@ def recorded(machine: Machine, cycles: int, *, seed: int = 1) -> tuple[bytes, di
         content = pcap(packets, order=order, nano=step == "ns", start_s=start_s)
     else:
         resolution = 9 if step == "ns" else random.choice((6, None))
-        content = pcapng(packets, order=order, resolution=resolution, start_s=start_s, dropped=machine.dropped)
-    return content, truth(machine, [trip for trip in each if trip.us >= start_us])
+        content = pcapng(packets, order=order, resolution=resolution, start_s=start_s)
+        content += b"" if machine.dropped is None else statistics(5, machine.dropped, order=order)
+    return content, truth(machine, cycles + 2, start_us, seed=seed)
 
 
-def truth(machine: Machine, each: list[Trip]) -> dict[str, float]:
-    """What a capture has in truth, by the emulator's own words: times in us, bytes, counts."""
-    by_cycle: dict[int, list[Trip]] = {}
+def truth(machine: Machine, cycles: int, start_us: float, *, seed: int) -> dict[str, float]:
+    """What a capture has in truth, by the emulator's own words: times in us, bytes, counts.
+
+    Round trip, frames and bytes are those of the fullest cycle, and of each sort of cycle by its name.
+    """
+    each = [trip for trip in trips(machine, cycles, seed=seed) if trip.us >= start_us]
+    by_cycle: dict[int, list[Trip]] = defaultdict(list)
+    sorts: dict[str, dict[int, list[Trip]]] = defaultdict(dict)
     for trip in each:
         if not trip.is_poll:
-            by_cycle.setdefault(trip.cycle, []).append(trip)
-    whole = [own for own in by_cycle.values() if all(trip.returns for trip in own)]
-    most_us = max(map(_wire_us, machine.in_turn))
-    fullest = [own for own in whole if _wire_us([trip.frame for trip in own]) == most_us]
-    cycles = range(min(by_cycle), max(by_cycle) + 1)
-    starts = [own[0].late_us for own in by_cycle.values()]
-    back = [trip for trip in each if trip.returns]
-    return {
-        "period": machine.period_us * machine.clock * (1 + machine.bend),
-        "latest start": max(starts) - min(starts),
-        "round trip": max(own[-1].back_us - own[0].us for own in fullest),
-        "master, least": max(own[-1].host_us for own in fullest),
-        "master, most": max(own[-1].host_us for own in whole),
-        "frames in a cycle": max(map(len, machine.in_turn)),
-        "datagrams": max(sum(size + 12 for frame in own for *_, size in frame.datagrams) for own in machine.in_turn),
-        "lost": len(each) - len(back),
-        "wrong": sum(trip.is_wrong for trip in back),
-        "without a frame": sum(bool(machine.in_turn[at % len(machine.in_turn)]) for at in cycles) - len(by_cycle),
+            by_cycle[trip.cycle].append(trip)
+            if trip.cycle not in machine.lost:
+                sorts[machine.names[trip.cycle % len(machine.names)]][trip.cycle] = by_cycle[trip.cycle]
+    late_us, host_us = zip(*starts_and_hosts(machine, cycles, seed=seed), strict=True)
+    due = [cycle for cycle in range(min(by_cycle), max(by_cycle) + 1) if machine.frames(cycle)]
+    found: dict[str, float] = {
+        "period": machine.period_us * (1 + (machine.clock_ppm + machine.bend_ppm) / 1e6),
+        "latest start": max(late_us[cycle] for cycle in by_cycle) - min(late_us[cycle] for cycle in by_cycle),
+        "lost": sum(trip.cycle in machine.lost for trip in each),
+        "wrong": sum(trip.cycle in machine.wrong for trip in each),
+        "without a frame": len(due) - len(by_cycle),
     }
+    fullest = max(sorts.values(), key=lambda own: sum(map(_wire_us, next(iter(own.values())))))
+    for name, own in (*sorts.items(), ("", fullest)):
+        frames = next(iter(own.values()))
+        found[f"frames in a cycle{name}"] = len(frames)
+        found[f"datagrams of a cycle{name}"] = sum(size + 12 for trip in frames for size in _sizes(trip))
+        found[f"round trip{name}"] = max(trip[-1].back_us - trip[0].us for trip in own.values())
+    found["master, least"] = max(host_us[cycle] for cycle in fullest)
+    found["master, most"] = max(host_us[cycle] for own in sorts.values() for cycle in own)
+    return found
+
+
+def _sizes(trip: Trip) -> list[int]:
+    return [size for *_, size in trip.datagrams]
+
+
+def _wire_us(trip: Trip) -> float:
+    return wire_us(_sizes(trip))
 
 
 # --- the machine of a plan ----------------------------------------------------------------------------------
 
 DELAYS_US: Final = {"100BASE-TX": HOP_US, "E-bus": 0.1507}
+FORMS: Final = ("pcapng ns", "pcapng us", "pcap ns", "pcap us")
 
 
-def housekeeping(bus: dict[str, Any], devices: int) -> Iterator[tuple[Datagram, int]]:
-    """Datagrams that a master adds to the first frame, each with its working counter."""
+def housekeeping(bus: dict[str, Any], devices: int) -> Datagrams:
+    """Datagrams that a master adds to the first frame."""
     if "housekeeping_bytes" in bus:
-        yield from (((BRD, 0x130, size), devices) for size in bus["housekeeping_bytes"])
-        return
-    master, has_clocks = bus.get("master"), bus.get("distributed_clocks", False)
-    if master == "IgH":
-        yield (BRD, 0x130, 2), devices
-    elif master == "TwinCAT":
-        yield from (((NOP, 0, 4), 0), ((BRD, 0x130, 2), devices), ((LRD, 0x9000000, 1), 1))
-    elif master == "ethercrab":
-        yield from (((FPRD, 0x1300000 + device, 2), 1) for device in range(devices))
-    elif master != "SOEM":
-        yield from (((NOP, 0, 4), 0), ((APWR, 0, 4), 1), ((BRD, 0x130, 2), devices))
-    if has_clocks:
-        yield (FRMW, 0x910, 8 if master in ("SOEM", "ethercrab") else 4), devices
+        return tuple((BRD, 0x130, size) for size in bus["housekeeping_bytes"])
+    master = bus.get("master", "")
+    added: dict[str, Datagrams] = {
+        "SOEM": (),
+        "IgH": ((BRD, 0x130, 2),),
+        "TwinCAT": ((NOP, 0, 4), (BRD, 0x130, 2), (LRD, 0x9000000, 1)),
+        "ethercrab": tuple((FPRD, 0x1300000 + device, 2) for device in range(devices)),
+    }
+    as_acontis: Datagrams = ((NOP, 0, 4), (APWR, 0, 4), (BRD, 0x130, 2))
+    clocks = ((FRMW, 0x910, 8 if master in ("SOEM", "ethercrab") else 4),) if bus.get("distributed_clocks") else ()
+    return (*added.get(master, as_acontis), *clocks)
 
 
 def bytes_of(group: dict[str, Any], way: str) -> int:
@@ -264,47 +260,44 @@ def first_cycles(groups: list[dict[str, Any]], sizes: list[int], *, is_spread: b
     return found
 
 
-def frames_of(plan: dict[str, Any]) -> tuple[tuple[Frame, ...], ...]:
-    """Frames of each cycle in turn: devices in their order, each whole, a new frame where the next has no room."""
-    bus = plan["bus"]
-    master = bus.get("master")
-    layout = bus.get("process_data", "LRW-shared" if master in ("TwinCAT", "acontis") else "LRW-separate")
-    groups = groups_of(plan)
+def schedule_of(plan: dict[str, Any]) -> Iterator[tuple[str, tuple[Datagrams, ...]]]:
+    """Names and frames of each cycle in turn: devices in their order, a new frame where the next has no room."""
+    bus, groups = plan["bus"], groups_of(plan)
+    is_shared = bus.get("master") in ("TwinCAT", "acontis")
+    layout = bus.get("process_data", "LRW-shared" if is_shared else "LRW-separate")
     both = [(bytes_of(group, "read"), bytes_of(group, "write")) for group in groups]
     sizes = [max(pair) if layout == "LRW-shared" else sum(pair) for pair in both]
     totals = [size * group["nodes"] for size, group in zip(sizes, groups, strict=True)]
     first = first_cycles(groups, totals, is_spread=bus.get("units", "spread") == "spread")
     each = list(zip(groups, first, both, sizes, accumulate(totals, initial=0x10000), strict=False))
-    added = tuple(housekeeping(bus, sum(group["nodes"] for group in groups)))
-    headers = 24 if layout == "LRD-LWR" else 12
-    cycles = []
-    for cycle in range(lcm(*(group["every"] for group in groups))):
+    added = housekeeping(bus, sum(group["nodes"] for group in groups))
+    most = MOST_BYTES - (24 if layout == "LRD-LWR" else 12)
+    cycles = lcm(*(group["every"] for group in groups))
+    for cycle in range(cycles):
+        due = [own for own in each if (cycle - own[1]) % own[0]["every"] == 0]
         packed: list[list[tuple[int, int, int]]] = [[]]
-        room = MOST_BYTES - headers - sum(size + 12 for (*_, size), _ in added)
-        for group, start, (read, write), size, address in each:
-            for device in range(group["nodes"] if (cycle - start) % group["every"] == 0 and size else 0):
+        room = most - sum(size + 12 for *_, size in added)
+        for group, _, (read, write), size, address in due:
+            for device in range(group["nodes"] if size else 0):
                 if size > room:
                     packed.append([])
-                    room = MOST_BYTES - headers
+                    room = most
                 packed[-1].append((read, write, address + device * size))
                 room -= size
-        parts = [[*(() if place else added), *_process(own, layout)] for place, own in enumerate(packed)]
-        cycles.append(tuple(Frame(*(tuple(column) for column in zip(*own, strict=True))) for own in parts if own))
-    return tuple(cycles)
+        frames = [(*(() if place else added), *_process(own, layout)) for place, own in enumerate(packed)]
+        names = f" with {' and '.join(own[0]['name'] for own in due)}" if cycles > 1 else ""
+        yield names, tuple(filter(None, frames))
 
 
-def _process(own: list[tuple[int, int, int]], layout: str) -> Iterator[tuple[Datagram, int]]:
-    """Datagrams of process data of some devices."""
+def _process(own: list[tuple[int, int, int]], layout: str) -> Datagrams:
+    """Datagrams of the process data of some devices: what each is read and written, and its logical address."""
     if not own:
-        return
-    reads, writes = sum(bool(read) for read, *_ in own), sum(bool(write) for _, write, _ in own)
+        return ()
     address = own[0][2]
     if layout == "LRD-LWR":
-        yield (LRD, address, sum(read for read, *_ in own)), reads
-        yield (LWR, address + 0x800000, sum(write for _, write, _ in own)), writes
-        return
-    size = sum(max(read, write) if layout == "LRW-shared" else read + write for read, write, _ in own)
-    yield (LRW, address, size), reads + 2 * writes
+        reads, writes = sum(read for read, *_ in own), sum(write for _, write, _ in own)
+        return (LRD, address, reads), (LWR, address + 0x800000, writes)
+    return ((LRW, address, sum(max(pair) if layout == "LRW-shared" else sum(pair) for *pair, _ in own)),)
 
 
 def groups_of(plan: dict[str, Any]) -> list[dict[str, Any]]:
@@ -325,27 +318,27 @@ def planned(plan: dict[str, Any], *, seed: int) -> Machine:
         line_us += 2 * group["nodes"] * (delay_us + group.get("cable_m", 0) * CABLE_US)
     host_us, jitter_us = bus.get("master_us", 0.0), bus.get("master_jitter_us", 0.0)
     least = random.uniform(0.4, 0.95)
-    frames = frames_of(plan)
-    turn = random.randrange(len(frames))
+    cycles = list(schedule_of(plan))
+    turn = random.randrange(len(cycles))
+    names, schedule = zip(*cycles[turn:], *cycles[:turn], strict=True)
     return Machine(
         period_us=plan["cycle"]["period_us"],
         jitter_us=jitter_us * random.choice((1.0, random.uniform(0.2, 1))),
+        shape=random.choice(("uniform", "normal")),
+        clock_ppm=random.uniform(-40, 40),
+        bend_ppm=random.choice((0.0, random.uniform(-10, 10))),
         host_us=host_us * least,
         host_spread_us=host_us * (1 - least) * random.choice((1.0, random.random())),
+        schedule=schedule,
+        names=names,
+        counters=(),
         has_index=random.random() < 0.8,
-        frames=frames[turn:] + frames[:turn],
         line_us=line_us,
         polls=bus.get("mailbox_polls", 0),
         poll_bytes=bus.get("mailbox_bytes", 128),
-        is_normal=random.random() < 0.5,
-        clock=1 + random.uniform(-4e-5, 4e-5),
-        bend=random.choice((0.0, random.uniform(-1e-5, 1e-5))),
         form=random.choice(FORMS),
         dropped=random.choice((None, 0)),
     )
-
-
-FORMS: Final = ("pcapng ns", "pcapng us", "pcap ns", "pcap us")
 
 
 # --- files, and a start with the clocks of devices ----------------------------------------------------------
@@ -409,33 +402,36 @@ def pcap(
     return written
 
 
+def statistics(code: int, dropped: int, *, order: str = "<") -> bytes:
+    """An interface statistics block of pcapng: packets that the interface (5) or the system (7) dropped."""
+    size = 24 + 12 + 4
+    return struct.pack(f"{order}IIIIIHHQHHI", 5, size, 0, 0, 0, code, 8, dropped, 0, 0, size)
+
+
 def pcapng(
     packets: list[tuple[float, bytes]],
     *,
     order: str = "<",
     resolution: int | None = 9,
     start_s: int = 1_700_000_000,
-    dropped: int | None = None,
+    dropped_before: Mapping[int, int] = MappingProxyType({}),
 ) -> bytes:
     """A pcapng file of an interface with a resolution of its stamps, 10^-n s; None for the default, 1 us.
 
-    dropped: packets that the block of the interface's statistics says to be dropped; None for no such block.
+    dropped_before: packets that the recorder says it dropped, by the number of the packet behind them.
     """
     options = b"" if resolution is None else struct.pack(f"{order}HHB3xHH", 9, 1, resolution, 0, 0)
     written = struct.pack(f"{order}IIIHHqI", 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, 0, -1, 28)
     size = 20 + len(options)
     written += struct.pack(f"{order}IIHHI", 1, size, 1, 0, 65535) + options + struct.pack(f"{order}I", size)
     parts = [written]
-    for time_us, packet in packets:
+    for number, (time_us, packet) in enumerate(packets):
         time_ns = start_s * 10**9 + round(time_us * 1000)
         ticks = time_ns * 10 ** (6 if resolution is None else resolution) // 10**9
         filled = packet + bytes(-len(packet) % 4)
+        if number in dropped_before:
+            filled += struct.pack(f"{order}HHQHH", 4, 8, dropped_before[number], 0, 0)
         size = 32 + len(filled)
         head = struct.pack(f"{order}IIIIIII", 6, size, 0, ticks >> 32, ticks & 0xFFFFFFFF, len(packet), len(packet))
         parts.append(head + filled + struct.pack(f"{order}I", size))
-    if dropped is not None:
-        # isb_ifrecv and isb_ifdrop, at the time of the last packet.
-        counts = struct.pack(f"{order}HHQHHQHH", 4, 8, len(packets) + dropped, 5, 8, dropped, 0, 0)
-        head = struct.pack(f"{order}IIIII", 5, 24 + len(counts), 0, ticks >> 32, ticks & 0xFFFFFFFF)
-        parts.append(head + counts + struct.pack(f"{order}I", 24 + len(counts)))
     return b"".join(parts)

@@ -105,7 +105,7 @@ def test_frames_of_an_ethercat_cycle_are_as_many_and_as_long_as_planned(subjects
     for seed in SEEDS["ethercat"]:
         figures, truth = subjects("ethercat", seed).clean.figures, subjects("ethercat", seed).clean.truth
         planned = figures["frames in a cycle"].planned, figures["datagrams of a cycle"].planned
-        assert planned == (truth["frames in a cycle"], truth["datagrams"])
+        assert planned == (truth["frames in a cycle"], truth["datagrams of a cycle"])
 
 
 def test_the_emulators_know_nothing_of_busplan() -> None:
