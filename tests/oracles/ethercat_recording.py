@@ -186,13 +186,14 @@ def truth(machine: Machine, cycles: int, start_us: float, *, seed: int) -> dict[
     Round trip, frames and bytes are those of the fullest cycle, and of each sort of cycle by its name.
     """
     each = [trip for trip in trips(machine, cycles, seed=seed) if trip.us >= start_us]
-    by_cycle: dict[int, list[Trip]] = defaultdict(list)
-    sorts: dict[str, dict[int, list[Trip]]] = defaultdict(dict)
+    begun: dict[int, list[Trip]] = defaultdict(list)
     for trip in each:
         if not trip.is_poll:
-            by_cycle[trip.cycle].append(trip)
-            if trip.cycle not in machine.lost:
-                sorts[machine.names[trip.cycle % len(machine.names)]][trip.cycle] = by_cycle[trip.cycle]
+            begun[trip.cycle].append(trip)
+    by_cycle = {cycle: own for cycle, own in begun.items() if len(own) == len(machine.frames(cycle))}
+    sorts: dict[str, dict[int, list[Trip]]] = defaultdict(dict)
+    for cycle in by_cycle.keys() - machine.lost:
+        sorts[machine.names[cycle % len(machine.names)]][cycle] = by_cycle[cycle]
     late_us, host_us = zip(*starts_and_hosts(machine, cycles, seed=seed), strict=True)
     due = [cycle for cycle in range(min(by_cycle), max(by_cycle) + 1) if machine.frames(cycle)]
     found: dict[str, float] = {
