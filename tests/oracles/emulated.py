@@ -119,7 +119,7 @@ class Subject:
         """A value some U beyond the planned one, of the first figure of such a quantity."""
         each = (figure for quantity, figure in self.clean.figures.items() if re.fullmatch(pattern, quantity))
         figure = next(each, None)
-        if figure is None or figure.planned is None:
+        if figure is None or None in (figure.planned, figure.recorded):
             raise NoPlaceError
         return float(figure.planned + self.times_u * (figure.uncertainty or 0))
 
