@@ -214,7 +214,7 @@ def test_periods_without_a_frame_do_not_make_a_period_longer(tmp_path: Path) -> 
 
 
 def test_a_log_may_end_with_a_frame_more_than_its_length_has_periods(tmp_path: Path) -> None:
-    queued = [Queued(k * 10_000.0 + start, 0x180 + start, b"\x0f" * 8) for k in range(10) for start in range(4)]
+    queued = [Queued(k * 10_000.0 + start, 0x180 + start, b"\x3c" * 8) for k in range(10) for start in range(4)]
     answer = imported(candump(arbitrated(queued)), tmp_path)
     figures = busplan.measured(answer.profile, tmp_path / "drive.log").figures
     (load,) = (figure for figure in figures if figure.quantity == "load")
