@@ -5,14 +5,19 @@ and have passed all devices and back, and the host has taken the rest of its tim
 """
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from random import Random
+from types import MappingProxyType
+from typing import Literal
 
 MASTER = bytes.fromhex("001122334455")
 BYTE_US = 0.08
 COPY_US = 0.0035
 HOP_US = 0.698
 LRW, BRD, FRMW, FPRD, APRD, BWR = 12, 7, 14, 4, 1, 8
+Datagrams = tuple[tuple[int, int, int], ...]
+"""Command, address and data bytes of each."""
 
 
 @dataclass
@@ -21,14 +26,19 @@ class Machine:
 
     period_us: float = 1000.0
     jitter_us: float = 20.0
-    """Start of a frame behind the planned one, evenly 0..jitter."""
+    """Start of a frame behind the planned one, evenly 0..jitter, or of another shape with a spread of about that."""
+    shape: Literal["uniform", "normal", "exponential"] = "uniform"
+    clock_ppm: float = 0.0
+    """How much faster the recorder's clock runs."""
     host_us: float = 30.0
     host_spread_us: float = 10.0
     """The host takes host_us, and evenly 0..spread more."""
     devices: int = 4
-    datagrams: tuple[tuple[int, int, int], ...] = ((LRW, 0x10000, 80), (FRMW, 0, 8))
-    """Command, address and data bytes."""
+    datagrams: Datagrams = ((LRW, 0x10000, 80), (FRMW, 0, 8))
+    schedule: tuple[tuple[Datagrams, ...], ...] = ()
+    """Frames of each cycle, over and over; without it one of `datagrams`."""
     counters: tuple[int, ...] = (12, 4)
+    """Working counters of the datagrams; empty for 3 in each."""
     lost: frozenset[int] = frozenset()
     wrong: frozenset[int] = frozenset()
     skipped: frozenset[int] = frozenset()
@@ -45,7 +55,7 @@ def wire_us(data_bytes: tuple[int, ...]) -> float:
 
 
 def ethernet(
-    datagrams: tuple[tuple[int, int, int], ...],
+    datagrams: Datagrams,
     *,
     index: int,
     counters: tuple[int, ...],
@@ -64,26 +74,47 @@ def ethernet(
     return b"\xff" * 6 + source + tag + b"\x88\xa4" + struct.pack("<H", len(body) | 0x1000) + body
 
 
-def simulated(machine: Machine, cycles: int, *, seed: int = 1) -> list[tuple[float, bytes]]:
-    """Stamps [us] and packets of a number of cycles, in the order of time."""
+def starts_and_hosts(machine: Machine, cycles: int, *, seed: int = 1) -> list[tuple[float, float]]:
+    """How late each cycle starts, and what the host takes in it [us]."""
     random = Random(seed)
-    sizes = tuple(size for *_, size in machine.datagrams)
-    process = sum(size for command, _, size in machine.datagrams if command in (10, 11, 12))
-    way = wire_us(sizes) + 2 * machine.devices * machine.hop_us + process * COPY_US
+    shapes = {
+        "uniform": lambda: random.uniform(0, machine.jitter_us),
+        "normal": lambda: max(random.gauss(machine.jitter_us / 2, machine.jitter_us / 8), 0.0),
+        "exponential": lambda: random.expovariate(6 / machine.jitter_us),
+    }
+    return [
+        (
+            shapes[machine.shape]() + machine.late.get(cycle, 0.0),
+            machine.host_us + random.uniform(0, machine.host_spread_us),
+        )
+        for cycle in range(cycles)
+    ]
+
+
+def simulated(machine: Machine, cycles: int, *, seed: int = 1) -> list[tuple[float, bytes]]:
+    """Stamps [us] and packets of a number of cycles, in the order of time.
+
+    Frames of a cycle are sent one behind the other; each returns when it has passed all devices.
+    """
+    schedule = machine.schedule or ((machine.datagrams,),)
     packets = []
-    for cycle in range(cycles):
-        late = random.uniform(0, machine.jitter_us) + machine.late.get(cycle, 0.0)
-        host = machine.host_us + random.uniform(0, machine.host_spread_us)
+    for cycle, (late, host) in enumerate(starts_and_hosts(machine, cycles, seed=seed)):
         if cycle in machine.skipped:
             continue
         start = cycle * machine.period_us + late
         index = cycle % 256 if machine.has_index else 0
-        packets.append((start, ethernet(machine.datagrams, index=index, counters=machine.counters)))
-        if cycle not in machine.lost:
-            counters = (0,) * len(sizes) if cycle in machine.wrong else machine.counters
-            back = ethernet(machine.datagrams, index=index, counters=counters, returned=True)
-            packets.append((start + way + host, back))
-    return sorted(packets, key=lambda packet: packet[0])
+        way = 2 * machine.devices * machine.hop_us
+        for datagrams in schedule[cycle % len(schedule)]:
+            counters = machine.counters or (3,) * len(datagrams)
+            packets.append((start, ethernet(datagrams, index=index, counters=counters)))
+            sizes = tuple(size for *_, size in datagrams)
+            start += wire_us(sizes)
+            way += sum(size for command, _, size in datagrams if command in (10, 11, 12)) * COPY_US
+            if cycle not in machine.lost:
+                counted = (0,) * len(sizes) if cycle in machine.wrong else counters
+                packets.append((start + way + host, ethernet(datagrams, index=index, counters=counted, returned=True)))
+    faster = 1 + machine.clock_ppm / 1e6
+    return sorted(((time * faster, packet) for time, packet in packets), key=lambda packet: packet[0])
 
 
 def register(command: int, address: int, at: int, data: bytes, counter: int, *, returned: bool) -> bytes:
@@ -144,19 +175,35 @@ def pcap(
     return written
 
 
+def statistics(code: int, dropped: int, *, order: str = "<") -> bytes:
+    """An interface statistics block of pcapng: packets that the interface (5) or the system (7) dropped."""
+    size = 24 + 12 + 4
+    return struct.pack(f"{order}IIIIIHHQHHI", 5, size, 0, 0, 0, code, 8, dropped, 0, 0, size)
+
+
 def pcapng(
-    packets: list[tuple[float, bytes]], *, order: str = "<", resolution: int | None = 9, start_s: int = 1_700_000_000
+    packets: list[tuple[float, bytes]],
+    *,
+    order: str = "<",
+    resolution: int | None = 9,
+    start_s: int = 1_700_000_000,
+    dropped_before: Mapping[int, int] = MappingProxyType({}),
 ) -> bytes:
-    """A pcapng file of an interface with a resolution of its stamps, 10^-n s; None for the default, 1 us."""
+    """A pcapng file of an interface with a resolution of its stamps, 10^-n s; None for the default, 1 us.
+
+    dropped_before: packets that the recorder says it dropped, by the number of the packet behind them.
+    """
     options = b"" if resolution is None else struct.pack(f"{order}HHB3xHH", 9, 1, resolution, 0, 0)
     written = struct.pack(f"{order}IIIHHqI", 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, 0, -1, 28)
     size = 20 + len(options)
     written += struct.pack(f"{order}IIHHI", 1, size, 1, 0, 65535) + options + struct.pack(f"{order}I", size)
     parts = [written]
-    for time_us, packet in packets:
+    for number, (time_us, packet) in enumerate(packets):
         time_ns = start_s * 10**9 + round(time_us * 1000)
         ticks = time_ns * 10 ** (6 if resolution is None else resolution) // 10**9
         filled = packet + bytes(-len(packet) % 4)
+        if number in dropped_before:
+            filled += struct.pack(f"{order}HHQHH", 4, 8, dropped_before[number], 0, 0)
         size = 32 + len(filled)
         head = struct.pack(f"{order}IIIIIII", 6, size, 0, ticks >> 32, ticks & 0xFFFFFFFF, len(packet), len(packet))
         parts.append(head + filled + struct.pack(f"{order}I", size))

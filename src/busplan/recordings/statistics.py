@@ -20,9 +20,9 @@ _ROUNDING_US: Final = 1e-3
 """What the rounding of times may add to a jitter [us]."""
 _LEAST_STEP: Final = 1e-9
 """Where a search by halves ends, as a share of the value."""
-_DRIFT_SIGMAS: Final = 5.0
+_DRIFT_SIGMAS: Final = 8.0
 """How far beyond 1 the mean square of the distances of blocks from a line, in their standard errors, is a drift."""
-_REACH: Final = 3.0
+_REACH: Final = 4.0
 """Standard errors within which a clock is looked for."""
 _EARLY_SHARE: Final = 0.999
 """Share of the events that are taken for no earlier than the earliest: a stamp may be wrong."""

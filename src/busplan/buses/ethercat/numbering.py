@@ -15,6 +15,10 @@ from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, 
 Places = npt.NDArray[np.int64]
 _JUMP: Final = 1.25
 """Least ratio of a pause between cycles to one within a cycle."""
+_FARTHEST: Final = log(8)
+"""Logarithm of the largest ratio of a recorded period to the planned one that pauses are looked for with."""
+_ALIKE: Final = 0.1
+"""Difference of logarithms of periods that are taken for the same."""
 _BURST: Final = 1 / 20
 """Share of the planned period that is no distance of cycles, but of frames that were stamped in bursts."""
 
@@ -139,8 +143,9 @@ def _starts(times_us: Floats, kinds: Places, plan: PlannedCycles, period_us: flo
         for cycles in range(1, plan.least_apart + 1):
             beside = abs(log(least_us / cycles / period_us)) if least_us > 0 else inf
             found.append((beside, starts, least_us / cycles))
-    _, starts, near_us = min(found, key=lambda one: one[0])
-    return starts, near_us
+    least = min(beside for beside, *_ in found)
+    # Longer pauses may leave the same period, and merge cycles.
+    return next((starts, us) for beside, starts, us in found if beside <= least + _ALIKE or least > _FARTHEST)
 
 
 def _numbered(plan: PlannedCycles, places: Places, data_bytes: npt.NDArray[Any]) -> tuple[Places, Places]:

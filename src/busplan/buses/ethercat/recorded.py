@@ -385,7 +385,7 @@ class _Seen:
         note = f"round trips of {int(sizes.min())} to {int(sizes.max())} bytes on the wire"
         hidden = "less than on the wire: the host waits for more than the frame" if slope + doubt < BYTE_US else ""
         yield RecordedFigure(
-            "time of a byte", "us", planned, slope, doubt, "at most", len(sizes), note=note, hidden=hidden
+            "time of a byte", "us", planned, slope, doubt, "at most", len(sizes), "", note, is_mean=True, hidden=hidden
         )
 
     def remarks(self) -> Iterator[str]:
