@@ -309,3 +309,13 @@ def test_few_cycles_show_nothing(tmp_path: Path) -> None:
     # Of two sorts of cycle each is too few.
     few = asked(simulated(MACHINE, 18), tmp_path)[1]
     assert few == {"round trip with g0 and g2": "BP402", "master's time": "BP402", "round trip with g0 and g1": "BP402"}
+
+
+def test_a_plan_that_a_recording_was_written_into_holds_it(tmp_path: Path) -> None:
+    # The host takes longest in a cycle that is not the fullest.
+    packets = simulated(replace(MACHINE, jitter_us=33.3, host_us=91.7), 1001)
+    answer, found = asked(packets, tmp_path)
+    assert set(found.values()) == {"BP401"}
+    keys = {key: value for key, value in answer.edits.items() if value is not None}
+    again = busplan.measured(busplan.load_profile(tmp_path / "plan.toml", changes=keys), tmp_path / "capture.pcapng")
+    assert {figure.verdict for figure in again.figures} == {None, "within"}

@@ -127,7 +127,8 @@ def _starts(times_us: Floats, kinds: Places, plan: PlannedCycles, period_us: flo
 
     A frame begins one where its process data mostly come after a pause when they come behind those before it. How long
     a pause is, is said by the plan: of all jumps between such distances that counts which leaves the period nearest to
-    the planned one.
+    the planned one, and of those that leave the same the one with the fewest frames that contradict it: cycles closer
+    to each other than half the period, and frames of a cycle farther apart.
     """
     apart_us = np.diff(times_us)
     _, pair = np.unique(kinds[:-1] * (int(kinds.max()) + 1) + kinds[1:], return_inverse=True)
@@ -137,15 +138,19 @@ def _starts(times_us: Floats, kinds: Places, plan: PlannedCycles, period_us: flo
     within_us = ordered_us[:-1][ordered_us[1:] > _JUMP * ordered_us[:-1]]
     found = []
     for longest_us in (-inf, *within_us):
-        starts = np.flatnonzero(np.concatenate(([True], usual_us[pair] > longest_us)))
+        begins = np.concatenate(([True], usual_us[pair] > longest_us))
+        starts = np.flatnonzero(begins)
         between_us = np.diff(times_us[starts])
         least_us = float(np.quantile(between_us, plan.least_share / 2)) if len(between_us) else 0.0
         for cycles in range(1, plan.least_apart + 1):
-            beside = abs(log(least_us / cycles / period_us)) if least_us > 0 else inf
-            found.append((beside, starts, least_us / cycles))
+            near_us = least_us / cycles
+            beside = abs(log(near_us / period_us)) if near_us > 0 else inf
+            close, far = between_us < near_us / 2, apart_us[~begins[1:]] > near_us / 2
+            found.append((beside, int(np.count_nonzero(close) + np.count_nonzero(far)), starts, near_us))
     least = min(beside for beside, *_ in found)
-    # Longer pauses may leave the same period, and merge cycles.
-    return next((starts, us) for beside, starts, us in found if beside <= least + _ALIKE or least > _FARTHEST)
+    if least > _FARTHEST:
+        return found[0][2:]
+    return min((one for one in found if one[0] <= least + _ALIKE), key=lambda one: one[1])[2:]
 
 
 def _numbered(plan: PlannedCycles, places: Places, data_bytes: npt.NDArray[Any]) -> tuple[Places, Places]:

@@ -153,7 +153,10 @@ class _Seen:
         """Data of the master's own datagrams, where they are not as planned [bytes]."""
 
     def _bad_stamps(self) -> str:
-        typical_us, count = quantile(self.trips_us, 0.5).value, len(self.trips_us)
+        count = len(self.trips_us)
+        if not count:
+            return "no frame that it has as sent is among those that returned"
+        typical_us = quantile(self.trips_us, 0.5).value
         if self.cycles is not None and self.cycles.in_bursts:
             return "the frames were stamped in bursts, and not as they passed the port"
         if self.short > _STRAY * count:
@@ -369,12 +372,14 @@ class _Seen:
 
     def _byte(self) -> Iterator[RecordedFigure]:
         """The time of a byte, of frames that no other one is on the way with: others wait for those before them."""
+        if self.bad_stamps:
+            return
         sent_ns, back_ns = self.frames.times_ns[self.trips.sent], self.frames.times_ns[self.trips.returned]
         order = np.argsort(sent_ns, kind="stable")
         last_ns = np.maximum.accumulate(back_ns[order])
         alone = order[np.concatenate(([True], sent_ns[order][1:] >= last_ns[:-1]))]
         sizes = self.wire_us[self.trips.sent[alone]] / BYTE_US
-        if self.bad_stamps or not len(sizes) or sizes.max() - sizes.min() < _LEAST_SPAN_BYTES:
+        if sizes.max() - sizes.min() < _LEAST_SPAN_BYTES:
             return
         fitted = line(sizes, self.trips_us[alone], self.stamp_us * _TWO_STAMPS)
         if fitted is None:
