@@ -15,6 +15,8 @@ _BLOCKS: Final = range(8, 513)
 """Number of blocks."""
 _ALONE: Final = 40
 """Fewer events are blocks of one."""
+_FEW: Final = 6.0
+"""Share of n events, over n, by which their scatter is taken for more: for 99.9 % of n - 2 degrees of freedom."""
 _LEAST_ERROR_US: Final = 1e-6
 _ROUNDING_US: Final = 1e-3
 """What the rounding of times may add to a jitter [us]."""
@@ -232,7 +234,7 @@ def _clock(places: Floats, late: Floats) -> _Clock:
     middle_us = np.repeat([np.median(late[block]) for block in blocks], sizes)
     low, high = np.quantile(late - middle_us, (0.05, 0.95))
     kept = middle_us + np.clip(late - middle_us, 2 * low - high, 2 * high - low)
-    scatter_us = max(sqrt(float(np.mean(np.diff(kept) ** 2)) / 2), _LEAST_ERROR_US)
+    scatter_us = max(sqrt(float(np.mean(np.diff(kept) ** 2)) / 2) * (1 + _FEW / len(late)), _LEAST_ERROR_US)
     weight = np.sqrt(sizes) / scatter_us
     means = np.array([kept[block].mean() for block in blocks]) * weight
     pieces = 1
