@@ -145,11 +145,12 @@ def test_records_that_are_written_at_once_are_all_kept(tmp_path: Path, run: Run)
     run("check", "paper-1ms", *given, cwd=tmp_path)
     theirs = json.loads(path.read_text(encoding="utf-8"))
     theirs["profiles"]["theirs.toml"] = {}
+    (tmp_path / "theirs.toml").write_text(profile(), encoding="utf-8")
     other = Locked(tmp_path, lambda: path.write_text(json.dumps(theirs), encoding="utf-8"))
     assert run("check", "paper-4ms", *given, cwd=tmp_path).returncode == 0
     assert other.written
     found = json.loads(path.read_text(encoding="utf-8"))["profiles"]
-    assert sorted(found) == ["paper-1ms.toml", "paper-4ms.toml", "theirs.toml"]
+    assert sorted(found) == ["paper-1ms", "paper-4ms", "theirs.toml"]
 
 
 @pytest.mark.parametrize("command", ["plan", "calibrate"])
