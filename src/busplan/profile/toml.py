@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
-from busplan.profile.document import Document, TomlTable, text_of
+from busplan.profile.document import GRADING, Document, TomlTable, text_of
 from busplan.profile.keys import holder
 from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
@@ -211,8 +211,16 @@ def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Pro
     ]
 
 
+def has_comment_grades(profile: Profile) -> bool:
+    """Whether comments of its file may grade keys; one that was read from no file has no comments."""
+    document, _ = profile.__dict__.get(_SOURCE, (None, ()))
+    return document is not None and GRADING.search(document.text) is not None
+
+
 def comment_grade(profile: Profile, key: str) -> Grade | None:
     """The grade that a comment of its file, at the key or at its table, gives the value of a key.
+
+    Another value is not measured because the old one was; but an assumption that is made otherwise is still one.
 
     Parameters
     ----------
@@ -222,7 +230,9 @@ def comment_grade(profile: Profile, key: str) -> Grade | None:
         Dotted key.
     """
     document, changed = profile.__dict__.get(_SOURCE, (None, ()))
-    if document is None or any(key == changed_key or key.startswith(f"{changed_key}.") for changed_key in changed):
+    if document is None:
         return None
     grades: dict[str, Grade] = document.grades
-    return grades.get(key)
+    grade = grades.get(key)
+    is_changed = any(key == changed_key or key.startswith(f"{changed_key}.") for changed_key in changed)
+    return None if is_changed and grade != "assumed" else grade
