@@ -419,7 +419,9 @@ class CanCycle(BusCycle):
 
     @cached_property
     def sync_spread_us(self) -> Number:
-        """Delay of SYNC by other messages, B + I [us]; infinite where it has no end."""
+        """Delay of SYNC by other messages, B + I [us]; infinite where it has no end, 0 where no SYNC is sent."""
+        if not self.traffic.has_cycle:
+            return 0.0
         if self._sent.is_ordered:
             with suppress(TooManyStepsError):
                 us: Number = sync_spread_us(self.traffic, is_stuffed=self.is_stuffed)
