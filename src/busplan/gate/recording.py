@@ -38,13 +38,12 @@ def outside_plan(profile: Profile, recording: Recording) -> Iterator[RuleProblem
 
 def _words(figure: RecordedFigure) -> str:
     planned, seen = figure.planned or 0.0, figure.recorded or 0.0
-    unit = {"1": "", "share": " %"}.get(figure.unit, f" {figure.unit}")
+    unit, factor = {"1": "", "share": " %"}.get(figure.unit, f" {figure.unit}"), 100 if figure.unit == "share" else 1
     if figure.unit in ("1", "bytes"):
         said, allowed = f"{seen:.0f}", f"{planned:.0f}"
     else:
-        factor = 100 if figure.unit == "share" else 1
         said, allowed = told_apart(factor * seen, factor * planned)
-    doubt = "" if figure.uncertainty is None else f" +/- {figure.uncertainty:.2g}"
+    doubt = "" if figure.uncertainty is None else f" +/- {factor * figure.uncertainty:.2g}"
     sense = "" if figure.sense == "equal" else f"{figure.sense} "
     note = f" ({figure.note})" if figure.note else ""
     return f"{figure.quantity}: {said}{unit} recorded, {sense}{allowed}{doubt}{unit} planned{note}"
