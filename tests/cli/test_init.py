@@ -8,9 +8,9 @@ import select
 import stat
 import subprocess
 import sys
+import time
 import tomllib
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +120,11 @@ def test_init_writes_unlike_nodes_as_groups_and_knows_a_bus_by_its_other_names(r
     assert data["description"] == "A new machine: what is assumed here stays so until somebody measures it"
 
 
+def state_of(pid: int) -> str:
+    """State of a process: R where it runs, S where it waits."""
+    return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
+
+
 def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> tuple[int, str]:
     """Exit code and words of `init` in a terminal, with an answer to each of its questions."""
     leader, follower = pty.openpty()
@@ -141,17 +146,16 @@ def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> 
     for answer in answers:
         # A question ends in its default.
         while not said.rstrip().endswith("]:"):
-            assert select.select([leader], [], [], 30)[0]
+            assert select.select([leader], [], [], 300)[0]
             assert heard()
+        # A signal between a prompt and its read is lost, as at any keyboard: the program must wait for the answer.
+        end = time.monotonic() + 300
+        while state_of(process.pid) != "S":
+            assert time.monotonic() < end
+            time.sleep(0.02)
         said += "<"
         os.write(leader, answer)
-    for _ in range(30):
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=1)
-            break
-        # A signal between a prompt and its read is lost, as at any keyboard: who presses Ctrl-C presses it again.
-        os.write(leader, answers[-1].replace(b"\n", b""))
-    code = process.wait(timeout=1)
+    code = process.wait(timeout=300)
     while select.select([leader], [], [], 0.1)[0] and heard():
         pass
     os.close(leader)
