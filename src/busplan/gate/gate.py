@@ -9,7 +9,7 @@ from busplan.errors import BusplanError, PlacedError
 from busplan.gate import circle
 from busplan.gate.baseline import Record, figures_of, keys_of, regression
 from busplan.gate.finding import Finding, Subject, Violation, finding_of
-from busplan.gate.recording import Recording, outside_plan
+from busplan.gate.recording import Recording, beside_plan
 from busplan.gate.rules import (
     BASELINE,
     BY_KIND,
@@ -229,11 +229,11 @@ def check_document(
         ran.add(BASELINE.code)
     if recording is not None:
         try:
-            outside = list(outside_plan(profile, recording))
+            beside = list(beside_plan(profile, recording))
         except BusplanError as error:
             return FileResult(document.name, profile.name, (), {}, failure="; ".join(error.problems))
-        violations += [_placed(document, RECORDING, problem) for problem in outside]
-        ran.add(RECORDING.code)
+        violations += [_placed(document, rule, problem) for rule, problem in beside]
+        ran.update(rule.code for rule in RECORDING)
     if changes.each:
         # Comments were written for the file as it is: with changes, none counts as without effect.
         ran = set()

@@ -17,7 +17,7 @@ from busplan.progress import Progress
 from busplan.recordings.statistics import Floats
 from busplan.recordings.words import counted
 
-_EXTENDED, _REMOTE, _FD = 1, 2, 4
+_EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader", b"(": "CanutilsLogReader"}
 """Readers of python-can, by the first bytes of a file."""
 _FORMATS: Final = "candump -l, Vector's ASC and BLF, PEAK's TRC"
@@ -50,6 +50,8 @@ class CanFrames(NamedTuple):
     """On the wire, interframe space included; 0 of a CAN FD frame [bits]."""
     is_fd: npt.NDArray[np.bool_]
     """Whether it is a CAN FD frame."""
+    switched: npt.NDArray[np.bool_]
+    """Whether its data are at the data bit rate."""
     remote: int
     errors: int
     """Frames that ask for data, and error frames; the latter are not among the frames."""
@@ -137,7 +139,8 @@ class _Log:
             fd = message.is_fd
             # CAN FD has no remote frames: what a log marks so has data that it lost.
             remote = message.is_remote_frame and not fd
-            flags(message.is_extended_id * _EXTENDED | remote * _REMOTE | fd * _FD)
+            switched = fd and message.bitrate_switch
+            flags(message.is_extended_id * _EXTENDED | remote * _REMOTE | fd * _FD | switched * _SWITCHED)
 
     def frames(self, path: Path) -> CanFrames:
         """All frames as arrays."""
@@ -155,7 +158,7 @@ class _Log:
         flags = np.frombuffer(self._flags, dtype=np.uint8)
         sizes = np.frombuffer(self._sizes, dtype=np.uint8).astype(np.int64)
         codes = np.where(sizes < _LONG_BYTES[0], sizes, 10 + np.searchsorted(_LONG_BYTES[:-1], sizes))
-        extended, remote, fd = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD))
+        extended, remote, fd, switched = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD, _SWITCHED))
         data = np.frombuffer(self._data, dtype=np.uint64)
         return CanFrames(
             float(stamps[0]),
@@ -165,6 +168,7 @@ class _Log:
             np.where(fd, sizes, np.minimum(sizes, _CLASSICAL_BYTES)),
             np.where(fd, 0, written_bits(identifiers, extended, remote, codes, data)),
             fd,
+            switched,
             int(np.count_nonzero(remote)),
             self._errors,
             self.broken,

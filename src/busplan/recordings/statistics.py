@@ -49,8 +49,13 @@ class PeriodicEvents(NamedTuple):
     """Each event behind its place in the period, the middle of them at 0, without the drift of clocks [us]."""
     doubt_us: float
     """Standard uncertainty of the places [us]."""
-    missing: int
-    """Periods without an event."""
+    places: npt.NDArray[np.int64]
+    """Number of the period of each event, from 0."""
+
+    @property
+    def missing(self) -> int:
+        """Periods without an event."""
+        return int(self.places[-1]) + 1 - len(self.places)
 
 
 def quantile(values: Floats, share: float) -> Quantile:
@@ -118,22 +123,20 @@ def grid(times_us: Floats) -> PeriodicEvents | None:
     late, slope, error, bend_us = _without_drift(places.astype(np.float64), late)
     # The places of the first and of the last event scatter as all do.
     doubt_us = hypot(float(np.std(late)) * sqrt(3 / len(late)), bend_us)
-    missing = int(places[-1] - places[0]) + 1 - len(times_us)
-    return PeriodicEvents(period_us + slope, error, late, doubt_us, missing)
+    return PeriodicEvents(period_us + slope, error, late, doubt_us, places)
 
 
-def sporadic_period(times_us: Floats, length_us: float) -> float:
-    """The longest period that events at no fixed times have with a jitter of no more than a period [us].
+def ahead(times_us: Floats, period_us: float) -> Floats:
+    """How much sooner each event comes than a period behind each other allows, seen from any event before it [us].
 
-    With the period T and the jitter J, k + 1 events take k T - J or longer. The period is also so short that one event
-    more than those fits into the length of the log.
+    The largest is the least jitter with which events are those of the period.
 
     Parameters
     ----------
     times_us
-        Ascending times, at least one [us].
-    length_us
-        How long events were recorded [us].
+        Ascending times, n of them [us].
+    period_us
+        The period [us].
 
     References
     ----------
@@ -141,30 +144,11 @@ def sporadic_period(times_us: Floats, length_us: float) -> float:
 
     Examples
     --------
-    Two events each second, the second one 10 ms behind the first:
-
-    >>> round(sporadic_period(np.array([0.0, 10e3, 1e6, 1.01e6, 2e6, 2.01e6]), 10e6))
-    502500
-    """
-    low, high = 0.0, length_us / (len(times_us) + 1)
-    if sporadic_jitter(times_us, high) <= high + _ROUNDING_US:
-        return high
-    while high - low > _LEAST_ERROR_US + _LEAST_STEP * high:
-        half = (low + high) / 2
-        low, high = (half, high) if sporadic_jitter(times_us, half) <= half + _ROUNDING_US else (low, half)
-    return low
-
-
-def sporadic_jitter(times_us: Floats, period_us: float) -> float:
-    """The least jitter with which events are those of a period: how much sooner than it they come [us].
-
-    Examples
-    --------
-    >>> float(sporadic_jitter(np.array([0.0, 100, 130, 300]), 100))
+    >>> float(ahead(np.array([0.0, 100, 130, 300]), 100).max())
     70.0
     """
     early = np.arange(len(times_us)) * period_us - times_us
-    return float((early - np.minimum.accumulate(early)).max())
+    return np.asarray(early - np.minimum.accumulate(early), dtype=np.float64)
 
 
 def _period(times_us: Floats) -> float:

@@ -298,7 +298,7 @@ def test_the_circle_has_its_set_points_from_sync() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"message.alarm.jitter_us": 2001.0}, "is over the period of the message, 2000 us"),
+        ({"message.alarm.burst": 0}, "1 or more"),
         ({"message.alarm.identifier": 0x800}, "is over 2047, the largest of 11 bits"),
         ({"message.alarm.payload_bytes": 65}, "64 or less"),
         ({"bus.bit_rate_kbit_s": 4}, "5 to 1000|5 or more"),

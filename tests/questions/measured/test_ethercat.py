@@ -113,10 +113,10 @@ def test_a_slow_outlier_is_the_worst_case(tmp_path: Path) -> None:
     answer = of_machine(Machine(late={600: 700.0}), tmp_path)
     jitter = figure(answer, "latest start")
     assert jitter.recorded == pytest.approx(710, abs=11)
-    assert jitter.within is False
+    assert jitter.verdict == "outside"
     assert figure(answer, "period").recorded == pytest.approx(1000, abs=0.01)
     assert answer.edits["bus.master_uncertainty_us"] is None
-    assert figure(of_machine(Machine(late={600: 700.0}), tmp_path, quantile=0.99), "latest start").within is True
+    assert figure(of_machine(Machine(late={600: 700.0}), tmp_path, quantile=0.99), "latest start").verdict == "within"
 
 
 def test_what_is_lost_wrong_or_not_sent_is_counted(tmp_path: Path) -> None:
@@ -146,7 +146,7 @@ def test_the_drift_of_the_recorders_clock_is_no_jitter(tmp_path: Path) -> None:
     packets = [(time + 40e-6 * time**2 / 12e6, packet) for time, packet in simulated(Machine(), 6000)]
     answer = of_packets(packets, tmp_path, quantile=0.99)
     assert figure(answer, "latest start").recorded == pytest.approx(19.8, abs=1.5)
-    assert figure(answer, "period").within is True
+    assert figure(answer, "period").verdict == "within"
 
 
 def test_a_clock_that_is_set_back_is_said(tmp_path: Path) -> None:
@@ -178,7 +178,7 @@ def test_frames_of_a_cycle_are_those_that_come_as_often(tmp_path: Path) -> None:
     # The recording begins within a cycle.
     answer = of_packets(sorted(packets)[2:], tmp_path, plan="ethercat-servo-8")
     assert figure(answer, "frames in a cycle").recorded == 2
-    assert figure(answer, "frames in a cycle").within is False
+    assert figure(answer, "frames in a cycle").verdict == "outside"
     assert figure(answer, "datagrams").recorded == 1600 + 12 + 12 + 20
     assert figure(answer, "datagrams").note == "LRW 1000 FRMW 8 | LRW 600"
     assert figure(answer, "round trip ").recorded == pytest.approx(230, abs=0.01)
@@ -189,7 +189,7 @@ def test_other_datagrams_than_planned_are_measured(tmp_path: Path) -> None:
     machine = Machine(datagrams=((LRW, 0x10000, 80), (FPRD, 0, 2), (FRMW, 0, 8)), counters=(12, 1, 4))
     answer = of_machine(machine, tmp_path, cycles=100)
     assert answer.edits["bus.housekeeping_bytes"] == [2, 8]
-    assert figure(answer, "datagrams").within is False
+    assert figure(answer, "datagrams").verdict == "outside"
     assert "bus.housekeeping_bytes" not in of_machine(Machine(), tmp_path, cycles=100).edits
 
 
@@ -226,7 +226,7 @@ def test_port_times_say_the_delay_of_each_device_of_a_line(tmp_path: Path, read:
     assert [found.recorded for found in delays] == [0.7, 0.69, 0.82]
     assert [found.quantity for found in delays] == [f"delay of device {number}" for number in (2, 3, 4)]
     assert [found.planned for found in delays] == pytest.approx([0.698] * 3, abs=0.001)
-    assert (mean.quantity, mean.within) == ("mean delay of devices 2 to 4", True)
+    assert (mean.quantity, mean.verdict) == ("mean delay of devices 2 to 4", "within")
     assert mean.recorded == pytest.approx(0.736667)
     assert answer.edits["node.delay_us"] == pytest.approx(0.736667)
     # The master's time is what the measured delays leave.
@@ -239,7 +239,7 @@ def test_port_times_say_the_delay_of_each_device_of_a_line(tmp_path: Path, read:
     # A plan that a recording was written into holds it, though no device has its mean.
     applied = busplan.load_profile(PLAN, changes={"node.delay_us": answer.edits["node.delay_us"]})
     again = of_packets(started + simulated(machine, 100), tmp_path, plan=applied)
-    assert figure(again, "mean delay").within is True
+    assert figure(again, "mean delay").verdict == "within"
     assert again.edits["bus.master_us"] == pytest.approx(30, abs=0.01)
     assert answer.notes["node"] == "busplan measured: the mean of 1 event in capture.pcapng of 2023-11-14"
 

@@ -27,7 +27,19 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
 from busplan.buses.parts import EventKind
 from busplan.buses.rates import Rate
-from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, named, plain, pointwise, rounded_up, total
+from busplan.elementwise import (
+    FIT_ROUNDING,
+    Number,
+    choose,
+    is_off,
+    larger,
+    named,
+    plain,
+    pointwise,
+    rounded_up,
+    total,
+    value_of,
+)
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
@@ -268,7 +280,8 @@ class CanCycle(BusCycle):
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
         for message, _ in self._before:
-            count = _of_all(message, rounded_up((window_us + message.jitter_us) / message.period_us))
+            each = rounded_up((window_us + message.jitter_us) / message.period_us)
+            count = _of_all(message, each if is_off(message.burst - 1) else each + message.burst - 1)
             yield choose(self._goes_before_last(message), count, 0)
 
     def _goes_before_last(self, message: Message) -> Number:
@@ -441,7 +454,10 @@ class CanCycle(BusCycle):
         interference_us = figure("interference_us", f"frames of higher priorities before {name}, in its worst instance")
         instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")
         period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
-        backlog_us = choose(instance < inf, instance * frame_us_ - instance * period_us, instance)
+        periods = instance
+        if any(value_of(message.burst) > 1 for message in self.traffic.messages if message.name == name):
+            periods = instance - figure("burst", f"frames of {name} that may come at once") + 1
+        backlog_us = choose(instance < inf, instance * frame_us_ - periods * period_us, instance)
         parts_us = {
             "jitter_us": named(jitter_us, "jitter_us", "J"),
             "blocking_us": named(blocking_us, "blocking_us", "B"),

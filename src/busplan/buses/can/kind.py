@@ -91,6 +91,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "node.execution.worst_extra_us": Key("T_extra"),
         "message.payload_bytes": Key("s"),
         "message.period_us": Key("T"),
+        "message.burst": Key("b"),
         "message.jitter_us": Key("J"),
         "message.deadline_us": Key("D"),
         "message.identifier": Key("id"),

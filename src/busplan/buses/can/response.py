@@ -35,7 +35,7 @@ class Sender(NamedTuple):
 
 
 class Response(NamedTuple):
-    """The worst case of a message: R = J + B + I + q (C - T) + C. The numbers may be arrays."""
+    """The worst case of a message: R = J + B + I + q C - (q - b + 1) T + C. The numbers may be arrays."""
 
     blocking_us: Points
     """B, the longest frame of a lower priority [us]."""
@@ -48,7 +48,13 @@ class Response(NamedTuple):
 
 
 def worst_response(
-    own: Sender, higher: Sequence[Sender], *, blocking_us: float, bit_us: float, first_us: float = 0.0
+    own: Sender,
+    higher: Sequence[Sender],
+    *,
+    blocking_us: float,
+    bit_us: float,
+    first_us: float = 0.0,
+    burst: int = 1,
 ) -> Response | None:
     """Find the worst-case response time of a message.
 
@@ -64,6 +70,8 @@ def worst_response(
         Time of a bit [us]: a frame that arrives within it behind the start still takes part in the arbitration.
     first_us
         Frames of higher priorities that come once, when the busy period begins [us].
+    burst
+        Frames of the message that may come at once b; instance q from b - 1 on comes q - b + 1 periods later [1].
 
     Returns
     -------
@@ -83,13 +91,21 @@ def worst_response(
     Response(blocking_us=0, instance=1, interference_us=5000.0, us=3500.0)
     """
     try:
-        return worst_instance(own, Demand(higher), blocking_us=blocking_us, bit_us=bit_us, first_us=first_us)
+        return worst_instance(
+            own, Demand(higher), blocking_us=blocking_us, bit_us=bit_us, first_us=first_us, burst=burst
+        )
     except TooManyStepsError:
         return None
 
 
 def worst_instance(
-    own: Sender, before: "Demand", *, blocking_us: Points, bit_us: Points, first_us: Points = 0.0
+    own: Sender,
+    before: "Demand",
+    *,
+    blocking_us: Points,
+    bit_us: Points,
+    first_us: Points = 0.0,
+    burst: Points = 1,
 ) -> Response | None:
     """As `worst_response`, of arrays, too: R is infinite at points that have none, and None says that none has one.
 
@@ -105,24 +121,27 @@ def worst_instance(
     bound_us = before.bound_us(ahead_us, bit_us=bit_us)
     per_us = own.frames_us / (1 - choose(is_over, 0.0, before.load))
     worst, waits_us = Response(blocking_us, 0, 0.0, choose(is_over, inf, 0.0)), 0.0
-    for instance in count():
-        late_us = own.jitter_us + own.frames_us - instance * own.period_us
-        if instance:
+    # All of a burst are there at once, and the last of them is the latest.
+    for late in count():
+        instance = late + burst - 1
+        late_us = own.jitter_us + own.frames_us - late * own.period_us
+        if late:
             # The bound falls from one instance to the next.
             is_over = is_over | (late_us + bound_us + instance * per_us <= worst.us)
             if is_everywhere(is_over):
                 return worst
-            if instance == 1:
-                from_us = ahead_us + own.frames_us + before.frames_us
-                busy_us = before.behind(own).settled_us(ahead_us, steps, from_us=from_us, is_settled=is_over)
-            is_over = is_over | (instance * own.period_us >= busy_us + own.jitter_us)
+            if late == 1:
+                first_us = ahead_us + (burst - 1) * own.frames_us
+                from_us = first_us + own.frames_us + before.frames_us
+                busy_us = before.behind(own).settled_us(first_us, steps, from_us=from_us, is_settled=is_over)
+            is_over = is_over | (late * own.period_us >= busy_us + own.jitter_us)
             if is_everywhere(is_over):
                 return worst
         # It waits at least as long as the instance before it, and for that instance.
         own_us = instance * own.frames_us
         waits_us = before.settled_us(ahead_us + own_us, steps, bit_us=bit_us, from_us=waits_us, is_settled=is_over)
         response = Response(blocking_us, instance, waits_us - blocking_us - own_us, waits_us + late_us)
-        is_worse = choose(is_over, False, response.us > worst.us if instance else True)
+        is_worse = choose(is_over, False, response.us > worst.us if late else True)
         worst = Response(*(choose(is_worse, new, old) for new, old in zip(response, worst, strict=True)))
     raise AssertionError
 

@@ -58,7 +58,7 @@ class CanBus(BusSection):
     data_bit_rate_kbit_s: DataBitRate | None = Field(
         default=None,
         description="Data bit rate of CAN FD, behind the switch of bit rate: SYNC and PDOs are FD frames of up to 64 "
-        "bytes, and messages with fd = true; without it the bus is classical CAN [kbit/s]",
+        "bytes, and messages with fd = true; without it SYNC and PDOs are classical frames [kbit/s]",
         examples=[5000],
     )
     nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[8])
@@ -185,17 +185,24 @@ class CanMessage(Section):
     per_node: bool = Field(
         default=False, description="Whether each node sends it, in the order of the profile", examples=[True]
     )
-    fd: bool = Field(
-        default=False,
-        description="Whether it is a CAN FD frame that switches to bus.data_bit_rate_kbit_s, or a classical frame",
-        examples=[True],
+    fd: bool = Field(default=False, description="Whether it is a CAN FD frame, or a classical frame", examples=[True])
+    brs: bool = Field(
+        default=True,
+        description="Whether its FD frame switches to bus.data_bit_rate_kbit_s; false: all of it has the bit rate of "
+        "the bus",
+        examples=[False],
     )
     payload_bytes: Annotated[int, Field(ge=0, le=int(FD_FRAME_BYTES))] = Field(
         description="Its data, 0 to 8, of an FD frame to 64 [bytes]", examples=[8]
     )
-    period_us: PeriodUs = Field(description="Shortest time from one to the next [us]", examples=[10_000])
+    period_us: PeriodUs = Field(
+        description="Shortest time from one to the next; with burst the mean time [us]", examples=[10_000]
+    )
+    burst: Count = Field(
+        default=1, description="Frames that may come at once, with as many periods to the next burst", examples=[5]
+    )
     jitter_us: TimeUs = Field(
-        default=0.0, description="How late it may be queued, no more than its period [us]", examples=[500]
+        default=0.0, description="How late it may be queued; it may be more than its period [us]", examples=[500]
     )
     deadline_us: PeriodUs | None = Field(
         default=None,
@@ -208,13 +215,9 @@ class CanMessage(Section):
         if self.payload_bytes > FRAME_BYTES and not self.fd:
             why = f"is over the {FRAME_BYTES:g} bytes of a classical frame; fd = true allows {FD_FRAME_BYTES:g}"
             raise refused(Problem(why, key="payload_bytes"))
-        return self
-
-    @model_validator(mode="after")
-    def _is_queued_within_its_period(self) -> Self:
-        if self.jitter_us > self.period_us:
-            why = f"is over the period of the message, {self.period_us:g} us"
-            raise refused(Problem(why, key="jitter_us", kind="inconsistent"))
+        if not (self.brs or self.fd):
+            why = "is of an FD frame that keeps the bit rate, and a classical frame has one alone; write fd = true"
+            raise refused(Problem(why, key="brs", kind="inconsistent"))
         return self
 
 
@@ -356,9 +359,12 @@ class CanProfile(Profile):
         if self.bus.data_bit_rate_kbit_s is not None:
             return self
         problems = [
-            Problem("asks for bus.data_bit_rate_kbit_s: without it a bus is classical CAN", f"message.{place}.fd")
+            Problem(
+                "asks for bus.data_bit_rate_kbit_s; brs = false says a frame without a switch of bit rate",
+                f"message.{place}.fd",
+            )
             for place, message in enumerate(self.message)
-            if message.fd
+            if message.fd and message.brs
         ]
         problems += (
             Problem(f"has a PDO over the {FRAME_BYTES:g} bytes of a classical frame", f"{section}.{name}")

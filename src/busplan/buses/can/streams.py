@@ -53,6 +53,8 @@ class Stream(NamedTuple):
     is_message: bool = False
     is_end: bool = True
     """Whether the PDO, or the message, is complete with it."""
+    burst: Points = 1
+    """Frames of each identifier that may come at once [1]."""
 
     @property
     def last(self) -> Points:
@@ -77,6 +79,10 @@ class Stream(NamedTuple):
     def sender(self, count: Points | None = None) -> Sender:
         """Its frames, or some of them, as a source."""
         return Sender((self.identifiers if count is None else count) * self.frame_us, self.period_us, self.jitter_us)
+
+    def burst_us(self, count: Points | None = None) -> Points:
+        """Frames that come at once beside the first, of all its identifiers or of some of them [us]."""
+        return (self.burst - 1) * self.sender(count).frames_us
 
     def goes_before(self, stream: "Stream") -> Points:
         """Whether its frames win the arbitration against the last frame of another."""
@@ -169,14 +175,14 @@ class MessageStreams:
 
 
 def columns_of(each: Iterable[Stream]) -> "NDArray[Any]":
-    """Of plain streams: all frames, period, jitter, a frame, deadline, block and last place."""
+    """Of plain streams: all frames, period, jitter, a frame, deadline, block, last place and burst."""
     import numpy as np  # of many streams alone
 
-    rows = [(*own.sender(), own.frame_us, own.deadline_us, own.block, own.last_place) for own in each]
+    rows = [(*own.sender(), own.frame_us, own.deadline_us, own.block, own.last_place, own.burst_us()) for own in each]
     return np.array(rows, dtype=float).reshape(len(rows), _COLUMNS).T
 
 
-_COLUMNS: Final = 7
+_COLUMNS: Final = 8
 """Numbers of a stream in `columns_of`."""
 
 
@@ -213,6 +219,7 @@ def _of_message(message: Message, bit_rate_kbit_s: Points, is_stuffed: bool) -> 
         deadline_us=message.deadline_us,
         identifier_bits=bits,
         is_message=True,
+        burst=message.burst,
     )
 
 

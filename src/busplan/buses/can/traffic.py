@@ -67,7 +67,9 @@ class Message(NamedTuple):
     senders: Number = 1
     """Nodes that send it, each with the identifier behind that of the node before [1]."""
     data_bit_rate_kbit_s: Number = 0.0
-    """Of an FD frame; 0 for a classical frame."""
+    """Of an FD frame, that of the bus where it does not switch; 0 for a classical frame."""
+    burst: Number = 1
+    """Frames that may come at once [1]."""
 
 
 class MessageList(tuple[Message, ...]):  # noqa: SLOT001 - a tuple's subclass with slots holds no attribute
@@ -94,7 +96,7 @@ class MessageList(tuple[Message, ...]):  # noqa: SLOT001 - a tuple's subclass wi
     def timeless(self) -> "MessageList":
         """The same with all times alike, which identifiers do not rest on."""
         return MessageList(
-            message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0, data_bit_rate_kbit_s=0.0)
+            message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0, data_bit_rate_kbit_s=0.0, burst=1)
             for message in self
         )
 
@@ -347,7 +349,7 @@ _known: tuple[tuple[Any, ...], MessageList, bool] | None = None
 def _messages(said: tuple[Any, ...], bus: Any, nodes: Number) -> MessageList:
     """Messages of a profile. The last result is remembered: searches change the nodes and times of a network."""
     global _known  # noqa: PLW0603 - a profile may hold arrays, and is told apart by identity alone
-    key = nodes, bus.identifier_bits, bus.data_bit_rate_kbit_s, *said
+    key = nodes, bus.identifier_bits, bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s, *said
     if _known is not None and len(key) == len(_known[0]):
         has_same_nodes, *rest_same = map(is_, key, _known[0])
         if all(rest_same) and (has_same_nodes or not _known[2]):
@@ -382,5 +384,6 @@ def _message(said: Any, bus: Any, nodes: Number) -> Message:
         deadline_us,
         bus.identifier_bits if said.identifier_bits is None else said.identifier_bits,
         nodes if said.per_node else 1,
-        bus.data_bit_rate_kbit_s if said.fd else 0.0,
+        0.0 if not said.fd else bus.data_bit_rate_kbit_s if said.brs else bus.bit_rate_kbit_s,
+        said.burst,
     )

@@ -24,11 +24,11 @@ from busplan.buses.can.response import (
 )
 from busplan.buses.can.streams import Stream, columns_of, last_place, message_streams, remembered, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic
-from busplan.elementwise import choose, is_everywhere, larger, plain, rounded_up, smaller, total
+from busplan.elementwise import choose, is_everywhere, is_off, larger, plain, rounded_up, smaller, total
 
 _CYCLIC: Final = (SYNC, *NAMES.values())
-_FRAME, _BLOCK = 3, 5
-"""Places of a frame and of the block in `columns_of`; numbers of a sender stand before a frame."""
+_FRAME, _BLOCK, _BURST = 3, 5, 7
+"""Places of a frame, the block and the burst in `columns_of`; numbers of a sender stand before a frame."""
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 
 
@@ -76,7 +76,8 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     SYNC, the feedback of the slowest node and the commands each meet an idle bus, or a bus that has just become busy. A
     frame of a lower priority may have started then: three such frames, the longest that can be there. One of a message
     whose deadline D is kept ends within it, so ceil((w + D) / T) of them are there in w. Frames that go before the last
-    PDO go whenever they are queued: ceil((w + J + bit) / T).
+    PDO go whenever they are queued: ceil((w + J + bit) / T). Of a message whose frames may come b at once there are
+    b - 1 more.
 
     Nothing of that is still pending from the cycle before: all that was queued by w behind its start has been sent by
     then, and w is within the period.
@@ -100,12 +101,16 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
             else stream
             for stream in lower
         )
+    ranked = [sent.each[number] for number in before]
     higher = [
         Sender(
             choose(stream.first_place <= last, stream.sender().frames_us, 0.0), stream.period_us, stream.jitter_us + bit
         )
-        for stream in (sent.each[number] for number in before)
+        for stream in ranked
     ]
+    others_us = others_us + total(
+        choose(stream.first_place <= last, stream.burst_us(), 0.0) for stream in ranked if not is_off(stream.burst - 1)
+    )
 
     def blocking_us(span_us: Points) -> Points:
         blocked: Points = 0.0
@@ -126,7 +131,7 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
 def _frames_within(stream: Stream, span_us: Points) -> Points:
     """Frames of a message of a lower priority that go within a span of time, of which three are enough [1]."""
     each = rounded_up(smaller((span_us + stream.deadline_us) / stream.period_us, int(MOST_BLOCKS)))
-    return smaller(stream.identifiers * each, int(MOST_BLOCKS))
+    return smaller(stream.identifiers * (each + stream.burst - 1), int(MOST_BLOCKS))
 
 
 def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> dict[str, Points]:
@@ -147,6 +152,8 @@ class _Start:
         All senders, in the order of arbitration; or arrays of all of them.
     is_late
         Of each, whether it is late: it comes at once, and again in the next cycle.
+    bursts_us
+        Frames of each that come at once beside the first [us].
     groups
         Of arrays, the number of the period and jitter of each, from 0.
     bit_us
@@ -154,7 +161,12 @@ class _Start:
     """
 
     def __init__(
-        self, senders: Sequence[Sender] | Sender, is_late: Sequence[bool], bit_us: Points, groups: Points = None
+        self,
+        senders: Sequence[Sender] | Sender,
+        is_late: Sequence[bool],
+        bursts_us: Points,
+        bit_us: Points,
+        groups: Points = None,
     ) -> None:
         self.senders = senders
 
@@ -172,10 +184,11 @@ class _Start:
             _, first = np.unique(groups, return_index=True)
             self.times_us = senders.period_us[first], senders.jitter_us[first]
             """Period and jitter of each group [us]."""
-            self.first_us = _sums_of_array(senders.frames_us * is_late)
+            self.first_us = _sums_of_array(senders.frames_us * is_late + bursts_us)
             self.least_us, self.most_us = _sums_of_array(least_us(senders)), _sums_of_array(most_us(senders))
         else:
-            self.first_us = _sums(sender.frames_us * late for sender, late in zip(senders, is_late, strict=True))
+            parts = zip(senders, is_late, bursts_us, strict=True)
+            self.first_us = _sums(sender.frames_us * late + burst_us for sender, late, burst_us in parts)
             self.least_us, self.most_us = _sums(map(least_us, senders)), _sums(map(most_us, senders))
 
 
@@ -265,12 +278,13 @@ class Messages:
                 stream.sender()._replace(jitter_us=-next(rest)) if late and not stream.is_message else stream.sender()
                 for stream in self._ranked
             ]
-            return _Start(senders, is_late, self._bit_us)
+            return _Start(senders, is_late, [stream.burst_us() for stream in self._ranked], self._bit_us)
         frames_us, period_us, jitter_us = self._columns[:_FRAME]
         if late:
             jitter_us = jitter_us.copy()
             jitter_us[~self._is_message] = [-us for us in offsets_us]
-        return _Start(Sender(frames_us, period_us, jitter_us), is_late, self._bit_us, self._groups)
+        own = Sender(frames_us, period_us, jitter_us)
+        return _Start(own, is_late, self._columns[_BURST], self._bit_us, self._groups)
 
     @cached_property
     def _ranks_by_name(self) -> dict[str, int]:
@@ -281,7 +295,7 @@ class Messages:
         """Of all messages of plain numbers, the lowest priority first: first rank behind, a single frame, deadline."""
         import numpy as np
 
-        _, period_us, jitter_us, frame_us, deadline_us, _, last = self._columns[:, self._is_message][:, ::-1]
+        _, period_us, jitter_us, frame_us, deadline_us, _, last, _ = self._columns[:, self._is_message][:, ::-1]
         behind = np.searchsorted(self._columns[_BLOCK], last, side="right")
         return behind, Sender(frame_us, period_us, jitter_us), deadline_us
 
@@ -342,7 +356,14 @@ class Messages:
             blocking_us, first_us = self._longest_us[behind], start.first_us[behind]
             if self._columns is not None:
                 blocking_us, first_us = float(blocking_us), float(first_us)
-            yield worst_instance(own.sender(1), before, blocking_us=blocking_us, bit_us=self._bit_us, first_us=first_us)
+            yield worst_instance(
+                own.sender(1),
+                before,
+                blocking_us=blocking_us,
+                bit_us=self._bit_us,
+                first_us=first_us - own.burst_us(1),
+                burst=own.burst,
+            )
 
     def _before(self, own: Stream, behind: int) -> Iterator[Demand]:
         """What goes before a message, other nodes' of its name among them, from each start of a busy period."""
@@ -405,6 +426,7 @@ class Messages:
             frames_us[self._ranks_by_name[own.name]] = (own.identifiers - 1) * own.frame_us
             of_groups_us[:, number] = np.bincount(place[:end], frames_us, len(groups))
         own_all = Sender(*np.array([own.sender(1) for own in each]).T)
+        burst, bursts_us = np.array([(own.burst, own.burst_us(1)) for own in each]).T
         for start in self._starts:
             times_us = (times[groups, np.newaxis] for times in start.times_us)
             yield worst_instance(
@@ -412,7 +434,8 @@ class Messages:
                 Demand.of_many(Sender(of_groups_us, *times_us)),
                 blocking_us=self._longest_us[behind],
                 bit_us=self._bit_us,
-                first_us=start.first_us[behind],
+                first_us=start.first_us[behind] - bursts_us,
+                burst=burst,
             )
 
     def latest(self) -> tuple[Stream, Response | None]:
@@ -514,25 +537,27 @@ def response(own: Stream, traffic: Traffic, *, is_stuffed: bool) -> Response | N
     """
     if own.is_message:
         return messages(traffic, is_stuffed=is_stuffed).response(own)
-    higher, blocking_us = _rivals(own, streams(traffic, is_stuffed=is_stuffed))
+    higher, blocking_us, first_us = _rivals(own, streams(traffic, is_stuffed=is_stuffed))
     if own.identifiers > 1:
         higher.append(own.sender(own.identifiers - 1))
     bit = plain(bit_us(traffic.bit_rate_kbit_s))
-    return worst_response(own.sender(1), higher, blocking_us=plain(blocking_us), bit_us=bit)
+    return worst_response(own.sender(1), higher, blocking_us=plain(blocking_us), bit_us=bit, first_us=plain(first_us))
 
 
-def _rivals(own: Stream, each: Iterable[Stream]) -> tuple[list[Sender], Points]:
-    """What goes before SYNC or a PDO, and the longest frame that may hold it up [us]."""
+def _rivals(own: Stream, each: Iterable[Stream]) -> tuple[list[Sender], Points, Points]:
+    """What goes before SYNC or a PDO, the longest frame that may hold it up [us], and what comes at once [us]."""
     higher: list[Sender] = []
     blocking_us: Points = 0.0
+    first_us: Points = 0.0
     for stream in each:
         is_higher = stream.goes_before(own)
         if stream is not own and is_higher is not False:
             sender = stream.sender()
             higher.append(sender._replace(frames_us=choose(is_higher, sender.frames_us, 0.0)))
+            first_us = first_us + choose(is_higher, stream.burst_us(), 0.0)
         if is_higher is not True and (own.name != SYNC or stream.is_message):
             blocking_us = larger(blocking_us, choose(is_higher, 0.0, stream.frame_us))
-    return higher, blocking_us
+    return higher, blocking_us, first_us
 
 
 def sync_spread_us(traffic: Traffic, *, is_stuffed: bool) -> Points:
@@ -551,8 +576,12 @@ def sync_spread_us(traffic: Traffic, *, is_stuffed: bool) -> Points:
         It takes too many steps to find.
     """
     own, *_ = each = streams(traffic, is_stuffed=is_stuffed)
-    higher, blocking_us = _rivals(own, each)
+    higher, blocking_us, first_us = _rivals(own, each)
     worst = worst_instance(
-        own.sender(1), Demand(higher), blocking_us=blocking_us, bit_us=bit_us(traffic.bit_rate_kbit_s)
+        own.sender(1),
+        Demand(higher),
+        blocking_us=blocking_us,
+        bit_us=bit_us(traffic.bit_rate_kbit_s),
+        first_us=first_us,
     )
     return inf if worst is None else choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)

@@ -1,0 +1,169 @@
+"""Bursts, jitter beyond the period, and FD frames at one bit rate, against a simulation of arbitration.
+
+The simulation, tests/oracles/can_simulation.py, knows nothing of the model.
+"""
+
+import importlib.util
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import busplan
+from busplan.buses.can.section import CanProfile
+from busplan.errors import BusplanError
+from busplan.profile.toml import override
+
+if TYPE_CHECKING:
+    from tests.oracles.can_simulation import Frame, SimulatedMessage, simulate
+else:
+    path = Path(__file__).parents[2] / "oracles" / "can_simulation.py"
+    spec = importlib.util.spec_from_file_location("can_simulation", path)
+    oracle = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(oracle)
+    Frame, SimulatedMessage, simulate = oracle.Frame, oracle.SimulatedMessage, oracle.simulate
+
+WORST: Final = "worst-stuffing"
+KBIT_S: Final = 500
+BIT_US: Final = 2
+
+
+def network(*messages: dict[str, Any], **bus: Any) -> CanProfile:
+    """Messages alone, the first goes first."""
+    each = [
+        {"name": f"m{place}", "identifier": 16 * place, "payload_bytes": 8, **keys}
+        for place, keys in enumerate(messages)
+    ]
+    bus = {"kind": "can", "bit_rate_kbit_s": KBIT_S, **bus}
+    return CanProfile.model_validate({"schema_version": 1, "name": "bursts", "bus": bus, "message": each})
+
+
+class Sent(NamedTuple):
+    """A message as it is sent, in whole microseconds."""
+
+    frame_us: int
+    period_us: int
+    jitter_us: int
+    burst: int
+
+    def queued(self, identifier: int, until_us: int) -> SimulatedMessage:
+        """All instances up to a time, those of before 0 as late as they may be, and then as early."""
+        due = (*(-self.jitter_us,) * (self.burst - 1), *range(-self.jitter_us, until_us, self.period_us))
+        return SimulatedMessage(Frame(identifier, self.frame_us), due, tuple(max(us, 0) for us in due))
+
+
+def longest_us(each: Sequence[Sent], place: int, until_us: int) -> int:
+    """The longest response of a message in the busy period that the longest frame of a lower priority opens [us]."""
+    queued = [one.queued(number, until_us) for number, one in enumerate(each[: place + 1])]
+    # It has won the arbitration before any of the others came.
+    lower = [Frame(-1, one.frame_us) for one in each[place + 1 :]]
+    blocking = [SimulatedMessage(max(lower, key=lambda frame: frame.us), (0,), (0,))] if lower else []
+    # A frame that is queued within a bit still takes part in the arbitration.
+    found = simulate(Frame(0, 1), (), [*queued, *blocking], period_us=1, host_us=(), late_us=BIT_US - 1)
+    return max(found.responses_us[place])
+
+
+def frames_us(own: CanProfile) -> list[float]:
+    """Frame of each message [us]."""
+    return [float(one.frame_us) for one in busplan.latency(own, timing_model=[WORST]).transactions]
+
+
+def responses_us(own: CanProfile) -> list[float | None]:
+    """Worst-case response of each message [us]."""
+    return [one.worst_response_us for one in busplan.latency(own, timing_model=[WORST]).transactions]
+
+
+MESSAGES: Final = st.lists(
+    st.fixed_dictionaries(
+        {
+            "payload_bytes": st.integers(0, 8),
+            "period_us": st.sampled_from([700, 1300, 2000, 2500, 6000, 20_000]),
+            "jitter_us": st.sampled_from([0, 0, 300, 1900, 5000, 30_000]),
+            "burst": st.sampled_from([1, 1, 2, 3, 7]),
+        },
+        optional={"fd": st.just(True), "brs": st.just(False)},
+    ).filter(lambda one: one.get("fd", False) or "brs" not in one),
+    min_size=1,
+    max_size=6,
+)
+
+
+@given(MESSAGES)
+@settings(max_examples=200, deadline=None)
+def test_a_simulation_reaches_each_response_and_never_passes_it(messages: list[dict[str, Any]]) -> None:
+    # Data at 1000 kbit/s: all frames are whole microseconds, with a switch of bit rate and without.
+    own = network(*messages, data_bit_rate_kbit_s=1000)
+    bounds = responses_us(own)
+    assume(None not in bounds)
+    each = [
+        Sent(int(us), one["period_us"], one["jitter_us"], one["burst"])
+        for us, one in zip(frames_us(own), messages, strict=True)
+    ]
+    load = sum(one.frame_us / one.period_us for one in each)
+    at_once_us = sum(one.frame_us * (one.burst + (one.jitter_us + 20) / one.period_us + 1) for one in each)
+    assume(at_once_us / (1 - min(load, 0.99)) < 2e5)
+    for place, bound in enumerate(bounds):
+        assert longest_us(each, place, int(at_once_us / (1 - load)) + 1) == pytest.approx(bound, abs=1e-6)
+
+
+def test_a_burst_waits_for_itself_and_others_wait_for_all_of_it() -> None:
+    # 270 us a frame: five at once, and behind them a message that meets one of them and one of a lower priority.
+    own = network({"period_us": 100_000, "burst": 5}, {"period_us": 10_000}, {"period_us": 50_000})
+    assert frames_us(own) == [270.0] * 3
+    assert responses_us(own) == [270 * 6, 270 * 7, 270 * 7]
+    (first, *_) = busplan.latency(own, timing_model=[WORST]).transactions
+    assert (first.blocking_us, first.interference_us, first.instance, first.backlog_us) == (270, 0, 4, 4 * 270)
+    # Its period is the mean: the load is that of a frame in each of them.
+    (found,) = busplan.capacity(own, timing_model=[WORST]).results
+    assert found.bus_load == pytest.approx(270 / 100_000 + 270 / 10_000 + 270 / 50_000)
+
+
+def test_the_deadline_of_a_burst_counts_from_when_it_is_queued() -> None:
+    burst = {"period_us": 100_000, "burst": 5}
+    for deadline_us, is_kept in [(270 * 5, True), (270 * 5 - 1, False)]:
+        (found,) = busplan.capacity(network({**burst, "deadline_us": deadline_us}), timing_model=[WORST]).results
+        assert ("deadline" in found.exceeded) is not is_kept
+
+
+def test_a_jitter_beyond_the_period_queues_several_at_once() -> None:
+    # Three periods late: four are there at once, the first of them was due three periods before, and a fifth comes.
+    own = network({"period_us": 1000, "jitter_us": 3000}, {"period_us": 100_000})
+    assert responses_us(own) == [3000 + 270 + 270, 270 * 6]
+
+
+@pytest.mark.parametrize(("size", "bits"), [(0, 67), (8, 147), (64, 712)])
+def test_an_fd_frame_without_a_switch_has_the_bit_rate_of_the_bus_in_all_parts(size: int, bits: int) -> None:
+    message = {"period_us": 100_000, "payload_bytes": size, "fd": True}
+    (us,) = frames_us(network({**message, "brs": False}))
+    assert us == frames_us(network(message, data_bit_rate_kbit_s=KBIT_S))[0]
+    assert us == bits * BIT_US
+    assert frames_us(network({**message, "brs": False}, data_bit_rate_kbit_s=5000))[0] == us
+    assert frames_us(network(message, data_bit_rate_kbit_s=5000))[0] < us
+
+
+def test_brs_needs_no_data_bit_rate_and_is_of_fd_alone() -> None:
+    message = {"period_us": 100_000, "payload_bytes": 64}
+    with pytest.raises(ValueError, match="brs = false says a frame without a switch"):
+        network({**message, "fd": True})
+    with pytest.raises(ValueError, match="write fd = true"):
+        network({"period_us": 100_000, "brs": False})
+    own = network({**message, "fd": True, "brs": False})
+    with pytest.raises(BusplanError, match=r"asks for bus\.data_bit_rate_kbit_s"):
+        override(own, {"message.m0.brs": True})
+
+
+@pytest.mark.parametrize("key", ["burst", "jitter_us", "period_us"])
+def test_a_sweep_has_at_each_point_what_the_point_has(key: str) -> None:
+    own = network(
+        {"period_us": 5000, "burst": 3, "deadline_us": 2000},
+        {"period_us": 9000, "jitter_us": 10_000, "deadline_us": 20_000},
+    )
+    values = {"burst": [1, 2, 8], "jitter_us": [0, 400, 12_000], "period_us": [300, 5000, 90_000]}[key]
+    swept = busplan.sweep(own, vary={f"message.m0.{key}": values}, timing_model=[WORST])
+    for value, load, fits in zip(values, swept["bus_load"], swept["fits"], strict=True):
+        (found,) = busplan.capacity(override(own, {f"message.m0.{key}": value}), timing_model=[WORST]).results
+        assert (load, fits) == (pytest.approx(found.bus_load), found.fits)
+    assert len(set(swept["fits"])) > 1
