@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
+from busplan.files import is_unwritten_pipe
 from busplan.profile.document import GRADING, Document, TomlTable, text_of
 from busplan.profile.keys import holder
 from busplan.profile.kinds import kind_of, profile_model
@@ -20,8 +21,6 @@ from busplan.sourced import Grade
 
 MAX_FILE_BYTES: Final = 2_000_000
 """Some 10,000 messages of a CAN network with their comments; a larger file is something else."""
-_OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
-"""Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
 PERIOD_KEY: Final = "cycle.period_us"
 _KINDS: Final = ("bus", "bus.kind")
 """Keys whose change may ask for tables of another kind of bus."""
@@ -86,8 +85,7 @@ def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
             if sys.stdin is None:
                 raise BusplanError(f"{name}: standard input is closed")
             return sys.stdin.buffer.read(limit + 1)
-        if path.is_fifo() and not str(path).startswith(_OPENED):
-            # Opening it would wait for a writer forever.
+        if is_unwritten_pipe(path):
             raise BusplanError(f"{name}: is a named pipe; give a regular file")
         with path.open("rb") as file:
             return file.read(limit + 1)
