@@ -120,6 +120,22 @@ def test_init_writes_unlike_nodes_as_groups_and_knows_a_bus_by_its_other_names(r
     assert data["description"] == "A new machine: what is assumed here stays so until somebody measures it"
 
 
+CLOSED = """
+import os, sys
+os.execv("/bin/sh", ["sh", "-c", '"$0" -m busplan "$@" <&-', sys.executable, *sys.argv[1:]])
+"""
+
+
+def test_init_asks_nothing_where_nobody_can_answer(run: Run, tmp_path: Path) -> None:
+    for python in (None, ("-c", CLOSED)):
+        name = "open" if python is None else "closed"
+        done = run("init", name, cwd=tmp_path, python=python)
+        assert (done.returncode, done.stdout) == (0, "")
+        assert done.stderr.startswith("not given, so taken: --bus ieee1394 ")
+    written = [(tmp_path / f"{name}.toml").read_text(encoding="utf-8") for name in ("open", "closed")]
+    assert written[0].replace("open", "closed") == written[1]
+
+
 def state_of(pid: int) -> str:
     """State of a process: R where it runs, S where it waits."""
     return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
