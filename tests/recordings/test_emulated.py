@@ -15,14 +15,6 @@ from tests.oracles import can_recording
 from tests.oracles.emulated import FAULTS, HIDDEN, Fault, Subject
 
 SEEDS = {"can": (9, 16, 22, 26, 34, 42), "ethercat": (1, 3, 8, 14, 21, 31)}
-OPEN = {
-    "no error",
-    "within U",
-    *("commands behind the next SYNC", "late in some due cycles"),
-    *("SYNC missing", "commands missing", "feedback missing", "error frames", "other period"),
-    *("cycles skipped", "skipped in a row", "more bytes", "few frames", "stamps of no port"),
-}
-"""What the readers of recordings do not do yet (issue 43)."""
 Subjects = Callable[[str, int], Subject]
 
 
@@ -32,23 +24,13 @@ def subjects(tmp_path_factory: pytest.TempPathFactory) -> Subjects:
     return cache(lambda kind, seed: Subject(kind, seed, tmp_path_factory.mktemp(f"{kind}-{seed}")))
 
 
-def open_until_mended(name: str) -> tuple[pytest.MarkDecorator, ...]:
-    return (pytest.mark.xfail(strict=False, reason="issue 43"),) if name in OPEN else ()
-
-
-def of_each(faults: tuple[Fault, ...]) -> list[object]:
-    names = [f"{fault.kind}: {fault.name}" for fault in faults]
-    marks = [open_until_mended(fault.name) for fault in faults]
-    return [pytest.param(fault, id=name, marks=own) for fault, name, own in zip(faults, names, marks, strict=True)]
-
-
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=open_until_mended("no error")) for kind in SEEDS])
+@pytest.mark.parametrize("kind", SEEDS)
 def test_a_machine_that_keeps_its_plan_has_no_error(kind: str, subjects: Subjects) -> None:
     errors = {seed: subjects(kind, seed).clean.errors for seed in SEEDS[kind]}
     assert errors == {seed: [] for seed in SEEDS[kind]}
 
 
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=open_until_mended("within U")) for kind in SEEDS])
+@pytest.mark.parametrize("kind", SEEDS)
 def test_figures_lie_within_their_u_of_the_truth(kind: str, subjects: Subjects) -> None:
     judged = [(seed, *pair) for seed in SEEDS[kind] for pair in subjects(kind, seed).clean.judged()]
     beside = [(seed, name) for seed, name, is_within in judged if not is_within]
@@ -57,7 +39,7 @@ def test_figures_lie_within_their_u_of_the_truth(kind: str, subjects: Subjects) 
     assert len(beside) <= 0.05 * len(judged), beside
 
 
-@pytest.mark.parametrize("fault", of_each((*FAULTS, *HIDDEN)))
+@pytest.mark.parametrize("fault", (*FAULTS, *HIDDEN), ids=lambda fault: f"{fault.kind}: {fault.name}")
 def test_a_fault_larger_than_u_is_named_and_a_recording_that_shows_nothing_says_so(
     fault: Fault, subjects: Subjects
 ) -> None:
