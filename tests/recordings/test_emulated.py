@@ -39,7 +39,7 @@ def test_figures_lie_within_their_u_of_the_truth(kind: str, subjects: Subjects) 
     assert len(beside) <= 0.05 * len(judged), beside
 
 
-@pytest.mark.parametrize("fault", (*FAULTS, *HIDDEN), ids=lambda fault: f"{fault.kind}: {fault.name}")
+@pytest.mark.parametrize("fault", [*FAULTS, *HIDDEN], ids=lambda fault: f"{fault.kind}: {fault.name}")
 def test_a_fault_larger_than_u_is_named_and_a_recording_that_shows_nothing_says_so(
     fault: Fault, subjects: Subjects
 ) -> None:
