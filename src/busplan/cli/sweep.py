@@ -1,13 +1,14 @@
 """`busplan sweep`: its options and their checks."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal, get_args
 
 import typer
 
-from busplan.cli.answering import naming_option
+from busplan.cli.answering import give, naming_option, report_with
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
@@ -22,18 +23,23 @@ from busplan.cli.options import (
     output_option,
     parse_axes,
 )
-from busplan.cli.output import refuse_terminal
+from busplan.cli.output import emit_document, refuse_terminal, say
 from busplan.cli.pictures import plot_form
-from busplan.cli.sweep_run import TOP_FORMS, SweepForm, SweepJob, run_sweep
+from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
-from busplan.files import partial_path
-from busplan.forms import ENDINGS, ROWS_ENDINGS
+from busplan.files import document_bytes, new_file
+from busplan.forms import ENDINGS, ROWS_ENDINGS, Form, RowsForm, render
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from busplan.questions.sweep.asked import Sweep
 
+SweepForm = Literal[Form, RowsForm]
+_TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in get_args(RowsForm))
+"""Forms with the top rows, for people."""
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
 _DEFAULT_TOP: Final = 20
 
@@ -56,8 +62,8 @@ def sweep_command(
         typer.Option(
             "--format",
             help="Form of the answer: the top rows as a table (text in lines), markdown or html, or every row as csv, "
-            "json (one document), jsonl (a JSON object a line, the first describes the sweep) or parquet (typed "
-            "columns; needs the extra table, pyarrow).  [default: by the ending of --output, else table]",
+            "json (one document) or parquet (typed columns; needs the extra table, pyarrow).  [default: by the ending "
+            "of --output, else table]",
             show_default=False,
         ),
     ] = None,
@@ -90,8 +96,16 @@ def sweep_command(
         str | None,
         option(
             "--figure COLUMN",
-            "Figure that --plot draws, by its name in --columns.  [default: safe_axes; margin_corrected_us of groups "
-            "and where safe_axes does not vary]",
+            "Figure that --plot draws, by its name in --columns.  [default: safe_axes; margin_corrected_us where "
+            "safe_axes does not vary]",
+        ),
+    ] = None,
+    group: Annotated[
+        str | None,
+        option(
+            "--group NAME",
+            "Of a profile with groups: the one whose nodes vary for the most and the safe nodes and axes; the others are "
+            "as they are.  [default: the one with the most axes]",
         ),
     ] = None,
     all_: AllOption = False,
@@ -118,25 +132,14 @@ def sweep_command(
             "same versions of Python, busplan and numpy. Needs the extra cluster (distributed).  [default: here]",
         ),
     ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume",
-            help="With --circle and -o FILE: continue a sweep that was interrupted or killed, after the finished "
-            "tests in FILE.parts.",
-        ),
-    ] = False,
     force: Annotated[
         bool, typer.Option("--force", help="Run more than 1,000 circle tests, which --circle alone refuses.")
     ] = False,
 ) -> None:
     """Compute capacity over a grid: every combination of values of any keys, under each timing model.
 
-    Each row has the figures of `busplan capacity` for one point. Memory does not grow with the grid; millions of points
-    take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in
-    FILE.partial.csv (or .json, .jsonl, .parquet) and leave FILE as it was. With --circle and -o FILE, finished tests
-    are kept in the folder FILE.parts until FILE is complete, and --resume continues from there, even after SIGKILL.
-    Exits 0 with any verdict.
+    Each row has the figures of `busplan capacity` for one point, of a million at most. Ctrl-C, SIGTERM and SIGHUP leave
+    FILE as it was. Exits 0 with any verdict.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
@@ -145,20 +148,18 @@ def sweep_command(
         _require_parquet(output, typed=format_)
     _require_sense(form, sort=sort, top=top)
     _require_needed("--plot FILE", plot is not None, {"--figure": figure})
-    own = {"--cluster": cluster, "--resume": resume or None, "--force": force or None, "--summary": summary or None}
-    _require_needed("--circle", circle, {"--jobs": jobs, **own})
-    _require_needed("--output FILE, beside which the parts stand", output is not None, {"--resume": resume or None})
+    own = {"--jobs": jobs, "--cluster": cluster, "--force": force or None, "--summary": summary or None}
+    _require_needed("--circle", circle, own)
     if cluster is not None:
         _require_cluster(jobs)
     for name, number in (("--top", top), ("--jobs", jobs)):
         if number is not None and number < 1:
             raise BusplanError(f"{name} {number}: must be 1 or more")
-    kept = None if output is None else partial_path(output)
-    outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
-    require_apart(outputs, inputs=profile_files(profile))
+    require_apart({"--output": output, "--plot": plot}, inputs=profile_files(profile))
     plot_form_ = None if plot is None else plot_form(plot)
-    from busplan.cli.workers import available_processors
-    from busplan.questions.sweep import checked_sweep
+    from busplan.forms.numbers import sentence_text
+    from busplan.questions.sweep import checked_sweep, computed, require_drawable
+    from busplan.questions.words.documents import changes_sentences
 
     loaded = load_changed(profile, changes)
     varied = parse_axes(vary or [])
@@ -168,35 +169,66 @@ def sweep_command(
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    with naming_option("vary", "timing_model", "circle", "summary", "force"):
+    with naming_option("vary", "timing_model", "group", "circle", "summary", "force"):
         asked = checked_sweep(
             loaded,
             varied,
             timing_models=None if timing == ALL_MODELS else [timing],
+            group=group,
             circle=circle,
             summary=summary,
             force=force,
             changes=changes,
         )
     _require_number(asked, {"--sort": sort_by or None, "--figure": figure})
-    chosen = _columns(asked, columns, short=form in TOP_FORMS, sort_by=sort_by)
-    run_sweep(
-        SweepJob(
-            asked._replace(columns=chosen),
-            form=form,
-            output=output,
-            top=top or _DEFAULT_TOP,
-            is_whole=all_,
-            sort_by=sort_by or None,
-            ascending=order == "asc",
-            plot=plot,
-            plot_form=plot_form_,
-            figure=figure,
-            jobs=jobs or available_processors(),
-            cluster=cluster,
-            resume=resume,
-        )
-    )
+    chosen = _columns(asked, columns)
+    if plot is not None:
+        require_drawable(asked.grid, option="--plot")
+    with ExitStack() as run:
+        # Opened before the work, so that a path that cannot be written fails at once.
+        plot_file = run.enter_context(new_file(plot, overwrite=True)) if plot else None
+        file = run.enter_context(new_file(output, overwrite=True)) if output else None
+        with progress_bar("sweep") as progress, _crew(asked, jobs=jobs, cluster=cluster) as crew:
+            answer = computed(asked, executor=crew, progress=progress)
+        match form:
+            case "csv" | "json" | "parquet":
+                for piece in answer.rows_in(form, chosen):
+                    (emit_document if file is None else file.write)(piece)
+            case _:
+                rows = answer.report(
+                    columns=chosen, top=top or _DEFAULT_TOP, sort_by=sort_by or None, ascending=bool(order)
+                )
+                report = report_with(changes, rows)._replace(is_whole=all_)
+                if file is None:
+                    give(report, form)
+                else:
+                    file.write(document_bytes(render(report, form)))
+        if form not in _TOP_FORMS or file is not None:
+            say(*map(sentence_text, (*changes_sentences(changes), *answer.sentences())))
+        if plot_file is not None and plot_form_ is not None:
+            from busplan.forms.raster import picture
+
+            plot_file.write(document_bytes(picture(answer.svg(figure=figure), plot_form_)))
+    for path in (output, plot):
+        if path is not None:
+            say(f"wrote {path}")
+
+
+@contextmanager
+def _crew(asked: "Sweep", *, jobs: int | None, cluster: str | None) -> Iterator["Executor | None"]:
+    """Where circle tests run: in worker processes or on a cluster; None for this thread."""
+    if cluster is not None:
+        from busplan.cli.cluster import dask_executor
+
+        with dask_executor(cluster) as there:
+            yield there
+    elif asked.circle:
+        from busplan.cli.workers import available_processors, executor
+
+        with executor(min(jobs or available_processors(), asked.tests.points)) as here:
+            yield here
+    else:
+        yield None
 
 
 def _form_of(output: Path | None) -> SweepForm:
@@ -205,7 +237,7 @@ def _form_of(output: Path | None) -> SweepForm:
     if ending == ".npz":
         raise BusplanError(
             f"--output {output}: a sweep writes no NumPy file; in Python, busplan.sweep(...) gives arrays, "
-            "and FILE.csv, FILE.jsonl or FILE.parquet holds every row"
+            "and FILE.csv, FILE.json or FILE.parquet holds every row"
         )
     return form_of_file(None, output, forms=_ENDINGS, default="table")
 
@@ -229,12 +261,12 @@ def _require_cluster(jobs: int | None) -> None:
 def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> None:
     """Refuse options that do not apply to the form."""
     for name, value in (("--sort", sort), ("--top", top)):
-        if value is not None and form not in TOP_FORMS:
-            forms = f"{', '.join(TOP_FORMS[:-1])} or {TOP_FORMS[-1]}"
+        if value is not None and form not in _TOP_FORMS:
+            forms = f"{', '.join(_TOP_FORMS[:-1])} or {_TOP_FORMS[-1]}"
             raise BusplanError(f"{name}: goes with --format {forms}; {form} has every row in the order of the grid")
 
 
-def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> None:
+def _require_needed(needed: str, is_there: bool, options: Mapping[str, object]) -> None:
     """Refuse options that need another name."""
     for name, value in options.items():
         if value is not None and not is_there:
@@ -248,17 +280,12 @@ def _require_number(sweep: "Sweep", asked: dict[str, str | None]) -> None:
             raise BusplanError(f"{name} {column}: expected a column in numbers: {', '.join(sweep.numbers)}")
 
 
-def _columns(sweep: "Sweep", asked: str | None, *, short: bool, sort_by: str) -> tuple[str, ...]:
-    """Columns to write: the varied keys and timing_model, then those asked for, or all, or the main ones."""
-    if asked is not None:
-        chosen = tuple(name.strip() for name in asked.split(","))
-        for name in chosen:
-            if name not in sweep.columns:
-                raise BusplanError(f"--columns {name}: no such column; there are {', '.join(sweep.columns)}")
-    elif short:
-        from busplan.questions.sweep import default_columns
-
-        chosen = default_columns(sweep)
-    else:
-        chosen = sweep.columns
-    return tuple(dict.fromkeys((*sweep.grid.axes, "timing_model", *chosen, *([sort_by] if sort_by else []))))
+def _columns(sweep: "Sweep", asked: str | None) -> list[str] | None:
+    """Columns that are asked for; None without --columns."""
+    if asked is None:
+        return None
+    chosen = [name.strip() for name in asked.split(",")]
+    for name in chosen:
+        if name not in sweep.columns:
+            raise BusplanError(f"--columns {name}: no such column; there are {', '.join(sweep.columns)}")
+    return chosen

@@ -11,7 +11,7 @@ from busplan.profile.write import whole
 from busplan.questions.fit.circle_refusal import step_refusals
 from busplan.questions.fit.network import bus_of, network_of, varied_nodes
 from busplan.questions.fit.node_steps import NodeSteps, node_steps, telling_periods
-from busplan.questions.sweep.grid import Values, require_keys
+from busplan.questions.sweep.grid import Array, require_keys
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 
@@ -75,7 +75,7 @@ def own_value(key: str, profile: Profile) -> Any:
 
 
 def checked_direction(
-    profile: Profile, key: str, values: Values, *, option: str, circle_option: str | None = None
+    profile: Profile, key: str, values: Array, *, option: str, circle_option: str | None = None
 ) -> Direction:
     """Make a direction after checking its key and how many values it has.
 
@@ -105,8 +105,8 @@ def checked_direction(
         raise BusplanError(
             f"{option} {key}: {values.size:,} values; a map shows up to {MOST_VALUES} of a key. A sweep takes more"
         )
-    numbers = [whole(value) for value in values.part(0, values.size).tolist()]
-    return Direction(key, tuple(numbers if values.has_words else sorted(numbers)))
+    numbers = [whole(value) for value in values.tolist()]
+    return Direction(key, tuple(numbers if values.dtype == object else sorted(numbers)))
 
 
 _FACTORS: Final = ((1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 2, 5), (1,))

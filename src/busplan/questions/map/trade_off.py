@@ -1,18 +1,15 @@
 """The map of a profile: a sweep over two keys, with the verdict and its limit in each cell."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import isnan
-from typing import Any, Final, Literal, NamedTuple, Protocol, TypeVar, get_args
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
-from busplan.progress import Progress
-from busplan.questions.circle.roundness import circle_test
-from busplan.questions.circle.setup import NOTHING, announce, estimate, setup
+from busplan.progress import Progress, ignored
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, TIME, VerdictWord
-from busplan.questions.fit.circle_refusal import refusals
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.map.direction import (
     AXES,
@@ -23,8 +20,9 @@ from busplan.questions.map.direction import (
     own_value,
     profile_key,
 )
-from busplan.questions.sweep.blocks import sweep
-from busplan.questions.sweep.grid import Grid, Listed
+from busplan.questions.sweep.circles import MOST_CIRCLES_UNASKED, CircleOutcome, Mapper, Point, circle_outcomes
+from busplan.questions.sweep.grid import Grid, axis_of
+from busplan.questions.sweep.table import figure_table
 from busplan.sections.profile import Profile
 
 State = Literal[
@@ -43,15 +41,6 @@ CELL_FIGURES: Final = (
     *("margin_corrected_us", "uncertainty_us"),
 )
 """Columns of a sweep that a cell is made of."""
-
-
-class MapPoint(NamedTuple):
-    """One combination of values that a profile can have."""
-
-    changes: dict[str, Value]
-    """New values by key of the profile."""
-    profile: Profile
-    """The profile with them."""
 
 
 class Cell(NamedTuple):
@@ -96,38 +85,32 @@ class Region(NamedTuple):
     cells: int
 
 
-def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value) -> Cell:
+def cell_of(profile: Profile, figures: Mapping[str, Any], *, x: Value, y: Value) -> Cell:
     """Make a cell from its capacity alone, before any circle test.
 
     Parameters
     ----------
-    setting
-        The setting.
+    profile
+        The profile at the setting.
     figures
         `CELL_FIGURES` of a sweep at the setting, under the timing model that decides.
     x, y
         Values of the map's directions.
     """
-    network = network_of(setting.profile)
-    unsafe = tuple(
-        limit.key for limit in bus_of(setting.profile).limits if limit.is_safety and limit.is_broken(network)
-    )
-    verdict = figures["verdict"]
+    network = network_of(profile)
+    unsafe = tuple(limit.key for limit in bus_of(profile).limits if limit.is_safety and limit.is_broken(network))
+    verdict, refused = figures["verdict"], figures["circle_refused_by"]
     keys = figures["not_shown" if verdict == NOT_SHOWN else "exceeded"]
     broken = tuple(key for key in keys if key != TIME) or (TIME,)
-    refused = tuple(figures["circle_refused_by"])
     state, limits = _state_and_limits(verdict, broken=broken, unsafe=unsafe, refused=refused)
+    uncertainty_us = figures["uncertainty_us"]
     return Cell(
         x=x,
         y=y,
-        nodes=int(figures["nodes"]),
-        axes=int(figures["axes"]),
+        **{name: figures[name] for name in ("nodes", "axes", "binding_term", "verdict", "margin_corrected_us")},
         state=state,
         limited_by=limits,
-        binding_term=figures["binding_term"],
-        verdict=verdict,
-        margin_corrected_us=figures["margin_corrected_us"],
-        uncertainty_us=None if isnan(figures["uncertainty_us"]) else figures["uncertainty_us"],
+        uncertainty_us=None if isnan(uncertainty_us) else uncertainty_us,
         is_safe=not unsafe,
         circle_refused_by=refused,
     )
@@ -146,94 +129,15 @@ def _state_and_limits(
     return ("circle cannot be run", refused) if refused else (verdict, ())
 
 
-_AT_ONCE: Final = 16
-"""Circle tests between two reports of the progress."""
+def _with_circle(cell: Cell, outcome: CircleOutcome) -> Cell:
+    cell = cell._replace(circle_passed=outcome.passed)
+    if outcome.passed is False:
+        return cell._replace(state="circle fails", limited_by=outcome.failures)
+    return cell if outcome.passed else cell._replace(state="circle not judged")
+
 
 Place = tuple[int, int]
 """Row and column of a cell."""
-Task = TypeVar("Task")
-Result = TypeVar("Result")
-
-
-class Mapper(Protocol):
-    """The built-in `map`, here or in other processes."""
-
-    def __call__(self, function: Callable[[Task], Result], tasks: Iterable[Task], /) -> Iterable[Result]:
-        """Return the results in the order of the tasks."""
-
-
-class _Task(NamedTuple):
-    """The circle test of one setting; a process can be handed it."""
-
-    profile: Profile
-    changes: dict[str, object]
-
-
-class _Judgement(NamedTuple):
-    passed: bool | None
-    failures: tuple[str, ...]
-
-
-def _run_circle(task: _Task) -> _Judgement:
-    (result,) = circle_test(override(task.profile, task.changes), explain=False).results
-    return _Judgement(result.passed, tuple(failure.name for failure in result.failures))
-
-
-def with_circles(
-    profile: Profile,
-    fitting: Mapping[Place, tuple[Cell, MapPoint]],
-    *,
-    mapper: Mapper,
-    progress: Progress | None,
-) -> dict[Place, Cell]:
-    """Run the circle tests of cells that fit; a long run is announced first.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    fitting
-        Cells and their settings.
-    mapper
-        How the tests are run.
-    progress
-        Called now and then with the tests that are done, and all of them.
-
-    Returns
-    -------
-    dict
-        The same cells, with what their circle says.
-    """
-    cost, runs = NOTHING, dict[Place, _Task]()
-    cells = {place: cell for place, (cell, _) in fitting.items()}
-    for place, (cell, setting) in fitting.items():
-        # For a profile that asks for no circle, `cell_of` did not look for refusals.
-        refused = tuple(cause.name for cause in refusals(setting.profile))
-        if refused:
-            cells[place] = cell._replace(state="circle cannot be run", limited_by=refused, circle_refused_by=refused)
-        else:
-            cost = cost.then(estimate((), [setup(setting.profile)]))
-            runs[place] = _Task(profile, dict(setting.changes))
-    announce(cost)
-    places = list(runs)
-    for start in range(0, len(places), _AT_ONCE):
-        part = places[start : start + _AT_ONCE]
-        for place, judgement in zip(part, mapper(_run_circle, [runs[place] for place in part]), strict=True):
-            cells[place] = _with_circle(cells[place], judgement)
-        if progress is not None:
-            progress(start + len(part), len(places))
-    return cells
-
-
-def _with_circle(cell: Cell, judgement: _Judgement) -> Cell:
-    cell = cell._replace(circle_passed=judgement.passed)
-    if judgement.passed is False:
-        return cell._replace(state="circle fails", limited_by=judgement.failures)
-    return cell if judgement.passed else cell._replace(state="circle not judged")
-
-
-MOST_CIRCLES: Final = 1000
-"""Most circle tests of a map."""
 
 
 class TradeOff(NamedTuple):
@@ -293,7 +197,7 @@ def trade_off(
     y: Direction | None = None,
     with_circle: bool = False,
     mapper: Mapper = map,
-    progress: Progress | None = None,
+    progress: Progress = ignored,
 ) -> TradeOff:
     """Tell where over two keys the cycle of a profile fits, and what limits it elsewhere.
 
@@ -343,21 +247,24 @@ def trade_off(
         for row, value_y in enumerate(y.values)
         for column, value_x in enumerate(x.values)
     }
-    points = {place: point for place, point in settings.items() if isinstance(point, MapPoint)}
-    if not points:
-        reason = next(value for value in settings.values() if not isinstance(value, MapPoint))
-        raise BusplanError(f"no setting of this map can exist: {reason}")
+    possible = {place: setting for place, setting in settings.items() if isinstance(setting, _Setting)}
+    if not possible:
+        raise BusplanError(f"no setting of this map can exist: {next(iter(settings.values()))}")
+    figures = dict(_swept(profile, [setting.changes for setting in possible.values()], with_circle=with_circle))
     cells = {
-        (row, column): cell_of(points[row, column], figures, x=x.values[column], y=y.values[row])
-        for (row, column), figures in _swept(profile, points)
+        (row, column): cell_of(setting.profile, figures[setting.values], x=x.values[column], y=y.values[row])
+        for (row, column), setting in possible.items()
     }
     if with_circle:
-        fitting = {place: (cell, points[place]) for place, cell in cells.items() if cell.state == "fits"}
-        if len(fitting) > MOST_CIRCLES:
+        fitting = [place for place, cell in cells.items() if cell.state == "fits"]
+        if len(fitting) > MOST_CIRCLES_UNASKED:
             raise BusplanError(
-                f"{len(fitting):,} settings fit, and a map runs up to {MOST_CIRCLES:,} circle tests; give fewer values"
+                f"{len(fitting):,} settings fit, and a map runs up to {MOST_CIRCLES_UNASKED:,} circle tests; give fewer "
+                "values"
             )
-        cells |= with_circles(profile, fitting, mapper=mapper, progress=progress)
+        points = [possible[place].changes for place in fitting]
+        outcomes = circle_outcomes(profile, points, mapper=mapper, progress=progress)
+        cells |= {place: _with_circle(cells[place], outcome) for place, outcome in zip(fitting, outcomes, strict=True)}
     rows = tuple(
         tuple(
             cells[row, column] if (row, column) in cells else NotDrawn(value_x, value_y, str(settings[row, column]))
@@ -368,41 +275,53 @@ def trade_off(
     return TradeOff(profile, x, y, rows, with_circle)
 
 
-def _setting(profile: Profile, *along: tuple[str, Value]) -> MapPoint | str:
+class _Setting(NamedTuple):
+    """One combination of values that a profile can have."""
+
+    changes: Point
+    """New values by key of the profile."""
+    profile: Profile
+    """The profile with them."""
+
+    @property
+    def values(self) -> tuple[object, ...]:
+        """The new values."""
+        return tuple(self.changes.values())
+
+
+def _setting(profile: Profile, *along: tuple[str, Value]) -> _Setting | str:
     """The profile at a point of the map, or why there is none."""
-    changes: dict[str, Value] = {}
+    changes: Point = {}
     try:
         # Axes come last: the number of nodes that they need may depend on the other value.
         for key, value in sorted(along, key=lambda key_value: key_value[0] == AXES):
             own = profile_key(key, profile)
-            is_axes = key == AXES
-            changes[own] = nodes_with(value, override(profile, dict(changes)), nodes_key=own) if is_axes else value
-        return MapPoint(changes, override(profile, dict(changes)))
+            changes[own] = nodes_with(value, override(profile, changes), nodes_key=own) if key == AXES else value
+        return _Setting(changes, override(profile, changes))
     except BusplanError as error:
         return error.problems[0]
 
 
-def _swept(profile: Profile, settings: Mapping[Place, MapPoint]) -> Iterator[tuple[Place, Mapping[str, Any]]]:
-    """Figures of each setting, from sweeps over grids of these settings alone."""
-    places: dict[tuple[object, ...], Place] = {
-        tuple(setting.changes.values()): place for place, setting in settings.items()
-    }
+def _swept(
+    profile: Profile, points: Sequence[Point], *, with_circle: bool
+) -> Iterator[tuple[tuple[object, ...], dict[str, Any]]]:
+    """Values of each point, with its figures from a sweep over a grid that has no other points."""
     model = bus_of(profile).deciding_model
-    for grid in _grids(settings.values()):
-        for block in sweep(profile, grid, timing_models=[model], with_counts=False):
-            for index in range(block.chunk.points):
-                point = tuple(block.chunk.point(index).values())
-                yield places[point], block.row(index, CELL_FIGURES)
+    for grid in _grids(points):
+        table = figure_table(profile, grid, timing_models=[model], with_counts=False, with_circle=with_circle)
+        rows = zip(*(table[name].tolist() for name in CELL_FIGURES), strict=True)
+        for point, row in zip(grid.each_point(), rows, strict=True):
+            yield tuple(point.values()), dict(zip(CELL_FIGURES, row, strict=True))
 
 
-def _grids(settings: Collection[MapPoint]) -> Iterator[Grid]:
-    """Full grids that together have every setting once: lines with equal values along them share a grid."""
-    across_key, along_key = next(iter(settings)).changes
-    lines: dict[Value, list[Value]] = {}
-    for point in settings:
-        lines.setdefault(point.changes[across_key], []).append(point.changes[along_key])
-    alike: dict[tuple[Value, ...], list[Value]] = {}
+def _grids(points: Sequence[Point]) -> Iterator[Grid]:
+    """Full grids that together have every point once: lines with equal values along them share a grid."""
+    across_key, along_key = points[0]
+    lines: dict[Any, list[Any]] = {}
+    for point in points:
+        lines.setdefault(point[across_key], []).append(point[along_key])
+    alike: dict[tuple[Any, ...], list[Any]] = {}
     for across, along in lines.items():
         alike.setdefault(tuple(along), []).append(across)
     for along_values, across_values in alike.items():
-        yield Grid({across_key: Listed(tuple(across_values)), along_key: Listed(along_values)})
+        yield Grid({across_key: axis_of(across_values), along_key: axis_of(along_values)})

@@ -10,7 +10,7 @@ from busplan.forms.numbers import SILENT_UNITS, factor_of, with_unit
 from busplan.profile.kinds import words_of
 from busplan.questions.fit.network import bus_of
 from busplan.questions.sweep.asked import column_figures
-from busplan.questions.sweep.grid import Array, Values
+from busplan.questions.sweep.grid import Array
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
@@ -39,7 +39,7 @@ class PlotScale(NamedTuple):
         return bool(self.labels)
 
 
-def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> PlotScale:
+def plot_scale(profile: Profile, key: str, axis: Array, *, as_cells: bool) -> PlotScale:
     """Make the scale of a key.
 
     Words, and numbers of a key that takes words, too, such as a gap count, are choices; so are numbers that do not
@@ -56,7 +56,7 @@ def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> P
     as_cells
         If True, numbers that are not evenly spaced are choices, too: cells of a map are equally wide.
     """
-    values, own = axis.part(0, axis.size), value_at(profile, key)
+    values, own = axis, value_at(profile, key)
     are_words = values.dtype == object or bool(words_of(profile, key))
     are_choices = are_words or not _on_a_line(values, evenly=as_cells)
     whole = values.dtype != object and bool(np.equal(np.mod(values, 1), 0).all())
