@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from busplan.questions.sweep.blocks import CHUNK_POINTS, figure_names, sweep
 
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.buses.ieee1394.table_1 import residual
@@ -20,7 +21,6 @@ from busplan.forms import RowsForm
 from busplan.profile.toml import override
 from busplan.questions.fit.figures import figures
 from busplan.questions.sweep.asked import Sweep
-from busplan.questions.sweep.blocks import CHUNK_POINTS, figure_names, sweep
 from busplan.questions.sweep.grid import Chunk, Grid, Steps, checked_grid
 from busplan.questions.sweep.rows import TEXT_POINTS, TextForm, rows_writer
 

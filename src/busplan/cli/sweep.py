@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, BinaryIO, Final, Literal, NamedTuple, get_args
 
 import typer
 
@@ -35,6 +36,7 @@ from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from busplan.questions.sweep import SweepAnswer
     from busplan.questions.sweep.asked import Sweep
 
 SweepForm = Literal[Form, RowsForm]
@@ -104,8 +106,8 @@ def sweep_command(
         str | None,
         option(
             "--group NAME",
-            "Of a profile with groups: the one whose nodes vary for the most and the safe nodes and axes; the others are "
-            "as they are.  [default: the one with the most axes]",
+            "Of a profile with groups: the one whose nodes vary for max_axes, safe_axes and so on; the others are as "
+            "they are.  [default: the one with the most axes]",
         ),
     ] = None,
     all_: AllOption = False,
@@ -146,32 +148,25 @@ def sweep_command(
     form = format_ or _form_of(output)
     if form == "parquet":
         _require_parquet(output, typed=format_)
-    _require_sense(form, sort=sort, top=top)
-    _require_needed("--plot FILE", plot is not None, {"--figure": figure})
-    own = {"--jobs": jobs, "--cluster": cluster, "--force": force or None, "--summary": summary or None}
-    _require_needed("--circle", circle, own)
-    if cluster is not None:
-        _require_cluster(jobs)
-    for name, number in (("--top", top), ("--jobs", jobs)):
-        if number is not None and number < 1:
-            raise BusplanError(f"{name} {number}: must be 1 or more")
+    _require_sense(form, {"--sort": sort, "--top": top})
+    _require_needed("--plot FILE", {"--figure": figure} if plot is None else {})
+    of_circle = {"--jobs": jobs, "--cluster": cluster, "--force": force or None, "--summary": summary or None}
+    _require_needed("--circle", {} if circle else of_circle)
+    _require_numbers({"--top": top, "--jobs": jobs})
+    _require_cluster(cluster, jobs)
     require_apart({"--output": output, "--plot": plot}, inputs=profile_files(profile))
-    plot_form_ = None if plot is None else plot_form(plot)
-    from busplan.forms.numbers import sentence_text
-    from busplan.questions.sweep import checked_sweep, computed, require_drawable
-    from busplan.questions.words.documents import changes_sentences
-
-    loaded = load_changed(profile, changes)
-    varied = parse_axes(vary or [])
-    for change in changes.each:
-        for key in varied:
-            require_separate(change, key, typed=f"--vary {key}")
+    picture_form = None if plot is None else plot_form(plot)
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
+    from busplan.questions.sweep import checked_sweep, computed, require_drawable
+
+    varied = parse_axes(vary or [])
+    for change, key in product(changes.each, varied):
+        require_separate(change, key, typed=f"--vary {key}")
     with naming_option("vary", "timing_model", "group", "circle", "summary", "force"):
         asked = checked_sweep(
-            loaded,
+            load_changed(profile, changes),
             varied,
             timing_models=None if timing == ALL_MODELS else [timing],
             group=group,
@@ -181,37 +176,55 @@ def sweep_command(
             changes=changes,
         )
     _require_number(asked, {"--sort": sort_by or None, "--figure": figure})
-    chosen = _columns(asked, columns)
     if plot is not None:
         require_drawable(asked.grid, option="--plot")
+    rows = _Rows(_columns(asked, columns), top or _DEFAULT_TOP, sort_by or None, ascending=bool(order), is_whole=all_)
     with ExitStack() as run:
         # Opened before the work, so that a path that cannot be written fails at once.
-        plot_file = run.enter_context(new_file(plot, overwrite=True)) if plot else None
+        picture_file = run.enter_context(new_file(plot, overwrite=True)) if plot else None
         file = run.enter_context(new_file(output, overwrite=True)) if output else None
         with progress_bar("sweep") as progress, _crew(asked, jobs=jobs, cluster=cluster) as crew:
             answer = computed(asked, executor=crew, progress=progress)
-        match form:
-            case "csv" | "json" | "parquet":
-                for piece in answer.rows_in(form, chosen):
-                    (emit_document if file is None else file.write)(piece)
-            case _:
-                rows = answer.report(
-                    columns=chosen, top=top or _DEFAULT_TOP, sort_by=sort_by or None, ascending=bool(order)
-                )
-                report = report_with(changes, rows)._replace(is_whole=all_)
-                if file is None:
-                    give(report, form)
-                else:
-                    file.write(document_bytes(render(report, form)))
-        if form not in _TOP_FORMS or file is not None:
-            say(*map(sentence_text, (*changes_sentences(changes), *answer.sentences())))
-        if plot_file is not None and plot_form_ is not None:
+        _write(answer, form, rows, file)
+        if picture_file is not None and picture_form is not None:
             from busplan.forms.raster import picture
 
-            plot_file.write(document_bytes(picture(answer.svg(figure=figure), plot_form_)))
+            picture_file.write(document_bytes(picture(answer.svg(figure=figure), picture_form)))
     for path in (output, plot):
         if path is not None:
             say(f"wrote {path}")
+
+
+class _Rows(NamedTuple):
+    """Which rows and columns are written."""
+
+    columns: list[str] | None
+    """Those asked for; None without --columns."""
+    top: int
+    sort_by: str | None
+    ascending: bool
+    is_whole: bool
+    """If True, a narrow terminal leaves out no column of the top rows."""
+
+
+def _write(answer: "SweepAnswer", form: SweepForm, rows: _Rows, file: BinaryIO | None) -> None:
+    """Write a sweep to a file, and say how much fits; or to standard output."""
+    from busplan.forms.numbers import sentence_text
+    from busplan.questions.words.documents import changes_sentences
+
+    changes = answer.sweep.changes
+    match form:
+        case "csv" | "json" | "parquet":
+            for piece in answer.rows_in(form, rows.columns):
+                (emit_document if file is None else file.write)(piece)
+        case _:
+            top = answer.report(columns=rows.columns, top=rows.top, sort_by=rows.sort_by, ascending=rows.ascending)
+            report = report_with(changes, top)._replace(is_whole=rows.is_whole)
+            if file is None:
+                give(report, form)
+                return
+            file.write(document_bytes(render(report, form)))
+    say(*map(sentence_text, (*changes_sentences(changes), *answer.sentences())))
 
 
 @contextmanager
@@ -249,27 +262,35 @@ def _require_parquet(output: Path | None, *, typed: str | None) -> None:
     require_pyarrow("--format parquet" if typed else f"--output {output}")
 
 
-def _require_cluster(jobs: int | None) -> None:
+def _require_cluster(cluster: str | None, jobs: int | None) -> None:
     """Refuse a cluster without its library, or beside processes of our own."""
-    if jobs is not None:
+    if cluster is not None and jobs is not None:
         raise BusplanError(
             "--jobs: is the number of processes here, and --cluster runs the tests elsewhere; leave one out"
         )
-    require_extra("distributed", extra="cluster", option="--cluster", module="distributed")
+    if cluster is not None:
+        require_extra("distributed", extra="cluster", option="--cluster", module="distributed")
 
 
-def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> None:
-    """Refuse options that do not apply to the form."""
-    for name, value in (("--sort", sort), ("--top", top)):
+def _require_numbers(options: Mapping[str, int | None]) -> None:
+    """Refuse numbers below 1."""
+    for name, number in options.items():
+        if number is not None and number < 1:
+            raise BusplanError(f"{name} {number}: must be 1 or more")
+
+
+def _require_sense(form: SweepForm, options: Mapping[str, object]) -> None:
+    """Refuse options of the top rows where every row is written."""
+    for name, value in options.items():
         if value is not None and form not in _TOP_FORMS:
             forms = f"{', '.join(_TOP_FORMS[:-1])} or {_TOP_FORMS[-1]}"
             raise BusplanError(f"{name}: goes with --format {forms}; {form} has every row in the order of the grid")
 
 
-def _require_needed(needed: str, is_there: bool, options: Mapping[str, object]) -> None:
-    """Refuse options that need another name."""
+def _require_needed(needed: str, options: Mapping[str, object]) -> None:
+    """Refuse options that need another, which is not there."""
     for name, value in options.items():
-        if value is not None and not is_there:
+        if value is not None:
             raise BusplanError(f"{name}: goes with {needed}")
 
 

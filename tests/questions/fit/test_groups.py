@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from busplan.questions.sweep.blocks import figure_names, sweep
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,7 +27,6 @@ from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.plan.constraints import nodes_for_axes, rooms
 from busplan.questions.plan.planning import plan
-from busplan.questions.sweep.blocks import figure_names, sweep
 from busplan.questions.sweep.grid import checked_grid
 from busplan.questions.sweep.values import listed
 from busplan.sections.profile import Profile

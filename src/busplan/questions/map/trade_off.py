@@ -259,8 +259,8 @@ def trade_off(
         fitting = [place for place, cell in cells.items() if cell.state == "fits"]
         if len(fitting) > MOST_CIRCLES_UNASKED:
             raise BusplanError(
-                f"{len(fitting):,} settings fit, and a map runs up to {MOST_CIRCLES_UNASKED:,} circle tests; give fewer "
-                "values"
+                f"{len(fitting):,} settings fit, and a map runs up to {MOST_CIRCLES_UNASKED:,} circle tests; "
+                "give fewer values"
             )
         points = [possible[place].changes for place in fitting]
         outcomes = circle_outcomes(profile, points, mapper=mapper, progress=progress)

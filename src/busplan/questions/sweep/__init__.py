@@ -106,10 +106,13 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         require_extra("pandas", option="to_pandas()", module="pandas")
         import pandas as pd
 
-        frame = pd.DataFrame(dict(self))
-        words = [name for name, column in self.items() if column.dtype.kind == "U"]
-        kinds = {name: pd.CategoricalDtype([*dict.fromkeys(filter(None, frame[name]))]) for name in words}
-        return frame.astype(kinds).infer_objects()
+        columns = {name: column.tolist() if column.dtype.kind == "U" else column for name, column in self.items()}
+        words = {
+            name: pd.Categorical([word or None for word in texts], [*dict.fromkeys(filter(None, texts))])
+            for name, texts in columns.items()
+            if isinstance(texts, list)
+        }
+        return pd.DataFrame({**columns, **words}).infer_objects()
 
     def to_xarray(self) -> "xr.Dataset":
         """Make a dataset of xarray: a dimension for each varied key, by its name, and `timing_model`.
@@ -383,5 +386,4 @@ def _typed(name: str, values: Array) -> Array:
     """A figure of circles as numbers, or as truth values, None where one is missing."""
     if CIRCLE_BY_KEY[name].sort != "truth":
         return values
-    truths = np.array([None if np.isnan(value) else bool(value) for value in values.tolist()])
-    return truths
+    return np.array([None if np.isnan(value) else bool(value) for value in values.tolist()])

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from itertools import islice
-from random import Random
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -135,9 +134,9 @@ def circle_outcomes(
 
 def cost_of(profile: Profile, points: Sequence[Point]) -> Estimate:
     """Estimate what the circle tests of some points cost; of many, from some of them."""
-    some = points if len(points) <= _ESTIMATED else Random(0).sample(points, _ESTIMATED)
+    some = np.random.default_rng(0).permutation(len(points))[:_ESTIMATED]
     cost = NOTHING
-    for variant in (override(profile, point) for point in some):
+    for variant in (override(profile, points[number]) for number in some):
         if bus(variant).fits:
             cost = cost.then(estimate((), [setup(variant)]))
     times = len(points) / len(some)

@@ -102,6 +102,7 @@ def _plain(values: Array, *, is_count: bool) -> list[Any]:
 
 
 def plain_rows(sweep: Sweep, table: Columns, places: Array) -> list[dict[str, Any]]:
-    """Some rows, by their number."""
+    """Some rows as plain data, by their number; a tuple becomes a list."""
     columns = plain_columns(sweep, {name: values[places] for name, values in table.items()})
-    return [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
+    rows = ([list(value) if isinstance(value, tuple) else value for value in row] for row in zip(*columns, strict=True))
+    return [dict(zip(table, row, strict=True)) for row in rows]

@@ -7,7 +7,7 @@ axis of their own, so that a figure is computed only over the keys that it depen
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, lru_cache, partial, reduce
 from math import inf, prod
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
