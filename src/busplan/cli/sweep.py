@@ -161,12 +161,12 @@ def sweep_command(
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
     from busplan.questions.sweep import checked_sweep, computed, require_drawable
 
-    varied = parse_axes(vary or [])
+    loaded, varied = load_changed(profile, changes), parse_axes(vary or [])
     for change, key in product(changes.each, varied):
         require_separate(change, key, typed=f"--vary {key}")
     with naming_option("vary", "timing_model", "group", "circle", "summary", "force"):
         asked = checked_sweep(
-            load_changed(profile, changes),
+            loaded,
             varied,
             timing_models=None if timing == ALL_MODELS else [timing],
             group=group,

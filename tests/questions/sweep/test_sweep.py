@@ -1,7 +1,7 @@
 """Every row of a sweep is what `capacity` gives for its point; grids come in order and in pieces."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from itertools import product
 from math import prod
 from typing import Any
@@ -65,7 +65,7 @@ WORDS = {
 
 def assert_rows_are_those_of_capacity(
     profile: Profile,
-    vary: dict[str, Sequence[Any]],
+    vary: Mapping[str, Any],
     *,
     chunk_points: int,
     model: str | None = None,

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
-from itertools import islice
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -85,7 +84,7 @@ class CircleChunk(NamedTuple):
     """Some points; a process can be handed it."""
 
     profile: Profile
-    points: tuple[Point, ...]
+    points: Sequence[Point]
 
 
 def run_chunk(chunk: CircleChunk) -> list[CircleOutcome]:
@@ -124,8 +123,9 @@ def circle_outcomes(
         return
     cost = cost_of(profile, points)
     announce(cost)
-    size, done, left = chunk_tests(len(points), time_s=cost.time_s), 0, iter(points)
-    chunks = (CircleChunk(profile, part) for part in iter(lambda: tuple(islice(left, size)), ()))
+    done, size = 0, chunk_tests(len(points), time_s=cost.time_s)
+    # A list, for Dask takes no iterator.
+    chunks = [CircleChunk(profile, points[start : start + size]) for start in range(0, len(points), size)]
     for outcomes in mapper(run_chunk, chunks):
         done += len(outcomes)
         progress(done, len(points))
