@@ -26,7 +26,7 @@ Array = NDArray[Any]
 _CHECKED_EACH: Final = 100
 """Up to this many values of a key are all checked; of more, the extremes: every valid range is an interval."""
 MOST_POINTS: Final = 1_000_000
-"""Most points of a sweep: their figures under two timing models take about a gigabyte of memory."""
+"""Most points of a sweep: the work on them takes up to two gigabytes of memory."""
 
 
 def axis_of(values: Sequence[Value]) -> Array:
