@@ -103,7 +103,7 @@ def test_a_payload_that_the_axes_do_not_change_is_said_to_be_so(follows: bool) -
 
 def test_of_groups_it_is_said_which_one_varies() -> None:
     swept = busplan.sweep("gantry-24", vary={"cycle.period_us": [500, 1000]}, group="tool")
-    assert said(swept)[1] == "max_axes and safe_axes: the nodes of tool vary, the others are as they are."
+    assert said(swept)[1] == "Axes are counted with more nodes of tool, the other groups as they are."
     assert shown(swept.report(), "safe_axes") == [0, 28]
     assert shown(swept.report(), "group.drives.safe_nodes") == [2, 5]
 

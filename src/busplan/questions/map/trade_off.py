@@ -57,7 +57,8 @@ class Cell(NamedTuple):
     binding_term: str
     """The largest term of the cycle."""
     verdict: VerdictWord
-    margin_corrected_us: float
+    margin_corrected_us: float | None
+    """None of messages alone."""
     uncertainty_us: float | None
     """None where it is unknown."""
     is_safe: bool
@@ -103,14 +104,13 @@ def cell_of(profile: Profile, figures: Mapping[str, Any], *, x: Value, y: Value)
     keys = figures["not_shown" if verdict == NOT_SHOWN else "exceeded"]
     broken = tuple(key for key in keys if key != TIME) or (TIME,)
     state, limits = _state_and_limits(verdict, broken=broken, unsafe=unsafe, refused=refused)
-    uncertainty_us = figures["uncertainty_us"]
     return Cell(
         x=x,
         y=y,
-        **{name: figures[name] for name in ("nodes", "axes", "binding_term", "verdict", "margin_corrected_us")},
+        **{name: figures[name] for name in ("nodes", "axes", "binding_term", "verdict")},
+        **{name: None if isnan(figures[name]) else figures[name] for name in ("margin_corrected_us", "uncertainty_us")},
         state=state,
         limited_by=limits,
-        uncertainty_us=None if isnan(uncertainty_us) else uncertainty_us,
         is_safe=not unsafe,
         circle_refused_by=refused,
     )

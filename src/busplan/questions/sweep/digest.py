@@ -93,7 +93,7 @@ def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
         yield from _circles(sweep, table) if sweep.seeds is None else _over_seeds(first, sweep.seeds.size)
     yield from payload_sentences(sweep.profile, sweep.grid.axes)
     if sweep.group:
-        yield sentence("max_axes and safe_axes: the nodes of {} vary, the others are as they are.", Code(sweep.group))
+        yield sentence("Axes are counted with more nodes of {}, the other groups as they are.", Code(sweep.group))
     safety = bus.safety.figure
     unsafe = 0 if safety is None else np.sum(~first[safety.key].astype(bool))
     if unsafe and safety is not None:
