@@ -175,10 +175,13 @@ def sweep_command(
             force=force,
             changes=changes,
         )
-    _require_number(asked, {"--sort": sort_by or None, "--figure": figure})
+    asked.require_number(sort_by or None, name="--sort")
+    asked.require_number(figure, name="--figure")
+    chosen = [name.strip() for name in columns.split(",")] if columns is not None else []
+    asked.require_columns(chosen, name="--columns")
     if plot is not None:
         require_drawable(asked.grid, option="--plot")
-    rows = _Rows(_columns(asked, columns), top or _DEFAULT_TOP, sort_by or None, ascending=bool(order), is_whole=all_)
+    rows = _Rows(chosen, top or _DEFAULT_TOP, sort_by or None, ascending=bool(order), is_whole=all_)
     with ExitStack() as run:
         # Opened before the work, so that a path that cannot be written fails at once.
         picture_file = run.enter_context(new_file(plot, overwrite=True)) if plot else None
@@ -198,8 +201,8 @@ def sweep_command(
 class _Rows(NamedTuple):
     """Which rows and columns are written."""
 
-    columns: list[str] | None
-    """Those asked for; None without --columns."""
+    columns: list[str]
+    """Those asked for; none without --columns."""
     top: int
     sort_by: str | None
     ascending: bool
@@ -292,21 +295,3 @@ def _require_needed(needed: str, options: Mapping[str, object]) -> None:
     for name, value in options.items():
         if value is not None:
             raise BusplanError(f"{name}: goes with {needed}")
-
-
-def _require_number(sweep: "Sweep", asked: dict[str, str | None]) -> None:
-    """Refuse a column that does not exist or is not numeric."""
-    for name, column in asked.items():
-        if column is not None and column not in sweep.numbers:
-            raise BusplanError(f"{name} {column}: expected a column in numbers: {', '.join(sweep.numbers)}")
-
-
-def _columns(sweep: "Sweep", asked: str | None) -> list[str] | None:
-    """Columns that are asked for; None without --columns."""
-    if asked is None:
-        return None
-    chosen = [name.strip() for name in asked.split(",")]
-    for name in chosen:
-        if name not in sweep.columns:
-            raise BusplanError(f"--columns {name}: no such column; there are {', '.join(sweep.columns)}")
-    return chosen

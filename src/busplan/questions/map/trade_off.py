@@ -108,12 +108,17 @@ def cell_of(profile: Profile, figures: Mapping[str, Any], *, x: Value, y: Value)
         x=x,
         y=y,
         **{name: figures[name] for name in ("nodes", "axes", "binding_term", "verdict")},
-        **{name: None if isnan(figures[name]) else figures[name] for name in ("margin_corrected_us", "uncertainty_us")},
         state=state,
         limited_by=limits,
+        margin_corrected_us=_known(figures["margin_corrected_us"]),
+        uncertainty_us=_known(figures["uncertainty_us"]),
         is_safe=not unsafe,
         circle_refused_by=refused,
     )
+
+
+def _known(number: float) -> float | None:
+    return None if isnan(number) else number
 
 
 def _state_and_limits(

@@ -21,7 +21,7 @@ from busplan.questions.base.inputs import Models, ProfileLike, checked_models, l
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.sweep.asked import Sweep, checked_sweep, column_figures
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, mapper_of
-from busplan.questions.sweep.digest import Top, default_columns, sentences, top_rows
+from busplan.questions.sweep.digest import default_columns, sentences, top_rows
 from busplan.questions.sweep.grid import Array
 from busplan.questions.sweep.plot import FigureData, is_drawable, require_drawable
 from busplan.questions.sweep.rows import sweep_facts, written_rows
@@ -184,11 +184,17 @@ class SweepAnswer(Answer, Mapping[str, Array]):
             The form; "parquet" needs the extra `table`.
         columns
             Names of columns, behind the varied keys and the timing model; by default all.
+
+        Raises
+        ------
+        BusplanError
+            No such column.
         """
         names = self._behind_keys(columns or self.columns)
         return written_rows(form, self.sweep, {name: self.table[name] for name in names})
 
     def _behind_keys(self, columns: Iterable[str]) -> tuple[str, ...]:
+        self.sweep.require_columns(columns, name="columns")
         return tuple(dict.fromkeys((*self.sweep.grid.axes, TIMING_MODEL.key, *columns)))
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
@@ -209,8 +215,9 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         Raises
         ------
         BusplanError
-            More than two keys vary, or there are too many points.
+            No column in numbers, more than two keys vary, or there are too many points.
         """
+        self.sweep.require_number(figure, name="figure")
         title = ", ".join(filter(None, (self.profile.name, self.sweep.changes.words)))
         return FigureData(self.sweep, self.table, figure=figure).svg(title)
 
@@ -252,12 +259,18 @@ class SweepAnswer(Answer, Mapping[str, Array]):
             Column in numbers to sort by; by default rows are in the order of the grid.
         ascending
             Smallest first.
+
+        Raises
+        ------
+        BusplanError
+            No such column, or none in numbers.
         """
+        self.sweep.require_number(sort_by, name="sort_by")
         shown = self._behind_keys((*(columns or default_columns(self.sweep)), *([sort_by] if sort_by else [])))
-        rows = Top(shown, top, sort_by, ascending)
+        rows = partial(top_rows, columns=shown, top=top, sort_by=sort_by, ascending=ascending)
         return Report(
             Sentence(("Sweep of ", Code(self.profile.name))),
-            lambda: (*self.sentences(), *top_rows(self.sweep, self.table, rows)),
+            lambda: (*self.sentences(), *rows(self.sweep, self.table)),
             lambda: json.loads(self.to_json()),
             lambda: json.loads(self.to_json())["rows"],
         )

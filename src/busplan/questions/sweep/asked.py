@@ -48,6 +48,25 @@ class Sweep(NamedTuple):
         }
         return tuple(name for name in self.columns if not is_word[name])
 
+    def require_columns(self, columns: Iterable[str], *, name: str) -> None:
+        """Refuse columns that do not exist.
+
+        Parameters
+        ----------
+        columns
+            Their names.
+        name
+            Name of the argument in messages.
+        """
+        for column in columns:
+            if column not in self.columns:
+                raise BusplanError(f"{name} {column}: no such column; there are {', '.join(self.columns)}")
+
+    def require_number(self, column: str | None, *, name: str) -> None:
+        """Refuse a column that does not exist or is not numeric; None is none."""
+        if column is not None and column not in self.numbers:
+            raise BusplanError(f"{name} {column}: expected a column in numbers: {', '.join(self.numbers)}")
+
     @property
     def tests(self) -> Grid:
         """Points of the circle tests, where there are any; seeds change fastest."""

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping
 from itertools import chain
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -150,41 +150,46 @@ def _unjudged(points: int) -> Iterator[Sentence]:
         yield sentence(words, _points(points), state="warns")
 
 
-class Top(NamedTuple):
-    """Which rows of a sweep are shown."""
+def top_rows(
+    sweep: Sweep, table: Columns, *, columns: tuple[str, ...], top: int, sort_by: str | None, ascending: bool
+) -> tuple[Sentence, Table]:
+    """The first or best rows, after how many there are; headings are the names that --columns and --sort take.
 
-    columns: tuple[str, ...]
-    """The varied keys and the timing model are among them."""
-    rows: int
-    """How many at most."""
-    sort_by: str | None = None
-    """Column in numbers to sort by; None for the order of the grid."""
-    ascending: bool = False
-    """Smallest first."""
-
-
-def top_rows(sweep: Sweep, table: Columns, top: Top) -> tuple[Sentence, Table]:
-    """The first or best rows, after how many there are; headings are the names that --columns and --sort take."""
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    table
+        All its columns.
+    columns
+        Names of those shown; the timing model is one.
+    top
+        Most rows.
+    sort_by
+        Column in numbers to sort by; None for the order of the grid.
+    ascending
+        Smallest first.
+    """
     total, order = table[TIMING_MODEL.key].size, ""
     places = np.arange(total)
-    if top.sort_by is not None:
-        ranks = table[top.sort_by].astype(float)
+    if sort_by is not None:
+        ranks = table[sort_by].astype(float)
         # NaN comes last and is left out; among equals, the first in the grid comes first.
-        places = np.argsort(ranks if top.ascending else -ranks, kind="stable")[: np.sum(~np.isnan(ranks))]
-        order = f", {'smallest' if top.ascending else 'largest'} {top.sort_by} first"
-    records = plain_rows(sweep, {name: table[name] for name in top.columns}, places[: top.rows])
+        places = np.argsort(ranks if ascending else -ranks, kind="stable")[: np.sum(~np.isnan(ranks))]
+        order = f", {'smallest' if ascending else 'largest'} {sort_by} first"
+    records = plain_rows(sweep, {name: table[name] for name in columns}, places[:top])
     figures = column_figures(sweep.profile)
     # Columns that were asked for by name stay.
-    ranks_of = _RANKS if set(_RANKS) <= set(top.columns) else {}
+    ranks_of = _RANKS if set(_RANKS) <= set(columns) else {}
     shown, words = _points(len(records)), f"{nouns(total, 'row')}{order}."
     return (
         sentence(f"{{}} of {{}} {words}", shown, _points(total))
         if len(records) < total
         else sentence(f"{{}} {words}", shown),
         Table(
-            tuple(_column(name, figures.get(name), rank=ranks_of.get(name, 0)) for name in top.columns),
+            tuple(_column(name, figures.get(name), rank=ranks_of.get(name, 0)) for name in columns),
             tuple(TableRow(tuple(_cells(record, figures))) for record in records),
-            heads=top.columns.index(TIMING_MODEL.key) + 1,
+            heads=columns.index(TIMING_MODEL.key) + 1,
         ),
     )
 
