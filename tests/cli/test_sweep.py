@@ -24,7 +24,7 @@ def process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
         text=True,
         cwd=cwd,
         check=False,
-        timeout=120,
+        timeout=300,
         env=ENVIRONMENT,
     )
 
