@@ -257,7 +257,7 @@ def test_without_the_limit_the_next_one_keeps_one_node_more_off(
 def test_a_change_that_moves_no_margin_says_what_it_takes_from_other_limits() -> None:
     def of_execution(base_us: float) -> Effect:
         execution = {"base_us": base_us, "per_byte_us": 0.0, "uncertainty_us": 0.0, "worst_extra_us": 0.0}
-        changes = {f"node.execution.{key}": value for key, value in execution.items()}
+        changes: dict[str, object] = {f"node.execution.{key}": value for key, value in execution.items()}
         profile = override(load("ethercat-servo-8").profile, changes)
         return next(effect for effect in sensitivity(profile).effects if effect.key == "execution_us")
 

@@ -20,6 +20,7 @@ from busplan.forms.blocks import (
     Report,
     Sentence,
     ShownValue,
+    State,
     Table,
     TableColumn,
     TableRow,
@@ -32,7 +33,6 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import listed, nouns, period, period_value, sentence_text
 from busplan.profile.conversion import AssumedKey
 from busplan.profile.write import short_text
-from busplan.questions.circle.report import verdict_words
 from busplan.questions.compare.drawing import STYLE, compare_lines, compare_svg
 from busplan.questions.compare.kinds import (
     CircleAtSmallest,
@@ -228,6 +228,7 @@ _CIRCLE: Final = (
     TableColumn("", kind="words", group="circle"),
     TableColumn("step", "us", group="circle"),
 )
+_CIRCLE_STATES: Final[dict[bool | None, State]] = {True: "passes", False: "fails", None: "warns"}
 _ASSUMED: Final = (
     TableColumn("bus", kind="words"),
     TableColumn("key", kind="words", wraps=True),
@@ -371,7 +372,8 @@ def _circle(machine: MachineOnKind) -> tuple[Cell, ...]:
     step = ShownValue(machine.circle.step_us, "step_us", "us", 3)
     if machine.circle.figures is None:
         return Words("NOT RUN", "warns"), step
-    return verdict_words(machine.circle.figures), step
+    figures = machine.circle.figures
+    return Words(figures.verdict_word, _CIRCLE_STATES[figures.passed]), step
 
 
 def compare_chart(comparison: KindComparison) -> Chart:
