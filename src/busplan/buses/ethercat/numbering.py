@@ -103,7 +103,7 @@ def seen_cycles(frames: Places, times_us: Floats, kinds: Places, data_bytes: Flo
     in_bursts = len(starts) > 1 and float(np.median(np.diff(times_us[starts]))) < _BURST * period_us
     begin, end = 0, len(starts)
     while True:
-        kept = slice(starts[begin], (*starts, len(frames))[end])
+        kept = slice(int(starts[begin]), int(np.append(starts, len(frames))[end]))
         own = starts[begin:end] - starts[begin]
         number = np.searchsorted(own, np.arange(kept.stop - kept.start), side="right") - 1
         periods = None if in_bursts else grid(times_us[starts[begin:end]], near_us)
