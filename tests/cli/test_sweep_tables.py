@@ -67,11 +67,11 @@ def interrupted(*arguments: str, folder: Path) -> tuple[int, str]:
     program = "import signal; signal.signal(2, signal.default_int_handler); from busplan.__main__ import main; main()"
     call = [sys.executable, "-c", program, *arguments]
     with subprocess.Popen(call, cwd=folder, stderr=subprocess.PIPE, text=True) as run:
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 300
         while not has_opened(run.pid, folder) and time.monotonic() < deadline:
             time.sleep(0.02)
         run.send_signal(signal.SIGINT)
-        _, errors = run.communicate(timeout=60)
+        _, errors = run.communicate(timeout=300)
     return run.returncode, errors
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from busplan.errors import BusplanError
+from busplan.files import is_unwritten_pipe
 from busplan.progress import Progress
 
 Numbers = npt.NDArray[np.int64]
@@ -22,6 +23,10 @@ _MOST_RECORD_BYTES: Final = 1_000_000
 """Longest record that is no damage; a packet has 262,144 bytes at most."""
 _ETHERNET: Final = 1
 _NS: Final = 1_000_000_000
+_END_NS: Final = (1 << 33) * _NS
+"""Stamps from here on, in the year 2242, are no times [ns]."""
+_LONGEST_NS: Final = 86_400 * _NS
+"""Longest time from one packet to the next that is no damage: a day [ns]."""
 _PCAP: Final = {
     b"\xd4\xc3\xb2\xa1": ("<", 1000),
     b"\xa1\xb2\xc3\xd4": (">", 1000),
@@ -60,7 +65,7 @@ class CaptureNotes:
     other_links: int = 0
     """CapturedPackets of interfaces that are no Ethernet."""
     without_time: int = 0
-    """CapturedPackets in records that have no stamp."""
+    """CapturedPackets in records that have no stamp, or one that is no time."""
     dropped: int = 0
     """Packets that the recorder says it dropped; a pcap file has no word of them."""
     broken_at: int | None = None
@@ -89,6 +94,8 @@ def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[
     BusplanError
         The file cannot be read, or is no such file.
     """
+    if is_unwritten_pipe(path):
+        raise BusplanError(f"{path}: is a named pipe; give a regular file")
     try:
         with path.open("rb") as file:
             yield from _pieces(file, path, notes, progress)
@@ -106,13 +113,21 @@ def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress)
         walker, held, at = _PcapNg(notes), head, 0
     else:
         raise BusplanError(f"{path}: is no pcap or pcapng file")
+    before: int | None = None
     while True:
         content = held + file.read(_PIECE_BYTES)
         rows, used = walker.walk(content)
         if rows:
-            notes.packets += len(rows)
             starts, sizes, times = np.array(rows, dtype=np.int64).T
-            yield CapturedPackets(np.frombuffer(content, dtype=np.uint8), starts, sizes, times)
+            late = np.flatnonzero(np.diff(times, prepend=times[0] if before is None else before) > _LONGEST_NS)
+            whole = slice(late[0] if len(late) else None)
+            notes.packets += len(starts[whole])
+            if len(starts[whole]):
+                yield CapturedPackets(np.frombuffer(content, dtype=np.uint8), starts[whole], sizes[whole], times[whole])
+            if len(late):
+                notes.broken_at = at + int(starts[late[0]])
+                return
+            before = int(times[-1])
         at += used
         is_last = len(content) - len(held) < _PIECE_BYTES
         held = content[used:]
@@ -214,7 +229,7 @@ class _PcapNg(_Walker):
         time_ns = ticks * _NS // interface.ticks + interface.offset_ns
         if interface.link != _ETHERNET:
             self._notes.other_links += 1
-        elif not -(2**63) <= time_ns < 2**63:
+        elif not 0 <= time_ns < _END_NS:
             self._notes.without_time += 1
         else:
             rows.append((at, size, time_ns))

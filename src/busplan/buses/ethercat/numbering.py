@@ -82,7 +82,7 @@ class SeenCycles(NamedTuple):
     gaps: Places
     """Cycles that should have process data between each and the next."""
     left_out: int
-    """Frames of the master's start and end, where more cycles are missing than there are."""
+    """Frames of the master's start and end, where more cycles are missing than there are, and of cycles in part."""
 
 
 def seen_cycles(frames: Places, times_us: Floats, kinds: Places, data_bytes: Floats, network: Network) -> SeenCycles:
@@ -113,6 +113,8 @@ def seen_cycles(frames: Places, times_us: Floats, kinds: Places, data_bytes: Flo
                 plan, periods.places, np.bincount(number, weights=data_bytes[kept]).astype(np.float64)
             )
         first, last = _in_operation(gaps)
+        if periods is not None and (first, last) == (0, len(own)):
+            first, last = _whole(np.bincount(number), plan.sort[of_plan])
         if first == 0 and last == len(own):
             starts = frames[starts[begin:end]]
             sort = plan.sort[of_plan]
@@ -179,3 +181,15 @@ def _in_operation(gaps: Places) -> tuple[int, int]:
     first, last = int(rows[0]), int(rows[-1]) + LEAST_EVENTS
     before, behind = int(gaps[:first].sum()), int(gaps[last - 1 :].sum())
     return first if before > first else 0, last if behind > len(gaps) + 1 - last else len(gaps) + 1
+
+
+def _whole(frames: Places, sort: Places) -> tuple[int, int]:
+    """The first cycle and the one behind the last, without those that the capture begins or ends within.
+
+    Parameters
+    ----------
+    frames, sort
+        Frames of n cycles, and which cycles of the plan they are.
+    """
+    has_less = [frames[end] < np.median(frames[sort == sort[end]]) for end in (0, -1)]
+    return int(has_less[0]), len(frames) - int(has_less[1])

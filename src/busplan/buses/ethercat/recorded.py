@@ -402,8 +402,8 @@ class _Seen:
             yield (f"Its clock was set back {counted(self.steps_back, 'time')}: the longest stretch between is taken.")
         if self.cycles is not None and self.cycles.left_out:
             yield (
-                f"{counted(self.cycles.left_out, 'frame')} of process data at its ends are left out, for more cycles "
-                "are missing between than are there: taken for the master's start or end."
+                f"{counted(self.cycles.left_out, 'frame')} of process data at its ends are left out: of the master's "
+                "start or end, where more cycles are missing than are there, or of cycles that the capture has in part."
             )
         if self.trips.unsent:
             yield f"{counted(self.trips.unsent, 'frame')} returned without having been seen to be sent."
