@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Callable
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -464,3 +465,30 @@ def test_events_are_the_terms_with_what_blocks_and_what_interferes() -> None:
     assert {key: us for key, us in sums.items() if us} == {term.key: term.us for term in found.terms if term.us}
     assert sums["cycle_blocking_us"] == 135 + 2 * 65  # a heartbeat may be late by its period, and one more be there
     assert sums["cycle_interference_us"] == 135
+
+
+@pytest.mark.parametrize("load", [0.5, 0.9, 0.985, 0.992])
+def test_a_cycle_waits_for_the_messages_that_arrive_in_it_and_for_no_more(load: float) -> None:
+    # Six messages before SYNC: w is the smallest with w = SYNC + PDOs + sum of ceil((w + bit) / T) C, one by one.
+    frame_us, number = 135.0, 6
+    periods_us = [round(number * frame_us / load, 3) + place for place in range(number)]
+    data = {
+        "schema_version": 1,
+        "name": "busy",
+        "bus": {"kind": "can", "bit_rate_kbit_s": 1000, "nodes": 1},
+        "cycle": {"period_us": 1e6},
+        "payload": {"read_bytes": 8, "write_bytes": 8},
+        "node": {"axes": 1, "execution": {"kind": "linear", "base_us": 0.0, "per_byte_us": 0.0}},
+        "message": [
+            {"name": f"m{place}", "identifier": place + 1, "payload_bytes": 8, "period_us": period_us}
+            for place, period_us in enumerate(periods_us)
+        ],
+    }
+    (found, _) = busplan.capacity(CanProfile.model_validate(data)).results
+    own_us = 55.0 + 2 * frame_us
+    lasts_us, before_us = own_us, 0.0
+    while lasts_us != before_us:
+        before_us = lasts_us
+        lasts_us = own_us + sum(ceil((before_us + 1) / period_us) * frame_us for period_us in periods_us)
+    assert 0.48 < found.bus_load < 0.99
+    assert found.required_us == pytest.approx(lasts_us, rel=1e-12)
