@@ -13,7 +13,7 @@ from busplan.elementwise import plain
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, grid
 
 Places = npt.NDArray[np.int64]
-_JUMP: Final = 1.25
+_JUMP: Final = 1.01
 """Least ratio of a pause between cycles to one within a cycle."""
 _FARTHEST: Final = log(8)
 """Logarithm of the largest ratio of a recorded period to the planned one that pauses are looked for with."""
