@@ -1,10 +1,12 @@
 """A CAN bus: its cycle by hand, its identifiers, its limits and rules, and every question in some form."""
 
+import importlib.util
 import json
 import re
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import given
@@ -13,11 +15,10 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named
 from busplan.buses.can.limits import shared_identifiers
-from busplan.buses.can.response import Sender, worst_response
 from busplan.buses.can.section import CanProfile
 from busplan.buses.can.streams import streams
 from busplan.buses.can.traffic import traffic_of_profile
-from busplan.buses.can.waiting import response
+from busplan.buses.can.waiting import responses
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
@@ -27,6 +28,14 @@ from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from tests.oracles import can_textbook as textbook
+else:
+    path = Path(__file__).parents[2] / "oracles" / "can_textbook.py"
+    spec = importlib.util.spec_from_file_location("can_textbook", path)
+    textbook = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(textbook)
 
 Run = Callable[..., Any]
 
@@ -204,29 +213,29 @@ def test_the_last_pdo_of_a_group_answers_last_of_it(data: st.DataObject) -> None
         "cycle.period_us": float(data.draw(st.integers(4000, 9000))),
     }
     traffic = traffic_of_profile(override(profile(), changes))
-    each = streams(traffic, is_stuffed=True)
     sent = {
-        identifier: Sender(one.frame_us, one.period_us, one.jitter_us)
-        for one in each
+        identifier: textbook.Sender(int(one.frame_us), int(one.period_us), int(one.jitter_us))
+        for one in streams(traffic, is_stuffed=True)
         for identifier in range(one.first, one.last + 1)
     }
-    for own in each:
+    for own, worst in responses(traffic, is_stuffed=True):
         # No PDO of a cycle that fits blocks the next SYNC.
         alarm = changes["message.alarm.identifier"]
         blocking = sent if own.name != "SYNC" else {alarm: sent[alarm]}
         alone = [
-            worst_response(
+            textbook.response_us(
                 sent[identifier],
                 [one for other, one in sent.items() if other < identifier],
-                blocking_us=max((one.frames_us for other, one in blocking.items() if other > identifier), default=0.0),
+                blocking_us=max((one.frame_us for other, one in blocking.items() if other > identifier), default=0),
                 bit_us=BIT_US,
+                most_us=500_000,
             )
             for identifier in range(own.first, own.last + 1)
         ]
-        found = response(own, traffic, is_stuffed=True)
+        us, instance = alone[-1] or (inf, worst.instance)
         # A message may also meet a late cycle, and the next one soon behind it.
-        assert found == alone[-1] or (own.is_message and (found is None or (alone[-1] and found.us > alone[-1].us)))
-        assert found is None or all(one is not None and one.us <= found.us for one in alone)
+        assert (worst.us, worst.instance) == (us, instance) or (own.is_message and worst.us > us)
+        assert worst.us == inf or all(one is not None and one[0] <= worst.us for one in alone)
 
 
 def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path) -> None:

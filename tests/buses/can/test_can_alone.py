@@ -264,16 +264,15 @@ def test_a_sweep_and_a_map_agree_with_capacity_point_by_point() -> None:
             assert cells[rates.index(row["bus.bit_rate_kbit_s"])].state == figures.verdict
 
 
-@pytest.mark.parametrize("number", [3, 49, 50, 400])
+@pytest.mark.parametrize("number", [3, 400])
 def test_many_messages_are_answered_as_few_are(number: int) -> None:
-    """From 50 messages on they are computed in arrays."""
     messages = [
         {"identifier": own, "payload_bytes": own % 9, "period_us": 30_000 * (1 + own % 7), "jitter_us": own}
         for own in range(number)
     ]
     own = network(*messages, bit_rate_kbit_s=1000)
     each = streams(traffic_of_profile(own), is_stuffed=True)
-    assert sum(stream.sender().load for stream in each) < 1
+    assert sum(stream.frames_us / stream.period_us for stream in each) < 1
     us = responses(own)
     for place_ in {0, number // 2, number - 1}:
         bit_us = 1.0
