@@ -249,6 +249,13 @@ def test_plan_raises_the_bit_rate_to_the_first_that_is_enough() -> None:
     assert none.recommended is None
 
 
+def test_messages_that_all_say_their_11_bits_are_answered_on_a_bus_of_29() -> None:
+    alone = network({"identifier": 5, "identifier_bits": 11, "payload_bytes": 8, "period_us": 10_000})
+    own = override(alone, {"bus.identifier_bits": 29})
+    assert busplan.capacity(own).report().blocks()
+    assert busplan.plan(own, free=["identifier_bits"]).report().blocks()
+
+
 def test_a_sweep_and_a_map_agree_with_capacity_point_by_point() -> None:
     rates, deadlines_us = [20.0, 33.3, 50.0, 125.0], [5000.0, 10_000.0, 50_000.0]
     vary = {"bus.bit_rate_kbit_s": rates, "message.doors.deadline_us": deadlines_us}

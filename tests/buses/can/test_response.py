@@ -5,6 +5,7 @@ tests/oracles/can_textbook.py, nothing of its short cuts.
 """
 
 import importlib.util
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -269,3 +270,27 @@ def test_a_sweep_has_at_each_point_what_the_point_has(key: str) -> None:
         (found,) = busplan.capacity(override(own, {f"message.m0.{key}": value}), timing_model=[WORST]).results
         assert (load, fits) == (pytest.approx(found.bus_load), found.fits)
     assert len(set(swept["fits"])) > 1
+
+
+@pytest.mark.parametrize("profile", ["can-servo-8", "canopen-6", "can-fd-arm-7"])
+def test_a_derivation_lists_the_frames_that_were_counted(profile: str) -> None:
+    derivations = busplan.explain(profile, "worst_response_us").to_dict()["derivations"]
+    assert len(derivations) > 5
+    for one in derivations:
+        for step in one["steps"]:
+            before, _, listed = step["formula"].partition(", in its worst instance")
+            if not before.startswith("frames of higher priorities before "):
+                continue
+            frames = re.findall(r"(\d+) [\w-]+ of ([\d.]+) us", listed)
+            assert sum(int(number) * float(us) for number, us in frames) == pytest.approx(step["value"])
+            assert bool(frames) == bool(step["value"])
+
+
+def test_a_derivation_of_a_burst_has_its_periods() -> None:
+    own = network({"period_us": 100_000, "burst": 5}, {"period_us": 10_000})
+    first = busplan.explain(own, "latency.worst_response_us").to_dict()["derivations"][0]
+    steps = {step["key"]: (step["formula"], step["value"]) for step in first["steps"]}
+    assert steps["blocking_us"] == ("the longest frame of a lower priority than m0: m1", 270)
+    assert steps["burst"] == ("frames of m0 that may come at once", 5)
+    assert steps["backlog_us"] == ("q C - (q - b + 1) T", 4 * 270)
+    assert [one["name"] for one in first["inputs"] if one["name"].endswith("burst")] == ["message.m0.burst"]

@@ -11,7 +11,7 @@ from busplan.buses.can.equations import bit_us, frame_us, payload_us
 from busplan.buses.can.figures import BUS_LOAD, TERMS
 from busplan.buses.can.streams import Stream, frame_sizes, last_identifier, place, streams
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Traffic, traffic_of
-from busplan.buses.can.waiting import message_responses, responses, sent_in, sync_response, waits
+from busplan.buses.can.waiting import counted, message_responses, responses, sent_in, sync_response, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
@@ -20,6 +20,7 @@ from busplan.buses.rates import Rate
 from busplan.elementwise import (
     FIT_ROUNDING,
     Number,
+    Traced,
     choose,
     is_off,
     larger,
@@ -425,15 +426,18 @@ class CanCycle(BusCycle):
         def figure(key: str, words: str) -> Number:
             return self.traffic.ask_points(partial(_phase, self.is_stuffed, place, key), words=words)
 
+        blocks, before = self._counted(place)
         jitter_us = figure("jitter_us", f"how late {name} may be queued")
         frame_us_ = figure("frame_us", f"the last frame of {name}")
-        blocking_us = figure("blocking_us", f"the longest frame of a lower priority than {name}")
-        interference_us = figure("interference_us", f"frames of higher priorities before {name}, in its worst instance")
+        blocking_us = figure("blocking_us", f"the longest frame of a lower priority than {name}{blocks}")
+        words = f"frames of higher priorities before {name}, in its worst instance{before}"
+        interference_us = figure("interference_us", words)
         instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")
         period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
         periods = instance
         if any(value_of(message.burst) > 1 for message in self.traffic.messages if message.name == name):
-            periods = instance - figure("burst", f"frames of {name} that may come at once") + 1
+            burst = named(figure("burst", f"frames of {name} that may come at once"), "burst", "b")
+            periods = instance - burst + 1
         backlog_us = choose(instance < inf, instance * frame_us_ - periods * period_us, instance)
         parts_us = {
             "jitter_us": named(jitter_us, "jitter_us", "J"),
@@ -451,6 +455,13 @@ class CanCycle(BusCycle):
             instance=instance,
             deadline_us=figure("deadline_us", f"deadline of {name}"),
         )
+
+    def _counted(self, place: int) -> Iterator[str]:
+        """The frames that a derivation of a response says were counted: the one that blocks, and those before it."""
+        at, words = self.traffic.place, ("", "")
+        if isinstance(at, Traced):
+            words = counted(self.traffic.at(at.value), place, is_stuffed=self.is_stuffed)
+        return (f": {one}" if one else "" for one in words)
 
 
 def _numbered(parts_us: Mapping[str, Number], **figures: Number) -> dict[str, Number]:

@@ -61,6 +61,6 @@ def _identifier_bits(network: Network) -> Setting:
     if plain(traffic.identifier_bits) == BASE_BITS:
         return empty._replace(reason=f"they have {BASE_BITS} bits")
     own = (stream for stream in streams(traffic, is_stuffed=True) if stream.identifier_bits == traffic.identifier_bits)
-    if max(stream.last for stream in own) > MAX_IDENTIFIER[BASE_BITS]:
+    if max((stream.last for stream in own), default=0) > MAX_IDENTIFIER[BASE_BITS]:
         return empty._replace(reason=f"some are over {MAX_IDENTIFIER[BASE_BITS]:#x}")
     return empty._replace(values=({key: BASE_BITS},))

@@ -5,7 +5,7 @@ from collections.abc import Container, Iterator, Sequence
 from functools import cache, lru_cache
 from importlib import import_module
 from itertools import chain, islice, repeat
-from math import inf
+from math import ceil, inf, isclose
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -147,23 +147,8 @@ def message_responses(
     is_verdict
         Whether a bound, without parts, is enough where it shows that a deadline is kept.
 
-    Notes
-    -----
-    SYNC comes once a period, and feedback and commands behind it. So a busy period that begins with SYNC meets each
-    once a period. One that begins with late feedback, or with late commands, meets these, and the next SYNC with all
-    that follows it sooner than a period later. A message has the worst of the three.
     """
-    each, starts = streams(traffic, is_stuffed=is_stuffed), [_Start()]
-    if traffic.has_cycle:
-        us = dict.fromkeys((SYNC, _FEEDBACK, _COMMAND), 0.0)
-        for stream in each:
-            if not stream.is_message:
-                us[stream.name] = us[stream.name] + stream.frames_us
-        others_us = total(us.values()) + traffic.read_us + traffic.host_us
-        commands_us = waits(traffic, others_us, is_stuffed=is_stuffed).lasts_us - us[_COMMAND]
-        feedback_us = commands_us - traffic.host_us - us[_FEEDBACK]
-        starts.append(_Start((_FEEDBACK, _COMMAND), feedback_us, traffic.period_us))
-        starts.append(_Start((_COMMAND,), commands_us, traffic.period_us))
+    each, starts = streams(traffic, is_stuffed=is_stuffed), _starts(traffic, is_stuffed=is_stuffed)
     asked = [number for number, stream in enumerate(each) if stream.is_message]
     enough_us = [stream.deadline_us for stream in each] if is_verdict else None
     found = _worst(each, asked, starts, bit=bit_us(traffic.bit_rate_kbit_s), enough_us=enough_us)
@@ -197,6 +182,45 @@ def responses(traffic: Traffic, *, is_stuffed: bool) -> tuple[tuple[Stream, Resp
     )
 
 
+def counted(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[str, str]:
+    """Frames in a response of `responses`, in words: the one that blocks, and those that go before it, by number.
+
+    Parameters
+    ----------
+    traffic
+        What is sent, in plain numbers.
+    place
+        Place of the response.
+    is_stuffed
+        Whether the stuff bits of the worst case are counted.
+    """
+    own, worst = responses(traffic, is_stuffed=is_stuffed)[place]
+    higher, blocking = [], [""]
+    for one in streams(traffic, is_stuffed=is_stuffed):
+        if (one.block if own.is_message else one.first_place) <= own.last_place:
+            higher.append(one)
+        elif one.frame_us == worst.blocking_us and (one.is_message or own.name != SYNC):
+            blocking.append(one.label)
+    waited_us = worst.blocking_us + worst.interference_us + worst.instance * own.frame_us
+    window_us = waited_us + plain(bit_us(traffic.bit_rate_kbit_s))
+    for start in _starts(traffic, is_stuffed=is_stuffed) if own.is_message else [_Start()]:
+        numbers = [
+            (one.identifiers - (one == own))
+            * (ceil((window_us + start.jitter_us(one)) / one.period_us) + one.burst - 1 + (one.name in start.late))
+            for one in higher
+        ]
+        us = sum(n * one.frame_us for n, one in zip(numbers, higher, strict=True))
+        if isclose(us, worst.interference_us, abs_tol=1e-6):
+            each = [f"{n} {one.label} of {one.frame_us:g} us" for n, one in zip(numbers, higher, strict=True) if n]
+            more = f", and of {len(each) - _LISTED} more" if len(each) > _LISTED else ""
+            return blocking[:2][-1], ", ".join(each[:_LISTED]) + more
+    return "", ""
+
+
+_LISTED = 20
+"""Senders whose frames are listed, at most."""
+
+
 class _Start(NamedTuple):
     """Where in the cycle a busy period begins: late PDOs come at once, and all that is of the cycle in the next one."""
 
@@ -213,6 +237,29 @@ class _Start(NamedTuple):
         # Late ones come again with their own period. Of the others any may be due in the next cycle.
         again_us = stream.period_us if stream.name in self.late else self.period_us
         return smaller(self.late_us - again_us, 0.0)
+
+
+def _starts(traffic: Traffic, *, is_stuffed: bool) -> list[_Start]:
+    """Where a busy period of a message may begin: it has the worst of these.
+
+    SYNC comes once a period, and feedback and commands behind it. So a busy period that begins with SYNC meets each
+    once a period. One that begins with late feedback, or with late commands, meets these, and the next SYNC with all
+    that follows it sooner than a period later.
+    """
+    if not traffic.has_cycle:
+        return [_Start()]
+    us = dict.fromkeys((SYNC, _FEEDBACK, _COMMAND), 0.0)
+    for stream in streams(traffic, is_stuffed=is_stuffed):
+        if not stream.is_message:
+            us[stream.name] = us[stream.name] + stream.frames_us
+    others_us = total(us.values()) + traffic.read_us + traffic.host_us
+    commands_us = waits(traffic, others_us, is_stuffed=is_stuffed).lasts_us - us[_COMMAND]
+    feedback_us = commands_us - traffic.host_us - us[_FEEDBACK]
+    return [
+        _Start(),
+        _Start((_FEEDBACK, _COMMAND), feedback_us, traffic.period_us),
+        _Start((_COMMAND,), commands_us, traffic.period_us),
+    ]
 
 
 def _worst(
