@@ -318,6 +318,10 @@ class CanCycle(BusCycle):
         traffic = () if self._messages or self.network.nonperiodic_us else (LeftOut("other messages", "message"),)
         return (*host, *slowest, *traffic)
 
+    def premises(self) -> tuple[str, ...]:
+        """Each node offers its highest message first, and no error repeats a frame."""
+        return "priority queues: assumed", "no repeated frames"
+
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
         least, most = (CanCycle(self.network, model).load for model in (NONE, WORST))
