@@ -271,15 +271,16 @@ def _instants(message: Message, own: Scene, random: Random) -> tuple[Whole, Whol
     """When instances of a message are due and queued: no more than b - 1 + ceil(t / T) of them are due in a time t."""
     period_us, jitter_us = int(plain(message.period_us)), int(plain(message.jitter_us))
     saved_us = (int(plain(message.burst)) - 1) * period_us
-    at_us, found = random.randint(-period_us - jitter_us, own.period_us), []
+    at_us, dues_us, queues_us = random.randint(-period_us - jitter_us, own.period_us), [], []
     # From one to the next it is a period; what was not sent is made up for later, up to a burst.
     regular_us = at_us
     while at_us < CYCLES * own.period_us:
-        queued_us = at_us + random.choice([0, jitter_us, random.randint(0, jitter_us)])
-        if queued_us >= 0:
-            found.append((at_us, queued_us))
+        dues_us.append(at_us)
+        queues_us.append(at_us + random.choice([0, jitter_us, random.randint(0, jitter_us)]))
         regular_us = max(regular_us, at_us) + period_us
         at_us = max(at_us, regular_us - saved_us) + random.choice([0, 0, 0, 0, random.randint(0, 200)])
+    # They are queued in their order.
+    found = [(due, queued) for due, queued in zip(dues_us, sorted(queues_us), strict=True) if queued >= 0]
     return tuple(due for due, _ in found), tuple(queued for _, queued in found)
 
 

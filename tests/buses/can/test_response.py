@@ -155,8 +155,9 @@ def test_no_other_start_takes_longer(messages: list[dict[str, Any]], random: Ran
             due.append(at_us)
             regular_us = max(regular_us, at_us) + own["period_us"]
             at_us = max(at_us, regular_us - (own["burst"] - 1) * own["period_us"]) + random.choice([0, 0, 7, 3000])
-        queued = tuple(us + random.choice([0, own["jitter_us"], random.randint(0, own["jitter_us"])]) for us in due)
-        sent.append(SimulatedMessage(Frame(number, int(one.frame_us or 0)), tuple(due), queued))
+        queued = [us + random.choice([0, own["jitter_us"], random.randint(0, own["jitter_us"])]) for us in due]
+        # They are queued in their order.
+        sent.append(SimulatedMessage(Frame(number, int(one.frame_us or 0)), tuple(due), tuple(sorted(queued))))
     run = simulate(Frame(0, 1), (), sent, period_us=1, host_us=(), late_us=random.choice([0, BIT_US - 1]))
     for one, us in zip(found, run.responses_us, strict=True):
         assert one.worst_response_us is None or max(us) <= one.worst_response_us + 1e-6
