@@ -4,7 +4,7 @@ import importlib.util
 import json
 import re
 from collections.abc import Callable
-from math import inf
+from math import ceil, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +78,28 @@ def test_its_cycle_is_that_by_hand() -> None:
     assert terms(profile(), "no-stuffing")["feedback"] == 3 * (47 + 64 + 47 + 16) * BIT_US
     assert terms(profile(bus__sync_counter=True))["sync"] == 65 * BIT_US
     assert terms(profile(bus__identifier_bits=29))["command"] == 3 * 140 * BIT_US
+
+
+@pytest.mark.parametrize("load", [0.5, 0.975, 0.985, 0.9895, 0.9905, 0.995, 0.9998, 1.0, 1.2])
+def test_a_cycle_behind_a_nearly_full_bus_is_a_bound_in_closed_form(load: float) -> None:
+    # One message goes before all PDOs, and one behind them may block: three frames of it, in a cycle so long.
+    frame, period_us, others = 135 * BIT_US, 135 * BIT_US / load, (55 + 3 * (135 + 75) + 3 * 115) * BIT_US
+    urgent = {"name": "urgent", "identifier": 0x10, "payload_bytes": 8, "period_us": period_us}
+    low = {"name": "low", "identifier": 0x7FF, "payload_bytes": 0, "period_us": 50_000.0, "deadline_us": 50_000.0}
+    own = profile(message=[urgent, low], node__execution__base_us=0, node__execution__per_byte_us=0)
+
+    def blocked(span: float) -> float:
+        return ceil(min((span + 50_000) / 50_000, 3)) * 55 * BIT_US
+
+    if load > 0.99:
+        span = (others + blocked(inf) + frame + load * BIT_US) / (1 - min(load, 0.9999))
+    else:
+        span = wider = others
+        while span < (wider := others + blocked(span) + ceil((span + BIT_US) / period_us) * frame):
+            span = wider
+    found = terms(own)
+    assert found["interference"] == pytest.approx(ceil((span + BIT_US) / period_us) * frame)
+    assert found["blocking"] == blocked(span)
 
 
 def test_a_pdo_for_each_axis_shares_the_payload() -> None:
