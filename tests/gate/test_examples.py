@@ -1,8 +1,8 @@
 """Every rule has a valid and an invalid profile in `examples/CODE/`, and says of them what it should.
 
 An invalid one begins with `# expect: LINE:COLUMN ...`: each finding's place, and every one is of the folder's rule. A
-valid one has no findings at all. `baseline.json` or `recording.log`, where there is one, is what the profiles beside it
-are held against.
+valid one has no findings at all. `baseline.json`, `recording.log` or a log of its own name, where there is one, is what
+a profile beside it is held against.
 """
 
 import json
@@ -44,11 +44,11 @@ def checked(path: Path) -> FileResult:
     )
     content = path.read_bytes()
     try:
-        recording = path.parent / "recording.log"
+        logs = [log for log in (path.with_suffix(".log"), path.parent / "recording.log") if log.exists()]
         return check_document(
             decode(content, name=path.name),
             baseline=recorded.get(path.name),
-            recording=Recording(recording) if recording.exists() else None,
+            recording=Recording(logs[0]) if logs else None,
         )
     except PlacedError as error:
         return unreadable(path.name, error, content)
@@ -125,6 +125,8 @@ def test_codes_are_stable() -> None:
         "BP204": "circle-too-long",
         "BP301": "baseline-regression",
         "BP401": "machine-outside-plan",
+        "BP402": "not-shown-by-recording",
+        "BP403": "recording-shows-nothing",
         "BP901": "suppression-without-reason",
         "BP902": "suppression-without-effect",
     }

@@ -34,7 +34,7 @@ def test_a_machine_within_its_plan_passes_and_one_outside_fails(run: Run, tmp_pa
     assert done.returncode == 1
     line = next(number for number, text in enumerate(path.read_text().splitlines(), 1) if "master_jitter_us" in text)
     assert f"press.toml:{line}:1: BP401 error: bus.master_jitter_us: latest start: " in done.stdout
-    assert "us recorded, at most 11.0 +/- " in done.stdout
+    assert " us recorded, at most 11.0 us planned; " in done.stdout
     assert "busplan measured --apply writes what was measured" in done.stdout
     # Half of the cycles keep it.
     assert "BP401" not in run(*words, "--quantile", "0.5", cwd=tmp_path).stdout
@@ -44,6 +44,16 @@ def test_a_machine_within_its_plan_passes_and_one_outside_fails(run: Run, tmp_pa
     assert "BP902" in run(*words, cwd=tmp_path).stdout
     # Without a recording the comment is not held to be without effect.
     assert "BP902" not in run(*words[:3], cwd=tmp_path).stdout
+
+
+def test_a_share_and_its_uncertainty_are_in_one_unit(tmp_path: Path) -> None:
+    profile = tmp_path / "slow.toml"
+    profile.write_text((LOG.parent / "valid.toml").read_text().replace("period_us = 4000", "period_us = 8000"))
+    (seen,) = [one for one in busplan.measured(profile, LOG).figures if one.quantity == "load"]
+    assert seen.uncertainty is not None
+    messages = [one.finding.message for one in busplan.check(profile, recording=LOG).findings]
+    (said,) = [message for message in messages if message.startswith("name: load: ")]
+    assert f" +/- {100 * seen.uncertainty:.2g} % recorded, " in said
 
 
 def test_what_no_key_plans_is_at_the_name(tmp_path: Path) -> None:

@@ -18,15 +18,19 @@ _FIRST_DAY_NS: Final = 10 * 365 * 86400 * 1_000_000_000
 _LAST_DAY_NS: Final = 1 << 63
 _ROUNDING: Final = 1e-9
 """Share of a figure that is rounding."""
+SURE: Final = 3.29 / 2
+"""Expanded uncertainties (k = 2) from its plan on which a figure is outside it: k = 3.29, 99.9 % of a normal error."""
 Sense = Literal["equal", "at most", "at least", "shown"]
 """How a recorded figure is within its plan; shown: it has none."""
+RecordedVerdict = Literal["within", "not shown", "outside"]
+"""Whether a figure is within its plan, beside it by no more than the doubt allows or hidden, or surely outside."""
 
 
 class RecordedFigure(NamedTuple):
     """A figure as planned and as recorded, both in `unit`."""
 
     quantity: str
-    unit: Literal["us", "bytes", "1", "share"]
+    unit: Literal["us", "bytes", "1", "share", "kbit/s"]
     """A share is 0..1."""
     planned: float | None
     recorded: float | None
@@ -41,6 +45,8 @@ class RecordedFigure(NamedTuple):
     note: str = ""
     is_mean: bool = False
     """Whether it is the mean of its events, whatever the quantile."""
+    hidden: str = ""
+    """Why the recording cannot show it, though something is planned; empty where it can."""
 
     @property
     def residual(self) -> float | None:
@@ -48,12 +54,27 @@ class RecordedFigure(NamedTuple):
         return None if self.planned is None or self.recorded is None else self.recorded - self.planned
 
     @property
-    def within(self) -> bool | None:
-        """Whether it is within its plan, or no further beside it than the uncertainty; None where nothing is said."""
+    def beyond(self) -> float | None:
+        """How far it is beside its plan, on the side that counts; negative within; None where nothing is planned."""
         if self.residual is None or self.sense == "shown":
             return None
-        beyond = {"equal": abs(self.residual), "at most": self.residual, "at least": -self.residual}[self.sense]
-        return beyond <= (self.uncertainty or 0.0) + _ROUNDING * abs(self.planned or 0.0)
+        return {"equal": abs(self.residual), "at most": self.residual, "at least": -self.residual}[self.sense]
+
+    @property
+    def verdict(self) -> RecordedVerdict | None:
+        """How it stands to its plan; None where nothing is planned.
+
+        A worst case that was recorded within the plan is within it; beyond by less than a doubt of 99.9 % it is not
+        shown. A mean, and what is to be equal, is within up to U.
+        """
+        if self.hidden:
+            return "not shown"
+        if self.beyond is None:
+            return None
+        doubt, rounding = self.uncertainty or 0.0, _ROUNDING * abs(self.planned or 0.0)
+        if self.beyond <= rounding + (doubt if self.is_mean or self.sense == "equal" else 0.0):
+            return "within"
+        return "outside" if self.beyond > SURE * doubt + rounding else "not shown"
 
 
 class Recorded(NamedTuple):
@@ -66,6 +87,8 @@ class Recorded(NamedTuple):
     """New value by dotted key of what was measured; None removes a key."""
     day: str
     """Day of the first stamp in UTC, as 2026-11-23; empty where stamps do not say it."""
+    shows_nothing: tuple[str, ...] = ()
+    """Why the recording as a whole shows no machine within its plan, a sentence each; empty where it can."""
 
 
 def day_of(time_ns: int) -> str:

@@ -49,9 +49,9 @@ _FILE_CODES: Final[Mapping[ProblemKind, str]] = {
 }
 BY_KIND: Final = {kind: OWN[code] for kind, code in _FILE_CODES.items()}
 """Rules of the file format, by what reading a profile finds."""
-BASELINE, RECORDING, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT = (
-    OWN[code] for code in ("BP301", "BP401", "BP901", "BP902")
-)
+BASELINE, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT = (OWN[code] for code in ("BP301", "BP901", "BP902"))
+RECORDING = OUTSIDE_PLAN, NOT_RECORDED, NOTHING_RECORDED = tuple(OWN[code] for code in ("BP401", "BP402", "BP403"))
+"""Rules of a recording of the machine."""
 NEVER_SUPPRESSED: Final = frozenset((*_FILE_CODES.values(), "BP901", "BP902"))
 """Codes that cannot be suppressed: those of the file format and of suppressions."""
 

@@ -1,11 +1,13 @@
 """Frames of CAN logs as arrays, and the bits that each of them had on the wire."""
 
 import logging
+import zlib
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from pathlib import Path
+from struct import Struct
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -17,7 +19,7 @@ from busplan.progress import Progress
 from busplan.recordings.statistics import Floats
 from busplan.recordings.words import counted
 
-_EXTENDED, _REMOTE, _FD = 1, 2, 4
+_EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader", b"(": "CanutilsLogReader"}
 """Readers of python-can, by the first bytes of a file."""
 _FORMATS: Final = "candump -l, Vector's ASC and BLF, PEAK's TRC"
@@ -35,6 +37,19 @@ _LONG_BYTES: Final = (16, 20, 24, 32, 48, 64)
 """Length codes 10 to 15, as python-can gives them even of classical frames; they have 8 bytes in those."""
 
 
+_DAY_S: Final = 86_400.0
+_LONGEST_S: Final = _DAY_S
+"""Longest time from one frame to the next that is no damage [s]."""
+_END_S: Final = float(1 << 33)
+"""Stamps from here on, in the year 2242, are no times [s]."""
+_MOST_CONTAINER_BYTES: Final = 16_000_000
+"""Most data of a container of BLF; Vector's and python-can's have 131,072 bytes."""
+_BLF_OBJECT: Final = Struct("<4s4xII")
+"""Head of an object: signature, size and kind, as python-can has it."""
+_BLF_METHOD: Final = Struct("<H14x")
+_BLF_CONTAINER, _BLF_DEFLATED = 10, 2
+
+
 class CanFrames(NamedTuple):
     """Frames of one channel, n of them in the order of the log."""
 
@@ -50,6 +65,8 @@ class CanFrames(NamedTuple):
     """On the wire, interframe space included; 0 of a CAN FD frame [bits]."""
     is_fd: npt.NDArray[np.bool_]
     """Whether it is a CAN FD frame."""
+    switched: npt.NDArray[np.bool_]
+    """Whether its data are at the data bit rate."""
     remote: int
     errors: int
     """Frames that ask for data, and error frames; the latter are not among the frames."""
@@ -73,6 +90,9 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
         The file cannot be read, is of no known format, has no frame, or those of several channels; or python-can is
         not installed.
     """
+    if path.is_fifo():
+        # Opening it may wait for ever, and it is opened twice.
+        raise BusplanError(f"{path}: is a named pipe; give a regular file")
     try:
         with path.open("rb") as file:
             head = file.read(4)
@@ -90,15 +110,54 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
     log = _Log()
     reader: Any = None
     try:
-        reader = getattr(can, name)(str(path))
+        reader = (_bounded_blf() if name == "BLFReader" else getattr(can, name))(str(path))
         stream = getattr(reader, "file", None)
         log.read(reader, lambda: progress(min(stream.tell() if stream else 0, size), size))
+    except _DamageError as error:
+        log.broken = str(error)
     except Exception as error:  # noqa: BLE001 - a damaged log fails in many ways
         log.broken = f"{type(error).__name__}: {error}"
     finally:
         with suppress(Exception):
             reader.stop()
     return log.frames(path)
+
+
+class _DamageError(Exception):
+    """What no log can say, in words."""
+
+
+def _bounded_blf() -> Any:
+    """The reader of BLF of python-can, with a bound for what a container is inflated to."""
+    from can.io import blf  # noqa: PLC0415 - as above
+
+    class Reader(blf.BLFReader):  # type: ignore[misc,unused-ignore]
+        def __iter__(self) -> Generator[Any, None, None]:
+            while head := self.file.read(_BLF_OBJECT.size):
+                signature, size, kind = _BLF_OBJECT.unpack(head)
+                if signature != b"LOBJ" or size < _BLF_OBJECT.size:
+                    raise _DamageError("what should be an object of the log is none")
+                content = self.file.read(size - _BLF_OBJECT.size)
+                self.file.read(size % 4)
+                if kind == _BLF_CONTAINER:
+                    yield from self._parse_container(_inflated(content, held=len(self._tail)))
+
+    return Reader
+
+
+def _inflated(content: bytes, *, held: int) -> bytes:
+    """Data of a container; with what is held of the container before, they are bounded."""
+    (method,), data = _BLF_METHOD.unpack_from(content), content[_BLF_METHOD.size :]
+    if method == 0:
+        return data
+    if method != _BLF_DEFLATED:
+        raise _DamageError(f"a container that is compressed by method {method}")
+    most = max(_MOST_CONTAINER_BYTES - held, 0)
+    # A byte more than there is room for tells that there is more.
+    data = zlib.decompressobj().decompress(data, most + 1)
+    if len(data) > most:
+        raise _DamageError(f"a container of over {_MOST_CONTAINER_BYTES:,} bytes")
+    return data
 
 
 class _Log:
@@ -120,7 +179,7 @@ class _Log:
             self._sizes.append,
             self._flags.append,
         )
-        number = 0
+        number, last_s = 0, None
         for message in messages:
             number += 1
             if not number % _TURN:
@@ -129,15 +188,18 @@ class _Log:
             if message.is_error_frame:
                 self._errors += 1
                 continue
+            _require_frame(message, last_s)
+            last_s = message.timestamp
             self._channels[message.channel] += 1
-            times(message.timestamp)
+            times(last_s)
             identifiers(message.arbitration_id)
             data(int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"))
             sizes(message.dlc)
             fd = message.is_fd
             # CAN FD has no remote frames: what a log marks so has data that it lost.
             remote = message.is_remote_frame and not fd
-            flags(message.is_extended_id * _EXTENDED | remote * _REMOTE | fd * _FD)
+            switched = fd and message.bitrate_switch
+            flags(message.is_extended_id * _EXTENDED | remote * _REMOTE | fd * _FD | switched * _SWITCHED)
 
     def frames(self, path: Path) -> CanFrames:
         """All frames as arrays."""
@@ -155,7 +217,7 @@ class _Log:
         flags = np.frombuffer(self._flags, dtype=np.uint8)
         sizes = np.frombuffer(self._sizes, dtype=np.uint8).astype(np.int64)
         codes = np.where(sizes < _LONG_BYTES[0], sizes, 10 + np.searchsorted(_LONG_BYTES[:-1], sizes))
-        extended, remote, fd = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD))
+        extended, remote, fd, switched = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD, _SWITCHED))
         data = np.frombuffer(self._data, dtype=np.uint64)
         return CanFrames(
             float(stamps[0]),
@@ -165,10 +227,25 @@ class _Log:
             np.where(fd, sizes, np.minimum(sizes, _CLASSICAL_BYTES)),
             np.where(fd, 0, written_bits(identifiers, extended, remote, codes, data)),
             fd,
+            switched,
             int(np.count_nonzero(remote)),
             self._errors,
             self.broken,
         )
+
+
+def _require_frame(message: Any, before_s: float | None) -> None:
+    """Refuse what is no frame at a time: then nothing of it is taken."""
+    stamp_s, identifier = message.timestamp, message.arbitration_id
+    if not 0 <= stamp_s < _END_S:  # which is so of no number, too
+        raise _DamageError(f"a stamp of {stamp_s:g} s")
+    if before_s is not None and stamp_s - before_s > _LONGEST_S:
+        raise _DamageError(f"a stamp {(stamp_s - before_s) / _DAY_S:,.1f} days after the one before")
+    bits = 29 if message.is_extended_id else 11
+    if not 0 <= identifier < 1 << bits:
+        raise _DamageError(f"an identifier of {identifier:#x}, which has no room in {bits} bits")
+    if not 0 <= message.dlc <= _LONG_BYTES[-1] or len(message.data) > _LONG_BYTES[-1]:
+        raise _DamageError(f"data of {max(message.dlc, len(message.data))} bytes")
 
 
 def written_bits(

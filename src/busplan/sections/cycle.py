@@ -182,3 +182,9 @@ class Limits(Section):
     min_spare_axes: SpareCount | None = Field(
         default=None, description="Axes that the bus must be able to carry beyond its own", examples=[4]
     )
+    missed_cycles: SpareCount = Field(
+        default=0,
+        description="Most cycles of a recording without a frame or SYNC, most PDOs missing or twice, and most error "
+        "frames",
+        examples=[0],
+    )

@@ -94,7 +94,7 @@ def test_a_cycle_behind_a_nearly_full_bus_is_a_bound_in_closed_form(load: float)
     if load > 0.99:
         span = (others + blocked(inf) + frame + load * BIT_US) / (1 - min(load, 0.9999))
     else:
-        span = wider = others
+        span = float(others)
         while span < (wider := others + blocked(span) + ceil((span + BIT_US) / period_us) * frame):
             span = wider
     found = terms(own)

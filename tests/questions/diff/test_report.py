@@ -112,7 +112,7 @@ class Page(HTMLParser):
         ),
         (
             {"bus.gap_count": 62},
-            "B is better in 12 figures: corrected margin, smallest safe period, margin, utilisation and 8 more.",
+            "B is better in 12 figures: corrected margin, period with enough time, margin, utilisation and 8 more.",
         ),
         (
             {"payload.overhead_bytes": 24},
@@ -238,7 +238,7 @@ def test_regressions_are_named_with_the_timing_that_has_them(paper: Profile) -> 
     found = difference(paper, override(paper, {"cycle.nonperiodic_us": 250}))
     assert regression_words(found, found.regressions(tolerance=0.8), tolerance=80) == (
         "regression: B is worse by more than 80 % in 9 figures: verdict, shown to fit, corrected margin, "
-        "smallest safe period, margin, utilisation, required time, smallest period, no limit broken (standard)"
+        "period with enough time, margin, utilisation, required time, smallest period, no limit broken (standard)"
     )
     assert regression_words(found, found.regressions(), tolerance=0).startswith("regression: B is worse in ")
 
@@ -298,7 +298,7 @@ def test_a_comment_has_the_verdict_first_and_what_differs() -> None:
     page = Page(comment(difference(a, b), arguments=("main:line.toml", "paper-optimal-gap")))
     title, verdict = page.text.strip().splitlines()[:2]
     assert title == "Changes from main:line.toml to paper-optimal-gap"
-    assert verdict.startswith("B is better in 16 figures: corrected margin, safe nodes, safe axes, smallest safe ")
+    assert verdict.startswith("B is better in 16 figures: corrected margin, safe nodes, safe axes, period with ")
     assert page.rows[1:3] == [
         ["A", "main:line.toml", "paper-1ms", "1000", "paper"],
         ["B", "paper-optimal-gap", "paper-optimal-gap", "1000", "standard"],

@@ -74,10 +74,10 @@ def test_a_machine_within_its_plan_is_found_to_be(tmp_path: Path, seed: int) -> 
     none, worst = (figure(answer, f"load, {sort}").recorded or 0 for sort in ("no", "worst"))
     assert none < load < worst
     assert figure(answer, "SYNC: period").recorded == pytest.approx(4000, abs=0.5)
-    assert figure(answer, "heartbeats: jitter").unit == "us"
-    assert figure(answer, "sdo-request: shortest distance").note == "not periodic"
+    assert figure(answer, "heartbeats: sooner than its period").unit == "us"
+    assert figure(answer, "sdo-request: period").note == "not periodic"
     last = max(frame.us % 4000 for frame in logged if 0x181 <= frame.identifier <= 0x208)
-    assert figure(answer, "last PDO behind SYNC").recorded == pytest.approx(last - 47, abs=60)
+    assert figure(answer, "last PDO after SYNC").recorded == pytest.approx(last - 47, abs=60)
 
 
 def test_every_format_has_the_same_frames(tmp_path: Path) -> None:
@@ -110,10 +110,12 @@ def test_what_is_planned_and_not_seen_and_seen_and_not_planned_is_said(tmp_path:
     logged += [Logged(k * 900.0 + 3, 0x7FF - k % 2, b"\1", False, 0) for k in range(20)]
     logged += [Logged(50.0, 0x181, b"", True, 0)]
     answer = of_log(candump(sorted(logged)), tmp_path)
-    assert "In the plan and not in the log: 1 of feedback, sdo-request, heartbeats." in answer.remarks
+    unseen = figure(answer, "frames of the plan never in the log")
+    assert (unseen.hidden, unseen.verdict) == ("never in the log: 1 of feedback, sdo-request, heartbeats", "not shown")
+    assert figure(answer, "PDOs missing").note == "299 of 0x183"
     unplanned = figure(answer, "frames of no message")
     # 0x181 of 29 bits is not the feedback of 11.
-    assert (unplanned.recorded, unplanned.note, unplanned.within) == (21, "0x181, 0x7fe, 0x7ff", False)
+    assert (unplanned.recorded, unplanned.note, unplanned.verdict) == (21, "0x181, 0x7fe, 0x7ff", "outside")
 
 
 def test_a_message_that_comes_more_often_or_longer_is_outside_and_measured(tmp_path: Path) -> None:
@@ -122,28 +124,28 @@ def test_a_message_that_comes_more_often_or_longer_is_outside_and_measured(tmp_p
     answer = of_log(candump(logged), tmp_path, plan=plan)
     assert [found.quantity for found in answer.outside] == ["heartbeats: period", "heartbeats: data"]
     assert answer.edits["message.heartbeats.payload_bytes"] == 2
-    assert answer.edits["message.heartbeats.period_us"] == pytest.approx(50_000, rel=1e-3)
+    assert answer.edits["message.heartbeats.period_us"] == pytest.approx(50_000, rel=2e-3)
 
 
 def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
-    late = [frame._replace(us=frame.us + 1500 * (frame.identifier == 0x208)) for frame in servo_8(100)]
+    late = [frame._replace(us=frame.us + 3000 * (frame.identifier == 0x208)) for frame in servo_8(100)]
     shaken = arbitrated(servo_8(300, sync_jitter_us=900))
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").recorded == pytest.approx(900, abs=150)
-    assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").within is False
+    assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").verdict == "outside"
     answer = of_log(candump(arbitrated(late)), tmp_path)
-    assert [found.quantity for found in answer.outside] == ["last PDO behind SYNC"]
+    assert [found.quantity for found in answer.outside] == ["last PDO after SYNC"]
 
 
 def test_every_frame_of_a_pdo_has_a_name_of_its_own(tmp_path: Path) -> None:
     answer = of_log(candump(LOGGED), tmp_path, plan="canopen-6")
-    assert figure(answer, "feedback 1: period").recorded == pytest.approx(4000, abs=5)
-    assert any("not in the log: feedback 2, command 2," in remark for remark in answer.remarks)
+    assert figure(answer, "feedback 1: data").recorded == 8
+    assert "feedback 2, command 2," in figure(answer, "frames of the plan never in the log").hidden
 
 
 def test_a_plan_that_is_too_full_has_no_response_to_stand_beside(tmp_path: Path) -> None:
     plan = busplan.load_profile(PLAN, changes={"bus.bit_rate_kbit_s": 125})
     answer = of_log(candump(LOGGED), tmp_path, plan=plan)
-    assert figure(answer, "sdo-request: shortest").planned is None
+    assert figure(answer, "sdo-request: sooner").planned is None
     assert "NaN" not in answer.to_json()
     assert "Infinity" not in answer.to_json()
 
@@ -151,7 +153,7 @@ def test_a_plan_that_is_too_full_has_no_response_to_stand_beside(tmp_path: Path)
 def test_a_burst_is_counted(tmp_path: Path) -> None:
     burst = [Queued(10_000.0 * cycle, 0x300 + number, b"\xaa" * 8) for cycle in range(20) for number in range(7)]
     answer = of_log(candump(arbitrated(burst)), tmp_path)
-    assert figure(answer, "frames at once").recorded == 7
+    assert figure(answer, "frames directly after each other").recorded == 7
 
 
 def test_a_clock_that_is_set_back_is_said(tmp_path: Path) -> None:
@@ -159,7 +161,7 @@ def test_a_clock_that_is_set_back_is_said(tmp_path: Path) -> None:
     logged = [frame._replace(us=frame.us - (frame.us > middle) * 1e6) for frame in LOGGED]
     answer = of_log(candump(logged), tmp_path)
     assert "Its clock was set back 1 time: the longest stretch between is taken." in answer.remarks
-    assert figure(answer, "SYNC: period").within is True
+    assert figure(answer, "SYNC: period").verdict == "within"
     assert figure(answer, "SYNC: period").events in {200, 201}
 
 
@@ -167,20 +169,24 @@ def test_errors_remote_frames_and_can_fd_are_said(tmp_path: Path) -> None:
     more = "(1700000000.000001) can0 123#R\n(1700000000.000002) can0 20000080#0000000000000000\n"
     fd = "(1700000000.000003) can0 124##1" + "AA" * 16 + "\n"
     answer = of_log(more + fd + candump(LOGGED), tmp_path)
-    assert "1 frame of CAN FD: in no load, for the plan has none." in answer.remarks
+    said = "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 in no load, for the plan has no "
+    assert f"{said}data bit rate." in answer.remarks
     assert "1 remote frame: the length code is shown as data." in answer.remarks
-    assert "1 error frame: in no load." in answer.remarks
+    assert figure(answer, "error frames").recorded == 1
 
 
-def test_frames_of_can_fd_are_in_the_load_with_the_most_stuff_bits(tmp_path: Path) -> None:
+def test_frames_of_can_fd_are_in_the_load_with_half_of_the_possible_stuff_bits(tmp_path: Path) -> None:
     lines = [
         f"({1_700_000_000 + cycle // 1000}.{cycle % 1000:03d}000) can0 181##1{'5A' * 12}\n" for cycle in range(2000)
     ]
     answer = of_log("".join(lines), tmp_path, plan="can-fd-arm-7")
-    assert "2,000 frames of CAN FD: in the load with the most stuff bits." in answer.remarks
+    assert "2,000 frames of CAN FD: in the load with half of the possible stuff bits." in answer.remarks
     plan: Any = busplan.load_profile("can-fd-arm-7")
-    us = 32 * 1000 / plan.bus.bit_rate_kbit_s + (5 + 96 + 4 + 17 + 6 + 1 + 26) * 1000 / plan.bus.data_bit_rate_kbit_s
-    assert figure(answer, "load ").recorded == pytest.approx(us / 1000, rel=0.01)
+    nominal_us, data_us = 1000 / plan.bus.bit_rate_kbit_s, 1000 / plan.bus.data_bit_rate_kbit_s
+    least_us, most_us = 29 * nominal_us + 129 * data_us, 32 * nominal_us + 155 * data_us
+    load = figure(answer, "load ")
+    assert load.recorded == pytest.approx((least_us + most_us) / 2 / 1000, rel=0.01)
+    assert load.uncertainty == pytest.approx((most_us - least_us) / 2 / 1000, rel=0.05)
 
 
 def test_stuffing_is_that_of_classical_frames(tmp_path: Path) -> None:
@@ -216,15 +222,15 @@ def test_a_load_without_its_can_fd_frames_is_not_judged(tmp_path: Path) -> None:
     answer = of_log(fd, tmp_path)
     assert not [found for found in answer.figures if found.quantity.startswith("load")]
     mixed = of_log(candump(LOGGED) + fd, tmp_path)
-    assert figure(mixed, "load ").within is None
-    assert figure(mixed, "load ").note.endswith("without frames of CAN FD")
+    assert figure(mixed, "load ").verdict is None
+    assert figure(mixed, "load ").note.endswith("without frames of CAN FD that switch")
 
 
 def test_a_damaged_log_says_where(tmp_path: Path) -> None:
     text = candump(LOGGED[:100])
     answer = of_log(text + "(1700000001.0000) can0 zz#\n", tmp_path)
     assert any(
-        remark.startswith("The log is cut or damaged behind frame 100, read up to there: ") for remark in answer.remarks
+        remark.startswith("The log is cut or damaged after frame 100, read up to there: ") for remark in answer.remarks
     )
     for ending in ("blf", "asc", "trc"):
         path = tmp_path / f"bus.{ending}"
@@ -237,7 +243,8 @@ def test_a_damaged_log_says_where(tmp_path: Path) -> None:
                 )
         content, random = path.read_bytes(), Random(1)
         for _ in range(15):
-            end = random.randrange(4, len(content))
+            # python-can's reader of BLF leaves a file open whose head is cut.
+            end = random.randrange(200 if ending == "blf" else 4, len(content))
             path.write_bytes(content[:end] + random.choice((b"", b"\xff\0\n", b"nonsense\n")))
             try:
                 read_can(path, progress=lambda _done, _total: None)
@@ -269,9 +276,9 @@ def test_apply_writes_the_keys_of_a_message(run: Run, tmp_path: Path) -> None:
     (tmp_path / "bus.log").write_text(candump(LOGGED))
     done = run("measured", "arm.toml", "bus.log", "--apply", "--format", "json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["measured"] == {"message.heartbeats.period_us": pytest.approx(50_000, rel=1e-3)}
+    assert json.loads(done.stdout)["measured"] == {"message.heartbeats.period_us": pytest.approx(50_000, rel=2e-3)}
     profile: Any = busplan.load_profile(path)
-    assert profile.message[2].period_us == pytest.approx(50_000, rel=1e-3)
+    assert profile.message[2].period_us == pytest.approx(50_000, rel=2e-3)
     assert "# busplan measured: the worst of " in path.read_text()
     again = run("measured", "arm.toml", "bus.log", "--apply", cwd=tmp_path)
     assert again.returncode == 2

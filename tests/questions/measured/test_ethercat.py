@@ -113,10 +113,10 @@ def test_a_slow_outlier_is_the_worst_case(tmp_path: Path) -> None:
     answer = of_machine(Machine(late={600: 700.0}), tmp_path)
     jitter = figure(answer, "latest start")
     assert jitter.recorded == pytest.approx(710, abs=11)
-    assert jitter.within is False
+    assert jitter.verdict == "outside"
     assert figure(answer, "period").recorded == pytest.approx(1000, abs=0.01)
     assert answer.edits["bus.master_uncertainty_us"] is None
-    assert figure(of_machine(Machine(late={600: 700.0}), tmp_path, quantile=0.99), "latest start").within is True
+    assert figure(of_machine(Machine(late={600: 700.0}), tmp_path, quantile=0.99), "latest start").verdict == "within"
 
 
 def test_what_is_lost_wrong_or_not_sent_is_counted(tmp_path: Path) -> None:
@@ -128,9 +128,10 @@ def test_what_is_lost_wrong_or_not_sent_is_counted(tmp_path: Path) -> None:
         answer = of_machine(machine, tmp_path)
         assert figure(answer, "lost frames").recorded == 3
         assert figure(answer, "wrong working counters").recorded == 2
-        assert figure(answer, "period").note == "3 periods without a frame"
+        assert figure(answer, "cycles without a frame").recorded == 3
         assert figure(answer, "master's time").recorded == pytest.approx(40, abs=0.2)
-        assert [found.quantity for found in answer.outside] == ["lost frames", "wrong working counters"]
+        missed = ["cycles without a frame", "lost frames", "wrong working counters"]
+        assert [found.quantity for found in answer.outside] == missed
 
 
 def test_the_frame_that_is_still_on_its_way_is_not_lost(tmp_path: Path) -> None:
@@ -146,7 +147,7 @@ def test_the_drift_of_the_recorders_clock_is_no_jitter(tmp_path: Path) -> None:
     packets = [(time + 40e-6 * time**2 / 12e6, packet) for time, packet in simulated(Machine(), 6000)]
     answer = of_packets(packets, tmp_path, quantile=0.99)
     assert figure(answer, "latest start").recorded == pytest.approx(19.8, abs=1.5)
-    assert figure(answer, "period").within is True
+    assert figure(answer, "period").verdict == "within"
 
 
 def test_a_clock_that_is_set_back_is_said(tmp_path: Path) -> None:
@@ -178,7 +179,7 @@ def test_frames_of_a_cycle_are_those_that_come_as_often(tmp_path: Path) -> None:
     # The recording begins within a cycle.
     answer = of_packets(sorted(packets)[2:], tmp_path, plan="ethercat-servo-8")
     assert figure(answer, "frames in a cycle").recorded == 2
-    assert figure(answer, "frames in a cycle").within is False
+    assert figure(answer, "frames in a cycle").verdict == "outside"
     assert figure(answer, "datagrams").recorded == 1600 + 12 + 12 + 20
     assert figure(answer, "datagrams").note == "LRW 1000 FRMW 8 | LRW 600"
     assert figure(answer, "round trip ").recorded == pytest.approx(230, abs=0.01)
@@ -189,7 +190,7 @@ def test_other_datagrams_than_planned_are_measured(tmp_path: Path) -> None:
     machine = Machine(datagrams=((LRW, 0x10000, 80), (FPRD, 0, 2), (FRMW, 0, 8)), counters=(12, 1, 4))
     answer = of_machine(machine, tmp_path, cycles=100)
     assert answer.edits["bus.housekeeping_bytes"] == [2, 8]
-    assert figure(answer, "datagrams").within is False
+    assert figure(answer, "datagrams").verdict == "outside"
     assert "bus.housekeeping_bytes" not in of_machine(Machine(), tmp_path, cycles=100).edits
 
 
@@ -208,8 +209,19 @@ def test_the_time_of_a_byte_is_found_from_frames_of_several_sizes(tmp_path: Path
     found = figure(answer, "time of a byte")
     assert found.recorded == pytest.approx(0.0841, abs=0.0003)
     assert found.planned == pytest.approx(0.0835, abs=0.0002)
-    assert any("no frame of process data" in remark for remark in answer.remarks)
+    assert "no frame of process data" in answer.shows_nothing[0]
     assert answer.edits == {}
+
+
+def test_a_frame_that_waits_for_another_says_no_time_of_a_byte(tmp_path: Path) -> None:
+    # Both stamped as they were handed over; the small one waits until the large one is sent.
+    large, small = ((LRW, 0x10000, 1000),), ((LRW, 0x20000, 80),)
+    packets = simulated(Machine(datagrams=large, counters=(3,)), 100) + [
+        (time + 1 + 85 * bool(packet[6] & 2), packet)
+        for time, packet in simulated(Machine(datagrams=small, counters=(3,)), 100)
+    ]
+    answer = of_packets(sorted(packets), tmp_path)
+    assert not [found for found in answer.figures if found.quantity == "time of a byte"]
 
 
 HOPS_NS = (700, 690, 820)
@@ -226,7 +238,7 @@ def test_port_times_say_the_delay_of_each_device_of_a_line(tmp_path: Path, read:
     assert [found.recorded for found in delays] == [0.7, 0.69, 0.82]
     assert [found.quantity for found in delays] == [f"delay of device {number}" for number in (2, 3, 4)]
     assert [found.planned for found in delays] == pytest.approx([0.698] * 3, abs=0.001)
-    assert (mean.quantity, mean.within) == ("mean delay of devices 2 to 4", True)
+    assert (mean.quantity, mean.verdict) == ("mean delay of devices 2 to 4", "within")
     assert mean.recorded == pytest.approx(0.736667)
     assert answer.edits["node.delay_us"] == pytest.approx(0.736667)
     # The master's time is what the measured delays leave.
@@ -239,7 +251,7 @@ def test_port_times_say_the_delay_of_each_device_of_a_line(tmp_path: Path, read:
     # A plan that a recording was written into holds it, though no device has its mean.
     applied = busplan.load_profile(PLAN, changes={"node.delay_us": answer.edits["node.delay_us"]})
     again = of_packets(started + simulated(machine, 100), tmp_path, plan=applied)
-    assert figure(again, "mean delay").within is True
+    assert figure(again, "mean delay").verdict == "within"
     assert again.edits["bus.master_us"] == pytest.approx(30, abs=0.01)
     assert answer.notes["node"] == "busplan measured: the mean of 1 event in capture.pcapng of 2023-11-14"
 
@@ -278,8 +290,15 @@ def test_stamps_that_were_not_taken_at_the_port_are_said(tmp_path: Path) -> None
     packets = simulated(Machine(), 100)
     quick = [(time - 44.0 * (place % 2), packet) for place, (time, packet) in enumerate(packets)]
     answer = of_packets(quick, tmp_path)
-    assert any("sooner than it takes to send them" in remark for remark in answer.remarks)
-    assert "bus.master_us" not in answer.edits or answer.edits["bus.master_us"] != 0
+    assert "sooner than it takes to send them" in answer.shows_nothing[0]
+    assert answer.edits == {}
+    # A single frame may be taken for another one.
+    packets = simulated(Machine(host_spread_us=0.1), 200)
+    answer = of_packets(
+        [(time - 44.0 * (place == 101), packet) for place, (time, packet) in enumerate(packets)], tmp_path
+    )
+    assert any("1 frame returned sooner" in remark for remark in answer.remarks)
+    assert not answer.shows_nothing
 
 
 @contextmanager
@@ -320,8 +339,8 @@ def test_what_cannot_be_told_is_refused(tmp_path: Path) -> None:
 
 def test_few_cycles_have_no_period(tmp_path: Path) -> None:
     answer = of_machine(Machine(), tmp_path, cycles=5)
-    assert "It has 5 cycles, too few for a period." in answer.remarks
-    assert figure(answer, "master's time").events == 5
+    assert answer.shows_nothing == ("it has 5 cycles, and a period takes 10",)
+    assert (figure(answer, "master's time").events, figure(answer, "master's time").verdict) == (5, "not shown")
 
 
 # --- the command ----------------------------------------------------------------------------------------
@@ -336,7 +355,7 @@ def test_every_form_has_the_same_figures(run: Run) -> None:
     assert document["day"] == "2023-11-14"
     assert document["outside"] == []
     text = run(*words).stdout
-    assert "capture.pcapng: 8 of 8 figures within the plan." in text
+    assert "capture.pcapng: 9 of 9 figures within the plan." in text
     assert "bus.master_us = " in text
 
 

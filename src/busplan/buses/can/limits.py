@@ -157,8 +157,8 @@ def _kept_from_us(network: Network) -> float:
     return kept_us
 
 
-_HALVINGS: Final = 20
-"""Halvings of a doubled period: to a millionth, and advice asks the limit again."""
+_HALVINGS: Final = 44
+"""Halvings of a doubled period: to the rounding of floats."""
 
 
 def _load(network: Network) -> Number:

@@ -1,22 +1,22 @@
 """The card of a verdict: what a person reads first."""
 
 from collections.abc import Iterator
-from itertools import islice
 from math import ceil, floor, isfinite, log10
 from typing import TYPE_CHECKING, Final
 
 from busplan.buses.published import parts_tested
 from busplan.buses.rule import contradicts
-from busplan.elementwise import plain
+from busplan.elementwise import FIT_ROUNDING, plain
 from busplan.forms.blocks import Card, Code, Gauge, Sentence, State, Words, joined
 from busplan.forms.numbers import listed, period, plural
 from busplan.profile.toml import override
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.assumed import heavy_assumptions
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
 from busplan.questions.fit.circle_refusal import circle_refusals
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.plan.constraints import most_asking, shown
 from busplan.questions.plan.freedoms import PERIOD
 from busplan.questions.words.sentences import broken_limits, change_meanings, settings_sentence, warnings
 from busplan.sections.profile import Profile
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 _FIGURES: Final = 3
 """Digits of a time whose uncertainty is unknown."""
-_ALMOST: Final = 1 - 1e-9
-"""Share that float rounding may take."""
+_MOST_DECIMALS: Final = 6
+"""Decimals of a time in us: what is below a picosecond is float rounding."""
 _Line = tuple[str, Sentence]
 
 
@@ -122,14 +122,21 @@ def _times(figures: CapacityFigures, profile: Profile) -> Iterator[_Line]:
     kept_us = figures.available_us * profile.limits.reserve
     kept = f"; {_us(kept_us, doubt_us)} must stay free" if kept_us else ""
     yield ("short by" if margin_us < 0 else "free"), Sentence((f"{_us(abs(margin_us), doubt_us)} us{doubt}{kept}",))
-    fastest_us = figures.safe_min_period_us
-    broken = filter(None, map(bus_of(profile).limit, limits_behind(figures)))
-    if not all(limit.is_of_period or limit.period or limit.kept_from_us for limit in broken):
-        yield "fastest period", Sentence(("none: no period keeps the limit",), "fails")
-    elif fastest_us is None:
-        yield "fastest period", Sentence(("no period that the bus allows is long enough",), "fails")
-    else:
-        yield "fastest period", Sentence((f"{period(_up(fastest_us, doubt_us))}{_kept_by(figures, profile)}",))
+    yield "fastest period", _fastest(profile, doubt_us)
+
+
+def _fastest(profile: Profile, doubt_us: float | None) -> Sentence:
+    """The shortest period at which the verdict is that it fits, up to the digits of the doubt, and what asks for it."""
+    network, periods = network_of(profile), bus_of(profile).periods
+    time, *others = shown(network, is_safe=False)
+    least = most_asking((time, *others), ratio=profile.cycle.slice_ratio)
+    if least.why:
+        return Sentence(("none: no period keeps the limit",), "fails")
+    time_us, least_us = (plain(periods.from_us(need.period_us(profile.cycle.slice_ratio))) for need in (time, least))
+    if not isfinite(least_us):
+        return Sentence(("no period that the bus allows is long enough",), "fails")
+    limited = f", limited by {least.key}" if least_us > time_us else ""
+    return Sentence((f"{period(least_us if periods.us else _up(least_us, doubt_us))}{limited}",))
 
 
 def _bus_lines(profile: Profile) -> Iterator[_Line]:
@@ -137,16 +144,6 @@ def _bus_lines(profile: Profile) -> Iterator[_Line]:
     bus = bus_of(profile)
     lines = bus.cycle(network_of(profile), model=bus.deciding_model).card_lines()
     return ((label, Sentence((words,))) for label, words in lines)
-
-
-def _kept_by(figures: CapacityFigures, profile: Profile) -> str:
-    """Say what keeps the period from being shorter, where that is not the time of the cycle."""
-    network, bus, fastest_us = network_of(profile), bus_of(profile), figures.safe_min_period_us or 0.0
-    if plain(bus.periods.from_us((figures.safe_required_us or 0.0) / network.slice_ratio)) >= fastest_us:
-        return ""
-    limits = (limit for limit in bus.limits if limit.period is not None)
-    holding = (limit for limit in limits if plain(limit.shown.period_us(network)) >= fastest_us * _ALMOST)
-    return "".join(f", limited by {limit.key}" for limit in islice(holding, 1))
 
 
 def _room(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
@@ -220,11 +217,13 @@ def _us(us: float, doubt_us: float | None) -> str:
 def _up(us: float, doubt_us: float | None) -> float:
     """A time rounded up to the digits that its doubt allows."""
     scale: float = 10.0 ** _decimals(us, doubt_us)
-    return ceil(us * scale - 1e-6) / scale
+    return ceil(us * scale * (1 - FIT_ROUNDING)) / scale
 
 
 def _decimals(us: float, doubt_us: float | None) -> int:
     """Decimals down to the first digit of the doubt, or of three digits without one."""
     if doubt_us and isfinite(doubt_us):
-        return max(0, -floor(log10(doubt_us)))
-    return max(0, _FIGURES - 1 - floor(log10(us))) if us else 0
+        decimals = -floor(log10(doubt_us))
+    else:
+        decimals = _FIGURES - 1 - floor(log10(us)) if us else 0
+    return min(max(0, decimals), _MOST_DECIMALS)

@@ -32,6 +32,7 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import listed, nouns, period, period_value, sentence_text
 from busplan.profile.conversion import AssumedKey
 from busplan.profile.write import short_text
+from busplan.questions.circle.report import verdict_words
 from busplan.questions.compare.drawing import STYLE, compare_lines, compare_svg
 from busplan.questions.compare.kinds import (
     CircleAtSmallest,
@@ -227,11 +228,6 @@ _CIRCLE: Final = (
     TableColumn("", kind="words", group="circle"),
     TableColumn("step", "us", group="circle"),
 )
-_CIRCLE_WORDS: Final = {
-    True: Words("PASSED", "passes"),
-    False: Words("FAILED", "fails"),
-    None: Words("NOT JUDGED", "warns"),
-}
 _ASSUMED: Final = (
     TableColumn("bus", kind="words"),
     TableColumn("key", kind="words", wraps=True),
@@ -375,7 +371,7 @@ def _circle(machine: MachineOnKind) -> tuple[Cell, ...]:
     step = ShownValue(machine.circle.step_us, "step_us", "us", 3)
     if machine.circle.figures is None:
         return Words("NOT RUN", "warns"), step
-    return _CIRCLE_WORDS[machine.circle.figures.passed], step
+    return verdict_words(machine.circle.figures), step
 
 
 def compare_chart(comparison: KindComparison) -> Chart:

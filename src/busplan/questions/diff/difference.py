@@ -56,7 +56,7 @@ def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
     """Figures of the plan: the verdict of the model that decides, and what all models share.
 
     A longer period or one more node is a choice, neither good nor bad by itself. Nor are the bias and the uncertainty:
-    the corrected margin and the smallest safe period have them.
+    the corrected margin and the period with enough time have them.
     """
     setup = by_key(figure for bus in buses for figure in bus.figures.setup)
     return (

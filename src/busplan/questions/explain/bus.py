@@ -78,7 +78,7 @@ def latency_figures(
 
 def if_finite(number: Number) -> Number:
     """A figure, or None with the inputs of an infinite one, which does not exist."""
-    if isinstance(number, Traced) and number.value == inf:
+    if value_of(number) == inf:
         return result_of(None, "does not exist", (number,))
     return number
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from math import isfinite
 from types import MappingProxyType
 from typing import Final, Literal, NamedTuple
 
@@ -326,7 +327,8 @@ def _steps(profile: Profile, traced: Traced, command: CommandName, figure: Figur
             reference=known.reference,
             formula=formula_text(line, in_numbers=False),
             numbers=formula_text(line, in_numbers=True),
-            value=line.value,
+            # What is infinite does not exist.
+            value=None if isinstance(line.value, float) and not isfinite(line.value) else line.value,
             unit=known.unit,
         )
 

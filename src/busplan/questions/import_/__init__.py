@@ -111,6 +111,7 @@ def import_profile(
         raise BusplanError(f"take {take!r}: expected 'file' or 'profile'")
     readings = machines(names, progress=progress or (lambda _done, _total: None))
     _require_one_log([reading.file for reading in readings if reading.is_log], update=update)
+    can.settled(readings)
     machine = merged(readings)
     files = [(reading.file, reading.title) for reading in readings]
     if update is None:

@@ -1,6 +1,6 @@
 """The profile of a CAN bus: CANopen nodes in groups, and all other messages."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any, Final, NamedTuple
 
@@ -17,7 +17,11 @@ _FD_BYTES: Final = 64
 _PDO_STEP: Final = 0x100
 _MOST_PDOS: Final = 4
 _HEARTBEAT_ID: Final = 0x700
-_BIT_RATE: Final = "bit_rate_kbit_s"
+BIT_RATE: Final = "bit_rate_kbit_s"
+LEAST, SHOWN = "least_bit_rate", "shown_bit_rate"
+"""What a log alone says of the bit rate, for `settled`."""
+_CLEARLY: Final = 0.02
+"""By how much a recorded period is shorter than that of a database where it counts, as a share."""
 _DATA_BIT_RATE: Final = "data_bit_rate_kbit_s"
 _USUAL_BIT_RATE: Final = 1000
 """Of machines [kbit/s]."""
@@ -59,8 +63,8 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     yield ProfileLine("bus", "kind", Fact("can", machine.place(1)))
     usual = _USUAL_BIT_RATE if nodes else _USUAL_OF_CARS
     assumed = "no file says it; the cable decides" if nodes else "no file says it, and all times follow from it"
-    yield ProfileLine("bus", _BIT_RATE, bus.get(_BIT_RATE) or Fact(usual, "", "assumed", assumed))
-    if has_fd(messages):
+    yield ProfileLine("bus", BIT_RATE, bus.get(BIT_RATE) or Fact(usual, "", "assumed", assumed))
+    if switches(messages):
         assumed = f"no file says it{'; SYNC and PDOs are FD frames with it, too' if nodes else ''}"
         yield ProfileLine("bus", _DATA_BIT_RATE, bus.get(_DATA_BIT_RATE) or Fact(2000, "", "assumed", assumed))
     if usual_bits != _BASE_BITS:
@@ -86,9 +90,9 @@ def _cycle(machine: Reading, nodes: list[_Node]) -> Iterator[ProfileLine]:
         yield from _group([node for _, node in alike], taken)
 
 
-def has_fd(messages: list[ProfileLine]) -> bool:
-    """Whether lines of messages say that any is of CAN FD."""
-    return any(row.key == "fd" for row in messages)
+def switches(messages: list[ProfileLine]) -> bool:
+    """Whether lines of messages say that any is a CAN FD frame with a switch of bit rate."""
+    return len({row.section for row in messages if row.key == "fd"}) > sum(row.key == "brs" for row in messages)
 
 
 def _nodes(machine: Reading) -> Iterator[_Node]:
@@ -157,10 +161,10 @@ def _period(machine: Reading) -> Fact:
 
 def part_rows(machine: Reading) -> Iterator[ProfileLine]:
     """What databases alone say: the bit rate and messages."""
-    if _BIT_RATE in machine.bus:
-        yield ProfileLine("bus", _BIT_RATE, machine.bus[_BIT_RATE])
+    if BIT_RATE in machine.bus:
+        yield ProfileLine("bus", BIT_RATE, machine.bus[BIT_RATE])
     messages = list(message_rows(machine))
-    if _DATA_BIT_RATE in machine.bus and has_fd(messages):
+    if _DATA_BIT_RATE in machine.bus and switches(messages):
         yield ProfileLine("bus", _DATA_BIT_RATE, machine.bus[_DATA_BIT_RATE])
     yield from messages
 
@@ -196,8 +200,7 @@ def message_rows(machine: Reading, *, usual_bits: int = _BASE_BITS, has_sync: bo
         found = {"identifier": Fact(identifier, facts["name"].place), **facts}
         yield from _message(found, used, taken, left_out, usual_bits=usual_bits)
     for reason, names in left_out.items():
-        more = f" and {len(names) - _LISTED} more" if names[_LISTED:] else ""
-        machine.remarks.append(f"left out, {reason}: {', '.join(names[:_LISTED])}{more}")
+        machine.remarks.append(_left_out(reason, names))
 
 
 def _of_node(number: int, facts: Facts, node: _Node | None, period: Fact) -> Iterator[Facts]:
@@ -251,13 +254,65 @@ def _message(
         yield ProfileLine(section, "identifier_bits", identifier._replace(value=bits, note=""))
     if is_fd:
         yield ProfileLine(section, "fd", found["is_fd"])
+        if "switches" in found and not found["switches"].value:
+            yield ProfileLine(section, "brs", found["switches"])
     yield ProfileLine(section, "payload_bytes", found["payload_bytes"])
     period = found["period_us"]
     yield ProfileLine(section, "period_us", period)
-    if "jitter_us" in found:
-        # Of a log; the period may be that of a database.
-        jitter = found["jitter_us"]
-        jitter = jitter._replace(value=min(jitter.value, period.value))
-        yield ProfileLine(section, "jitter_us", jitter)
-        if "deadline_us" in found:
-            yield ProfileLine(section, "deadline_us", found["deadline_us"]._replace(value=period.value + jitter.value))
+    for key in ("jitter_us", "burst", "deadline_us"):
+        if key in found:
+            yield ProfileLine(section, key, found[key])
+
+
+def _left_out(reason: str, names: list[str]) -> str:
+    more = f" and {len(names) - _LISTED} more" if names[_LISTED:] else ""
+    return f"left out, {reason}: {', '.join(names[:_LISTED])}{more}"
+
+
+def settled(readings: Sequence[Reading]) -> None:
+    """Settle what a log and the databases beside it say of the same: the log says what is sent, and how often.
+
+    Of a message the shorter period and the longer data count, and what the log never has is left out. The bit rate is
+    the log's where its frames show one, or need more than a database says.
+    """
+    for log in (reading for reading in readings if reading.is_log):
+        for other in (reading for reading in readings if reading is not log and reading.messages):
+            unseen = [number for number in other.messages if number not in log.messages]
+            names = [str(other.messages.pop(number)["name"].value) for number in unseen]
+            if names:
+                log.remarks.append(_left_out(f"never in {log.file}", names))
+            for number, facts in other.messages.items():
+                _settle_message(log.messages[number], facts, log)
+        for other in (reading for reading in readings if reading is not log and BIT_RATE in reading.bus):
+            _settle_bit_rate(log, other)
+
+
+def _settle_message(recorded: Facts, said: Facts, log: Reading) -> None:
+    said.pop("switches", None)
+    for key in ("name", "is_fd"):
+        if key in said:
+            recorded.pop(key, None)
+    (said if said["payload_bytes"].value < recorded["payload_bytes"].value else recorded).pop("payload_bytes")
+    if "period_us" not in said:
+        return
+    period = said["period_us"]
+    if recorded["period_us"].value < period.value * (1 - _CLEARLY):
+        del said["period_us"]
+        log.remarks.append(
+            f"{said['name'].value} comes every {recorded['period_us'].value:,.0f} us in {log.file}, every "
+            f"{period.value:,.0f} by {period.place}: the log's is taken"
+        )
+    else:
+        # It comes in the bursts of the log all the same, and its deadline is that of the log.
+        del recorded["period_us"]
+
+
+def _settle_bit_rate(log: Reading, other: Reading) -> None:
+    said, least, shown = other.bus[BIT_RATE], log.bus.get(LEAST), log.bus.get(SHOWN)
+    if least is None or (least.value <= said.value and (shown is None or shown.value == said.value)):
+        log.bus.pop(BIT_RATE, None)
+        return
+    del other.bus[BIT_RATE]
+    log.remarks.append(
+        f"{other.file} says {said.value:g} kbit/s and {log.file} shows {log.bus[BIT_RATE].value:g}: the log's is taken"
+    )

@@ -1,7 +1,7 @@
-"""Logs of a CAN bus: candump -l, ASC, BLF, TRC. Identifiers, lengths, periods and jitter, and a least bit rate."""
+"""Logs of a CAN bus: candump -l, ASC, BLF, TRC. Identifiers, lengths, periods, jitter, bursts, and a least bit rate."""
 
 from collections.abc import Iterable, Iterator
-from math import ceil, floor, log10
+from math import floor, log10
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -10,20 +10,28 @@ import numpy as np
 from busplan.buses.recorded import CLOCK_TOLERANCE
 from busplan.errors import BusplanError
 from busplan.progress import Progress
+from busplan.questions.import_.can import BIT_RATE, LEAST, SHOWN
 from busplan.questions.import_.can_database import EXTENDED
 from busplan.questions.import_.record import Fact, Reading
 from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.can_messages import ClockStretch, SentFrames, faults, listed, longest_stretch, sent_messages
-from busplan.recordings.statistics import LEAST_EVENTS, Floats, expanded, sporadic_jitter, sporadic_period, step
+from busplan.recordings.can_messages import (
+    ClockStretch,
+    EventModel,
+    SentFrames,
+    event_model,
+    faults,
+    least_bit_rate,
+    listed,
+    longest_stretch,
+    sent_messages,
+    stamps_of_no_bus,
+    step_us,
+)
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, expanded
 from busplan.recordings.words import counted
 
 _BIT_RATES: Final = (33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
 """Usual bit rates [kbit/s]."""
-_KEY: Final = "bit_rate_kbit_s"
-_USUAL: Final = 500.0
-"""Assumed where the log allows it [kbit/s]."""
-_CLOCKS: Final = 0.01
-"""How far a bit rate and the clock of a recorder are off, and how early a frame may begin, as a share."""
 _NEAR: Final = 0.02
 """How far beside a bit rate frames that follow each other at once may seem to be, by their stamps, as a share."""
 _ABOUT: Final = 0.9
@@ -32,8 +40,9 @@ _SHARP: Final = 0.8
 """Share of them that are at the bit rate itself, where it is that of the bus."""
 _LEAST_US: Final = 30.0
 """No two frames of an identifier are closer [us]."""
-_MOST_US: Final = 5e8
-"""Longest period: half of what a profile takes, for the deadline may be twice as long [us]."""
+_MOST_US: Final = 1e8
+"""Longest period, so that several of them are no longer than a profile allows [us]."""
+_MOST_DEADLINE_US: Final = 1e9
 
 
 class _Timing(NamedTuple):
@@ -41,9 +50,14 @@ class _Timing(NamedTuple):
 
     sent: SentFrames
     period_us: float
-    jitter_us: float
+    model: EventModel
     uncertainty_us: float | None
     """Expanded uncertainty of the period; None of a message that is not periodic [us]."""
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether it comes once a period."""
+        return self.uncertainty_us is not None
 
 
 def read(path: Path, name: str, *, progress: Progress) -> Reading:
@@ -61,36 +75,57 @@ def read(path: Path, name: str, *, progress: Progress) -> Reading:
     Raises
     ------
     BusplanError
-        The extra is not installed, or it is no log of one channel with frames at several times.
+        The extra is not installed, or it is no log of one channel that shows when frames come.
     """
     frames = read_can(path, progress=progress)
     stretch = longest_stretch(frames)
-    length_us = float(stretch.times_us[-1] - stretch.times_us[0])
-    if not length_us:
-        raise BusplanError(f"{name}: has {counted(len(stretch.taken), 'frame')} at one time, so no period")
+    messages = sent_messages(frames, stretch).values()
+    least = least_bit_rate(frames, stretch).likely
+    _require_times(stretch, messages, least, name)
     machine = Reading("can", "CAN log", name, rank=2, lists_all=False, is_log=True)
-    step_us = step(np.rint(stretch.times_us).astype(np.int64) * 1000)
-    timings = [_timing(sent, length_us, step_us) for sent in sent_messages(frames, stretch).values()]
+    length_us, error_us = float(stretch.times_us[-1] - stretch.times_us[0]), step_us(stretch)
+    timings = [_timing(sent, length_us, error_us) for sent in messages]
     for timing in timings:
         number = timing.sent.identifier + EXTENDED * timing.sent.extended
         machine.messages[number] = dict(_facts(timing, Path(name).name))
     machine.remarks += _remarks(frames, stretch, timings, length_us)
-    _bit_rate(machine, frames, stretch, step_us)
+    _bit_rate(machine, frames, stretch, least)
     return machine
 
 
-def _timing(sent: SentFrames, length_us: float, step_us: float) -> _Timing:
-    """Period and jitter of an identifier: of its grid, or those that hold all its frames."""
+def _require_times(stretch: ClockStretch, messages: Iterable[SentFrames], least_kbit_s: float, name: str) -> None:
+    """Refuse a log that does not show when frames come."""
+    often = [sent for sent in messages if len(sent.times_us) >= LEAST_EVENTS]
+    if not often:
+        raise BusplanError(
+            f"{name}: {counted(len(stretch.taken), 'frame')}, none of an identifier that comes {LEAST_EVENTS} times: "
+            "too few for a plan; record for longer"
+        )
+    fastest = min(often, key=lambda sent: sent.mean.value)
+    error_us = step_us(stretch)
+    if not error_us or 2 * error_us > fastest.mean.value:
+        steps = f"steps of {error_us:,.0f} us" if error_us else "one time for all frames"
+        raise BusplanError(
+            f"{name}: its stamps have {steps}, too coarse for {fastest.identifier:#x}, which comes every "
+            f"{fastest.mean.value:,.0f} us; record with finer stamps, as `candump -l` has them"
+        )
+    reason = stamps_of_no_bus(least_kbit_s)
+    if reason:
+        raise BusplanError(f"{name}: {reason}; record the bus itself, as with `candump -l`")
+
+
+def _timing(sent: SentFrames, length_us: float, stamp_error_us: float) -> _Timing:
+    """Period, jitter and burst that hold all frames of an identifier."""
     if sent.grid is not None:
-        # The first frame and the last one lie no further beside their places than all do; the grid took off a slope.
-        periods, scatter_us = len(sent.times_us) - 1 + sent.grid.missing, float(np.ptp(sent.grid.late_us))
-        period_us = float(sent.times_us[-1] - sent.times_us[0]) / periods
-        doubt = expanded(scatter_us / periods, CLOCK_TOLERANCE * period_us / 3**0.5) or 0.0
+        period_us, error_us = sent.mean
+        doubt = expanded(error_us, CLOCK_TOLERANCE * period_us / 3**0.5) or 0.0
         period_us = _roundest(period_us, doubt / 2)
-        if ceil(scatter_us) <= period_us:
-            return _Timing(sent, period_us, ceil(scatter_us), doubt)
-    period_us = min(max(floor(sporadic_period(sent.times_us, length_us)), ceil(step_us), _LEAST_US), _MOST_US)
-    return _Timing(sent, period_us, min(ceil(sporadic_jitter(sent.times_us, period_us)), period_us), None)
+    else:
+        # A frame more may lie in a log of this length.
+        doubt, period_us = None, min(max(floor(length_us / (len(sent.times_us) + 1)), _LEAST_US), _MOST_US)
+    stamp_error_us = stamp_error_us if len(sent.times_us) > 1 else 0.0
+    model = event_model(sent.times_us, period_us, stamp_error_us=stamp_error_us, tolerance=float(CLOCK_TOLERANCE))
+    return _Timing(sent, period_us, model, doubt)
 
 
 def _roundest(value: float, doubt: float) -> float:
@@ -109,27 +144,26 @@ def _roundest(value: float, doubt: float) -> float:
 
 
 def _facts(timing: _Timing, place: str) -> Iterator[tuple[str, Fact]]:
-    sent = timing.sent
+    sent, (burst, jitter_us) = timing.sent, timing.model
     frames = counted(len(sent.times_us), "frame")
     yield "name", Fact(f"id-{sent.identifier:#x}", place)
     yield "identifier", Fact(sent.identifier + EXTENDED * sent.extended, place, "measured")
     if sent.is_fd:
         yield "is_fd", Fact(True, place, "measured")
+        yield "switches", Fact(sent.switches, place, "measured")
     yield "payload_bytes", Fact(sent.most_bytes, place, "measured", "the most seen")
-    if timing.uncertainty_us is not None:
-        yield "period_us", Fact(timing.period_us, place, "measured", f"{frames}, U {timing.uncertainty_us:.2g} us")
-        yield from _jitter(timing, place, "of the arrival, the wait for other frames in it")
-        return
-    yield "period_us", Fact(timing.period_us, place, "measured", f"{frames}, not periodic: as close as they came")
-    yield from _jitter(timing, place, "how much sooner than a period it came")
-    if timing.jitter_us:
-        note = "a period behind the latest start"
-        yield "deadline_us", Fact(timing.period_us + timing.jitter_us, place, "derived", note)
-
-
-def _jitter(timing: _Timing, place: str, note: str) -> Iterator[tuple[str, Fact]]:
-    if timing.jitter_us:
-        yield "jitter_us", Fact(timing.jitter_us, place, "measured", note)
+    kind = f"U {timing.uncertainty_us:.2g} us" if timing.is_periodic else "not periodic: the mean distance"
+    yield "period_us", Fact(timing.period_us, place, "measured", f"{frames}, {kind}")
+    if jitter_us:
+        note = "of the arrival, the wait for other frames in it" if timing.is_periodic else "the soonest after another"
+        yield "jitter_us", Fact(jitter_us, place, "measured", note)
+    if burst > 1:
+        yield "burst", Fact(burst, place, "measured", "so many come together")
+        deadline_us, note = burst * timing.period_us, "the time in which so many more come"
+    else:
+        deadline_us, note = timing.period_us + jitter_us, "a period after the latest start"
+    if burst > 1 or (jitter_us and not timing.is_periodic):
+        yield "deadline_us", Fact(min(deadline_us, _MOST_DEADLINE_US), place, "derived", note)
 
 
 def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing], length_us: float) -> Iterator[str]:
@@ -143,44 +177,32 @@ def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing], l
     seldom = [timing for timing in timings if len(timing.sent.times_us) < LEAST_EVENTS]
     if seldom:
         yield f"fewer than {LEAST_EVENTS} frames, so a longer log knows the period better: {_names(seldom)}"
-    often = [timing for timing in timings if len(timing.sent.times_us) >= LEAST_EVENTS]
-    bursts = [timing for timing in often if timing.uncertainty_us is None]
+    bursts = [timing for timing in timings if timing.model.burst > 1]
     if bursts:
-        planned = sum(length_us / timing.period_us for timing in bursts)
-        more = planned / sum(len(timing.sent.times_us) for timing in bursts)
-        yield (
-            f"not periodic: {_names(bursts)}; the closest frames of the log are planned for all time, {more:.2g} times "
-            "as many as it has of them: where you know the shortest period, write that"
-        )
+        yield f"in bursts, each with the most that the log has together: {_names(bursts)}"
 
 
 def _names(timings: Iterable[_Timing]) -> str:
     return listed([f"{timing.sent.identifier:#x}" for timing in timings])
 
 
-def _bit_rate(machine: Reading, frames: CanFrames, stretch: ClockStretch, step_us: float) -> None:
-    """The bit rate that frames behind each other show, or the least usual one that the log allows where 500 is too low.
-
-    Frames do not overlap. They are stamped at their ends, or by some controllers at their starts: the shorter of two
-    lies between both stamps in either case. A single stamp may be wrong, ten are not.
-    """
-    bits, apart_us = frames.bits[stretch.taken].astype(np.float64), np.diff(stretch.times_us)
-    least = 1000 * float(bits[1:].sum()) / (float(apart_us.sum()) + step_us)
-    rates = 1000 * np.minimum(bits[1:], bits[:-1]) / (apart_us + step_us)
-    if len(rates) >= LEAST_EVENTS:
-        closest = float(np.partition(rates, -LEAST_EVENTS)[-LEAST_EVENTS])
-        # Where no bit rate allows such stamps a driver took several frames at once.
-        least = max(least, closest) if closest <= _BIT_RATES[-1] * (1 + _CLOCKS) else least
-    allowed = [rate for rate in _BIT_RATES if least <= rate * (1 + _CLOCKS)]
-    shown = [rate for rate in allowed if _is_shown(rate, 1000 * bits[1:] / np.maximum(apart_us, step_us))]
-    said = f"no less than {least:.3g} kbit/s by the log, for frames do not overlap"
+def _bit_rate(machine: Reading, frames: CanFrames, stretch: ClockStretch, least_kbit_s: float) -> None:
+    """The bit rate that frames directly after each other show, or the least usual one that the log allows."""
+    if not least_kbit_s:
+        return
+    machine.bus[LEAST] = Fact(least_kbit_s)
+    bits, apart_us = frames.bits[stretch.taken][1:], np.diff(stretch.times_us)
+    rates = 1000 * bits / np.maximum(apart_us, 1e-3)
+    allowed = [rate for rate in _BIT_RATES if rate >= least_kbit_s]
+    shown = [rate for rate in allowed if _is_shown(rate, rates)]
+    why = f"no less than {least_kbit_s:.3g} kbit/s by the log, for frames do not overlap"
     if shown:
-        said = f"{shown[0]:g} kbit/s by frames of the log that follow each other at once"
-        machine.bus[_KEY] = Fact(shown[0], "", "assumed", "frames of the log follow each other at once by it")
-    elif allowed and allowed[0] > _USUAL:
-        machine.bus[_KEY] = Fact(allowed[0], "", "assumed", f"the least usual one that is {said}")
-    if shown or 0 < len(allowed) < len(_BIT_RATES):
-        machine.remarks.append(f"The bit rate is {said}")
+        why = f"{shown[0]:g} kbit/s by frames of the log directly after each other"
+        machine.bus[BIT_RATE] = Fact(shown[0], "", "assumed", "by frames of the log directly after each other")
+        machine.bus[SHOWN] = machine.bus[BIT_RATE]
+    else:
+        machine.bus[BIT_RATE] = Fact(allowed[0], "", "assumed", f"the least usual one that is {why}")
+    machine.remarks.append(f"The bit rate is {why}")
 
 
 def _is_shown(bit_rate_kbit_s: float, rates: Floats) -> bool:

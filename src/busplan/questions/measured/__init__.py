@@ -37,6 +37,8 @@ class MeasuredAnswer(Answer):
         New value of each key that was measured, as `--apply` writes them; None removes a key.
     day
         Day of the recording in UTC, as 2026-11-23; empty where its stamps do not say it.
+    shows_nothing
+        Why the recording as a whole shows no machine within its plan; empty where it can.
     """
 
     profile: Profile
@@ -46,11 +48,12 @@ class MeasuredAnswer(Answer):
     remarks: tuple[str, ...]
     edits: Mapping[str, object]
     day: str
+    shows_nothing: tuple[str, ...]
 
     @property
     def outside(self) -> tuple[RecordedFigure, ...]:
-        """Figures that lie outside their plan, by more than their uncertainty."""
-        return tuple(figure for figure in self.figures if figure.within is False)
+        """Figures that lie outside their plan, by more than their doubt at 99.9 %."""
+        return tuple(figure for figure in self.figures if figure.verdict == "outside")
 
     @property
     def notes(self) -> dict[str, str]:

@@ -1,11 +1,12 @@
 """Answer of `busplan measured`."""
 
+from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from pathlib import PurePath
 from typing import Final
 
-from busplan.buses.recorded import RecordedFigure
+from busplan.buses.recorded import RecordedFigure, RecordedVerdict
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -38,10 +39,15 @@ _COLUMNS: Final = (
     TableColumn("n", rank=2),
     TableColumn("note", kind="words", rank=3, leaves="below", wraps=True),
 )
-_DECIMALS: Final = {"us": 3, "1": 0, "bytes": 0, "share": 2}
+_DECIMALS: Final = {"us": 3, "1": 0, "bytes": 0, "share": 2, "kbit/s": 1}
 _UNITS: Final = {"1": "", "share": "%"}
 """How a unit is shown, where not as it is."""
-_WITHIN: Final = {True: Words("yes", "passes"), False: Words("no", "fails")}
+_WITHIN: Final[dict[RecordedVerdict | None, Cell]] = {
+    None: "",
+    "within": Words("yes", "passes"),
+    "not shown": Words("not shown", "warns"),
+    "outside": Words("no", "fails"),
+}
 _SMALL_US: Final = 1.0
 """A time below it has more decimals."""
 
@@ -77,12 +83,10 @@ def measured_report(answer: MeasuredAnswer, *, applied_to: str | None) -> Report
 
 
 def _blocks(answer: MeasuredAnswer) -> Iterator[Block]:
-    judged = [figure for figure in answer.figures if figure.within is not None]
-    outside = answer.outside
-    state: State = "fails" if outside else "passes"
-    inside = f"{len(judged) - len(outside)} of {plural(len(judged), 'figure')} within the plan"
+    counts = Counter(figure.verdict for figure in answer.figures if figure.verdict)
+    state: State = "fails" if counts["outside"] else "warns" if answer.shows_nothing else "passes"
+    inside = f"{counts['within']} of {plural(counts.total(), 'figure')} within the plan"
     share = "the worst recorded" if answer.quantile == 1 else f"those of {100 * answer.quantile:g} % of the events"
-    names = f"; outside: {', '.join(figure.quantity for figure in outside)}" if outside else ""
     yield Sentence(
         (
             Code(answer.profile.name),
@@ -90,9 +94,10 @@ def _blocks(answer: MeasuredAnswer) -> Iterator[Block]:
             Code(answer.source),
             ": ",
             Words(inside, state),
-            f"{names}. Jitter and times are {share}.",
+            f"{_named(answer, 'outside')}{_named(answer, 'not shown')}. Jitter and times are {share}.",
         )
     )
+    yield from (Sentence((Words("Shows nothing", "warns"), f": {reason}.")) for reason in answer.shows_nothing)
     yield Table(_COLUMNS, tuple(map(_row, answer.figures)), stacks=True)
     yield from (Sentence((remark,)) for remark in answer.remarks)
     values = [f"{key} = {value_text(value)}" for key, value in answer.edits.items() if value is not None]
@@ -101,11 +106,16 @@ def _blocks(answer: MeasuredAnswer) -> Iterator[Block]:
         yield Snippet(tuple(values))
 
 
+def _named(answer: MeasuredAnswer, verdict: RecordedVerdict) -> str:
+    names = [figure.quantity for figure in answer.figures if figure.verdict == verdict]
+    return f"; {verdict}: {', '.join(names)}" if names else ""
+
+
 def _row(figure: RecordedFigure) -> TableRow:
-    within: Cell = "" if figure.within is None else _WITHIN[figure.within]
     shown = (_value(figure, name) for name in ("planned", "recorded", "residual", "uncertainty"))
     unit = _UNITS.get(figure.unit, figure.unit)
-    return TableRow((figure.quantity, unit, *shown, within, ShownValue(figure.events, "events"), figure.note))
+    note = ", ".join(filter(None, (figure.hidden, figure.note)))
+    return TableRow((figure.quantity, unit, *shown, _WITHIN[figure.verdict], ShownValue(figure.events, "events"), note))
 
 
 def _value(figure: RecordedFigure, name: str) -> ShownValue:
@@ -120,8 +130,9 @@ def _value(figure: RecordedFigure, name: str) -> ShownValue:
 
 def _record(figure: RecordedFigure) -> Record:
     fields = figure._asdict()
-    key, note, _ = fields.pop("key"), fields.pop("note"), fields.pop("is_mean")
-    return {**fields, "residual": figure.residual, "within": figure.within, "key": key or None, "note": note or None}
+    del fields["is_mean"]
+    texts = {name: fields.pop(name) or None for name in ("key", "note", "hidden")}
+    return {**fields, "residual": figure.residual, "verdict": figure.verdict, **texts}
 
 
 def _document(answer: MeasuredAnswer, *, applied_to: str | None) -> JsonDocument:
@@ -133,6 +144,7 @@ def _document(answer: MeasuredAnswer, *, applied_to: str | None) -> JsonDocument
         quantile=answer.quantile,
         figures=list(map(_record, answer.figures)),
         outside=[figure.quantity for figure in answer.outside],
+        shows_nothing=list(answer.shows_nothing),
         remarks=list(answer.remarks),
         measured=dict(answer.edits),
         applied_to=applied_to,

@@ -158,17 +158,24 @@ class Need(NamedTuple):
         return self.why or f"{who}, and at most {ratio * most_us:.3f} us can be given"
 
 
-def shown(network: Network) -> Iterator[Need]:
-    """Need of a network to be shown to fit, with bias, uncertainty and reserve, on a bus that is set safely.
+def shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
+    """Need of a network to be shown to fit, with bias, uncertainty and reserve.
 
     Time first, and then each limit that asks for a longer period than all before it.
+
+    Parameters
+    ----------
+    network
+        The network; its own period plays no part.
+    is_safe
+        Whether the bus must be set safely, too.
     """
     bus = bus_of(network.profile)
     time = Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
     yield time
     least_us = 0.0
     for limit in bus.limits:
-        if limit.is_of_period:
+        if limit.is_of_period or (limit.is_safety and not is_safe):
             continue
         # A limit that a period cures is asked at the shortest one that the others allow with any slice ratio.
         at_us = max(time.slice_us, least_us, MIN_STEP_US)
