@@ -70,6 +70,9 @@ class Subject:
         self.random = Random(self.seed)
         self.cycles = self.length()
         self.recorder = self.random.choice(("1 us", "1 us", "100 us", "1 ms", "late")) if self.kind == "can" else ""
+        # Stamps of 1 ms show nothing of a cycle under 2 ms.
+        if self.recorder == "1 ms" and self.plan.get("cycle", {}).get("period_us", 2000) < 2000:
+            self.recorder = "1 us"
 
     def length(self) -> int:
         """Cycles of the recording."""

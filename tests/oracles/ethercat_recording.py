@@ -286,7 +286,7 @@ def schedule_of(plan: dict[str, Any]) -> Iterator[tuple[str, tuple[Datagrams, ..
                 packed[-1].append((read, write, address + device * size))
                 room -= size
         frames = [(*(() if place else added), *_process(own, layout)) for place, own in enumerate(packed)]
-        names = f" with {' and '.join(own[0]['name'] for own in due)}" if cycles > 1 else ""
+        names = f" with {' and '.join(own[0]['name'] for own in due) or 'no group'}" if cycles > 1 else ""
         yield names, tuple(filter(None, frames))
 
 

@@ -32,6 +32,9 @@ _MISSING: Final = 0.1
 _SHOWN: Final = 6
 """Most identifiers that a sentence lists."""
 
+_ROUNDING: Final = 1e-9
+"""Share of a period that the rounding of floats may add to several."""
+
 
 class SentFrames(NamedTuple):
     """Frames of an identifier."""
@@ -93,11 +96,13 @@ def event_model(times_us: Floats, period_us: float, *, stamp_error_us: float, to
     EventModel(burst=1, jitter_us=21)
     >>> event_model(np.array([0.0, 1, 2, 1000]), 300, stamp_error_us=1, tolerance=0)
     EventModel(burst=3, jitter_us=0.0)
+    >>> event_model(np.array([38.0, 38, 38, 38]), 1.9, stamp_error_us=0, tolerance=0)
+    EventModel(burst=4, jitter_us=0.0)
     """
     jitter_us = float(ahead(times_us, period_us * (1 - tolerance)).max()) + stamp_error_us
     if jitter_us <= period_us:
         return EventModel(1, min(ceil(jitter_us), period_us))
-    return EventModel(1 + ceil(jitter_us / period_us), 0.0)
+    return EventModel(1 + ceil(jitter_us / period_us - _ROUNDING), 0.0)
 
 
 class ClockStretch(NamedTuple):

@@ -18,10 +18,6 @@ _ALONE: Final = 40
 _FEW: Final = 6.0
 """Share of n events, over n, by which their scatter is taken for more: for 99.9 % of n - 2 degrees of freedom."""
 _LEAST_ERROR_US: Final = 1e-6
-_ROUNDING_US: Final = 1e-3
-"""What the rounding of times may add to a jitter [us]."""
-_LEAST_STEP: Final = 1e-9
-"""Where a search by halves ends, as a share of the value."""
 _DRIFT_SIGMAS: Final = 8.0
 """How far beyond 1 the mean square of the distances of blocks from a line, in their standard errors, is a drift."""
 _REACH: Final = 4.0

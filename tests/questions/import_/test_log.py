@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import can
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import busplan
@@ -144,6 +144,7 @@ events = st.lists(st.integers(0, 10_000), min_size=1, max_size=12).map(sorted)
 
 
 @given(events, st.floats(1, 20_000))
+@example([38, 38, 38, 38], 1.9)
 def test_no_time_of_a_log_has_more_events_than_the_model_allows(each: list[int], period_us: float) -> None:
     """Of any k + 1 events in a row at most a burst comes at once: the rest takes its periods, less the jitter."""
     burst, jitter_us = event_model(np.array(each, dtype=np.float64), period_us, stamp_error_us=0.0, tolerance=0.0)
@@ -153,7 +154,7 @@ def test_no_time_of_a_log_has_more_events_than_the_model_allows(each: list[int],
     # A burst or a jitter less does not hold them.
     if burst > 1:
         assert jitter_us == 0
-        assert burst - 2 <= max(early) / period_us <= burst - 1 + 1e-9
+        assert burst - 2 <= max(early) / period_us + 1e-9 <= burst - 1 + 2e-9
     else:
         assert jitter_us - 1 <= max([0.0, *early]) <= min(jitter_us, period_us) + 1e-6
 

@@ -444,7 +444,7 @@ class _Seen:
             "SYNC: period", "us", planned_us, mean.value, doubt, "equal", count, "cycle.period_us", is_mean=True
         )
         late = lateness(periods, self.share)
-        doubt = expanded(late.uncertainty or periods.doubt_us)
+        doubt = expanded(late.uncertainty or 0.0)
         if spread_us is not None:
             yield RecordedFigure(
                 "SYNC: jitter of the arrival",

@@ -13,7 +13,7 @@ from busplan.elementwise import plain
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, grid
 
 Places = npt.NDArray[np.int64]
-_JUMP: Final = 1.25
+_JUMP: Final = 1.01
 """Least ratio of a pause between cycles to one within a cycle."""
 _FARTHEST: Final = log(8)
 """Logarithm of the largest ratio of a recorded period to the planned one that pauses are looked for with."""
@@ -103,7 +103,7 @@ def seen_cycles(frames: Places, times_us: Floats, kinds: Places, data_bytes: Flo
     in_bursts = len(starts) > 1 and float(np.median(np.diff(times_us[starts]))) < _BURST * period_us
     begin, end = 0, len(starts)
     while True:
-        kept = slice(starts[begin], (*starts, len(frames))[end])
+        kept = slice(int(starts[begin]), int(np.append(starts, len(frames))[end]))
         own = starts[begin:end] - starts[begin]
         number = np.searchsorted(own, np.arange(kept.stop - kept.start), side="right") - 1
         periods = None if in_bursts else grid(times_us[starts[begin:end]], near_us)

@@ -241,7 +241,7 @@ class _Seen:
         whole = each.is_back & (each.frames == frames) & (each.data_bytes == data_bytes)
         for place, sort in enumerate(cycles.sorts):
             names = [group.name for group, is_due in zip(self.network.groups, sort.due, strict=True) if is_due]
-            with_names = f" with {' and '.join(names)}" if has_rates(self.network) else ""
+            with_names = f" with {' and '.join(names) or 'no group'}" if has_rates(self.network) else ""
             own = np.flatnonzero(whole & (cycles.sort == place))
             if sort.data_bytes:
                 host_us = () if place else (each.host_us[own], each.host_us[whole])
@@ -331,13 +331,13 @@ class _Seen:
     ) -> Iterator[RecordedFigure]:
         """Frames of a sort of cycle, and their datagrams."""
         count, planned = len(own), EthercatCycle(self.network, LAST_BYTE, sort.numbers[0]).packing
-        name, planned_frames = f"frames in a cycle{with_names}", plain(planned.frames) if sort.data_bytes else 0.0
+        name, planned_frames = f"frames in a cycle{with_names}", plain(planned.frames)
+        if sort.data_bytes:
+            hidden = "" if count else "no such cycle is in the recording"
+            frames = int(each.frames[own[0]]) if count else None
+            yield RecordedFigure(name, "1", planned_frames, frames, None, "equal", count, hidden=hidden)
         if not count:
-            if sort.data_bytes:
-                hidden = "no such cycle is in the recording"
-                yield RecordedFigure(name, "1", planned_frames, None, None, "equal", 0, hidden=hidden)
             return
-        yield RecordedFigure(name, "1", planned_frames, int(each.frames[own[0]]), None, "equal", count)
         # Of those that are as most are, one in the middle: now and then a master adds a datagram.
         sizes, often = np.unique(each.datagrams_bytes[own], return_counts=True)
         usual = own[each.datagrams_bytes[own] == sizes[often.argmax()]]
@@ -346,7 +346,7 @@ class _Seen:
         yield RecordedFigure(
             f"datagrams of a cycle{with_names}",
             "bytes",
-            plain(planned.datagrams_bytes) if sort.data_bytes else 0.0,
+            plain(planned.datagrams_bytes),
             float(sizes[often.argmax()]),
             None,
             "at most",

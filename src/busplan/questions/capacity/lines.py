@@ -156,6 +156,8 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
     if verdict.left_out:
         yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in verdict.left_out)),))
+    if verdict.premises:
+        yield "rests on", Sentence(("; ".join(verdict.premises),))
     yield "checked against", Sentence((_tested(verdict),))
     for other in verdict.contradicting:
         needed = f"{_us(other.required_us, figures.uncertainty_us)} us needed of {_us(other.available_us, None)}"

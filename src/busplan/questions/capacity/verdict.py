@@ -57,6 +57,8 @@ class Verdict:
     """What carries much of the cycle or of its uncertainty, and is assumed."""
     left_out: tuple[LeftOut, ...]
     """What could add time to the cycle, and is not set."""
+    premises: tuple[str, ...]
+    """What the verdict rests on that no key says."""
     bus_lines: tuple[tuple[str, str], ...]
     """Lines of a card that only this kind of bus has."""
     warnings: tuple[str, ...]
@@ -120,6 +122,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         after_reset=after_reset(network, deciding),
         assumptions=heavy_assumptions(deciding, network),
         left_out=cycle.left_out(),
+        premises=cycle.premises(),
         bus_lines=cycle.card_lines(),
         warnings=tuple(bus.warnings(network, nodes=[n for n in (deciding.nodes, deciding.safe_nodes or 0) if n])),
         change=change,

@@ -9,6 +9,7 @@ from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.nearest import did_you_mean
 from busplan.profile.conversion import AssumedKey, converted
+from busplan.questions.fit.assumed import assumed_rates
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import FitFigures, after_reset, figures
 from busplan.questions.fit.inputs import given
@@ -16,7 +17,7 @@ from busplan.questions.fit.network import at_period, changed, network_of, varied
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.questions.plan.changes import settings_to_be_carried
 from busplan.questions.plan.needs import SmallestPeriod, smallest_period
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 
 _ROUND_US: Final = 1000.0
@@ -159,16 +160,18 @@ def _on_kind(network: Network, kind: str) -> MachineOnKind | NotOnKind:
     except BusplanError as error:
         return NotOnKind(kind, error.problems)
     on_kind, assumed = network_of(conversion.profile), conversion.assumed
-    needed = {} if kind == network.bus.kind else settings_to_be_carried(on_kind)
+    is_own = kind == network.bus.kind
+    needed = {} if is_own else settings_to_be_carried(on_kind)
     if needed:
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
         assumed = (*tried, *(each for each in assumed if each.key not in needed))
         on_kind = changed(on_kind, needed)
+    rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
     capacity = figures(on_kind, model=on_kind.bus.deciding_model)
     return MachineOnKind(
         network=on_kind,
-        is_own=kind == network.bus.kind,
-        assumed=assumed,
+        is_own=is_own,
+        assumed=tuple(rates) if is_own else assumed,
         left_out=conversion.left_out,
         figures=capacity,
         after_reset=after_reset(on_kind, capacity),

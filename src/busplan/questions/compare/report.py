@@ -273,8 +273,8 @@ def _words(assumed: Sequence[AssumedKey]) -> str:
 
 
 def _assumed(machine: MachineOnKind) -> str:
-    """Values that a kind takes from a new profile, with the number of its defaults."""
-    new = [assumed for assumed in machine.assumed if assumed.source == "new profile"]
+    """Values that a kind takes from a new profile or its own, with the number of its defaults."""
+    new = [assumed for assumed in machine.assumed if assumed.source in ("new profile", "profile")]
     defaults = len(machine.assumed) - len(new)
     return ", ".join(filter(None, (_words(new), f"{defaults} {nouns(defaults, 'default')}" if defaults else ""))) or "-"
 
@@ -335,7 +335,7 @@ def compare_chart(comparison: KindComparison) -> Chart:
 
 
 def assumed_table(comparison: KindComparison) -> Table:
-    """Values that each kind needs and the machine does not give; defaults are details.
+    """Values that each kind needs and nobody knows; defaults are details.
 
     Parameters
     ----------
@@ -350,5 +350,5 @@ def assumed_table(comparison: KindComparison) -> Table:
         for machine in comparison.compared
         for assumed in machine.assumed
     ]
-    words = "Assumed, as a new profile of the kind has it or by default, until somebody knows better"
+    words = "Assumed, by the profile, as a new profile of the kind has it or by default, until somebody knows better"
     return Table(_ASSUMED, tuple(rows), Sentence((words,)))
