@@ -83,7 +83,8 @@ def explain(
     period_us
         Communication period T_s [us], or several; by default the profile's own.
     timing_model
-        Name of a timing model, or several; by default the one that leads, for bias and uncertainty the one that decides.
+        Name of a timing model, or several; by default the one that leads, for bias and uncertainty
+        the one that decides.
     transaction
         Name of a transaction, such as "read", or several, for a figure of `latency`; by default all.
 

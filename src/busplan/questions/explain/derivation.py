@@ -154,9 +154,7 @@ def _derivation(
         symbol = own.symbol if line is number else line.symbol
         steps.append(Step(own.key, symbol, own.reference, formula, numbers, line.value, own.unit))
     period_us = value_of(network.period_us) if network.groups else None
-    return Derivation(
-        command, figure, model, transaction, period_us, number.value, tuple(steps), tuple(inputs(number))
-    )
+    return Derivation(command, figure, model, transaction, period_us, number.value, tuple(steps), tuple(inputs(number)))
 
 
 def _why_none(network: Network, command: CommandName, figure: Figure, timing_models: Sequence[str] | None) -> str:
@@ -246,7 +244,9 @@ def explained_figures(network: Network) -> list[tuple[CommandName, Figure]]:
     models = {leading_model(network), network.bus.deciding_model}
     found: list[tuple[CommandName, Figure]] = []
     for command, figures in figures_of(network.bus).items():
-        known = set[str]().union(*(keys for model in models for keys in numbers_of(network, command, model=model).values()))
+        known = set[str]().union(
+            *(keys for model in models for keys in numbers_of(network, command, model=model).values())
+        )
         found += [(command, figure) for key, figure in figures.items() if key in known]
     return found
 
