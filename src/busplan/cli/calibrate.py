@@ -17,7 +17,6 @@ from busplan.cli.options import (
     OutputOption,
     ProfileArgument,
     option,
-    timing_model,
 )
 from busplan.cli.output import say
 from busplan.cli.rewrite import apply_changes, require_own_file
@@ -50,9 +49,9 @@ def calibrate_command(
             "--group NAME", "In a profile with groups: the group of nodes that was measured.  [default: its one group]"
         ),
     ] = None,
-    timing: Annotated[
+    timing_model: Annotated[
         str | None,
-        option("--timing MODEL", "Timing model that computes the packets.  [default: the one that decides]"),
+        option("--timing-model MODEL", "Timing model that computes the packets.  [default: the one that decides]"),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
@@ -74,9 +73,9 @@ def calibrate_command(
     A column transaction says read or write (write without it).
 
     T_exec is the latency less the time of its packets by the timing model, equation (3). If the bench differs from the
-    profile, say so: --set bus.nodes=2 --set bus.gap_count=63. With a column request_and_acknowledge_us, the measured
-    T1+T2, both halves come from it, and the report shows how far the timing model is from it. Outliers are named by
-    their line and are not in the fit; slow ones are in worst_extra_us. Times are in us. Exits 0 with any figures.
+    profile, say so: --set bus.nodes=2 --set bus.gap_count=63. The fit has the median at each payload, as a table or as
+    a line through it. Of three or more measurements of a payload, those far from the median are named by their line
+    and are not in the fit; slow ones are in worst_extra_us. Times are in us. Exits 0 with any figures.
 
     Example: busplan calibrate paper-two-node table-1.csv --form linear
     """
@@ -100,7 +99,7 @@ def calibrate_command(
             measurements if shipped else read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES),
             form=form,
             group=group,
-            timing_model=None if timing is None else timing_model(timing, bench),
+            timing_model=timing_model,
             source=name,
         )
         if apply:
