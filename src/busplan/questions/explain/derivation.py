@@ -288,7 +288,7 @@ def wanted(name: str, network: Network) -> Wanted:
         lambda figure: figure.key == key,
         lambda figure: equation is not None and figure.reference == f"({equation[1]})",
         lambda figure: equation is not None and f"({equation[1]})" in figure.reference.split(),
-        lambda figure: _letters(key) in _names(figure),
+        lambda figure: _letters(key) in _names(figure) - {""},
         lambda figure: key == figure.symbol,
     ):
         for command in commands:
@@ -296,7 +296,7 @@ def wanted(name: str, network: Network) -> Wanted:
                 return Wanted(command, figures)
     labels = latency_names(network)
     asked = tuple(label for label in labels if _letters(name) in map(_letters, (label, *label.split())))
-    if asked or name in network.names:
+    if asked or (name and name in network.names):
         return Wanted("latency", (_main_latency(network.bus),), asked or None)
     raise BusplanError(f"{name or repr(name)}: no such figure{_hint(name, network)} one, explain lists them")
 
@@ -307,9 +307,9 @@ def _main_latency(bus: Bus) -> Figure:
     return by_key(bus.figures.latency)[key]
 
 
-def _names(figure: Figure) -> tuple[str, ...]:
+def _names(figure: Figure) -> set[str]:
     """What else a figure is called: as in tables, and beside the other terms."""
-    return tuple(_letters(word) for word in (figure.label, term_name(figure.key)) if word)
+    return {_letters(figure.label), _letters(term_name(figure.key))}
 
 
 def _letters(name: str) -> str:
@@ -321,8 +321,8 @@ def _hint(name: str, network: Network) -> str:
     for _, figure in explained_figures(network):
         names |= {**dict.fromkeys(_names(figure), figure.key), _letters(figure.key): figure.key}
     asked = _letters(name.rpartition(".")[2])
-    near = [word for word in names if asked and word.startswith(asked)]
-    close = dict.fromkeys(names[word] for word in (*near, *get_close_matches(asked, names, n=3, cutoff=0.5)))
+    near = [word for word in names if word.startswith(asked)] + get_close_matches(asked, names, cutoff=0.5)
+    close = dict.fromkeys(names[word] for word in near if asked)
     return f", did you mean {listed([*close][:_MOST_HINTS], 'or')}? Without" if close else "; without"
 
 
