@@ -123,8 +123,10 @@ def timed(
         if latency_us < packets_us:
             problems.append(
                 f"{source}:{line}: latency {latency_us:g} us at {size} bytes is below the {packets_us:.3f} us that the "
-                f"packets alone take in the {model} model: is latency_us in us?"
+                f"packets alone take in the {model} model"
             )
+    if all(sample.execution_us < 0 for sample in found):
+        problems.insert(0, f"{source}: every latency is too short: is latency_us in us?")
     more = len(problems) - _MOST_PROBLEMS
     if problems:
         raise BusplanError(*problems[:_MOST_PROBLEMS], *([f"{source}: and {more} more problems"] if more > 0 else []))
