@@ -33,6 +33,15 @@ def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
         file.write(content)
 
 
+_OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
+"""Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
+
+
+def is_unwritten_pipe(path: Path) -> bool:
+    """Whether a file is a named pipe, and opening it may wait for a writer for ever."""
+    return path.is_fifo() and not str(path).startswith(_OPENED)
+
+
 def partial_path(path: Path) -> Path:
     """File name for the output of a stopped run: rows.csv becomes rows.partial.csv."""
     return path.with_name(f"{path.stem}.partial{path.suffix}")

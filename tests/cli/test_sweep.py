@@ -27,7 +27,7 @@ def process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
         text=True,
         cwd=cwd,
         check=False,
-        timeout=120,
+        timeout=300,
         env=ENVIRONMENT,
     )
 
@@ -123,12 +123,12 @@ def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path:
         text=True,
         env=ENVIRONMENT,
     ) as run:
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 300
         # The file is open once Ctrl-C is listened to.
         while not has_written(run.pid, tmp_path) and time.monotonic() < deadline:
             time.sleep(0.02)
         run.send_signal(signal.SIGINT)
-        _, errors = run.communicate(timeout=60)
+        _, errors = run.communicate(timeout=300)
     assert run.returncode == 130
     partial = name.replace(".", ".partial.")
     assert f"kept in {partial}" in errors

@@ -104,8 +104,8 @@ HEADLINES = {
     "model).>",
     "map": "<MapAnswer: paper-1ms: 57 of 180 settings are shown to fit. This design (8 axes, period 1 ms): fits.>",
     "compare": "<CompareAnswer: paper-1ms at 1 ms: shown to fit on 1 of 2 kinds of bus: IEEE 1394.>",
-    "diff": "<DiffAnswer: B is better in 16 figures: corrected margin, safe nodes, safe axes, smallest safe period and "
-    "12 more.>",
+    "diff": "<DiffAnswer: B is better in 16 figures: corrected margin, safe nodes, safe axes, period with enough time "
+    "and 12 more.>",
     "explain": "<ExplainAnswer: margin_us of paper-1ms at 1 ms, paper model: 292.8825 us>",
     "explain all": "<ExplainAnswer: paper-1ms: 44 assumptions behind its figures>",
     "calibrate": "<CalibrateAnswer: paper-1ms: Table: the median at each payload, 4 to 1024 bytes.>",

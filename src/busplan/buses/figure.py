@@ -279,7 +279,7 @@ SAFE_MIN_PERIOD: Final = Figure(
     "T_s,safe",
     _CERTAINTY,
     "smallest period shown to have enough time for these nodes, null without one; other limits may be broken",
-    "smallest safe period",
+    "period with enough time",
     better="less",
 )
 VERDICT: Final = Figure(

@@ -16,6 +16,7 @@ from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.errors import BusplanError
 from busplan.files import NewFile, new_file
 from busplan.forms import ENDINGS, Form
+from busplan.printable import printable
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 _PROFILE_ENDINGS = ("", ".toml")
 _MAX_AXES = 1_000_000
+_LONGEST_NAME = 100
+_LONGEST_DESCRIPTION = 2000
 
 
 @takes_changes(
@@ -73,8 +76,9 @@ def plan_command(
             "-o",
             metavar="FILE",
             help=f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
-            "name, as NEW.toml: write the recommended profile as a new file, without comments; - is standard output, "
-            "and the report goes to standard error.  [default: no file, and the report to standard output]",
+            "name, as NEW.toml: write a copy of PROFILE with the recommended values, whose name is that of the file; - "
+            "is standard output, and the report goes to standard error.  [default: no file, and the report to standard "
+            "output]",
         ),
     ] = None,
     force: Annotated[
@@ -124,7 +128,7 @@ def plan_command(
                 free=None if free is None else [name.strip() for name in free.split(",")],
             )
             if new is not None:
-                _write_profile(result, file)
+                _write_profile(loaded, result, file, name=None if piped else new.stem)
         if result.recommended is None:
             if apply or new:
                 say(f"{profile if apply else new}: not written, for there is no plan")
@@ -156,24 +160,38 @@ def _check_options(
 
 def _apply(loaded: "LoadedProfile", result: "PlanAnswer") -> None:
     """Write the recommended values into the profile's file."""
-    from busplan.profile.write import whole
-
     if not result.recommended_changes:
         say(f"{loaded.document.name}: nothing to change, left as it is")
         return
-    apply_changes(loaded.document, {key: whole(value) for key, value in result.recommended_changes.items()})
+    apply_changes(loaded.document, _choices(result), are_choices=True)
     say(f"changed {loaded.document.name}: {result.recommended_words}")
 
 
-def _write_profile(result: "PlanAnswer", file: NewFile | None) -> None:
-    """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged."""
-    if result.recommended is not None:
-        from busplan.profile.write import profile_text
+def _write_profile(loaded: "LoadedProfile", result: "PlanAnswer", file: NewFile | None, *, name: str | None) -> None:
+    """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged.
 
+    A file is another plan than that of the profile: it has a name of its own, and what its description says is said
+    of the profile that it comes from.
+    """
+    if result.recommended is not None:
+        from busplan.profile.edit import edited_copy
+
+        profile, choices = loaded.profile, _choices(result)
+        if name is not None:
+            choices["name"] = printable(name).strip()[:_LONGEST_NAME] or profile.name
+            said = f"A plan of {profile.name}, which is: {profile.description.strip()}"[:_LONGEST_DESCRIPTION]
+            choices |= {"description": said} if profile.description.strip() else {}
         write = emit_document if file is None else file.write
-        write(profile_text(result.recommended.profile).encode())
+        write(edited_copy(loaded, choices))
     elif file is not None:
         file.abandon()
+
+
+def _choices(result: "PlanAnswer") -> dict[str, object]:
+    """The recommended values by key, as a file has them."""
+    from busplan.profile.write import whole
+
+    return {key: whole(value) for key, value in (result.recommended_changes or {}).items()}
 
 
 def _say_report(changes: KeyChanges, report: "Report") -> None:

@@ -39,6 +39,8 @@ class CheckReport(NamedTuple):
     """What was changed in every file."""
     others: int = 0
     """Number of files that were skipped because they are no profiles."""
+    unmatched: str = ""
+    """Which profiles have no record in the baseline, and which records no profile; empty where there is none."""
 
     @property
     def summary(self) -> Summary:

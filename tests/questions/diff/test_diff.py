@@ -237,7 +237,7 @@ def test_regressions_are_named_with_the_timing_that_has_them() -> None:
     found = diff(paper, override(paper, {"cycle.nonperiodic_us": 250}))
     assert regression_words(found, tolerance_percent=80) == (
         "regression: B is worse by more than 80 % in 8 figures: verdict, corrected margin, "
-        "smallest safe period, margin, utilisation, required time, smallest period, no limit broken (standard)"
+        "period with enough time, margin, utilisation, required time, smallest period, no limit broken (standard)"
     )
     assert regression_words(found, tolerance_percent=0).startswith("regression: B is worse in ")
     assert regression_words(diff(paper, paper), tolerance_percent=0) == ""

@@ -88,7 +88,7 @@ class Page(HTMLParser):
         ({"node.axes": 5}, "a.toml (A) fits, b.toml (B) fits; B is better in 2 figures: safe axes and most axes."),
         (
             {"bus.gap_count": 62},
-            "a.toml (A) fits, b.toml (B) fits; B is better in 12 figures: corrected margin, smallest safe period, ",
+            "a.toml (A) fits, b.toml (B) fits; B is better in 12 figures: corrected margin, period with enough ",
         ),
         (
             {"payload.overhead_bytes": 24},

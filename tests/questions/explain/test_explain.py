@@ -39,20 +39,6 @@ def names(derivation: Any) -> set[str]:
 # --- what is derived is what was computed -----------------------------------------------------------------
 
 
-@given(data=st.data())
-def test_a_figure_is_derived_as_it_is_computed(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
-    profile = data.draw(any_profile)
-    command, figure = data.draw(st.sampled_from(busplan.explain(profile).figures))
-    for one in busplan.explain(profile, f"{command}.{figure.key}").derivations:
-        if command == "capacity":
-            (result,) = busplan.capacity(profile, timing_model=one.timing_model).results
-            row = result.values()
-        else:
-            rows = busplan.latency(profile, timing_model=one.timing_model).to_dict()["transactions"]
-            row = next(row for row in rows if row["transaction"] == one.transaction)
-        assert one.value == pytest.approx(row[one.figure.key], rel=1e-12)
-
-
 @pytest.mark.parametrize("name", shipped_names())
 def test_every_figure_of_every_kind_ends_in_its_value_and_begins_at_graded_inputs(name: str) -> None:
     results = {one.timing_model: one.values() for one in busplan.capacity(name).results}

@@ -167,7 +167,7 @@ def test_a_worker_that_is_lost_is_said_and_none_is_left(monkeypatch: pytest.Monk
             call.cancel()
         for process in set(active_children()) - set(before):
             process.kill()
-        assert calls[1].exception(timeout=20)
+        assert calls[1].exception(timeout=300)
     assert active_children() == before
     assert not stumbles
 
@@ -193,7 +193,7 @@ def test_a_sweep_is_the_same_on_every_executor() -> None:
             assert document(executor) == alone
             assert document(executor, summary=True) == summary
             # It is the caller's, and goes on.
-            assert executor.submit(abs, -1).result(timeout=20) == 1
+            assert executor.submit(abs, -1).result(timeout=300) == 1
 
 
 def test_many_points_are_checked_on_the_executor_and_the_first_that_fails_is_named() -> None:

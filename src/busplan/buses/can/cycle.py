@@ -432,24 +432,35 @@ class CanCycle(BusCycle):
 
     @cached_property
     def sync_spread_us(self) -> Number:
-        """Delay of SYNC by other messages, B + I [us]; infinite where it has no end."""
+        """Delay of SYNC by other messages, B + I [us]; infinite where it has no end, 0 where no SYNC is sent."""
+        if not self.traffic.has_cycle:
+            return 0.0
         if self._sent.is_ordered:
             with suppress(TooManyStepsError):
                 us: Number = sync_spread_us(self.traffic, is_stuffed=self.is_stuffed)
                 return us
-        phases = self._phases(0, SYNC)
-        return named(phases["blocking_us"] + phases["interference_us"], "sync_spread_us", "B + I")
+        blocking_us, interference_us = self._waits_of(0, SYNC)
+        return named(blocking_us + interference_us, "sync_spread_us", "B + I")
+
+    def _figure(self, place: int, key: str, words: str) -> Number:
+        """A figure of the stream at a place among those that end a PDO or a message."""
+        return self._sent.of_points(partial(_phase, self.is_stuffed, place, key), words=words)
+
+    def _waits_of(self, place: int, name: str) -> tuple[Number, Number]:
+        """Blocking and interference of such a stream [us]."""
+        blocking = f"the longest frame of a lower priority than {name}"
+        interference = f"frames of higher priorities before {name}, in its worst instance"
+        return (
+            named(self._figure(place, "blocking_us", blocking), "blocking_us", "B"),
+            named(self._figure(place, "interference_us", interference), "interference_us", "I"),
+        )
 
     def _phases(self, place: int, name: str) -> dict[str, Number]:
-        """Figures of the stream at a place among those that end a PDO or a message."""
-
-        def figure(key: str, words: str) -> Number:
-            return self._sent.of_points(partial(_phase, self.is_stuffed, place, key), words=words)
-
+        """Figures of such a stream; of no arrays."""
+        figure = partial(self._figure, place)
         jitter_us = figure("jitter_us", f"how late {name} may be queued")
         frame_us_ = figure("frame_us", f"the last frame of {name}")
-        blocking_us = figure("blocking_us", f"the longest frame of a lower priority than {name}")
-        interference_us = figure("interference_us", f"frames of higher priorities before {name}, in its worst instance")
+        blocking_us, interference_us = self._waits_of(place, name)
         instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")
         period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
         periods = instance
@@ -458,8 +469,8 @@ class CanCycle(BusCycle):
         backlog_us = choose(instance < inf, instance * frame_us_ - periods * period_us, instance)
         parts_us = {
             "jitter_us": named(jitter_us, "jitter_us", "J"),
-            "blocking_us": named(blocking_us, "blocking_us", "B"),
-            "interference_us": named(interference_us, "interference_us", "I"),
+            "blocking_us": blocking_us,
+            "interference_us": interference_us,
             "backlog_us": named(backlog_us, "backlog_us", "q (C - T)"),
             "frame_us": named(frame_us_, "frame_us", "C"),
             "execution_us": 0.0,

@@ -250,8 +250,8 @@ def _kept_from_us(is_broken: Callable[[Network], Number], network: Network) -> f
     return kept_us
 
 
-_HALVINGS: Final = 20
-"""Halvings of a doubled period: to a millionth, and advice asks the limit again."""
+_HALVINGS: Final = 44
+"""Halvings of a doubled period: to the rounding of floats."""
 
 
 def _load(network: Network) -> Number:

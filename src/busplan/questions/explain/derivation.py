@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import product
-from math import inf
+from math import isinf
 from types import MappingProxyType
 from typing import Final, Literal, NamedTuple
 
@@ -49,7 +49,7 @@ class Step(NamedTuple):
     numbers: str
     """The computation in numbers."""
     value: object
-    """The result: a number, or a truth value."""
+    """The result: a number, or a truth value; None of what does not exist."""
     unit: str
     """Unit of the result; empty for counts and shares."""
 
@@ -66,7 +66,7 @@ class Derivation:
     period_us: float | None
     """None of a network without a cycle."""
     value: object
-    """Value as in the command's JSON."""
+    """Value as in the command's JSON; None of what does not exist."""
     steps: tuple[Step, ...]
     """In the order of computation; the last step is the figure, unless that is an input."""
     inputs: tuple[Input, ...]
@@ -150,11 +150,20 @@ def _derivation(
     steps = []
     for line in lines(number):
         own = figure if line is number else known.get(line.key, Figure(line.key, line.key, "", ""))
-        formula, numbers = (formula_text(line, in_numbers=in_numbers) for in_numbers in (False, True))
+        formula, numbers = (_INFINITE.sub("none", formula_text(line, in_numbers=way)) for way in (False, True))
         symbol = own.symbol if line is number else line.symbol
-        steps.append(Step(own.key, symbol, own.reference, formula, numbers, line.value, own.unit))
+        steps.append(Step(own.key, symbol, own.reference, formula, numbers, _existing(line.value), own.unit))
     period_us = value_of(network.period_us) if network.groups else None
-    return Derivation(command, figure, model, transaction, period_us, number.value, tuple(steps), tuple(inputs(number)))
+    value = _existing(number.value)
+    return Derivation(command, figure, model, transaction, period_us, value, tuple(steps), tuple(inputs(number)))
+
+
+_INFINITE: Final = re.compile(r"\binf\b")
+
+
+def _existing(value: object) -> object:
+    """A value; None for infinity, which stands for what does not exist."""
+    return None if isinstance(value, float) and isinf(value) else value
 
 
 def _why_none(network: Network, command: CommandName, figure: Figure, timing_models: Sequence[str] | None) -> str:
@@ -189,16 +198,16 @@ def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[st
     Returns
     -------
     dict
-        What does not exist is left out.
+        What is infinite does not exist.
     """
     # Traced for each command: a number keeps the name that it is given first.
     network = network_of(traced_profile(network.profile))
     cycle = network.bus.cycle(network, model=model)
     known = figures_of(network.bus)[command]
     if command == "capacity":
-        return {"": _existing(_of_capacity(cycle, is_decided=model == network.bus.deciding_model), known)}
+        return {"": _known(_of_capacity(cycle, is_decided=model == network.bus.deciding_model), known)}
     return {
-        latency.label: _existing(
+        latency.label: _known(
             {"payload_bytes": latency.payload_bytes, "nodes": network.nodes, **latency.phases}, known
         )
         for latency in cycle.latencies()
@@ -221,12 +230,12 @@ def _of_capacity(cycle: BusCycle, *, is_decided: bool) -> dict[str, Number | Non
     return numbers
 
 
-def _existing(numbers: Mapping[str, Number | None], known: Mapping[str, Figure]) -> dict[str, Traced]:
-    """Numbers of the known figures, each with its symbol; what does not exist is left out."""
+def _known(numbers: Mapping[str, Number | None], known: Mapping[str, Figure]) -> dict[str, Traced]:
+    """Numbers of the known figures, each with its symbol; None is left out."""
     return {
         key: _named(number, key, known[key].symbol)
         for key, number in numbers.items()
-        if key in known and number is not None and value_of(number) != inf
+        if key in known and number is not None
     }
 
 

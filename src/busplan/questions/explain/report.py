@@ -19,6 +19,7 @@ from busplan.forms.blocks import (
     Table,
     TableColumn,
     TableRow,
+    Words,
 )
 from busplan.forms.numbers import figure_text, period_value
 from busplan.questions.explain.derivation import CommandName, Derivation, Step
@@ -171,15 +172,16 @@ def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
     return Chapter(title, (about, Calculation(tuple(map(_step, derivation.steps))), below))
 
 
-def _result(value: object, key: str, unit: str) -> ShownValue:
-    return ShownValue(value, key, unit, digits=DIGITS)
+def _result(value: object, key: str, unit: str) -> ShownValue | Words:
+    return Words("none") if value is None else ShownValue(value, key, unit, digits=DIGITS)
 
 
 def _step(step: Step) -> CalculationStep:
     """A line in symbols and one in numbers; a line that repeats its neighbour is left out."""
     result = _result(step.value, step.key, step.unit)
-    formula = "" if step.formula == step.symbol else step.formula
-    numbers = "" if step.numbers in (formula, short(step.value), figure_text(result)) else step.numbers
+    said = result.text if isinstance(result, Words) else figure_text(result)
+    formula = "" if step.formula in (step.symbol, said) else step.formula
+    numbers = "" if step.numbers in (formula, short(step.value), said) else step.numbers
     return CalculationStep(step.reference, step.symbol, formula, numbers, result)
 
 
