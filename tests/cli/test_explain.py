@@ -42,8 +42,8 @@ def test_a_figure_is_derived_down_to_its_constants(run: Run) -> None:
 
 
 def test_options_multiply_as_in_the_commands(run: Run) -> None:
-    arguments = ("--period", "1ms", "--period", "600us", "--set", "bus.nodes=3", "--set", "bus.gap_count=optimal")
-    arguments += ("--timing-model", "both")
+    changes = ("--set", "bus.nodes=3", "--set", "bus.gap_count=optimal")
+    arguments = ("--period", "1ms", "--period", "600us", *changes, "--timing-model", "both")
     said = json.loads(run("explain", "paper-4ms", "required_us", *arguments, "--format", "json").stdout)
     given = json.loads(run("capacity", "paper-4ms", *arguments, "--format", "json").stdout)
     assert [one["value"] for one in said["derivations"]] == [row["required_us"] for row in given["results"]]
