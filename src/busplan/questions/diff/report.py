@@ -55,7 +55,7 @@ _MOST_KEYS: Final = 20
 """Most keys shown to a reader without --all; JSON lists all."""
 _ALL_DIGITS: Final = 17
 """Digits that distinguish any two floats."""
-_MOST_CHARACTERS: Final = 40
+_MOST_CHARACTERS: Final = 60
 """Longest value shown in full."""
 _CONTEXT: Final = 8
 """Characters shown before the first one that differs."""
@@ -171,7 +171,7 @@ def excerpt(text: str, opposite: str = "") -> str:
 
     Examples
     --------
-    >>> excerpt("[4, 16]"), excerpt("a" * 60 + "b", "a" * 60 + "c")
+    >>> excerpt("[4, 16]"), excerpt("a" * 70 + "b", "a" * 70 + "c")
     ('[4, 16]', '..aaaaaaaab')
     """
     if len(text) <= _MOST_CHARACTERS:
