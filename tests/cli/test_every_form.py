@@ -26,7 +26,7 @@ QUESTIONS = (
     ("explain", "paper-1ms"),
     ("explain", "paper-1ms", "required_us", "--timing-model", "both"),
     ("explain", "can-servo-8", "loop"),
-    ("calibrate", "paper-two-node", "table-1.csv", "--form", "linear"),
+    ("calibrate", "paper-two-node", "table-1.csv"),
     ("compare", "gantry-24", "--circle", "--set", "circle.radius_mm=10"),
     ("paper",),
     ("evidence", "can"),

@@ -90,8 +90,8 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     "evidence": busplan.evidence,
     "evidence can": lambda: busplan.evidence("can"),
     "paper": lambda: busplan.evidence(paper=True),
-    "calibrate paper-two-node table-1.csv --form linear --timing-model paper": lambda: busplan.calibrate(
-        "paper-two-node", "table-1.csv", form="linear", timing_model="paper"
+    "calibrate paper-two-node table-1.csv --timing-model paper": lambda: busplan.calibrate(
+        "paper-two-node", "table-1.csv", timing_model="paper"
     ),
     "report sercos2-servo-8 sercos3-servo-8 --set bus.nodes=3 --no-circle --title Two": lambda: busplan.report(
         [busplan.load_profile(name, changes={"bus.nodes": 3}) for name in ("sercos2-servo-8", "sercos3-servo-8")],

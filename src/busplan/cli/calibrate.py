@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -34,15 +34,6 @@ def calibrate_command(
             show_default=False,
         ),
     ],
-    form: Annotated[
-        Literal["table", "linear"] | None,
-        typer.Option(
-            "--form",
-            help="Form of the execution time: T_exec [us] at each payload, or a base [us] and us per byte.  "
-            "[default: the profile's node.execution.kind]",
-            show_default=False,
-        ),
-    ] = None,
     group: Annotated[
         str | None,
         option(
@@ -72,12 +63,12 @@ def calibrate_command(
     acknowledge, in us) and a line for each measurement; payloads may repeat, and lines that begin with # are comments.
     A column transaction says read or write (write without it).
 
-    T_exec is the latency less the time of its packets by the timing model, equation (3). If the bench differs from the
-    profile, say so: --set bus.nodes=2 --set bus.gap_count=63. The fit has the median at each payload, as a table or as
-    a line through it. Of three or more measurements of a payload, those far from the median are named by their line
-    and are not in the fit; slow ones are in worst_extra_us. Times are in us. Exits 0 with any figures.
+    T_exec is the latency less the time of its packets by the timing model, equation (3); of each payload the median. If
+    the bench differs from the profile, say so: --set bus.nodes=2 --set bus.gap_count=63. Of three or more measurements
+    of a payload, those far from their median are named by their line and left out; slow ones are in worst_extra_us.
+    Times are in us. Exits 0 with any figures.
 
-    Example: busplan calibrate paper-two-node table-1.csv --form linear
+    Example: busplan calibrate paper-two-node table-1.csv
     """
     if profile == measurements == "-":
         raise BusplanError("only one of PROFILE and MEASUREMENTS can be standard input")
@@ -97,7 +88,6 @@ def calibrate_command(
             bench,
             # Read here: Python reads no standard input, and takes a name of several lines for CSV text.
             measurements if shipped else read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES),
-            form=form,
             group=group,
             timing_model=timing_model,
             source=name,

@@ -11,8 +11,8 @@ from busplan.forms.blocks import Report, Sentence, Snippet
 Rows = list[tuple[int, float, str]]
 
 
-def run(rows: Rows, *, form: str = "table") -> CalibrateAnswer:
-    return busplan.calibrate("paper-two-node", rows, form="linear" if form == "linear" else "table", source="m.csv")
+def run(rows: Rows) -> CalibrateAnswer:
+    return busplan.calibrate("paper-two-node", rows, source="m.csv")
 
 
 def rows(*values: tuple[int, float], kind: str = "write") -> Rows:
@@ -24,8 +24,8 @@ def warnings(answer: CalibrateAnswer) -> list[str]:
     return found
 
 
-def example(form: str = "table") -> CalibrateAnswer:
-    return busplan.calibrate("paper-two-node", "table-1.csv", form="linear" if form == "linear" else "table")
+def example() -> CalibrateAnswer:
+    return busplan.calibrate("paper-two-node", "table-1.csv")
 
 
 def test_only_repetitions_have_a_spread() -> None:
@@ -38,7 +38,7 @@ def test_only_repetitions_have_a_spread() -> None:
 
 def test_warnings() -> None:
     assert warnings(run(rows((64, 80.0)))) == [
-        "the profile's payload of 4 bytes is outside the table, 64 to 64 bytes: measure it, or use --form linear."
+        "the profile's payload of 4 bytes is outside what was measured, 64 to 64 bytes: measure it."
     ]
     assert "is latency_us in us?" in warnings(run(rows((4, 48_700.0))))[0]
     (short,) = warnings(run(rows((4, 20.0))))
@@ -49,7 +49,7 @@ def test_warnings() -> None:
         "15 slow measurements: line 1 (90 us at 4 bytes: T_exec +40.0 us off the median), line 5 (94 us at 4 bytes: "
     )
     assert warning.endswith(
-        "off the median) and 5 more; not in the fit: the slowest execution takes 96.001 us more, worst_extra_us."
+        "off the median) and 5 more; left out: the slowest execution takes 96.001 us more, worst_extra_us."
     )
     assert f"Warning: {warning}\n" in str(many)
     (said,) = (block for block in many.report().blocks if isinstance(block, Sentence) and block.state == "warns")
@@ -57,23 +57,21 @@ def test_warnings() -> None:
     assert len([part for part in said.parts if getattr(part, "key", "") == "line"]) == 10
     quick = warnings(run(rows((4, 50.0), (4, 50.1), (4, 30.0), (4, 50.2), (4, 120.0))))
     assert [one.split(":")[0] for one in quick] == ["1 slow measurement", "1 fast measurement"]
-    assert quick[1].endswith("; left out of the fit; measure again.")
+    assert quick[1].endswith("; left out: measure again.")
 
 
-def test_a_line_in_words_in_its_note_and_as_changes() -> None:
-    answer = run(rows((4, 50.0), (64, 80.0)), form="linear")
-    execution = answer.execution
-    base, slope = execution.execution_us(0), execution.execution_us(1) - execution.execution_us(0)
-    assert f"Line: {base:g} us + {slope:g} us/byte * payload, by Theil-Sen through the median at each payload." in str(
-        answer
+def test_a_fit_in_words_in_its_note_and_as_changes() -> None:
+    answer = run(rows((4, 50.0), (64, 80.0)))
+    assert str(answer).startswith(
+        "paper-two-node: T_exec is the median at each payload, of 2 measurements at 2 payloads, m.csv.\n"
     )
-    assert answer.notes["node.execution"].startswith(
-        "busplan calibrate: linear (Theil-Sen) of 2 measurements in m.csv, packets by the standard model, rms residual "
-    )
+    assert answer.notes == {
+        "node.execution": "busplan calibrate: median of 2 measurements in m.csv, packets by the standard model"
+    }
     edits = answer.edits
-    assert (edits["node.execution.kind"], edits["node.execution.grade"]) == ("linear", "measured")
-    assert (edits["node.execution.payload_bytes"], edits["node.execution.time_us"]) == (None, None)
-    # Two measurements are used up by a line: no spread is left, and an old uncertainty goes.
+    assert (edits["node.execution.kind"], edits["node.execution.grade"]) == ("table", "measured")
+    assert (edits["node.execution.base_us"], edits["node.execution.per_byte_us"]) == (None, None)
+    # Nothing is repeated: no spread is left, and an old uncertainty goes.
     assert edits["node.execution.uncertainty_us"] is None
     assert (edits["node.execution.residual"], edits["node.execution.measured_gap_count"]) == ("standard", 63)
     assert "node.execution.worst_extra_us" not in edits
@@ -87,13 +85,12 @@ def test_no_figure_of_the_table_is_rounding_dust() -> None:
     assert "-0.000" not in text
 
 
-@pytest.mark.parametrize("form", ["table", "linear"])
-def test_every_figure_stands_at_its_place(form: str, values_of_the_document: Callable[[Report], int]) -> None:
-    assert values_of_the_document(example(form).report()) > 8 * 5
-    repeated = run([*rows((4, 50.0), (4, 52.0), (64, 80.0)), *rows((4, 54.0), kind="read")], form=form)
-    assert values_of_the_document(repeated.report()) > 2 * 6
+def test_every_figure_stands_at_its_place(values_of_the_document: Callable[[Report], int]) -> None:
+    assert values_of_the_document(example().report()) > 8 * 4
+    repeated = run([*rows((4, 50.0), (4, 52.0), (64, 80.0)), *rows((4, 54.0), kind="read")])
+    assert values_of_the_document(repeated.report()) > 2 * 5
     many = run(rows(*((4, 50.0 if index % 4 else 90.0 + index) for index in range(60))))
-    assert values_of_the_document(many.report()) > 8
+    assert values_of_the_document(many.report()) > 6
 
 
 def test_the_section_of_the_profile_is_toml_to_copy() -> None:

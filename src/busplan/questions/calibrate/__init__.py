@@ -6,14 +6,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import ceil
 from pathlib import PurePath
-from statistics import fmean
-from typing import Any, Final, Literal, Protocol
+from typing import Any, Final, Protocol
 
 from busplan.buses.network import Network
 from busplan.buses.parts import MeasuredLatencies
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import plural, sentence_text, with_unit
+from busplan.forms.numbers import plural, sentence_text
 from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, measurements_from, parse_measurements
 from busplan.profile.shipped import locate_measurements
 from busplan.profile.toml import read_bytes
@@ -21,23 +20,21 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, checked_models, load_network
 from busplan.questions.calibrate.fit import (
     REPETITIONS_TO_COMPARE,
-    Execution,
     Outlier,
     PayloadFit,
-    fitted,
     outliers,
     payload_fits,
-    residual_us,
+    spread_us,
     timed,
-    uncertainty_us,
 )
 from busplan.sections.alike_nodes import AlikeNodes
-from busplan.sections.execution import LinearExecution, TableExecution
+from busplan.sections.execution import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
 _IN_MEMORY: Final = "measurements"
 """Name of measurements that are no file, in messages and documents."""
 _WORST: Final = "worst_extra_us"
+_TIME_DECIMALS: Final = 3
 _PICOSECOND: Final = 1e-3
 """A picosecond in nanoseconds: what rounding adds is no nanosecond."""
 
@@ -70,7 +67,7 @@ class CalibrateAnswer(Answer):
     timing_model
         Timing model of the packets.
     execution
-        The execution time T_exec, as the section of a profile.
+        The execution time T_exec as the section of a profile: the median at each payload.
     measurements
         Number of all measurements, the outliers among them.
     payloads
@@ -79,12 +76,10 @@ class CalibrateAnswer(Answer):
         Measurements far from the others, by line: of rows in memory the number of the row, from 1.
     unchecked_bytes
         Payloads with too few measurements to tell an outlier.
-    rms_residual_us
-        Root mean square of the measurements less the fit.
     uncertainty_us
-        Standard uncertainty of T_exec, the spread of the measurements about the fit; None where nothing is left over.
+        Standard uncertainty of T_exec, the spread of the measurements about the medians; None where none is repeated.
     worst_extra_us
-        Time of the slowest execution beyond the fit; None where no outlier is slow.
+        Time of the slowest execution beyond the median; None where no outlier is slow.
     at_most_us
         A shorter execution cannot be told from a latency.
     section
@@ -95,12 +90,11 @@ class CalibrateAnswer(Answer):
     source: str
     nodes: AlikeNodes
     timing_model: str
-    execution: Execution
+    execution: TableExecution
     measurements: int
     payloads: tuple[PayloadFit, ...]
     outliers: tuple[Outlier, ...]
     unchecked_bytes: tuple[int, ...]
-    rms_residual_us: float
     uncertainty_us: float | None
     worst_extra_us: float | None
     at_most_us: float
@@ -111,11 +105,6 @@ class CalibrateAnswer(Answer):
         """The profile that was measured."""
         profile: Profile = self.network.profile
         return profile
-
-    @property
-    def method(self) -> str:
-        """How the time at each payload, and the line through them, were found."""
-        return "median" if self.execution.kind == "table" else "Theil-Sen"
 
     @property
     def key(self) -> str:
@@ -139,23 +128,17 @@ class CalibrateAnswer(Answer):
     @property
     def notes(self) -> dict[str, str]:
         """The comment that `--apply` writes above the section, by its key: where the execution time is from."""
-        from busplan.questions.calibrate.report import time_value
-
         slow = sum(outlier.off_us > 0 for outlier in self.outliers)
         fast = len(self.outliers) - slow
         doubts = (f"{slow} slow in {_WORST}, " if slow else "", f"{fast} fast left out, " if fast else "")
         kept = plural(self.measurements - len(self.outliers), "measurement")
-        rms = with_unit(time_value(self.rms_residual_us, "rms_residual_us"))
-        note = (
-            f"busplan calibrate: {self.execution.kind} ({self.method}) of {kept} in {PurePath(self.source).name}, "
-            f"{''.join(doubts)}packets by the {self.timing_model} model, rms residual {rms}"
-        )
-        return {self.key: note}
+        note = f"busplan calibrate: median of {kept} in {PurePath(self.source).name}, {''.join(doubts)}packets by the "
+        return {self.key: f"{note}{self.timing_model} model"}
 
     def _headline(self) -> str:
-        from busplan.questions.calibrate.report import form_sentence
+        from busplan.questions.calibrate.report import fit_sentence
 
-        return f"{self.profile.name}: {sentence_text(form_sentence(self))}"
+        return sentence_text(fit_sentence(self))
 
     def report(self, *, applied_to: str | None = None) -> Report:
         """The answer in blocks.
@@ -174,16 +157,14 @@ def calibrate(
     profile: ProfileLike,
     measurements: Measurements,
     *,
-    form: Literal["table", "linear"] | None = None,
     group: str | None = None,
     timing_model: str | None = None,
     source: str | None = None,
 ) -> CalibrateAnswer:
     """Find the execution time T_exec of a node from measured latencies.
 
-    T_exec is the latency less the time of its packets. The fit has the median at each payload, as a table or as the
-    line of Theil and Sen through it. Measurements far from the others of their payload are in neither: the slow ones
-    are what the slowest execution takes more.
+    T_exec is the latency less the time of its packets, and of each payload the median. Measurements far from the others
+    of their payload are left out: the slow ones are what the slowest execution takes more.
 
     Parameters
     ----------
@@ -194,8 +175,6 @@ def calibrate(
         A CSV file, the shipped "table-1.csv", or CSV text of several lines or as bytes; columns by name, as a mapping
         or a data frame; or rows, each a mapping or values in the order of the columns. Columns, n values each:
         payload_bytes, latency_us (T_lant [us]), and where known transaction ("read" or "write").
-    form
-        Form of the execution time; by default the profile's node.execution.kind.
     group
         Name of the group of nodes that was measured; by default the one that the profile has.
     timing_model
@@ -211,8 +190,8 @@ def calibrate(
     Raises
     ------
     BusplanError
-        Not a profile, not measurements (all problems with line and column), no group of that name, latencies shorter
-        than their packets, or a line through one payload or with a negative part.
+        Not a profile, not measurements (all problems with line and column), no group of that name, or latencies shorter
+        than their packets.
 
     References
     ----------
@@ -222,15 +201,13 @@ def calibrate(
     --------
     >>> import busplan
     >>> rows = [(4, 48.7), (16, 55.2), (64, 80.9), (256, 184.4)]
-    >>> answer = busplan.calibrate("paper-two-node", rows, form="linear")
-    >>> round(answer.execution.base_us, 2), round(answer.execution.per_byte_us, 3)
-    (35.97, 0.516)
-    >>> busplan.load_profile("paper-two-node", changes=answer.changes).node.execution.kind
-    'linear'
+    >>> answer = busplan.calibrate("paper-two-node", rows)
+    >>> answer.execution.time_us
+    (38.088, 44.181, 68.905, 168.498)
+    >>> busplan.load_profile("paper-two-node", changes=answer.changes).node.execution.grade
+    'measured'
     """
     network = load_network(profile)
-    if form not in (None, "table", "linear"):
-        raise BusplanError(f"form {form!r}: expected 'table' or 'linear'")
     of_bus = _latencies_of(network)  # refuses a kind without, before a recording of it is read as text
     read, name, shipped = _measured(measurements, name=source or _IN_MEMORY)
     nodes = _nodes(network.profile, group)
@@ -239,14 +216,22 @@ def calibrate(
     packets = {(kind, size): of_bus.packets(network, nodes.name, model, kind, size) for kind, size in sizes}
     samples = timed(network, read, packets, source=name, model=model)
     left_out = outliers(samples)
-    kept = [sample for place, sample in enumerate(samples) if place not in left_out]
-    # The shipped example has published figures, so the result is derived.
-    execution = fitted(kept, form or nodes.node.execution.kind, grade="derived" if shipped else "measured", source=name)
-    residuals_us = [residual_us(sample, execution) for sample in kept]
-    doubt_us = uncertainty_us(residuals_us, execution)
+    payloads = payload_fits(samples, left_out)
+    times_us = {fit.payload_bytes: round(fit.execution_us, _TIME_DECIMALS) for fit in payloads}
+    off_us = [sample.execution_us - times_us[sample.payload_bytes] for sample in samples]
+    kept_us = [us for place, us in enumerate(off_us) if place not in left_out]
+    doubt_us = spread_us(kept_us, payloads=len(payloads))
+    if doubt_us is not None:
+        doubt_us = round(max(doubt_us, float(MEASURED_UNCERTAINTY_US)), _TIME_DECIMALS)
     is_slow = any(outlier.off_us > 0 for outlier in left_out.values())
-    worst_us = max(residual_us(sample, execution) for sample in samples)
-    worst_extra_us = ceil(1000 * worst_us - _PICOSECOND) / 1000 if is_slow else None
+    worst_extra_us = ceil(1000 * max(off_us) - _PICOSECOND) / 1000 if is_slow else None
+    execution = TableExecution(
+        kind="table",
+        payload_bytes=tuple(times_us),
+        time_us=tuple(times_us.values()),
+        # The shipped example has published figures.
+        grade="derived" if shipped else "measured",
+    )
     repetitions = Counter((sample.transaction, sample.payload_bytes) for sample in samples)
     few = {size for (_, size), number in repetitions.items() if number < REPETITIONS_TO_COMPARE}
     return CalibrateAnswer(
@@ -256,10 +241,9 @@ def calibrate(
         timing_model=model,
         execution=execution,
         measurements=len(read),
-        payloads=tuple(payload_fits(samples, left_out, execution)),
+        payloads=payloads,
         outliers=tuple(left_out.values()),
         unchecked_bytes=tuple(sorted(few)),
-        rms_residual_us=fmean(us**2 for us in residuals_us) ** 0.5,
         uncertainty_us=doubt_us,
         worst_extra_us=worst_extra_us,
         at_most_us=max(each.shortest_us for each in packets.values()),
@@ -269,7 +253,7 @@ def calibrate(
 
 def _section(
     nodes: AlikeNodes,
-    execution: Execution,
+    execution: TableExecution,
     fit_keys: Mapping[str, object],
     doubt_us: float | None,
     worst_extra_us: float | None,

@@ -23,7 +23,6 @@ from busplan.profile.write import value_text
 from busplan.questions.calibrate import CalibrateAnswer
 from busplan.questions.calibrate.fit import REPETITIONS_TO_COMPARE, Outlier
 from busplan.questions.words.documents import document, with_profile
-from busplan.sections.execution import TableExecution
 from busplan.sections.transactions import TRANSACTION_KINDS
 
 _COLUMNS: Final = {
@@ -34,11 +33,7 @@ _COLUMNS: Final = {
     "packets_us": TableColumn("packets", "us", rank=2),
     "execution_us": TableColumn("T_exec", "us"),
     "deviation_us": TableColumn("std dev", "us", rank=1),
-    "fitted_us": TableColumn("fitted", "us"),
-    "residual_us": TableColumn("residual", "us"),
 }
-_LINE_DIGITS: Final = 6
-"""Significant digits of a line's base and slope."""
 _DECIMALS: Final = 3
 _MOST_LINES: Final = 10
 _LONG_EXECUTION_US: Final = 10_000.0
@@ -74,13 +69,10 @@ def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Re
             timing_model=answer.timing_model,
             nodes=network.nodes,
             **{key: figures[key] for key in network.bus.figures.headings},
-            form=answer.execution.kind,
-            method=answer.method,
             measurements=answer.measurements,
             execution=answer.section,
             uncertainty_us=answer.uncertainty_us,
             at_most_us=answer.at_most_us,
-            rms_residual_us=answer.rms_residual_us,
             outliers=[outlier._asdict() for outlier in answer.outliers],
             worst_extra_us=answer.worst_extra_us,
             unchecked_bytes=list(answer.unchecked_bytes),
@@ -94,19 +86,10 @@ def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Re
 
 def _blocks(answer: CalibrateAnswer, warned: list[Sentence]) -> Iterator[Block]:
     """The fit in sentences, the figures by payload, and the section for the profile."""
-    network, number, sizes = answer.network, answer.measurements, len(answer.payloads)
-    yield sentence(
-        f"{{}}: T_exec from {{}} {nouns(number, 'measurement')} at {{}} {nouns(sizes, 'payload')}, {{}}.",
-        Code(answer.profile.name),
-        count_value(number, "measurements"),
-        count_value(sizes),
-        Code(answer.source),
-    )
+    network = answer.network
+    yield fit_sentence(answer)
     where = ", ".join((network.bus.payloads(network).carrier, *network.bus.setup_words(network)))
     yield sentence(f"T_exec = T_lant - packets, eq (3): by the {answer.timing_model} timing model for {where}.")
-    yield form_sentence(answer)
-    rms = time_value(answer.rms_residual_us, "rms_residual_us")
-    yield sentence("Measured less fitted: rms {}.", rms)
     if answer.unchecked_bytes:
         sizes_said = ", ".join(map(str, answer.unchecked_bytes))
         words = f"it takes {REPETITIONS_TO_COMPARE} measurements of a payload"
@@ -130,15 +113,17 @@ def _cell(value: float | None, key: str) -> Cell:
     return time_value(value, key)._replace(fixed=True) if key.endswith("_us") else count_value(value, key)
 
 
-def form_sentence(answer: CalibrateAnswer) -> Sentence:
-    """Say what the execution time is, and how it was found."""
-    execution, without = answer.execution, ", without the outliers" if answer.outliers else ""
-    if isinstance(execution, TableExecution):
-        return sentence(f"Table: the {answer.method} at each payload{without}, {execution.range_bytes}.")
+def fit_sentence(answer: CalibrateAnswer) -> Sentence:
+    """Say what the execution time was found from."""
+    number, sizes = answer.measurements, len(answer.payloads)
+    without = ", without the outliers" if answer.outliers else ""
     return sentence(
-        f"Line: {{}} + {{}} * payload, by {answer.method} through the median at each payload{without}.",
-        ShownValue(execution.base_us, "base_us", "us", digits=_LINE_DIGITS),
-        ShownValue(execution.per_byte_us, "per_byte_us", "us/byte", digits=_LINE_DIGITS),
+        f"{{}}: T_exec is the median at each payload, of {{}} {nouns(number, 'measurement')} at {{}} "
+        f"{nouns(sizes, 'payload')}{without}, {{}}.",
+        Code(answer.profile.name),
+        count_value(number, "measurements"),
+        count_value(sizes),
+        Code(answer.source),
     )
 
 
@@ -151,12 +136,11 @@ def _warnings(answer: CalibrateAnswer) -> Iterator[Sentence]:
         if outliers:
             yield _outliers(outliers, word, answer.worst_extra_us or 0.0)
     execution = answer.execution
-    if isinstance(execution, TableExecution):
-        outside = [size for kind in TRANSACTION_KINDS if not execution.covers(size := int(answer.nodes.bytes_of(kind)))]
-        for size in dict.fromkeys(outside):
+    sizes = dict.fromkeys(int(answer.nodes.bytes_of(kind)) for kind in TRANSACTION_KINDS)
+    for size in sizes:
+        if not execution.covers(size):
             yield sentence(
-                f"the profile's payload of {{}} is outside the table, {execution.range_bytes}: measure it, or use "
-                "--form linear.",
+                f"the profile's payload of {{}} is outside what was measured, {execution.range_bytes}: measure it.",
                 ShownValue(size, "payload_bytes", "bytes"),
             )
     short = [fit for fit in answer.payloads if fit.execution_us <= answer.at_most_us]
@@ -184,10 +168,10 @@ def _outliers(outliers: list[Outlier], word: str, worst_us: float) -> Sentence:
         *([sentence(" and {} more", count_value(more))] if more > 0 else []),
     ]
     if word == "fast":
-        parts.append(sentence("; left out of the fit; measure again."))
+        parts.append(sentence("; left out: measure again."))
     else:
         worst = time_value(worst_us, "worst_extra_us")
-        parts.append(sentence("; not in the fit: the slowest execution takes {} more, worst_extra_us.", worst))
+        parts.append(sentence("; left out: the slowest execution takes {} more, worst_extra_us.", worst))
     return joined(*parts, by="")
 
 

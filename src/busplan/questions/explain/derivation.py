@@ -207,9 +207,7 @@ def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[st
     if command == "capacity":
         return {"": _known(_of_capacity(cycle, is_decided=model == network.bus.deciding_model), known)}
     return {
-        latency.label: _known(
-            {"payload_bytes": latency.payload_bytes, "nodes": network.nodes, **latency.phases}, known
-        )
+        latency.label: _known({"payload_bytes": latency.payload_bytes, "nodes": network.nodes, **latency.phases}, known)
         for latency in cycle.latencies()
     }
 
