@@ -42,17 +42,12 @@ def is_unwritten_pipe(path: Path) -> bool:
     return path.is_fifo() and not str(path).startswith(_OPENED)
 
 
-def partial_path(path: Path) -> Path:
-    """File name for the output of a stopped run: rows.csv becomes rows.partial.csv."""
-    return path.with_name(f"{path.stem}.partial{path.suffix}")
-
-
 @contextmanager
-def new_file(path: Path, *, overwrite: bool, keeps_after: type[BaseException] | tuple[()] = ()) -> Iterator["NewFile"]:
+def new_file(path: Path, *, overwrite: bool) -> Iterator["NewFile"]:
     """Open a file for atomic writing: a temporary file next to it is renamed at the end.
 
     It is opened at once, so that a path that cannot be written fails before the work. After an error, the old file is
-    unchanged; after an error of `keeps_after`, too, and the output so far is under `partial_path`.
+    unchanged.
 
     Raises
     ------
@@ -63,18 +58,14 @@ def new_file(path: Path, *, overwrite: bool, keeps_after: type[BaseException] | 
     # A name of the greatest length leaves no room for a suffix.
     stem = target.name if len(os.fsencode(target.name)) <= _LONG_NAME else "busplan"
     temporary = target.with_name(f".{stem}.{os.urandom(4).hex()}.tmp")
-    stopped: BaseException | None = None
     with ExitStack() as last:
         with naming_errors(path, target):
             mode = _mode_of(target, overwrite=overwrite)
             last.callback(_remove, temporary)
             file = NewFile(_Raw(temporary, path=path, target=target))
         last.callback(_close, file)
-        try:
-            # Errors of the caller's own work pass through.
-            yield file
-        except keeps_after as error:
-            stopped, target, overwrite = error, partial_path(target), True
+        # Errors of the caller's own work pass through.
+        yield file
         if file.abandoned:
             return
         with naming_errors(path, target):
@@ -88,8 +79,6 @@ def new_file(path: Path, *, overwrite: bool, keeps_after: type[BaseException] | 
                 temporary.replace(target)
             else:
                 _rename_new(temporary, target)
-        if stopped is not None:
-            raise stopped
 
 
 class _Raw(io.FileIO):

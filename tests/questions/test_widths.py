@@ -20,15 +20,11 @@ from busplan.questions.compare.report import compare_report
 from busplan.questions.diff import diff
 from busplan.questions.explain import explain
 from busplan.questions.fit.figures import capacity
-from busplan.questions.fit.network import model_names
 from busplan.questions.latency.figures import latency
 from busplan.questions.latency.report import latency_report
 from busplan.questions.plan.planning import plan
 from busplan.questions.plan.report import plan_report
-from busplan.questions.sweep.asked import Sweep
-from busplan.questions.sweep.blocks import sweep
-from busplan.questions.sweep.digest import Digest, default_columns
-from busplan.questions.sweep.grid import Listed, checked_grid
+from busplan.questions.sweep import sweep
 from busplan.questions.timeline.events import schedule
 from busplan.questions.timeline.report import timeline_report
 from busplan.sections.profile import Profile
@@ -39,18 +35,7 @@ PROFILES = ("paper-optimal-gap", "gantry-24", "can-servo-8", "can-fd-arm-7", "et
 
 
 def swept(profile: Profile) -> Report:
-    grid = checked_grid(
-        profile,
-        {"cycle.period_us": Listed((500, 1000, 4000)), "limits.reserve": Listed((0, 0.25))},
-        with_circle=False,
-    )
-    models = model_names(profile)
-    asked = Sweep(profile, grid, tuple(models), ())
-    columns = (*grid.axes, "timing_model", *default_columns(asked))
-    digest = Digest(asked._replace(columns=columns), top=20)
-    for block in sweep(profile, grid, timing_models=models):
-        digest.add(block)
-    return digest.report(dict)
+    return sweep(profile, vary={"cycle.period_us": (500, 1000, 4000), "limits.reserve": (0, 0.25)}).report()
 
 
 def several(profile: Profile) -> Report:

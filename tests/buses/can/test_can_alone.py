@@ -307,6 +307,8 @@ def test_a_sweep_and_a_map_agree_with_capacity_point_by_point() -> None:
         if figures.verdict is not None:
             cells: Any = pictured.rows[deadlines_us.index(row["message.doors.deadline_us"])]
             assert cells[rates.index(row["bus.bit_rate_kbit_s"])].state == figures.verdict
+    # Without a cycle there is no margin.
+    assert {cell["margin_corrected_us"] for cell in pictured.to_dict()["cells"]} == {None}
 
 
 @pytest.mark.parametrize("number", [3, 49, 50, 400])

@@ -50,7 +50,7 @@ class Answer(ABC):
         ----------
         path
             A name ending in .html, .md, .txt, .json or .csv; .svg or .png (with the extra `plot`) for an answer with
-            a picture; .jsonl or .parquet (with the extra `table`) for a sweep.
+            a picture; .parquet (with the extra `table`) for a sweep.
 
         Raises
         ------

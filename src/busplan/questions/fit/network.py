@@ -6,7 +6,6 @@ from typing import Final
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
-from busplan.buses.parts import Value
 from busplan.elementwise import Number, Traced, is_everywhere, total
 from busplan.profile.toml import override
 from busplan.sections.alike_nodes import AlikeNodes
@@ -46,7 +45,7 @@ def at_period(network: Network, period_us: Number) -> Network:
     return network._replace(profile=with_unchecked(network.profile, PERIOD, period_us), period_us=period_us)
 
 
-def changed(network: Network, changes: Mapping[str, Value]) -> Network:
+def changed(network: Network, changes: Mapping[str, object]) -> Network:
     """The network with other values by dotted key.
 
     Raises

@@ -17,8 +17,8 @@ from busplan.forms.picture import styled
 from busplan.forms.scale import placed_labels
 from busplan.forms.svg import LINE, PHONE, drawing, inside, markup, paragraph, text_at
 from busplan.questions.fit.certainty import TIME
-from busplan.questions.fit.network import bus_of, varied_nodes
-from busplan.questions.map.direction import AXES, PERIOD, Direction
+from busplan.questions.fit.network import PERIOD, varied_nodes
+from busplan.questions.map.direction import AXES, Direction
 from busplan.questions.map.trade_off import Cell, NotDrawn, Region, State, TradeOff
 from busplan.sections.profile import Profile
 
@@ -98,16 +98,16 @@ def legend_of(trade_off: TradeOff, looks: Looks) -> list[Swatch]:
 def state_words(state: State, trade_off: TradeOff) -> str:
     """Name of a state on a map."""
     if state == "unsafe":
-        return f"unsafe {bus_of(trade_off.profile).safety.setting}"
+        return f"unsafe {trade_off.network.bus.safety.setting}"
     return f"{state}, and the circle passes" if state == "fits" and trade_off.with_circle else state
 
 
-def limit_words(region: Region | Cell, profile: Profile) -> str:
+def limit_words(region: Region | Cell, trade_off: TradeOff) -> str:
     """Limits that keep a region from fitting; empty where it fits."""
     words = " and ".join(region.limited_by)
     if region.limited_by != (TIME,):
         return words
-    return f"{words}, largest term {bus_of(profile).figures.term_label(region.binding_term)}"
+    return f"{words}, largest term {trade_off.network.bus.figures.term_label(region.binding_term)}"
 
 
 def title_of(direction: Direction, profile: Profile) -> str:
@@ -145,7 +145,7 @@ def map_title(trade_off: TradeOff) -> str:
 
 def cell_words(trade_off: TradeOff, cell: Cell) -> str:
     """Say the setting of a cell, its state and its limit."""
-    limit = limit_words(cell, trade_off.profile)
+    limit = limit_words(cell, trade_off)
     return f"{setting_words(trade_off, cell)}: {state_words(cell.state, trade_off)}{limit and f', {limit}'}"
 
 
