@@ -143,6 +143,7 @@ def test_the_commands_of_a_page_give_the_origin_that_is_said() -> None:
 def test_a_difference_calls_its_sides_as_it_is_told() -> None:
     found = busplan.diff("paper-optimal-gap", "paper-1ms", arguments=("before", "after"))
     assert [found.to_dict()[side]["argument"] for side in "ab"] == ["before", "after"]
+    assert found.regression_words(tolerance_percent=10).startswith("regression: B is worse by more than 10 % in ")
 
 
 def test_figures_that_are_worse_are_named_with_a_tolerance() -> None:

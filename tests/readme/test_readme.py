@@ -201,7 +201,7 @@ def tables() -> Iterator[list[str]]:
         for row in constants
     ]
     yield table(list(constants[0]), cells, left=6)
-    for command, figures in {**figures_of(kind_named("ieee1394")), "circle-test": CIRCLE_BY_KEY}.items():
+    for command, figures in (*figures_of(kind_named("ieee1394")).items(), ("circle-test", CIRCLE_BY_KEY)):
         described = (
             [code(one.key), one.symbol, one.unit, one.meaning, one.reference, one.better.replace("neither", "")]
             for one in figures.values()

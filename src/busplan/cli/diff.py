@@ -71,12 +71,11 @@ def diff_command(
     with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
         from busplan.profile.revision import load_revision
         from busplan.questions.diff import diff
-        from busplan.questions.diff.report import regression_words
 
         first, second = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
         difference = diff(first, second, timing_model=chosen_model(timing_model), arguments=(a, b))
         give(difference.report())
-        regressions = regression_words(difference, tolerance_percent=allowed)
+        regressions = difference.regression_words(tolerance_percent=allowed)
     if fail_on_regression and regressions:
         say(regressions)
         raise PlanFailsError

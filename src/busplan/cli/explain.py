@@ -62,16 +62,15 @@ def explain_command(
     Example: busplan explain paper-4ms required_us
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.questions.base.inputs import load_network
+        from busplan.questions.base.inputs import checked_models, load_network
         from busplan.questions.explain import explain
-        from busplan.questions.fit.network import model_names
 
         loaded = load_changed(profile, changes)
         explanation = explain(
             loaded,
             figure,
             period_us=periods_us(period, loaded),
-            timing_model=model_names(load_network(loaded)) if timing_model == ALL_MODELS else timing_model,
+            timing_model=checked_models(None, load_network(loaded)) if timing_model == ALL_MODELS else timing_model,
             transaction=transaction,
         )
         give(explanation.report())

@@ -14,7 +14,6 @@ from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.questions.diff import ComparedFigure, DiffAnswer, diff
-from busplan.questions.diff.report import regression_words
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
@@ -235,12 +234,12 @@ def test_a_tolerance_that_is_none_is_refused(make: Make, percent: Any) -> None:
 def test_regressions_are_named_with_the_timing_that_has_them() -> None:
     paper = load("paper-1ms").profile
     found = diff(paper, override(paper, {"cycle.nonperiodic_us": 250}))
-    assert regression_words(found, tolerance_percent=80) == (
+    assert found.regression_words(tolerance_percent=80) == (
         "regression: B is worse by more than 80 % in 8 figures: verdict, corrected margin, "
         "period with enough time, margin, utilisation, required time, smallest period, no limit broken (standard)"
     )
-    assert regression_words(found, tolerance_percent=0).startswith("regression: B is worse in ")
-    assert regression_words(diff(paper, paper), tolerance_percent=0) == ""
+    assert found.regression_words(tolerance_percent=0).startswith("regression: B is worse in ")
+    assert diff(paper, paper).regression_words() == ""
 
 
 def test_two_kinds_of_bus_are_compared_by_the_models_that_decide() -> None:

@@ -133,6 +133,12 @@ class DiffAnswer(Answer):
             raise BusplanError(f"tolerance_percent {allowed:g}: must be 0 or more")
         return tuple(figure for figure in self.figures if figure.is_regression(tolerance=allowed / 100))
 
+    def regression_words(self, *, tolerance_percent: float = 0.0) -> str:
+        """Name the `regressions` in a sentence; empty if there are none."""
+        from busplan.questions.diff.report import regression_words
+
+        return regression_words(self, tolerance_percent=tolerance_percent)
+
     def report(self) -> Report:
         """The answer in blocks."""
         from busplan.questions.diff.report import diff_report
