@@ -281,7 +281,7 @@ class PayloadRange(NamedTuple):
     """Carrier that holds no more."""
 
 
-class Packets(NamedTuple):
+class PacketTime(NamedTuple):
     """What is not the execution in a measured latency [us]."""
 
     us: float
@@ -293,7 +293,7 @@ class Packets(NamedTuple):
 class MeasuredLatencies(NamedTuple):
     """Calibration of execution times from latencies that were measured on a kind of bus."""
 
-    packets: Callable[[Network, str, str, str, int], Packets]
+    packets: Callable[[Network, str, str, str, int], PacketTime]
     """Time of the packets of a transaction, by network, name of the group, timing model, "read" or "write", and
     payload [bytes]; a BusplanError where its latency could not be measured."""
     fit_keys: Callable[[Network, str], dict[str, Value]]

@@ -28,7 +28,7 @@ from busplan.buses.parts import (
     Cost,
     Key,
     MeasuredLatencies,
-    Packets,
+    PacketTime,
     PayloadRange,
     Perturbation,
     Safety,
@@ -44,7 +44,7 @@ _HOST_STEP_US: Final = 10.0
 """Step by which the host is made slower, for the sensitivity of the margin."""
 
 
-def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> Packets:
+def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> PacketTime:
     """Time of the packets of a split transaction with the farthest node of a group.
 
     Raises
@@ -72,7 +72,7 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
         overhead_bytes=said.payload.overhead_bytes,
         responder=Responder(0.0),
     )
-    return Packets(plain(phases.latency_us), plain(phases.subaction_gap_us))
+    return PacketTime(plain(phases.latency_us), plain(phases.subaction_gap_us))
 
 
 def fitted_against(network: Network, model: str) -> dict[str, Value]:

@@ -7,7 +7,7 @@ from statistics import median, stdev
 from typing import Final, NamedTuple
 
 from busplan.buses.network import Network
-from busplan.buses.parts import Packets
+from busplan.buses.parts import PacketTime
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement
 from busplan.sections.transactions import TransactionKind
@@ -70,7 +70,7 @@ class PayloadFit(NamedTuple):
 def timed(
     network: Network,
     measurements: Sequence[Measurement],
-    packets: Mapping[tuple[TransactionKind, int], Packets],
+    packets: Mapping[tuple[TransactionKind, int], PacketTime],
     *,
     source: str,
     model: str,
