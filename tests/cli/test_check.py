@@ -793,8 +793,7 @@ def test_completion_of_names_codes_and_values(busplan: Busplan, tmp_path: Path) 
     ]  # fmt: skip
     assert completed("busplan check paper-4ms paper-1") == ["paper-1ms"]
     assert completed("busplan rule BP11") == ["BP110", "BP111", "BP112", "BP113", "BP114", "BP115"]
-    assert completed("busplan explain paper-4ms safe_n") == ["safe_nodes"]
-    assert completed("busplan explain paper-4ms circle-test.fail") == ["circle-test.failures"]
+    assert completed("busplan explain paper-4ms safe_r") == ["safe_required_us"]
     assert completed("busplan check --format s") == ["sarif"]
     assert completed("busplan check --fail-on ") == ["error", "warning"]
     # Nothing of ours: the shell goes on to files.

@@ -61,7 +61,7 @@ EVERY = {
     "report": ("mine.toml", "--no-circle"),
     "plan": ("mine.toml", "--no-circle"),
     "sweep": ("mine.toml", "--vary", "bus.nodes=1:3"),
-    "diff": ("mine.toml", "paper-1ms", "--no-circle"),
+    "diff": ("mine.toml", "paper-1ms"),
     "calibrate": ("mine.toml", "table-1.csv"),
     "check": ("mine.toml", "--no-circle"),
 }

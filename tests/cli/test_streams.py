@@ -308,7 +308,7 @@ EQUATIONS = ("capacity {}", "latency {}", "capacity {} --format json", "profiles
 NO_CIRCLE = (
     "check {} --no-circle",
     "plan {} --no-circle --format csv",
-    "diff {} paper-1ms --no-circle",
+    "diff {} paper-1ms",
     "timeline {} -o a.svg",
 )
 

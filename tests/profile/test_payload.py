@@ -10,7 +10,7 @@ import busplan
 from busplan.errors import PlacedError
 from busplan.profile.shipped import load
 from busplan.profile.toml import decode, override, validate
-from busplan.questions.explain.derivation import explain
+from busplan.questions.explain import explain
 from busplan.questions.fit.figures import capacity, figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.latency.figures import latency

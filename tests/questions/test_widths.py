@@ -17,10 +17,8 @@ from busplan.questions.circle.report import circle_report
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.compare.kinds import compare
 from busplan.questions.compare.report import compare_report
-from busplan.questions.diff.difference import difference
-from busplan.questions.diff.report import diff_report
-from busplan.questions.explain.derivation import assumptions, explain
-from busplan.questions.explain.report import assumptions_report, explain_report
+from busplan.questions.diff import diff
+from busplan.questions.explain import explain
 from busplan.questions.fit.figures import capacity
 from busplan.questions.latency.figures import latency
 from busplan.questions.latency.report import latency_report
@@ -55,10 +53,10 @@ ANSWERS: dict[str, Callable[[Profile], Report]] = {
     "capacity --sensitivity": moved,
     "latency": lambda profile: latency_report(latency(profile)),
     "plan": lambda profile: plan_report(plan(profile)),
-    "explain": lambda profile: assumptions_report(profile, assumptions(profile)),
-    "explain margin_us": lambda profile: explain_report(explain(profile, "margin_us")),
+    "explain": lambda profile: explain(profile).report(),
+    "explain margin_us": lambda profile: explain(profile, "margin_us").report(),
     "circle-test": lambda profile: circle_report(circle_test(profile)._replace(with_contributions=True)),
-    "diff": lambda profile: diff_report(difference(load("paper-dma").profile, profile), arguments=("a.toml", "b.toml")),
+    "diff": lambda profile: diff("paper-dma", profile, arguments=("a.toml", "b.toml")).report(),
     "timeline": lambda profile: timeline_report(schedule(profile)),
     "sweep": swept,
     "compare": lambda profile: compare_report(compare(profile, with_circle=True)),

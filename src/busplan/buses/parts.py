@@ -276,28 +276,21 @@ class PayloadRange(NamedTuple):
     """Carrier that holds no more."""
 
 
-class Halves(NamedTuple):
-    """Parts of a measured latency beside the execution [us]."""
+class PacketTime(NamedTuple):
+    """What is not the execution in a measured latency [us]."""
 
-    latency_us: float
-    """All of it."""
-    request_and_acknowledge_us: float
-    """Up to the first acknowledge."""
+    us: float
+    """Time of the packets."""
     shortest_us: float = 0.0
     """The bus waits so long whatever the node does: a shorter execution cannot be told from a latency."""
-
-    @property
-    def response_and_acknowledge_us(self) -> float:
-        """Behind the execution."""
-        return self.latency_us - self.request_and_acknowledge_us
 
 
 class MeasuredLatencies(NamedTuple):
     """Calibration of execution times from latencies that were measured on a kind of bus."""
 
-    halves: Callable[[Network, str, str, str, int], Halves]
+    packets: Callable[[Network, str, str, str, int], PacketTime]
     """Time of the packets of a transaction, by network, name of the group, timing model, "read" or "write", and
     payload [bytes]; a BusplanError where its latency could not be measured."""
-    fit_keys: Callable[[Network, str | None], dict[str, Value]]
+    fit_keys: Callable[[Network, str], dict[str, Value]]
     """Keys of [node.execution] that say what an execution time was fitted against, by network and by timing model whose
-    packets were taken off; None where their time was measured."""
+    packets were taken off."""

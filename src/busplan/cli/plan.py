@@ -90,8 +90,8 @@ def plan_command(
     """Tell what to set for a number of nodes or axes: gap count, slice ratio, period, or several of them.
 
     It changes one thing at a time, the cheapest first and as little as possible, until the goal is shown to fit with
-    its reserve, at a safe gap count, within all [limits]; --free lists them by cost. The slice ratio goes up to 0.9; the
-    period changes only if nothing cheaper is enough. Values given by an option are kept.
+    its reserve, at a safe gap count, within all [limits]; --free lists them by cost. The slice ratio goes up to 0.9;
+    the period changes only if nothing cheaper is enough. Values given by an option are kept.
 
     The table has a row for each thing that was tried. Margins are in us, less the model's bias. Without a plan the
     answer names what prevents it and what would be enough. `busplan manual plan` has more. Exits 0 when there is a

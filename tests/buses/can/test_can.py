@@ -463,15 +463,13 @@ def test_the_hosts_own_time_is_in_the_cycle_that_it_computes_in() -> None:
     assert loop.worst_response_us == sum(terms(later).values()) + 2 * 6000
 
 
-def test_the_jitter_of_sync_reaches_the_circle(run: Run) -> None:
+def test_the_jitter_of_sync_reaches_the_circle() -> None:
     servo = load("can-servo-8").profile
     # SYNC ends behind 55 us, or 135 us later: half of that either way.
     assert busplan.circle_test(servo).results[0].jitter_us == 67.5
     own = override(servo, {"delivery.jitter_us": 10.0})
     assert busplan.circle_test(own).results[0].jitter_us == 77.5
     assert busplan.circle_test(override(servo, {"message.sdo-request.identifier": 0x10})).results[0].jitter_us == 135
-    said = run("explain", "can-servo-8", "circle-test.jitter_us").stdout
-    assert "J = jitter_us + (B + I) / 2" in said
 
 
 def test_the_expected_load_lies_between_no_stuff_bits_and_the_most() -> None:

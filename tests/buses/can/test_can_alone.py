@@ -343,7 +343,7 @@ def test_many_messages_are_answered_as_few_are(number: int) -> None:
         (lambda own: busplan.capacity(own, period_us=4000), "messages alone have no cycle"),
         (lambda own: busplan.plan(own, axes=4), "a plan for axes asks for one"),
         (busplan.circle_test, "messages alone have no axes that could move"),
-        (lambda own: busplan.explain(own, "circle-test.passed"), "messages have no circle"),
+        (lambda own: busplan.explain(own, "required_us"), "required_us: no equation leads to it"),
         (lambda own: busplan.sweep(own, vary={"cycle.period_us": [1000]}), "no figure of capacity depends on it"),
     ],
 )

@@ -150,7 +150,7 @@ def test_arrays_of_points_give_what_each_point_gives(
 
 
 def test_a_long_list_of_inputs_stands_once() -> None:
-    chapters = busplan.explain(many(40, load=0.5), "worst_response_us").report().blocks()
+    chapters = busplan.explain(many(40, load=0.5), "worst_response_us").report().blocks
     sections = [chapter.blocks for chapter in chapters if isinstance(chapter, Chapter)]
     tables = [block for blocks in sections for block in blocks if isinstance(block, Table)]
     shown = [len(table.rows) for table in tables]

@@ -19,7 +19,7 @@ from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load
 from busplan.profile.toml import decode, override, validate
 from busplan.profile.write import profile_text
-from busplan.questions.explain.bus import capacity_figures
+from busplan.questions.explain import explain
 from busplan.questions.fit.certainty import certainty, cycle_of, fits_in
 from busplan.questions.fit.figures import COUNTS, figures
 from busplan.questions.fit.loop_delays import loop_delays_us
@@ -205,13 +205,13 @@ def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: Profile)
 
 @given(profile=grouped())
 def test_a_derivation_gives_the_figures(profile: Profile) -> None:
-    for model in model_names(profile):
-        known, derived = figures(profile, model=model).by_key(), capacity_figures(profile, model=model)
-        for key, value in known.items():
-            if key in derived:
-                assert value_of(derived[key]) == (list(value) if isinstance(value, tuple) else value), key
-            else:
-                assert value is None
+    network = network_of(profile)
+    for model in model_names(network):
+        known = figures(network, model=model).values()
+        for key in ("required_us", "margin_us", "read_latency_us", "axes"):
+            if known[key] is not None:
+                (one,) = explain(profile, key, timing_model=model).derivations
+                assert one.value == known[key]
 
 
 @settings(max_examples=12)

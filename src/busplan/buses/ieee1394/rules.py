@@ -133,7 +133,8 @@ def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
         if after.verdict != "fits":
             yield RuleProblem(
                 "bus.gap_count",
-                f"fits at {figures.own['gap_count']}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: {margin(after)}",
+                f"fits at {figures.own['gap_count']}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: "
+                f"{margin(after)}",
                 "have the bus manager write the gap count after each reset",
             )
 

@@ -208,5 +208,5 @@ def _decimals(us: float, doubt_us: float | None) -> int:
     if doubt_us and isfinite(doubt_us):
         decimals = -floor(log10(doubt_us))
     else:
-        decimals = _FIGURES - 1 - floor(log10(us)) if us else 0
+        decimals = _FIGURES - 1 - floor(log10(abs(us))) if us else 0
     return min(max(0, decimals), _MOST_DECIMALS)

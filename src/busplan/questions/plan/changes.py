@@ -187,7 +187,7 @@ def _with_one(network: Network, change: Changes) -> Network | None:
 
 
 def _lack(needs: Sequence[Need], network: Network | None) -> tuple[int, float]:
-    """How far a network is from holding all constraints: those that no period mends, and the period that the rest needs."""
+    """How far a network is from all constraints: those that no period mends, and the period that the rest needs [us]."""
     if not needs or network is None:
         return 0, 0.0
     periods_us = [need.period_us(float(plain(network.slice_ratio))) for need in needs]
@@ -247,7 +247,7 @@ def _cut(alike: AlikeNodes, kind: TransactionKind) -> tuple[str, int]:
 
 
 def _periods(network: Network, _kept: Collection[str]) -> Iterator[Changes]:
-    """The period nearest to the own one at which all constraints hold: rounded up, or the next one that the bus allows."""
+    """The period nearest to the own one at which all constraints hold: rounded up, or the next that the bus allows."""
     least = smallest_period(network)
     if least.us is None:
         return

@@ -10,9 +10,8 @@ from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole, with_cycle
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.network import network_of
 from busplan.questions.timeline.events import Schedule, Total, schedule, totals, zoom
-from busplan.sections.profile import Profile
 
 _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
