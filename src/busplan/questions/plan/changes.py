@@ -187,7 +187,7 @@ def _with_one(network: Network, change: Changes) -> Network | None:
 
 
 def _lack(needs: Sequence[Need], network: Network | None) -> tuple[int, float]:
-    """How far a network is from all constraints: those that no period mends, and the period that the rest needs [us]."""
+    """How far a network is from all constraints: those that no period mends, and the period for the rest [us]."""
     if not needs or network is None:
         return 0, 0.0
     periods_us = [need.period_us(float(plain(network.slice_ratio))) for need in needs]
