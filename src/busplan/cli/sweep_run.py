@@ -107,10 +107,10 @@ def run_sweep(job: SweepJob) -> None:
                 say(f"{parts.tests:,} of {sweep.tests:,} circle tests are in {parts.folder}: go on with --resume")
             raise StoppedError(CANNOT) if signal is None else stopped_by(signal)
         if drawing is not None and plot_file is not None and job.plot_form is not None:
-            from busplan.forms.raster import picture
+            from busplan.forms.svg import content
 
-            svg = drawing.svg(", ".join(filter(None, (sweep.profile.name, sweep.changes.words))))
-            plot_file.write(document_bytes(picture(svg, job.plot_form)))
+            drawn = drawing.drawing(", ".join(filter(None, (sweep.profile.name, sweep.changes.words))))
+            plot_file.write(document_bytes(content(drawn, job.plot_form)))
     for path in (job.output, job.plot):
         if path is not None:
             say(f"wrote {path}")

@@ -1,6 +1,6 @@
 """Contour data of a simulation, for drawings and files: the error around the circle, and every step."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,23 +19,6 @@ class ContourProfile(NamedTuple):
 
     low_mm: tuple[float | None, ...]
     high_mm: tuple[float | None, ...]
-
-    def condensed(self, *, sectors: int) -> "ContourProfile":
-        """Merge neighbouring sectors.
-
-        Parameters
-        ----------
-        sectors
-            New number of sectors, a divisor of the present number [1].
-        """
-        width = len(self.low_mm) // sectors
-
-        def each(ends: tuple[float | None, ...], choose: Callable[[list[float]], float]) -> Iterator[float | None]:
-            for start in range(0, len(ends), width):
-                there = [end for end in ends[start : start + width] if end is not None]
-                yield choose(there) if there else None
-
-        return ContourProfile(tuple(each(self.low_mm, min)), tuple(each(self.high_mm, max)))
 
 
 def contour_profile(run: CircleRun, *, sectors: int = CONTOUR_SECTORS) -> ContourProfile:

@@ -40,7 +40,7 @@ from busplan.questions.circle.figures import CIRCLE_BY_KEY, CircleFigures
 from busplan.questions.circle.report import (
     ACT_TOGETHER,
     NO_SOURCES,
-    circle_drawing,
+    circle_or_reason,
     circle_sentences,
     circle_table,
     contributions_table,
@@ -54,7 +54,7 @@ from busplan.questions.map.report import headline, map_chart, regions_table
 from busplan.questions.report.all_answers import AllAnswers
 from busplan.questions.report.commands import Sources
 from busplan.questions.timeline.report import timeline_chart, totals_table
-from busplan.questions.words.drawings import LEFT, AxesDrawing, TermsDrawing
+from busplan.questions.words.drawings import LEFT, axes_drawing, terms_drawing
 
 _ORDER: Final = "The terms stand in the order of the table, and what they leave comes last."
 _OVER_PERIOD: Final = (SAFE_NODES, SAFE_AXES, SAFE_LIMITED_BY)
@@ -118,7 +118,7 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 def _terms(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     """The terms of the cycle, as bars and as a table."""
     results = answer.capacity.results
-    yield Chart(TermsDrawing(results), _largest_term(answer), Sentence((_ORDER,)))
+    yield Chart(terms_drawing(results), _largest_term(answer), Sentence((_ORDER,)))
     words = (TableColumn("term", kind="words"), TableColumn("eq", kind="words"))
     rows = []
     for term in (*bus_of(answer.profile).figures.terms, LEFT):
@@ -155,7 +155,7 @@ def _axes(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
         count_value(axes, AXES.key),
         count_value(nodes, NODES.key),
     )
-    yield Chart(AxesDrawing(answer.profile, steps), caption, Sentence((_curves(answer),)))
+    yield Chart(axes_drawing(answer.profile, steps), caption, Sentence((_curves(answer),)))
     columns = [
         TableColumn(figure.label, kind="words" if figure.sort == "word" else "figures", group=model.timing_model)
         for model in steps
@@ -210,11 +210,9 @@ def _shown_of(is_safe: bool) -> tuple[Figure, ...]:
 
 
 def _curves(answer: AllAnswers) -> str:
-    """Legend of the curves."""
+    """What each curve is."""
     names = [f"{step.timing_model}, {'shown to fit' if step.is_safe else 'the closed form'}" for step in answer.steps]
-    marks = ("solid with a square", "dashed with a diamond")
-    curves = (f"{name}: {mark}" for name, mark in zip(names, marks, strict=False))
-    return f"The axes that a period carries, {'; '.join(curves)}; the point is this profile's own."
+    return f"The axes that a period carries: {'; '.join(names)}."
 
 
 _QUESTION: Final = "Is the circle still round?"
@@ -258,7 +256,7 @@ def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     if result is None:
         yield from (Sentence((why,)) for why in _why_not(answer))
         return
-    yield circle_drawing(answer.contour, result, answer.profile)
+    yield circle_or_reason(answer.contour, result, answer.profile)
     yield circle_table((result,))
     yield sources["circle"].line
 

@@ -17,6 +17,7 @@ from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
 from busplan.forms import ROWS_ENDINGS, RowsForm
 from busplan.forms.blocks import Report
+from busplan.forms.charts import Drawing
 from busplan.forms.csv_rows import spelled
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_profile
@@ -163,12 +164,15 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         rows = {ending: partial(self._rows_in, form) for ending, form in ROWS_ENDINGS.items()}
         return {**Answer._contents(self), **rows}  # noqa: SLF001 - super() knows no class with slots made anew
 
-    def _svg(self) -> str:
-        """The picture of `busplan sweep --plot`."""
-        return self._figure().svg(self.profile.name)
+    def drawing(self) -> Drawing:
+        """The picture of `busplan sweep --plot`.
 
-    def _repr_svg_(self) -> str | None:
-        return self._svg() if is_drawable(self.grid) else None
+        Raises
+        ------
+        BusplanError
+            More than two keys vary, or there are too many points.
+        """
+        return self._figure().drawing(self.profile.name)
 
     def _repr_html_(self) -> str:
         from busplan.forms.html import fragment

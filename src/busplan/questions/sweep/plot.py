@@ -7,13 +7,14 @@ import numpy as np
 from busplan.buses.figure import VERDICT
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Chart, Sentence
+from busplan.forms.charts import Drawing
 from busplan.questions.fit.certainty import FITS, VERDICTS
 from busplan.questions.fit.network import bus_of
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import SweepBlock
 from busplan.questions.sweep.grid import Grid
-from busplan.questions.sweep.panels import SweepDrawing, sweep_svg
-from busplan.questions.sweep.plotted import Panel, Plotted, caption, is_constant, key_label, plot_scale, plotted_figure
+from busplan.questions.sweep.panels import sweep_drawing
+from busplan.questions.sweep.plotted import Plotted, SweptModel, is_constant, key_label, plot_scale, plotted_figure
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
@@ -85,8 +86,8 @@ class FigureData:
             unsafe = ~safe.are_true.astype(bool) & ~safe.are_missing.astype(bool)
             self._unsafe[points, number] = np.broadcast_to(unsafe, block.chunk.shape).ravel()
 
-    def svg(self, title: str) -> str:
-        """Draw the collected values; the same sweep gives the same SVG.
+    def drawing(self, title: str) -> Drawing:
+        """Draw the collected values.
 
         Parameters
         ----------
@@ -94,12 +95,12 @@ class FigureData:
             Name of the profile, and what was set.
         """
         plotted = self.plotted()
-        return sweep_svg(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
+        return sweep_drawing(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
 
     def chart(self) -> Chart:
         """The picture as a block of a page."""
-        plotted = self.plotted()
-        return Chart(SweepDrawing(plotted), Sentence((caption(plotted),)))
+        drawing = self.drawing(self._profile.name)
+        return Chart(drawing, Sentence(drawing.words))
 
     def plotted(self) -> Plotted:
         """The picture's content, in words and in the unit of the figure."""
@@ -108,7 +109,7 @@ class FigureData:
         figure, factor = plotted_figure(self._profile, name)
         shape, bus = tuple(self._grid.axes[key].size for key in keys), bus_of(self._profile)
         panels = tuple(
-            Panel(
+            SweptModel(
                 model,
                 number,
                 factor * values.reshape(shape),

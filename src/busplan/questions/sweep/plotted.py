@@ -120,7 +120,7 @@ def figure_label(figure: Figure) -> str:
     return ", ".join(filter(None, (figure.label or figure.key, "" if unit in SILENT_UNITS else unit)))
 
 
-class Panel(NamedTuple):
+class SweptModel(NamedTuple):
     """The values under one timing model."""
 
     model: str
@@ -151,7 +151,7 @@ class Plotted(NamedTuple):
     figure: Figure
     scales: tuple[PlotScale, ...]
     """Of two, the first is the y axis and the second the x axis."""
-    panels: tuple[Panel, ...]
+    panels: tuple[SweptModel, ...]
     deciding: str
     """The timing model that decides."""
     safety: str
@@ -168,16 +168,24 @@ class Plotted(NamedTuple):
         return self.figure.scale is not None
 
     @property
-    def any_unsafe(self) -> bool:
-        """Whether any point is set unsafely."""
-        return any(bool(panel.unsafe.any()) for panel in self.panels)
+    def unsafe(self) -> Array:
+        """Where the network is not set safely under any timing model."""
+        unsafe: Array = np.logical_or.reduce([panel.unsafe for panel in self.panels])
+        return unsafe
 
     @property
-    def told(self) -> Panel | None:
+    def not_shown(self) -> Array:
+        """Where the cycle is not shown to fit, if that differs from setting to setting."""
+        frontiers = [~panel.frontier for panel in self.panels if panel.frontier is not None]
+        not_shown: Array = np.logical_or.reduce([np.zeros_like(self.unsafe), *frontiers])
+        return not_shown
+
+    @property
+    def told(self) -> SweptModel | None:
         """The panel that the caption tells of: that of the model that decides, where it has one."""
         return next((panel for panel in self.panels if panel.model == self.deciding), next(iter(self.panels), None))
 
-    def value_at_own(self, panel: Panel) -> float | None:
+    def value_at_own(self, panel: SweptModel) -> float | None:
         """The figure at this design; None if it is no point of the grid."""
         places = []
         for scale in self.scales:
@@ -210,7 +218,7 @@ def caption(plotted: Plotted) -> str:
     return f"{name[:1].upper()}{name[1:]} {by}: {spread}{design}.{_fitting(plotted, panel)}"
 
 
-def _fitting(plotted: Plotted, panel: Panel) -> str:
+def _fitting(plotted: Plotted, panel: SweptModel) -> str:
     """Say at how many settings the cycle is shown to fit, and how they are drawn."""
     if panel.fits is None:
         return ""
