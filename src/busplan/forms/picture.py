@@ -29,7 +29,7 @@ def _shades(name: str, pale: tuple[int, int, int], deep: tuple[int, int, int]) -
     return shades
 
 
-LEVELS: Final = 8
+LEVELS: Final = 10
 """Colours of numbers above zero, and of those below."""
 INKS: Final[Mapping[str, InkColours]] = MappingProxyType(
     {

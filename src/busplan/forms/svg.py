@@ -1,13 +1,14 @@
 """Drawings as SVG: widths are in percent, so that a drawing fills its container and text keeps its size."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import groupby
 from math import ceil, cos, log, radians, sin
-from textwrap import wrap
 from typing import TYPE_CHECKING, Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from busplan.forms.charts import Cell, Curve, Curves, Dial, Drawing, Entry, Grid, Lanes, Panel, Ruler, Span, legend
+from busplan.forms.lines import Line, wrapped
 from busplan.forms.picture import styled
 from busplan.forms.raster import WIDTH, png
 from busplan.forms.scale import placed
@@ -98,6 +99,12 @@ def _rect(parent: Element, *, x: str = "0", y: float, width: str, height: float,
         SubElement(rect, "title").text = title
 
 
+def _frame(parent: Element, *, x: str, y: float, width: str, height: float) -> None:
+    """Draw an empty box that is seen on any colour."""
+    for css in ("halo", "frame"):
+        _rect(parent, x=x, y=y, width=width, height=height, css=css)
+
+
 def _line(parent: Element, x: tuple[str, str], y: tuple[float, float], *, css: str) -> None:
     ends = {"x1": x[0], "x2": x[1], "y1": f"{y[0]:.5g}", "y2": f"{y[1]:.5g}"}
     SubElement(parent, "line", {**ends, "class": css})
@@ -126,8 +133,6 @@ class _Area(NamedTuple):
 
     area: Element
     """Text and marks: x in percent, y in px of the drawing."""
-    paths: Element
-    """Paths, in the coordinates of `point`, clipped to the plot; stretched with it but in a PNG."""
     plot: Grid | Curves
     top: float
     width: float
@@ -141,6 +146,11 @@ class _Area(NamedTuple):
         """The y of a value, in px."""
         return self.top + self.height * (1 - _share(self.plot.up, value))
 
+    def paths(self) -> Element:
+        """A place for paths in the coordinates of `point`, clipped to the plot; stretched with it but in a PNG."""
+        box = {"y": f"{self.top:g}", "width": "100%", "height": f"{self.height:g}", "preserveAspectRatio": "none"}
+        return SubElement(self.area, "svg", {**box, "viewBox": f"0 0 {self.width:.1f} {self.height:g}"})
+
     def point(self, x: float, y: float) -> str:
         """Coordinates of a point of a path, from shares of the plot's width and height."""
         return f"{self.width * x:.1f} {self.height * (1 - y):.1f}"
@@ -150,8 +160,10 @@ _GUTTER: Final = 40.0
 """Widest part left of a plot, in percent."""
 _ROW: Final = 16
 """Least distance of two labels, up, in px."""
-_TALL, _MOST_TALL, _HEIGHT = 20, 32, 640
+_TALL, _MOST_TALL, _HEIGHT = 20, 32, 520
 """Height of a row of cells, how many may have it, and that of all rows of more, in px."""
+_FAR: Final = 48
+"""Distance of the marks of small cells, in px."""
 _CURVES: Final = 240
 """Height of curves, in px."""
 _BAR, _THIN_BAR = 18, 8
@@ -179,9 +191,9 @@ class _Sheet:
         """Write a paragraph."""
         characters = int((self._room - x) / _LETTER)
         # Letters of other scripts may be twice as wide.
-        for line in wrap(text, characters if text.isascii() else characters // 2):
+        for line in wrapped(Line(text), characters if text.isascii() else characters // 2) if text else ():
             self.y += _LINE
-            _text(self._body, line, x=f"{x:g}", y=self.y - 5, css=css)
+            _text(self._body, line.text, x=f"{x:g}", y=self.y - 5, css=css)
 
     def panel(self, panel: Panel) -> None:
         """Draw a chart below its title."""
@@ -212,7 +224,8 @@ class _Sheet:
                 if entry.mark:
                     _dot(self._body, entry, x=f"{x + 14:g}", y=above + 11)
             else:
-                _rect(self._body, x=f"{x + 1:g}", y=above + 4, width="14", height=14, css=entry.ink)
+                box = _frame if entry.ink == "frame" else partial(_rect, css=entry.ink)
+                box(self._body, x=f"{x + 1:g}", y=above + 4, width="14", height=14)
                 letter = f"letter on-{entry.ink}"
                 _text(self._body, entry.mark, x=f"{x + 8:g}", y=above + 15, css=letter, anchor="middle")
             self.words(entry.words, x=x + sample)
@@ -229,8 +242,6 @@ class _Sheet:
         gutter = min(_GUTTER, 100 * (_SMALL_LETTER * longest + 12) / self._room)
         area = _inside(self._body, left=gutter, width=99 - gutter)
         width = WIDTH * (1 - 2 * _MARGIN / 100) * (99 - gutter) / 100
-        stretched = {"width": "100%", "height": f"{height:g}", "preserveAspectRatio": "none"}
-        stretched |= {"y": f"{top:g}", "viewBox": f"0 0 {width:.1f} {height:g}"}
         places = [(height * (1 - _share(up, tick.at)), _ROW) for tick in up.ticks]
         for number in placed(places, room=height + _ROW, own=_own(up)):
             y = top + places[number][0]
@@ -238,13 +249,14 @@ class _Sheet:
                 _line(area, ("0", "100%"), (y, y), css="rule")
             css = "small here" if number == _own(up) else "small"
             _text(self._body, up.ticks[number].label, x=f"{gutter - 2:.5g}%", y=round(y) + 4, css=css, anchor="end")
-        paths = SubElement(area, "svg", stretched)
         self.y = top + height
         self._across(area, across, room=self._room * (99 - gutter) / 100)
-        return _Area(area, paths, plot, top, width, height)
+        _text(area, across.label, x="100%", y=self.y + 14, css="small", anchor="end")
+        self.y += _LINE + 2
+        return _Area(area, plot, top, width, height)
 
     def _across(self, area: Element, ruler: Ruler, *, room: float) -> None:
-        """Draw a scale below a plot that is `room` px wide or more."""
+        """Draw the ticks of a scale below a plot that is `room` px wide or more."""
         labels = [(room * _share(ruler, tick.at), _SMALL_LETTER * len(tick.label)) for tick in ruler.ticks]
         for number, start in placed(labels, room=room, gap=_SMALL_LETTER, own=_own(ruler)).items():
             (at, size), tick = labels[number], ruler.ticks[number]
@@ -253,8 +265,7 @@ class _Sheet:
             anchor = "middle" if abs(start - middle) < 1 else "start" if start > middle else "end"
             css = "small here" if number == _own(ruler) else "small"
             _text(area, tick.label, x=x, y=self.y + 19, css=css, anchor=anchor)
-        _text(area, ruler.label, x="100%", y=self.y + 36, css="small", anchor="end")
-        self.y += 2 * _LINE + 4
+        self.y += _LINE + 2
 
     # --- cells
 
@@ -263,8 +274,9 @@ class _Sheet:
         tall = _TALL if rows <= _MOST_TALL else _HEIGHT / rows
         area = self._area(grid, height=tall * rows)
         is_fine = max(rows, columns) > _MOST_TALL
-        css, wide = "cell fine" if is_fine else "cell", 1 / columns
-        every = ceil(_LETTER / (self._room * 0.8 * wide)), ceil(_GAP / tall)
+        css, wide = "fine" if is_fine else "cell", 1 / columns
+        # Small cells have a mark now and then.
+        every = (_FAR // (self._room * wide) + 1, ceil(_FAR / 2 / tall)) if is_fine else (1, 1)
         for number, row in enumerate(grid.rows):
             y, start = area.top + tall * (rows - number - 1), 0
             for cell, run in groupby(row):
@@ -273,27 +285,32 @@ class _Sheet:
                     box = {"x": _percent(start * wide), "width": _percent((end - start) * wide)}
                     _rect(area.area, **box, y=y, height=tall, css=f"{css} {cell.ink}", title=cell.words)
                 start = end
-            if number % every[1] == 0:
-                self._marks(area.area, row, y=y + tall / 2 + 4, every=every[0])
+            if number % every[1] == every[1] // 2:
+                self._marks(area.area, row, y=y + tall / 2 + 4, every=int(every[0]))
         edges = "".join(f"M{area.point(*start)}L{area.point(*end)}" for start, end in _borders(grid))
         if edges:
-            SubElement(area.paths, "path", {"class": "line border", "d": edges})
+            SubElement(area.paths(), "path", {"class": "line border", "d": edges})
         if grid.own is not None:
             x, y = grid.own
             place = SubElement(area.area, "svg", {"x": area.x(x), "y": f"{area.y(y):.5g}", "overflow": "visible"})
             if is_fine:
-                _rect(place, x="-6", y=-6, width="12", height=12, css="frame")
+                _frame(place, x="-6", y=-6, width="12", height=12)
             else:
                 left = _percent(_share(grid.across, x) - wide / 2)
-                _rect(area.area, x=left, y=area.y(y) - tall / 2, width=_percent(wide), height=tall, css="frame")
+                _frame(area.area, x=left, y=area.y(y) - tall / 2, width=_percent(wide), height=tall)
 
     @staticmethod
     def _marks(area: Element, row: Sequence[Cell | None], *, y: float, every: int) -> None:
-        """Write the marks of a row, or of every n-th cell, as one text with a place for each: a page has many maps."""
-        marked = [(column, cell.mark) for column, cell in enumerate(row) if cell and cell.mark and column % every == 0]
-        if marked:
-            places = " ".join(_percent((column + 0.5) / len(row)) for column, _ in marked)
-            _text(area, "".join(mark for _, mark in marked), x=places, y=y, css="letter", anchor="middle")
+        """Write the marks of a row, one for `every` cells that are alike, as one text: a page has many maps."""
+        marks, places, start = "", [], 0
+        for mark, run in groupby("" if cell is None else cell.mark for cell in row):
+            size = len(list(run))
+            several = max(1, size // every) if mark else 0
+            marks += mark * several
+            places += [_percent((start + size * (number + 0.5) / several) / len(row)) for number in range(several)]
+            start += size
+        if marks:
+            _text(area, marks, x=" ".join(places), y=y, css="letter", anchor="middle")
 
     # --- curves
 
@@ -304,15 +321,16 @@ class _Sheet:
             box = {"x": _percent(low), "width": _percent(high - low)}
             _rect(area.area, **box, y=area.top, height=_CURVES, css=f"shade {shade.entry.ink}")
             _text(
-                area.area, shade.entry.mark, x=_percent((low + high) / 2), y=area.top + 14, css="head", anchor="middle"
+                area.area, shade.entry.mark, x=_percent((low + high) / 2), y=area.top - 3, css="head", anchor="middle"
             )
         for guide in curves.guides:
             across = ("0", "100%") if guide.x is None else (area.x(guide.x),) * 2
             up = (area.top, area.top + _CURVES) if guide.y is None else (area.y(guide.y),) * 2
             _line(area.area, across, up, css=f"line {guide.entry.ink}")
+        paths = area.paths()
         for curve in curves.curves:
             if curve.has_line:
-                SubElement(area.paths, "path", {"class": f"line {curve.entry.ink}", "d": _path(area, curve)})
+                SubElement(paths, "path", {"class": f"line {curve.entry.ink}", "d": _path(area, curve)})
         for curve in curves.curves:
             known = [(number, x, y) for number, (x, y) in enumerate(curve.points) if y is not None]
             for number, x, y in (known if curve.has_dots else known[-1:]) if curve.entry.mark else ():
@@ -348,8 +366,9 @@ class _Sheet:
     # --- circles
 
     def _dial(self, dial: Dial) -> None:
-        sheet = {"y": f"{self.y:g}", "width": "100%", "height": f"{_DIAL}"}
-        box = SubElement(self._body, "svg", {**sheet, "viewBox": f"{-_DIAL / 2:g} {-_DIAL / 2:g} {_DIAL} {_DIAL}"})
+        wide, tall = _DIAL
+        sheet = {"y": f"{self.y:g}", "width": "100%", "height": f"{tall}"}
+        box = SubElement(self._body, "svg", {**sheet, "viewBox": f"{-wide / 2:g} {-tall / 2:g} {wide} {tall}"})
         far = max((_NOMINAL * radius for radius, _ in dial.rings), default=_NOMINAL) + 8
         for text, x, y, anchor in _ENDS:
             _line(box, (f"{40 * x}", f"{far * x:g}"), (40 * y, far * y), css="rule")
@@ -361,7 +380,7 @@ class _Sheet:
         SubElement(box, "circle", {"cx": f"{_NOMINAL}", "r": "4", "class": "start"})
         for number, words in enumerate(dial.words):
             _text(box, words, x="0", y=_LINE * number - 4, anchor="middle")
-        self.y += _DIAL
+        self.y += tall
 
 
 def _own(ruler: Ruler) -> int | None:
@@ -403,9 +422,9 @@ def _span(area: Element, span: Span, ruler: Ruler, *, y: float, height: float) -
         _text(area, span.entry.mark, x=middle, y=y + height / 2 + 4, css=f"letter on-{ink}", anchor="middle")
 
 
-_DIAL: Final = 400
-"""Height and width of a circle with its labels, in px."""
-_NOMINAL: Final = 120
+_DIAL: Final = (420, 380)
+"""Width and height of a circle with its labels, in px."""
+_NOMINAL: Final = 128
 """Radius of the nominal circle."""
 _ENDS: Final = (("X 0°", 1, 0, "start"), ("Y 90°", 0, -1, "middle"), ("180°", -1, 0, "end"), ("270°", 0, 1, "middle"))
 """Axes and angles at the ends of the cross, and where they are."""

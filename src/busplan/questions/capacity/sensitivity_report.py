@@ -52,7 +52,7 @@ def sensitivity_drawing(sensitivity: Sensitivity) -> Drawing | None:
     if least == most:
         return None
     lanes = tuple(
-        Lane(change, (_bar(us),), f"{decimals_of(us, _DECIMALS, signed=True)} us", is_thin=True)
+        Lane(change, tuple(_bar(us)), f"{decimals_of(us, _DECIMALS, signed=True)} us", is_thin=True)
         for change, us in changes
     )
     guides = [Guide(Entry("zero"), x=0.0)]
@@ -62,9 +62,11 @@ def sensitivity_drawing(sensitivity: Sensitivity) -> Drawing | None:
     return Drawing(title, (Panel(Lanes(numbers("us", least, most), lanes, tuple(guides))),))
 
 
-def _bar(us: float) -> Span:
-    entry = Entry("takes", "takes from the margin") if us < 0 else Entry("hides", "adds to it")
-    return Span(entry, min(us, 0.0), max(us, 0.0))
+def _bar(us: float) -> Iterator[Span]:
+    if us < 0:
+        yield Span(Entry("takes", "takes from the margin"), us, 0.0)
+    elif us > 0:
+        yield Span(Entry("hides", "adds to it"), 0.0, us)
 
 
 def next_bottleneck_sentence(bottlenecks: NextBottleneck, profile: Profile) -> Sentence:

@@ -16,7 +16,7 @@ _WIDEST: Final = 3.0
 _FLAT: Final = 0.1
 """Errors whose spread is a smaller share of the largest would look like one line above zero."""
 _NANOMETRES_BELOW_UM: Final = 0.1
-TOLERANCE: Final = Entry("tolerance", "tolerance of the largest contour error", shape="line")
+TOLERANCE: Final = Entry("tolerance", "tolerance of the largest error", shape="line")
 
 
 class LengthUnit(NamedTuple):

@@ -235,7 +235,7 @@ def _errors(row: CircleRow, scales: Scales) -> Panel:
     limits = () if limit_mm is None else (-limit_mm * 1e3 * per_um, limit_mm * 1e3 * per_um)
     guides += [Guide(TOLERANCE, y=limit) for limit in limits if up.low <= limit <= up.high]
     curves = tuple(_curve(curve, up, row, per_um=per_um) for curve in row.curves)
-    during = (Shade(Entry("gap"), *curve.time_s[[0, -1]].tolist()) for curve in row.curves if curve.measured)
+    during = (Shade(Entry("during"), *curve.time_s[[0, -1]].tolist()) for curve in row.curves if curve.measured)
     across = numbers("time [s]", 0.0, float(row.curves[-1].time_s[-1]))
     return Panel(Curves(across, up, curves, tuple(guides), tuple(during)), f"mean {mean}, max {largest}")
 

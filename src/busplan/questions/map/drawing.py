@@ -160,7 +160,7 @@ def map_drawing(trade_off: TradeOff, *, title: str) -> Drawing:
     legend = list(legend_of(trade_off, looks))
     own_row, own_column = trade_off.own_place or (None, None)
     if own_row is not None:
-        legend.append(Entry("frame", "this design", "[]"))
+        legend.append(Entry("frame", "this design"))
     if trade_off.not_drawn:
         legend.append(Entry("blank", "blank: cannot exist"))
     grid = Grid(

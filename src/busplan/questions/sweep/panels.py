@@ -1,6 +1,7 @@
 """The charts of a sweep's picture: curves over one key, maps of colours over two."""
 
 from collections.abc import Iterator
+from itertools import cycle, pairwise
 from typing import Final
 
 import numpy as np
@@ -20,17 +21,25 @@ from busplan.forms.charts import (
     letters,
     numbers,
 )
+from busplan.forms.numbers import figure_text
 from busplan.forms.picture import LEVELS
 from busplan.forms.scale import ticks
 from busplan.questions.sweep.grid import Array
-from busplan.questions.sweep.plotted import PlotScale, Plotted, SweptModel, caption, is_constant, value_text
+from busplan.questions.sweep.plotted import (
+    PlotScale,
+    Plotted,
+    SweptModel,
+    caption,
+    is_constant,
+    shown_value,
+    value_text,
+)
 
 _ROOM: Final = 0.06
 """Empty room above and below curves, as a share of their range."""
 _MOST_DOTS: Final = 16
 """Most points of a curve that have its mark each."""
 _OWN: Final = "this design"
-_INKS: Final = ("first", "second")
 
 
 def sweep_drawing(plotted: Plotted, *, title: str) -> Drawing:
@@ -47,12 +56,12 @@ def sweep_drawing(plotted: Plotted, *, title: str) -> Drawing:
     return Drawing(title, panels, (caption(plotted),), caption(plotted))
 
 
-def _ruler(scale: PlotScale, *, as_cells: bool) -> Ruler:
+def _ruler(scale: PlotScale, *, as_cells: bool, most: int = 5) -> Ruler:
     if scale.are_choices:
         return choices(scale.label, scale.labels, own=scale.own)
     half = (scale.places[1] - scale.places[0]) / 2 if as_cells and scale.places.size > 1 else 0.5 * as_cells
     low, high = float(scale.places[0] - half), float(scale.places[-1] + half)
-    return numbers(scale.label, low, high, whole=scale.are_whole)
+    return numbers(scale.label, low, high, most=most, whole=scale.are_whole)
 
 
 def _ends(plotted: Plotted) -> tuple[float, float]:
@@ -77,12 +86,12 @@ def _curves(plotted: Plotted) -> Panel:
     marks = letters(panel.model for panel in plotted.panels)
     curves = (
         Curve(
-            Entry(_INKS[panel.number % len(_INKS)], f"{panel.model} model", mark, "line"),
+            Entry(ink, f"{panel.model} model", mark, "line"),
             tuple(zip(scale.places.tolist(), _known(panel.values), strict=True)),
             has_dots=scale.are_choices or scale.places.size <= _MOST_DOTS,
             has_line=not scale.are_choices,
         )
-        for panel, mark in zip(plotted.panels, marks, strict=True)
+        for panel, mark, ink in zip(plotted.panels, marks, cycle(("first", "second")))
     )
     up = numbers(plotted.label, low, high, most=6, whole=is_count, room=_ROOM)
     return Panel(Curves(across, up, tuple(curves), tuple(guides), tuple(shades)))
@@ -100,42 +109,40 @@ def _runs(edges: list[float], chosen: Array) -> Iterator[tuple[float, float]]:
 
 def _maps(plotted: Plotted) -> Iterator[Panel]:
     """A map for each timing model, all with the same colours; a figure that is always the same is said instead."""
-    varying = [panel for panel in plotted.panels if not is_constant(panel.values)]
+    varying = tuple(panel for panel in plotted.panels if not is_constant(panel.values))
     for panel in plotted.panels:
         if is_constant(panel.values) and panel is not plotted.told:  # the caption tells of that
-            yield Panel(
-                None, f"{panel.model} model: {value_text(plotted, float(panel.values.flat[0]))} at every setting"
-            )
-    low, high = _ends(plotted._replace(panels=tuple(varying)))
-    edges = (
-        [low, *(tick.at for tick in ticks(low, high, most=LEVELS - 2) if low < tick.at < high), high] if varying else []
-    )
-    levels = [_level(plotted, edges, number) for number in range(len(edges) - 1)]
+            value = value_text(plotted, float(panel.values.flat[0]))
+            yield Panel(None, f"{panel.model} model: {value} at every setting")
+    low, high = _ends(plotted._replace(panels=varying))
+    inner = [tick.at for tick in ticks(low, high, most=LEVELS) if low < tick.at < high] if varying else []
+    levels = _levels(plotted, [low, *inner, high])
     for panel in varying:
-        yield Panel(_map(plotted, panel, edges, levels), f"{panel.model} model")
+        yield Panel(_map(plotted, panel, inner, levels), f"{panel.model} model")
 
 
-def _level(plotted: Plotted, edges: list[float], number: int) -> Entry:
-    """A colour and the values that it stands for; those of a difference grow stronger from zero to both sides."""
-    start, end = edges[number], edges[number + 1]
-    zero = sum(edge < 0 for edge in edges[1:-1]) + (edges[0] < 0) if plotted.has_zero else 0
-    strongest = max(zero, len(edges) - 1 - zero) - 1
-    level = round((number - zero if number >= zero else zero - number - 1) / max(1, strongest) * (LEVELS - 1))
-    is_last = number == len(edges) - 2
-    words = (
-        f"{value_text(plotted, start)} to {value_text(plotted, end - (plotted.figure.sort == 'count' and not is_last))}"
-    )
-    return Entry(f"{'above' if number >= zero else 'below'}-{level}", words)
+def _levels(plotted: Plotted, edges: list[float]) -> list[Entry]:
+    """Colours and the values that they stand for; those of a difference grow stronger from zero to both sides."""
+    size = len(edges) - 1
+    below = sum(edge < 0 for edge in edges[:-1]) if plotted.has_zero else 0
+    strongest = max(1, below - 1, size - below - 1)
+    entries = []
+    for number, (start, end) in enumerate(pairwise(edges)):
+        side, steps = ("above", number - below) if number >= below else ("below", below - 1 - number)
+        last = end - 1 if plotted.figure.sort == "count" and number + 1 < size else end
+        words = f"{figure_text(shown_value(start))} to {value_text(plotted, last)}"
+        entries.append(Entry(f"{side}-{round(steps / strongest * (LEVELS - 1))}", words))
+    return entries
 
 
-def _map(plotted: Plotted, panel: SweptModel, edges: list[float], levels: list[Entry]) -> Grid:
+def _map(plotted: Plotted, panel: SweptModel, inner: list[float], levels: list[Entry]) -> Grid:
     """Cells in the colours of their values, with the edge of what is shown to fit, unsafe settings and this design."""
     up, across = plotted.scales
     known = np.isfinite(panel.values)
-    numbers_ = np.searchsorted(edges[1:-1], np.where(known, panel.values, 0.0), side="right")
+    numbers_ = np.searchsorted(inner, np.where(known, panel.values, 0.0), side="right")
     legend = list(levels)
     if panel.frontier is not None:
-        legend.append(Entry("border", "edge of the settings that are shown to fit", shape="line"))
+        legend.append(Entry("border", "edge of what is shown to fit", shape="line"))
     if panel.unsafe.any():
         legend.append(Entry("blank", f"unsafe {plotted.safety}", "!"))
     if up.own is not None and across.own is not None:
@@ -157,4 +164,4 @@ def _map(plotted: Plotted, panel: SweptModel, edges: list[float], levels: list[E
         for parts in zip(known, numbers_, panel.unsafe, fits, strict=True)
     )
     own = None if up.own is None or across.own is None else (across.own, up.own)
-    return Grid(_ruler(across, as_cells=True), _ruler(up, as_cells=True), tuple(rows), tuple(legend), own)
+    return Grid(_ruler(across, as_cells=True), _ruler(up, as_cells=True, most=8), tuple(rows), tuple(legend), own)

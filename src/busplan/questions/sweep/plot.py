@@ -111,7 +111,6 @@ class FigureData:
         panels = tuple(
             SweptModel(
                 model,
-                number,
                 factor * values.reshape(shape),
                 unsafe.reshape(shape),
                 self._fits.reshape(shape) if model == bus.deciding_model else None,

@@ -7,7 +7,6 @@ import numpy as np
 from busplan.buses.figure import NODES, PERIOD, Figure, unit_of
 from busplan.forms.blocks import ShownValue, figure_value
 from busplan.forms.numbers import SILENT_UNITS, factor_of, with_unit
-from busplan.profile.kinds import words_of
 from busplan.questions.fit.network import bus_of
 from busplan.questions.sweep.asked import column_figures
 from busplan.questions.sweep.grid import Array, Values
@@ -42,8 +41,7 @@ class PlotScale(NamedTuple):
 def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> PlotScale:
     """Make the scale of a key.
 
-    Words, and numbers of a key that takes words, too, such as a gap count, are choices; so are numbers that do not
-    ascend. Others stand on a number line.
+    Words and numbers among words are choices, as are numbers that do not ascend. Others stand on a number line.
 
     Parameters
     ----------
@@ -57,8 +55,7 @@ def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> P
         If True, numbers that are not evenly spaced are choices, too: cells of a map are equally wide.
     """
     values, own = axis.part(0, axis.size), value_at(profile, key)
-    are_words = values.dtype == object or bool(words_of(profile, key))
-    are_choices = are_words or not _on_a_line(values, evenly=as_cells)
+    are_choices = values.dtype == object or not _on_a_line(values, evenly=as_cells)
     whole = values.dtype != object and bool(np.equal(np.mod(values, 1), 0).all())
     label = key_label(profile, key)
     if not are_choices:
@@ -124,8 +121,6 @@ class SweptModel(NamedTuple):
     """The values under one timing model."""
 
     model: str
-    number: int
-    """Number of the model among those asked for, from 0: its colour."""
     values: Array
     """In the unit of the label, shaped as the scales; NaN for a missing value."""
     unsafe: Array
@@ -208,9 +203,9 @@ def caption(plotted: Plotted) -> str:
     design = "" if own is None else f"; this design has {value_text(plotted, own)}"
     name = plotted.figure.label or plotted.figure.key
     if plotted.has_zero and panel.fits is None and known.min() < 0 <= known.max():
-        fitting, line = int((known >= 0).sum()), "line" if len(plotted.scales) > 1 else "dashed line"
-        settings = f"{fitting:,} of {known.size:,} settings"
-        return f"A {name} of 0 or more in {settings} {by}, on one side of the {line}{design}."
+        settings = f"{int((known >= 0).sum()):,} of {known.size:,} settings"
+        where = "in blue" if len(plotted.scales) > 1 else "above the dashed line"
+        return f"A {name} of 0 or more in {settings} {by}, {where}{design}."
     least, most = value_text(plotted, float(known.min())), value_text(plotted, float(known.max()))
     spread = f"{least} to {most}"
     if least == most:
@@ -233,5 +228,9 @@ def _fitting(plotted: Plotted, panel: SweptModel) -> str:
 
 def value_text(plotted: Plotted, value: float) -> str:
     """Write a value of the figure with its unit."""
-    unit = plotted.figure.column or plotted.figure.unit
-    return with_unit(ShownValue(value, unit=unit, digits=_DIGITS))
+    return with_unit(shown_value(value, plotted.figure.column or plotted.figure.unit))
+
+
+def shown_value(value: float, unit: str = "") -> ShownValue:
+    """A value of the figure with enough digits, and all before the point."""
+    return ShownValue(value, unit=unit, digits=max(_DIGITS, len(f"{abs(value):.0f}")))

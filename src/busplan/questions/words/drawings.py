@@ -40,10 +40,10 @@ def terms_drawing(results: Sequence[CapacityFigures]) -> Drawing:
         Figures of one period, one set for each timing model.
     """
     used_us, slice_us = max(result.required_us for result in results), results[0].available_us
-    head = "The slice" if used_us <= slice_us else "The cycle and where its slice ends"
+    head = "The slice, us" if used_us <= slice_us else "The cycle and where its slice ends, us"
     panels = [_terms(results, head, max(used_us, slice_us))]
     if used_us < _MAGNIFIED_BELOW * slice_us:
-        panels.append(_terms(results, "The cycle alone", used_us))
+        panels.append(_terms(results, "The cycle alone, us", used_us))
     title = "Terms of the cycle under each timing model, and what is left of the slice"
     return Drawing(title, tuple(panels))
 
