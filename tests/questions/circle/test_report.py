@@ -260,10 +260,9 @@ def test_a_page_has_the_magnified_circle_and_how_to_read_it(tolerance_mm: float,
     assert sentence_text(legend).endswith(words)
     report = circle_report(test._replace(with_contributions=False))
     page = render(report, "html")
-    assert page.count('class="chart circle"') == 1
+    assert page.count('<figure class="round">') == page.count('class="band first"') == 1
     assert "from ring to ring" in page
     text = render(report, "table")
-    assert re.search(r"The contour error at constant speed is [\d.]+ um or less, at 4 ms and 2500 mm/min\n +um\n", text)
     assert "ring" not in text
 
 

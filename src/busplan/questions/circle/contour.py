@@ -21,27 +21,25 @@ class ContourProfile(NamedTuple):
     high_mm: tuple[float | None, ...]
 
 
-def contour_profile(run: CircleRun, *, sectors: int = CONTOUR_SECTORS) -> ContourProfile:
+def contour_profile(run: CircleRun) -> ContourProfile:
     """Condense the measured part of a circle test.
 
     Parameters
     ----------
     run
         The simulation.
-    sectors
-        Number of equal sectors [1].
 
     Returns
     -------
     ContourProfile
         Sector 0 begins on the positive x axis; sectors follow counter-clockwise.
     """
-    low, high = np.full(sectors, np.inf), np.full(sectors, -np.inf)
+    low, high = np.full(CONTOUR_SECTORS, np.inf), np.full(CONTOUR_SECTORS, -np.inf)
     for block in blocks(run.measured):
         x_mm, y_mm = run.x_mm[block], run.y_mm[block]
         error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
         turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
-        sector = np.minimum((turn * sectors).astype(np.int64), sectors - 1)
+        sector = np.minimum((turn * CONTOUR_SECTORS).astype(np.int64), CONTOUR_SECTORS - 1)
         # Neighbouring points are mostly in the same sector: only the extremes of each stay are looked at one by one.
         entered = np.flatnonzero(np.diff(sector, prepend=-1))
         np.minimum.at(low, sector[entered], np.minimum.reduceat(error_mm, entered))

@@ -1,6 +1,6 @@
 """The charts of a sweep's picture: curves over one key, maps of colours over two."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import cycle, pairwise
 from typing import Final
 
@@ -52,8 +52,10 @@ def sweep_drawing(plotted: Plotted, *, title: str) -> Drawing:
     title
         Title of the picture.
     """
-    panels = (_curves(plotted),) if len(plotted.scales) == 1 else tuple(_maps(plotted))
-    return Drawing(title, panels, (caption(plotted),), caption(plotted))
+    panels: Iterable[Panel] = ()
+    if plotted.panels:
+        panels = [_curves(plotted)] if len(plotted.scales) == 1 else _maps(plotted)
+    return Drawing(title, tuple(panels), (caption(plotted),), caption(plotted))
 
 
 def _ruler(scale: PlotScale, *, as_cells: bool, most: int = 5) -> Ruler:

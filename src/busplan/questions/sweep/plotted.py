@@ -228,9 +228,10 @@ def _fitting(plotted: Plotted, panel: SweptModel) -> str:
 
 def value_text(plotted: Plotted, value: float) -> str:
     """Write a value of the figure with its unit."""
-    return with_unit(shown_value(value, plotted.figure.column or plotted.figure.unit))
+    shown = shown_value(value)._replace(unit=plotted.figure.column or plotted.figure.unit)
+    return with_unit(shown._replace(value=value / factor_of(shown)))
 
 
-def shown_value(value: float, unit: str = "") -> ShownValue:
-    """A value of the figure with enough digits, and all before the point."""
-    return ShownValue(value, unit=unit, digits=max(_DIGITS, len(f"{abs(value):.0f}")))
+def shown_value(value: float) -> ShownValue:
+    """A number with enough digits, and all before the point."""
+    return ShownValue(value, digits=max(_DIGITS, len(f"{abs(value):.0f}")))

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 from busplan.buses.figure import MARGIN, REQUIRED
 from busplan.buses.parts import EventKind
 from busplan.elementwise import plain
-from busplan.forms.blocks import Sentence, ShownValue, count_value, figure_value, joined, sentence
+from busplan.forms.blocks import Sentence, ShownValue, count_value, figure_value, sentence
 from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
 from busplan.forms.numbers import figure_text, nouns, sentence_text, with_unit
 from busplan.questions.fit.certainty import fits_in
@@ -63,8 +63,8 @@ def timeline_drawing(schedule: Schedule, *, title: str) -> Drawing:
         Its message in a sentence.
     """
     window = drawn_window(schedule)
-    words, subject = (sentence_text(said) for said in (charged(window), _subject(schedule)))
-    return Drawing(title, (_period(schedule), _lanes(window)), (words,), subject, has_characters=True)
+    words = sentence_text(charged(window))
+    return Drawing(title, (_period(schedule), _lanes(window)), (words,), words, has_characters=True)
 
 
 def drawn_window(schedule: Schedule) -> Schedule:
@@ -82,24 +82,19 @@ def kind_of(profile: Profile, key: str) -> EventKind:
     return bus_of(profile).event_kind(key)
 
 
-def _subject(schedule: Schedule) -> Sentence:
-    """Say what is shown: the number of nodes, and the part of the cycle."""
+def charged(schedule: Schedule) -> Sentence:
+    """Say what is shown, and which distance on the wire each node is charged with."""
     nodes, common, cycle = schedule.figures.nodes, CommonMultiple(schedule), "the cycle"
     if schedule.number is not None and common.cycles > 1:
         cycle = f"cycle {common.number} of {common.cycles}"
     setup = ", ".join((nouns(nodes, "node"), *bus_of(schedule.profile).setup_words(network_of(schedule.profile))))
+    way = bus_of(schedule.profile).way_charged(network_of(schedule.profile))
     return sentence(
-        f"{{}} {setup}; {{}} to {{}} of {cycle}",
+        f"{{}} {setup}; {{}} to {{}} of {cycle}, {way}",
         count_value(nodes, "nodes"),
         ShownValue(schedule.from_us, "from_us", "", TOTAL.decimals),
         ShownValue(schedule.to_us, "to_us", "us", TOTAL.decimals),
     )
-
-
-def charged(schedule: Schedule) -> Sentence:
-    """Say what is shown, and which distance on the wire each node is charged with."""
-    way = Sentence((bus_of(schedule.profile).way_charged(network_of(schedule.profile)),))
-    return joined(_subject(schedule), way, by=", ")
 
 
 def overruns(schedule: Schedule) -> bool:
