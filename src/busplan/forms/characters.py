@@ -18,21 +18,24 @@ _NARROWEST: Final = 60
 
 def drawing_lines(drawing: Drawing, width: int) -> list[Line]:
     """Draw it, `width` columns wide, each mark as a character."""
-    drawn = [line for panel in drawing.panels for line in (*_panel(panel, width), BLANK)]
-    entries = [
-        f"{_OWN if entry.ink == 'frame' else entry.mark} {entry.words}".lstrip()
-        for entry in legend(drawing)
-        if entry.shape == "area"
-    ]
-    return [*drawn, *legend_lines(entries, width=width)]
+    lines: list[Line] = []
+    for panel in drawing.panels:
+        lines += [*([BLANK] if lines else []), *_panel(panel, width)]
+    return lines
 
 
 def _panel(panel: Panel, width: int) -> Iterator[Line]:
+    """A chart and its legend; bars that have a lane and a label each need none."""
     match panel.plot:
         case Grid():
-            yield from _grid(panel.plot, width)
+            yield from (*_grid(panel.plot, width), BLANK)
         case Lanes():
             yield from _lanes(panel.title, panel.plot, max(width, _NARROWEST))
+            if all(len(lane.spans) == 1 for lane in panel.plot.lanes):
+                return
+    marks = ((_OWN if entry.ink == "frame" else entry.mark, entry) for entry in legend([panel]))
+    words = [f"{mark} {entry.words}".lstrip() for mark, entry in marks if entry.shape == "area"]
+    yield from legend_lines(words, width=width)
 
 
 def _grid(grid: Grid, width: int) -> Iterator[Line]:

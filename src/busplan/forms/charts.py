@@ -177,9 +177,9 @@ class Drawing(NamedTuple):
         return all(isinstance(panel.plot, Dial) for panel in self.panels)
 
 
-def legend(drawing: Drawing) -> list[Entry]:
-    """Every entry with words, once, in the order of the drawing."""
-    entries = (entry for panel in drawing.panels for entry in _entries(panel.plot))
+def legend(panels: Iterable[Panel]) -> list[Entry]:
+    """Every entry with words of some charts, once, in the order of the drawing."""
+    entries = (entry for panel in panels for entry in _entries(panel.plot))
     return list(dict.fromkeys(entry for entry in entries if entry.words))
 
 

@@ -65,7 +65,7 @@ def _drawn(drawing: Drawing, *, room: float, is_file: bool = False) -> str:
         sheet.y += _GAP
     for panel in drawing.panels:
         sheet.panel(panel)
-    sheet.legend(legend(drawing))
+    sheet.legend(legend(drawing.panels))
     return _markup(root, height=sheet.y + (_GAP if is_file else 0))
 
 
@@ -88,7 +88,8 @@ def _inside(parent: Element, *, left: float, width: float) -> Element:
 
 
 def _text(parent: Element, text: str, *, x: str = "0", y: float, css: str = "", anchor: str = "start") -> None:
-    SubElement(parent, "text", {"x": x, "y": f"{y:g}", "class": css, "text-anchor": anchor}).text = text
+    if text:
+        SubElement(parent, "text", {"x": x, "y": f"{y:g}", "class": css, "text-anchor": anchor}).text = text
 
 
 def _rect(parent: Element, *, x: str = "0", y: float, width: str, height: float, css: str, title: str = "") -> None:
@@ -215,7 +216,7 @@ class _Sheet:
         x = 0.0
         for entry in entries:
             sample = 34 if entry.shape == "line" else 20
-            width = sample + _LETTER * len(entry.words) + _GAP
+            width = sample + _SMALL_LETTER * len(entry.words) + 2 * _GAP
             if x and x + width > self._room:
                 x, self.y = 0.0, self.y + _LINE
             above = self.y
@@ -320,9 +321,8 @@ class _Sheet:
             low, high = (_share(curves.across, end) for end in (shade.low, shade.high))
             box = {"x": _percent(low), "width": _percent(high - low)}
             _rect(area.area, **box, y=area.top, height=_CURVES, css=f"shade {shade.entry.ink}")
-            _text(
-                area.area, shade.entry.mark, x=_percent((low + high) / 2), y=area.top - 3, css="head", anchor="middle"
-            )
+            middle, foot = _percent((low + high) / 2), area.top + _CURVES - 6
+            _text(area.area, shade.entry.mark, x=middle, y=foot, css="head", anchor="middle")
         for guide in curves.guides:
             across = ("0", "100%") if guide.x is None else (area.x(guide.x),) * 2
             up = (area.top, area.top + _CURVES) if guide.y is None else (area.y(guide.y),) * 2

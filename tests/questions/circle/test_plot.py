@@ -155,7 +155,7 @@ def test_the_tolerance_is_drawn_unless_it_lies_far_outside(limit_mm: float, ring
     drawn_um = sorted(guide.y or 0.0 for guide in plot.guides if guide.entry.ink == "tolerance")
     assert drawn_um == pytest.approx([-limit_mm * 1e3, limit_mm * 1e3][:rings])
     assert f"(limit {limit_mm * 1e3:g} um)" in " ".join(panel.title for panel in drawing.panels)
-    assert ("tolerance of the largest error" in [entry.words for entry in legend(drawing)]) == bool(rings)
+    assert ("tolerance of the largest error" in [entry.words for entry in legend(drawing.panels)]) == bool(rings)
 
 
 @pytest.mark.parametrize(("direction", "words"), [("ccw", "counter-clockwise"), ("cw", "clockwise")])
@@ -178,7 +178,7 @@ def test_error_sources_stand_below_the_circle_by_rank() -> None:
 
 
 def test_each_kind_of_line_is_explained_once() -> None:
-    words = [entry.words for entry in legend(run(*SMALL.items(), periods_us=(2000.0, 4000.0)).drawing())]
+    words = [entry.words for entry in legend(run(*SMALL.items(), periods_us=(2000.0, 4000.0)).drawing().panels)]
     assert sorted(text.split(":")[0] for text in words) == [
         *("measured", "nominal circle", "the rest", "tolerance of the largest error"),
     ]

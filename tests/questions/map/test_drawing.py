@@ -56,7 +56,7 @@ def test_each_cell_has_the_look_of_its_state_and_says_its_setting(name: str) -> 
 
 @EVERY
 def test_the_legend_explains_every_mark_once_and_this_design(name: str) -> None:
-    entries = legend(mapped(name).drawing())
+    entries = legend(mapped(name).drawing().panels)
     cells = {cell for row in grid_of(name).rows for cell in row if isinstance(cell, Cell)}
     assert sorted(entry.mark for entry in entries if entry.mark) == sorted({cell.mark for cell in cells})
     words = [entry.words for entry in entries]

@@ -53,7 +53,7 @@ def grids(one: Plotted) -> list[Grid]:
 
 
 def words(one: Plotted) -> list[str]:
-    return [entry.words for entry in legend(drawn(one))]
+    return [entry.words for entry in legend(drawn(one).panels)]
 
 
 @pytest.mark.parametrize("given", [(63, "optimal"), ("optimal",), (63, 7)])

@@ -184,7 +184,7 @@ def test_bars_are_the_events_in_the_lanes_of_their_nodes(one: Schedule) -> None:
     executions = [event for event in one.events if event.kind == "execution"]
     assert sorted((bar.start, bar.end) for bar in bars) == [(event.start_us, event.end_us) for event in executions]
     assert (lanes(one).across.low, lanes(one).across.high) == (one.from_us, one.used_us if one.is_whole else one.to_us)
-    explained = {entry.words for entry in legend(timeline_chart(one).drawing)}
+    explained = {entry.words for entry in legend(timeline_chart(one).drawing.panels)}
     assert {kind_named("ieee1394").event_kind(event.kind).label for event in one.events} - {"idle"} <= explained
 
 
