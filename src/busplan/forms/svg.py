@@ -277,7 +277,7 @@ class _Sheet:
         is_fine = max(rows, columns) > _MOST_TALL
         css, wide = "fine" if is_fine else "cell", 1 / columns
         # Small cells have a mark now and then.
-        every = (_FAR // (self._room * wide) + 1, ceil(_FAR / 2 / tall)) if is_fine else (1, 1)
+        every = (_FAR // (self._room * wide) + 1, ceil(_GAP / tall)) if is_fine else (1, 1)
         for number, row in enumerate(grid.rows):
             y, start = area.top + tall * (rows - number - 1), 0
             for cell, run in groupby(row):
