@@ -198,7 +198,7 @@ def _entries(plot: Grid | Curves | Lanes | Dial | None) -> Iterator[Entry]:
             yield from (plot.entry, *(entry for _, entry in plot.rings))
 
 
-def numbers(label: str, low: float, high: float, *, most: int = 5, whole: bool = False, room: float = 0.0) -> Ruler:
+def numbers(label: str, low: float, high: float, *, most: int = 6, whole: bool = False, room: float = 0.0) -> Ruler:
     """Make a scale of numbers; a single number gets room at both sides.
 
     Parameters

@@ -230,7 +230,7 @@ def _errors(row: CircleRow, scales: Scales) -> Panel:
     mean = measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
     largest = measure_text(result.max_contour_error_mm, limit_mm, scales)
     label = ", ".join(filter(None, (f"contour error [{scales.unit.name}]", errors.zero_outside)))
-    up = numbers(label, errors.bottom_um * per_um, errors.top_um * per_um, most=6, room=_ROOM)
+    up = numbers(label, errors.bottom_um * per_um, errors.top_um * per_um, room=_ROOM)
     guides = [] if errors.zero_outside else [Guide(Entry("zero"), y=0.0)]
     limits = () if limit_mm is None else (-limit_mm * 1e3 * per_um, limit_mm * 1e3 * per_um)
     guides += [Guide(TOLERANCE, y=limit) for limit in limits if up.low <= limit <= up.high]

@@ -129,15 +129,16 @@ def _along(direction: Direction, value: Value, profile: Profile) -> str:
 
 def map_title(trade_off: TradeOff) -> str:
     """Quantities on the y and x axis: "period against axes"."""
-    return " against ".join(_scale_title(direction, trade_off.profile) for direction in (trade_off.y, trade_off.x))
+    directions = (trade_off.y, trade_off.x)
+    title = " against ".join(title_of(direction, trade_off.profile) for direction in directions)
+    return title if all(map(_is_even, directions)) else f"{title}, in unequal steps"
 
 
-def _scale_title(direction: Direction, profile: Profile) -> str:
-    """Name of a direction, which says so if its steps are not equal."""
+def _is_even(direction: Direction) -> bool:
+    """Whether the values are words, or numbers in equal steps."""
     values = [value for value in direction.values if not isinstance(value, str)]
     steps = [after - before for before, after in pairwise(values)]
-    is_even = len(values) < len(direction.values) or all(isclose(step, steps[0], rel_tol=1e-6) for step in steps)
-    return f"{title_of(direction, profile)}{'' if is_even else ' in unequal steps'}"
+    return len(values) < len(direction.values) or all(isclose(step, steps[0], rel_tol=1e-6) for step in steps)
 
 
 def cell_words(trade_off: TradeOff, cell: Cell) -> str:
@@ -174,9 +175,8 @@ def map_drawing(trade_off: TradeOff, *, title: str) -> Drawing:
 
 
 def _ruler(direction: Direction, profile: Profile, *, own: int | None) -> Ruler:
-    return choices(
-        _scale_title(direction, profile), (value_text(direction, value) for value in direction.values), own=own
-    )
+    title = f"{title_of(direction, profile)}{'' if _is_even(direction) else ' in unequal steps'}"
+    return choices(title, (value_text(direction, value) for value in direction.values), own=own)
 
 
 def _cell(trade_off: TradeOff, cell: Cell | NotDrawn, looks: Looks) -> ChartCell | None:

@@ -58,7 +58,7 @@ def sweep_drawing(plotted: Plotted, *, title: str) -> Drawing:
     return Drawing(title, tuple(panels), (caption(plotted),), caption(plotted))
 
 
-def _ruler(scale: PlotScale, *, as_cells: bool, most: int = 5) -> Ruler:
+def _ruler(scale: PlotScale, *, as_cells: bool, most: int = 6) -> Ruler:
     if scale.are_choices:
         return choices(scale.label, scale.labels, own=scale.own)
     half = (scale.places[1] - scale.places[0]) / 2 if as_cells and scale.places.size > 1 else 0.5 * as_cells
@@ -95,7 +95,7 @@ def _curves(plotted: Plotted) -> Panel:
         )
         for panel, mark, ink in zip(plotted.panels, marks, cycle(("first", "second")))
     )
-    up = numbers(plotted.label, low, high, most=6, whole=is_count, room=_ROOM)
+    up = numbers(plotted.label, low, high, whole=is_count, room=_ROOM)
     return Panel(Curves(across, up, tuple(curves), tuple(guides), tuple(shades)))
 
 

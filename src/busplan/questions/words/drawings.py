@@ -87,7 +87,7 @@ def axes_drawing(profile: Profile, steps: Sequence[NodeSteps]) -> Drawing:
     )
     plot = Curves(
         logarithmic("communication period, logarithmic", from_us, to_us, period),
-        numbers("axes", 0, most, most=6, whole=True, room=0.06),
+        numbers("axes", 0, most, whole=True, room=0.06),
         tuple(curves),
         (Guide(own, x=own_us), Guide(own, y=own_axes)),
     )
