@@ -284,6 +284,9 @@ def test_a_column_shows_what_takes_most_of_it() -> None:
     _, row, _, explained = [line.text for line in drawing_lines(Drawing("t", (Panel(plot),)), 115)]
     assert row.endswith(f"|={'~' * 99}|")
     assert explained == "Legend: ~ idle, = work"
+    # What ends where a column begins takes nothing of it.
+    (_, row, *_) = [line.text for line in drawing_lines(Drawing("t", (Panel(lanes((WORK, 0, 50))),)), 115)]
+    assert row.endswith(f"|{'=' * 50}{' ' * 50}|")
 
 
 # --- circles

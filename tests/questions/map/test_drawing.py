@@ -124,4 +124,4 @@ def test_rows_have_equal_steps_or_say_that_they_do_not(periods_us: list[int], la
     assert isinstance(panel.plot, Grid)
     assert (panel.plot.up.label, panel.plot.across.label) == (label, "axes (bus.nodes)")
     assert ("period against axes (bus.nodes), in unequal steps" in str(found)) == ("unequal" in label)
-    assert grid_of("words").up.label == "bus.speed"
+    assert (grid_of("words").up.label, grid_of("words").across.label) == ("bus.speed", "bus.gap_count")

@@ -396,6 +396,8 @@ def test_letters_can_be_read_on_their_bars() -> None:
     for ink, colours in INKS.items():
         if ink.startswith(("above", "below")):
             assert contrast("#10151c", colours.light) >= 4, ink
+    levels = [colours for ink, colours in INKS.items() if ink.startswith(("above", "below"))]
+    assert len(set(levels)) == len(levels)
 
 
 @cache
