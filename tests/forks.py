@@ -55,7 +55,7 @@ def serve(path: str) -> None:
     listener = socket.socket(socket.AF_UNIX)
     listener.bind(path)
     listener.listen()
-    for line in ("capacity paper-4ms --format json", "check paper-4ms", "diff paper-4ms paper-1ms --no-circle"):
+    for line in ("capacity paper-4ms --format json", "check paper-4ms", "diff paper-4ms paper-1ms"):
         sys.argv, sys.stdout = ["busplan", *line.split()], TextIOWrapper(BytesIO())
         with suppress(SystemExit):
             main()

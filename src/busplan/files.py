@@ -33,17 +33,21 @@ def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
         file.write(content)
 
 
-def partial_path(path: Path) -> Path:
-    """File name for the output of a stopped run: rows.csv becomes rows.partial.csv."""
-    return path.with_name(f"{path.stem}.partial{path.suffix}")
+_OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
+"""Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
+
+
+def is_unwritten_pipe(path: Path) -> bool:
+    """Whether a file is a named pipe, and opening it may wait for a writer for ever."""
+    return path.is_fifo() and not str(path).startswith(_OPENED)
 
 
 @contextmanager
-def new_file(path: Path, *, overwrite: bool, keeps_after: type[BaseException] | tuple[()] = ()) -> Iterator["NewFile"]:
+def new_file(path: Path, *, overwrite: bool) -> Iterator["NewFile"]:
     """Open a file for atomic writing: a temporary file next to it is renamed at the end.
 
     It is opened at once, so that a path that cannot be written fails before the work. After an error, the old file is
-    unchanged; after an error of `keeps_after`, too, and the output so far is under `partial_path`.
+    unchanged.
 
     Raises
     ------
@@ -54,18 +58,14 @@ def new_file(path: Path, *, overwrite: bool, keeps_after: type[BaseException] | 
     # A name of the greatest length leaves no room for a suffix.
     stem = target.name if len(os.fsencode(target.name)) <= _LONG_NAME else "busplan"
     temporary = target.with_name(f".{stem}.{os.urandom(4).hex()}.tmp")
-    stopped: BaseException | None = None
     with ExitStack() as last:
         with naming_errors(path, target):
             mode = _mode_of(target, overwrite=overwrite)
             last.callback(_remove, temporary)
             file = NewFile(_Raw(temporary, path=path, target=target))
         last.callback(_close, file)
-        try:
-            # Errors of the caller's own work pass through.
-            yield file
-        except keeps_after as error:
-            stopped, target, overwrite = error, partial_path(target), True
+        # Errors of the caller's own work pass through.
+        yield file
         if file.abandoned:
             return
         with naming_errors(path, target):
@@ -79,8 +79,6 @@ def new_file(path: Path, *, overwrite: bool, keeps_after: type[BaseException] | 
                 temporary.replace(target)
             else:
                 _rename_new(temporary, target)
-        if stopped is not None:
-            raise stopped
 
 
 class _Raw(io.FileIO):

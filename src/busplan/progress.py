@@ -9,6 +9,10 @@ _PARTS: Final = 1000
 """Progress steps of a piece of work."""
 
 
+def ignored(_done: int, _total: int) -> None:
+    """Report no progress."""
+
+
 def part_of(progress: Progress, *, number: int, of: int) -> Progress:
     """Progress of a piece of work, of several that are equal.
 

@@ -30,7 +30,7 @@ def test_an_attack_does_no_harm(script: Path, tmp_path: Path, program: Path) -> 
         cwd=tmp_path,
         env={**kept, "PATH": f"{program.parent}{os.pathsep}{kept['PATH']}", "LANG": "C.UTF-8"},
         stdin=subprocess.DEVNULL,
-        timeout=30,
+        timeout=300,
     )
     said = done.stderr.decode(errors="backslashreplace")
     assert done.returncode == int(code), said

@@ -16,7 +16,7 @@ QUESTIONS = {
     "report": ("html", "markdown"),
     "check": ("text", "sarif"),
     "explain": ("table", "json"),
-    "diff paper-4ms --no-circle": ("table", "json"),
+    "diff paper-4ms": ("table", "json"),
     "circle-test": ("table",),
 }
 SWEEPS = (

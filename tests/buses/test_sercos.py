@@ -62,8 +62,8 @@ def test_capacity_check_and_sweep_name_an_unknown_period(kind: str, period_us: f
     assert f"no period of {period_us:g} us; the next" in problem
     assert all(f"{one:g}" in problem.partition("the next")[2] for one in neighbours)
     known_us = neighbours[-1]
-    done = run("sweep", name, "--vary", f"cycle.period_us={period_us},{known_us}", "--format", "jsonl", cwd=tmp_path)
-    _, *rows = map(json.loads, done.stdout.splitlines())
+    done = run("sweep", name, "--vary", f"cycle.period_us={period_us},{known_us}", "--format", "json", cwd=tmp_path)
+    rows = json.loads(done.stdout)["rows"]
     marked = {one["cycle.period_us"]: one for one in rows}
     assert "period" in marked[period_us]["exceeded"]
     assert marked[period_us]["limited_by"] == "period"
@@ -99,8 +99,8 @@ def test_no_known_period_is_long_enough_for_everything(kind: str, run: Run, tmp_
     document = json.loads(run("capacity", f"{kind}-servo-8", *options, "--format", "json", cwd=tmp_path).stdout)
     assert document["results"][0]["min_period_us"] is None
     assert document["results"][0]["safe_min_period_us"] is None
-    done = run("sweep", f"{kind}-servo-8", "--vary", "bus.nodes=8,40000", "--format", "jsonl", cwd=tmp_path)
-    _, *rows = map(json.loads, done.stdout.splitlines())
+    done = run("sweep", f"{kind}-servo-8", "--vary", "bus.nodes=8,40000", "--format", "json", cwd=tmp_path)
+    rows = json.loads(done.stdout)["rows"]
     assert [one["min_period_us"] is None for one in rows] == [False, False, True, True]
     done = run("explain", f"{kind}-servo-8", "min_period_us", "--set", "bus.nodes=40000", cwd=tmp_path)
     assert done.returncode == 0
@@ -111,8 +111,8 @@ def test_no_known_period_is_long_enough_for_everything(kind: str, run: Run, tmp_
 def test_every_row_of_a_sweep_equals_capacity_of_its_point(kind: str, run: Run, tmp_path: Path) -> None:
     vary = {"bus.nodes": "1,8,61,300", "cycle.period_us": "260,500,3000", "payload.read_bytes": "3,150"}
     options = [word for key, ones in vary.items() for word in ("--vary", f"{key}={ones}")]
-    done = run("sweep", f"{kind}-servo-8", *options, "--format", "jsonl", cwd=tmp_path)
-    _, *rows = map(json.loads, done.stdout.splitlines())
+    done = run("sweep", f"{kind}-servo-8", *options, "--format", "json", cwd=tmp_path)
+    rows = json.loads(done.stdout)["rows"]
     assert len(rows) == 2 * 4 * 3 * 2
     for row in rows:
         own = override(load(f"{kind}-servo-8").profile, {key: row.pop(key) for key in vary})

@@ -19,7 +19,6 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "link.csv").symlink_to("x.csv")
     (tmp_path / "twin.csv").hardlink_to(tmp_path / "x.csv")
     (tmp_path / "p.csv").symlink_to("p.toml")
-    (tmp_path / "a.partial.csv").symlink_to("x.csv")
     (tmp_path / "lost.svg").symlink_to("new.svg")
     (tmp_path / "b.json").write_text("{}", encoding="utf-8")
     return tmp_path
@@ -35,7 +34,6 @@ OVER_AN_INPUT = {
     "--output link.csv": ("check", "x.csv", "-o", "link.csv"),
     "--output twin.csv": ("sweep", "x.csv", *VARY, "-o", "twin.csv"),
     "--output p.csv": ("sweep", "p.toml", *VARY, "-o", "p.csv"),
-    "--output's partial file a.partial.csv": ("sweep", "x.csv", *VARY, "-o", "a.csv"),
     "--trace x.csv": ("circle-test", "x.csv", "--trace", "x.csv"),
     "--trace p.csv": ("circle-test", "p.toml", "--trace", "p.csv"),
     "--output x.csv ": ("report", "paper-4ms", "x.csv", "-o", "x.csv", "--format", "html"),

@@ -22,12 +22,11 @@ Refused = Callable[..., str]
 
 QUESTIONS = (
     ("diff", "paper-1ms", "paper-optimal-gap"),
-    ("diff", "paper-1ms", "paper-1ms", "--no-circle"),
+    ("diff", "paper-1ms", "paper-1ms"),
     ("explain", "paper-1ms"),
-    ("explain", "paper-1ms", "required_us", "--timing", "both"),
-    ("explain", "paper-1ms", "cheapest_change"),
-    ("explain", "paper-1ms", "centre_offset_mm"),
-    ("calibrate", "paper-two-node", "table-1.csv", "--form", "linear"),
+    ("explain", "paper-1ms", "required_us", "--timing-model", "both"),
+    ("explain", "can-servo-8", "loop"),
+    ("calibrate", "paper-two-node", "table-1.csv"),
     ("compare", "gantry-24", "--circle", "--set", "circle.radius_mm=10"),
     ("paper",),
     ("evidence", "can"),
@@ -55,11 +54,10 @@ execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 }
 """
 MEASUREMENTS = "<b>m `1` *c*.csv"
 HOSTILE = (
-    ("diff", "hostile.toml", "paper-1ms", "--no-circle"),
-    ("diff", "paper-1ms", "hostile.toml", "--no-circle"),
+    ("diff", "hostile.toml", "paper-1ms"),
+    ("diff", "paper-1ms", "hostile.toml"),
     ("compare", "hostile.toml"),
     ("explain", "hostile.toml"),
-    ("explain", "hostile.toml", "text"),
     ("explain", "hostile.toml", "required_us"),
     ("calibrate", "hostile.toml", MEASUREMENTS),
 )
@@ -186,7 +184,7 @@ def test_what_is_read_is_not_overwritten(refused: Refused, folder: Path) -> None
 
 
 def test_a_gate_that_fails_has_given_its_answer(run: Run, tmp_path: Path) -> None:
-    gate = ("diff", "paper-optimal-gap", "paper-1ms", "--no-circle", "--fail-on-regression", "-o", "diff.md")
+    gate = ("diff", "paper-optimal-gap", "paper-1ms", "--fail-on-regression", "-o", "diff.md")
     done = run(*gate, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (1, "")
     wrote, regression = done.stderr.splitlines()

@@ -57,7 +57,7 @@ def calls() -> Iterator[tuple[str, ...]]:
         yield ("sweep", PROFILE, "--vary", "bus.nodes=1:3", "--format", form)
         yield ("capacity", FAULTY, "--format", form)
     for form in ("table", "json", "markdown", "html", "csv"):
-        yield from (("diff", one, OTHER, "--no-circle", "--format", form) for one in (PROFILE, OTHER, FAULTY))
+        yield from (("diff", one, OTHER, "--format", form) for one in (PROFILE, OTHER, FAULTY))
     for form in ("table", "markdown", "html", "csv", "json"):
         yield from (("explain", PROFILE, *figure, "--format", form) for figure in ((), ("gaps_us",)))
     yield ("report", PROFILE, OTHER, "--no-circle", "--format", "html")
@@ -99,7 +99,7 @@ def test_no_name_commands_a_terminal(arguments: tuple[str, ...], run: Run, folde
 def test_json_reads_back_to_the_name(run: Run, folder: Path) -> None:
     checked = json.loads(run("check", PROFILE, "--no-circle", "--format", "json", cwd=folder).stdout)
     assert [one["path"] for one in checked["files"]] == [PROFILE]
-    compared = json.loads(run("diff", PROFILE, OTHER, "--no-circle", "--format", "json", cwd=folder).stdout)
+    compared = json.loads(run("diff", PROFILE, OTHER, "--format", "json", cwd=folder).stdout)
     assert (compared["a"]["argument"], compared["b"]["argument"]) == (PROFILE, OTHER)
 
 
@@ -115,8 +115,8 @@ def test_a_baseline_knows_the_name_again(run: Run, folder: Path) -> None:
 
 
 def test_markdown_shows_what_the_name_holds(run: Run, folder: Path) -> None:
-    said = run("diff", PROFILE, OTHER, "--no-circle", "--format", "markdown", cwd=folder).stdout
-    assert "| A | `a\\x1b[31m\\x7f\\x9b2J\\u202e\\u2066 \\ufeff\\udcff.toml` |" in said
+    said = run("diff", PROFILE, OTHER, "--format", "markdown", cwd=folder).stdout
+    assert "`a\\x1b[31m\\x7f\\x9b2J\\u202e\\u2066 \\ufeff\\udcff.toml` (A) fits" in said
 
 
 @pytest.mark.parametrize("beginning", ["=cmd|' /C calc'!A0", "+1", "-1", "@SUM(A1)"])

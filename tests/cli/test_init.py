@@ -8,9 +8,9 @@ import select
 import stat
 import subprocess
 import sys
+import time
 import tomllib
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -116,7 +116,29 @@ def test_init_writes_unlike_nodes_as_groups_and_knows_a_bus_by_its_other_names(r
     assert (io["name"], io["nodes"], io["axes"], io["read_bytes"], io["write_bytes"]) == ("io", 3, 0, 32, 8)
     # Bytes of a group are those of a node.
     assert (tool["read_bytes"], tool["write_bytes"], "read_bytes_per_axis" in tool) == (40, 24, False)
-    assert data["description"].startswith("8 nodes, 9 axes, 1000 us, 8 bytes an axis each way")
+    # It speaks of the machine, and not of figures that the next edit changes.
+    assert data["description"] == "A new machine: what is assumed here stays so until somebody measures it"
+
+
+CLOSED = """
+import os, sys
+os.execv("/bin/sh", ["sh", "-c", '"$0" -m busplan "$@" <&-', sys.executable, *sys.argv[1:]])
+"""
+
+
+def test_init_asks_nothing_where_nobody_can_answer(run: Run, tmp_path: Path) -> None:
+    for python in (None, ("-c", CLOSED)):
+        name = "open" if python is None else "closed"
+        done = run("init", name, cwd=tmp_path, python=python)
+        assert (done.returncode, done.stdout) == (0, "")
+        assert done.stderr.startswith("not given, so taken: --bus ieee1394 ")
+    written = [(tmp_path / f"{name}.toml").read_text(encoding="utf-8") for name in ("open", "closed")]
+    assert written[0].replace("open", "closed") == written[1]
+
+
+def state_of(pid: int) -> str:
+    """State of a process: R where it runs, S where it waits."""
+    return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
 
 
 def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> tuple[int, str]:
@@ -140,17 +162,16 @@ def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> 
     for answer in answers:
         # A question ends in its default.
         while not said.rstrip().endswith("]:"):
-            assert select.select([leader], [], [], 30)[0]
+            assert select.select([leader], [], [], 300)[0]
             assert heard()
+        # A signal between a prompt and its read is lost, as at any keyboard: the program must wait for the answer.
+        end = time.monotonic() + 300
+        while state_of(process.pid) != "S":
+            assert time.monotonic() < end
+            time.sleep(0.02)
         said += "<"
         os.write(leader, answer)
-    for _ in range(30):
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=1)
-            break
-        # A signal between a prompt and its read is lost, as at any keyboard: who presses Ctrl-C presses it again.
-        os.write(leader, answers[-1].replace(b"\n", b""))
-    code = process.wait(timeout=1)
+    code = process.wait(timeout=300)
     while select.select([leader], [], [], 0.1)[0] and heard():
         pass
     os.close(leader)

@@ -266,7 +266,7 @@ def test_a_machine_is_compared_on_it(run: Run, ring: Path, name: str, form: str)
     ("figure", "form"),
     [
         *((figure, form) for figure in ("required_us", None) for form in ("table", "markdown", "html", "csv", "json")),
-        *((figure, form) for figure in ("rounds", "text", "max_nodes") for form in ("table", "json")),
+        *((figure, form) for figure in ("rounds", "min_period_us") for form in ("table", "json")),
         ("latency.cycle_token_us", "json"),
     ],
 )
@@ -280,7 +280,7 @@ def test_every_figure_is_explained(run: Run, ring: Path, figure: str | None, for
         assert "T_need = data + token + T_npd" in done.stdout
 
 
-@pytest.mark.parametrize("form", ["table", "csv", "json", "jsonl"])
+@pytest.mark.parametrize("form", ["table", "csv", "json"])
 def test_it_is_swept(run: Run, ring: Path, form: str) -> None:
     vary = ("--vary", "bus.nodes=1:45:4", "--vary", "cycle.period_us=100,700,1500,20000")
     done = run("sweep", ring.name, *vary, "--format", form, cwd=ring.parent)
@@ -310,7 +310,7 @@ def test_it_is_compared_with_its_kind_and_with_another(
 ) -> None:
     other = TEXT.replace("nodes = 5", "nodes = 5\nrate_mbit_s = 2.0")
     (ring.parent / "other.toml").write_text(other, encoding="utf-8")
-    done = run("diff", *others, "--no-circle", "--format", form, cwd=ring.parent)
+    done = run("diff", *others, "--format", form, cwd=ring.parent)
     assert done.returncode == 0, done
     if form == "json" and others[1] == "other.toml":
         found = {(one["part"], one["figure"]): one for one in json.loads(done.stdout)["figures"]}
@@ -319,7 +319,6 @@ def test_it_is_compared_with_its_kind_and_with_another(
 
 
 def test_its_latency_has_no_payload_to_explain(run: Run, ring: Path) -> None:
-    assert run("explain", ring.name, "latency.transaction", cwd=ring.parent).returncode == 0
     done = run("explain", ring.name, "latency.payload_bytes", cwd=ring.parent)
     assert done.returncode == 2
     assert "payload_bytes" in done.stderr
@@ -427,9 +426,9 @@ def test_a_sweep_has_room_for_more_limits_than_bits_of_a_byte(run: Run, ring_fil
 
     limits = tuple(map(at_most, range(1, 12)))
     with registered(ring_with(limits)):
-        vary = ("sweep", ring_file.name, "--vary", "bus.nodes=1,4,12", "--format", "jsonl")
-        rows = [json.loads(line) for line in run(*vary, cwd=ring_file.parent).stdout.splitlines()]
-    assert [[one for one in row["exceeded"] if one != "time"] for row in rows if "exceeded" in row] == [
+        vary = ("sweep", ring_file.name, "--vary", "bus.nodes=1,4,12", "--format", "json")
+        rows = json.loads(run(*vary, cwd=ring_file.parent).stdout)["rows"]
+    assert [[one for one in row["exceeded"] if one != "time"] for row in rows] == [
         [f"at most {n}" for n in range(1, nodes)] for nodes in (1, 4, 12)
     ]
 
@@ -454,7 +453,7 @@ def test_a_name_is_registered_once(ring: Path) -> None:
 
 
 def test_a_timing_model_of_one_kind_alone_is_refused_between_two(run: Run, ring: Path) -> None:
-    done = run("diff", ring.name, "paper-1ms", "--timing", "plain", cwd=ring.parent)
+    done = run("diff", ring.name, "paper-1ms", "--timing-model", "plain", cwd=ring.parent)
     assert done.returncode == 2
     assert "have no timing model in common" in done.stderr
 

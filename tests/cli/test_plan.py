@@ -1,6 +1,7 @@
 """`busplan plan`: exit codes, documents, files that are written as a whole or not at all."""
 
 import json
+import re
 import signal
 import tomllib
 from collections.abc import Callable
@@ -50,6 +51,18 @@ def profile(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def explain(run: Run) -> Callable[[Path], dict[str, str]]:
+    """Grades of the keys that a profile's utilisation rests on."""
+
+    def call(path: Path) -> dict[str, str]:
+        document = json.loads(run("explain", path.name, "utilisation", "--format", "json", cwd=path.parent).stdout)
+        inputs = [given for derivation in document["derivations"] for given in derivation["inputs"]]
+        return {given["name"]: given["grade"] for given in inputs if "." in given["name"]}
+
+    return call
+
+
+@pytest.fixture
 def busplan(busplan: Run) -> Run:
     """Call `plan` in this process."""
 
@@ -85,6 +98,91 @@ def test_a_new_file_holds_the_plan_and_the_old_one_stays(busplan: Run, profile: 
     assert busplan("mine.toml", "-o", new.name, "--force", cwd=profile.parent).returncode == 0
     assert tomllib.loads(new.read_text(encoding="utf-8"))["bus"]["nodes"] == 2
     assert profile.read_text(encoding="utf-8") == PROFILE
+
+
+def test_a_new_file_keeps_comments_and_has_a_name_of_its_own(busplan: Run, profile: Path) -> None:
+    text = PROFILE.replace("[bus]", 'description = """\nTwo nodes,\n1 ms"""\n[bus]')
+    profile.write_text(text, encoding="utf-8")
+    assert busplan("mine.toml", "--axes", 15, "-o", "new.toml", cwd=profile.parent).returncode == 0
+    expected = text.replace("nodes = 2 ", "nodes = 4 ").replace("gap_count = 63 ", "gap_count = 10 ")
+    expected = expected.replace('"mine"', '"new"').replace(
+        '"""\nTwo nodes,\n1 ms"""', r'"A plan of mine, which is: Two nodes,\n1 ms"'
+    )
+    assert (profile.parent / "new.toml").read_text(encoding="utf-8") == expected
+    # To standard output it has no other name.
+    piped = busplan("mine.toml", "--axes", 15, "-o", "-", cwd=profile.parent)
+    assert tomllib.loads(piped.stdout)["name"] == "mine"
+
+
+def test_a_name_that_no_profile_has_is_made_one(busplan: Run, profile: Path) -> None:
+    for name, wanted in (("a\x1b[31m", r"a\x1b[31m"), ("x" * 200, "x" * 100), (" ", "mine")):
+        assert busplan("mine.toml", "-o", f"{name}.toml", cwd=profile.parent).returncode == 0
+        assert tomllib.loads((profile.parent / f"{name}.toml").read_text(encoding="utf-8"))["name"] == wanted
+
+
+GRADED = """\
+schema_version = 1
+name = "graded"
+[bus]
+kind = "ieee1394"
+speed = "S400"             # published: of its data sheet
+nodes = 2
+gap_count = 63             # measured: with gscanbus
+[cycle]                    # published: in the drawing
+period_us = 1000           # assumed: what the mechanics ask for
+[payload]                  # assumed
+read_bytes = 12
+write_bytes = 12
+[node]
+axes = 4
+[node.execution]
+kind = "linear"
+base_us = 60
+per_byte_us = 0.3          # derived
+grade = "measured"
+"""
+INLINE = """\
+schema_version = 1
+name = "inline"
+cycle = {period_us = 1000} # assumed
+bus.kind = "ieee1394"
+bus.speed = "S400"         # published: of its data sheet
+bus.nodes = 2
+bus.gap_count = 63         # measured: with gscanbus
+""" + GRADED[GRADED.index("[payload]") :]
+
+
+def test_no_grade_is_better_after_a_plan(
+    busplan: Run, explain: Callable[[Path], dict[str, str]], profile: Path
+) -> None:
+    profile.write_text(GRADED, encoding="utf-8")
+    before = explain(profile)
+    assert (before["cycle.period_us"], before["bus.gap_count"]) == ("assumed", "measured")
+    given = ("mine.toml", "--nodes", 9, "--set", "payload.read_bytes=16")
+    run = busplan(*given, "-o", "new.toml", "--format", "json", cwd=profile.parent)
+    changes = json.loads(run.stdout)["recommended_changes"]
+    assert {*changes} == {"bus.nodes", "payload.read_bytes", "bus.gap_count", "cycle.slice_ratio", "cycle.period_us"}
+    assert busplan(*given, "--apply", cwd=profile.parent).returncode == 0
+    for path in (profile, profile.parent / "new.toml"):
+        after = explain(path)
+        # A chosen value is not measured or published, and another assumption is one still.
+        assert after == {**before, "bus.gap_count": "given", "cycle.slice_ratio": "given"}
+        text = path.read_text(encoding="utf-8")
+        assert "# was measured: with gscanbus" in text
+        assert re.search(r"^slice_ratio = 0\.\d+  # not published$", text, re.MULTILINE)
+
+
+def test_a_layout_that_cannot_be_edited_loses_no_grade(
+    busplan: Run, explain: Callable[[Path], dict[str, str]], profile: Path
+) -> None:
+    profile.write_text(INLINE, encoding="utf-8")
+    refused = busplan("mine.toml", "--set", "cycle.slice_ratio=0.7", "--apply", cwd=profile.parent)
+    assert (refused.returncode, "by hand" in refused.stderr) == (2, True)
+    assert busplan("mine.toml", "--set", "cycle.slice_ratio=0.7", "-o", "new.toml", cwd=profile.parent).returncode == 0
+    before, after = explain(profile), explain(profile.parent / "new.toml")
+    assert before["cycle.period_us"] == after["cycle.period_us"] == "assumed"
+    assert before["bus.gap_count"] == after["bus.gap_count"] == "measured"
+    assert after == {**before, "cycle.slice_ratio": "given"}
 
 
 @pytest.mark.parametrize(
@@ -123,7 +221,7 @@ def test_the_form_beside_a_new_profile_is_that_of_standard_output(busplan: Run, 
     run = busplan("mine.toml", "-o", "new.toml", "--format", "markdown", cwd=profile.parent)
     assert (run.returncode, run.stderr) == (0, "wrote new.toml\n")
     assert run.stdout.startswith("### Plan of `mine`\n")
-    assert tomllib.loads((profile.parent / "new.toml").read_text(encoding="utf-8"))["name"] == "mine"
+    assert tomllib.loads((profile.parent / "new.toml").read_text(encoding="utf-8"))["name"] == "new"
 
 
 @pytest.mark.parametrize("option", [["--apply"], ["-o", "new.toml", "--force"], ["-o", "new.toml"]])

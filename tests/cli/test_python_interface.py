@@ -67,7 +67,6 @@ TERMINAL_OR_FILES: Reasons = {
     "top": "of the table on a terminal",
     "jobs": "processes: an executor",
     "cluster": "an executor",
-    "resume": "continues the file of a run that was ended",
     "fail_on": "exit code",
     "exit_zero": "exit code",
     "fail_on_regression": "exit code: regressions()",

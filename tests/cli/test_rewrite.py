@@ -4,15 +4,15 @@ import json
 import os
 import re
 import stat
-import threading
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from fcntl import LOCK_EX, flock
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
+from busplan import files
 from busplan.cli import rewrite
 
 if TYPE_CHECKING:
@@ -121,44 +121,50 @@ def test_what_would_be_another_file_is_refused_by_name(
     assert path.is_fifo() or path.read_bytes() == before
 
 
-class Locked:
-    """Another run in its folder: it writes while it has the lock."""
+@contextmanager
+def other_run(folder: Path, write: Callable[[], object], monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Another run in a folder, which has its lock; once that has been asked for, it writes, and ends."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    flock(descriptor, LOCK_EX)
+    locked, held = files.lock, [descriptor]
 
-    def __init__(self, folder: Path, write: Callable[[], object], *, for_s: float = 0.6) -> None:
-        self._descriptor = os.open(folder, os.O_RDONLY)
-        self._write = write
-        self._for_s = for_s
-        self.written = 0.0
-        flock(self._descriptor, LOCK_EX)
-        threading.Thread(target=self._end, daemon=True).start()
+    def ask(wanted: int) -> bool:
+        is_ours = locked(wanted)
+        if held:
+            assert not is_ours
+            write()
+            os.close(held.pop())
+        return is_ours
 
-    def _end(self) -> None:
-        time.sleep(self._for_s)
-        self._write()
-        self.written = time.monotonic()
-        os.close(self._descriptor)
+    monkeypatch.setattr(rewrite, "lock", ask)
+    yield
+    assert not held
 
 
-def test_records_that_are_written_at_once_are_all_kept(tmp_path: Path, run: Run) -> None:
+def test_records_that_are_written_at_once_are_all_kept(
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "base.json"
     given = ("--no-circle", "--baseline", "base.json", "--update-baseline")
     run("check", "paper-1ms", *given, cwd=tmp_path)
     theirs = json.loads(path.read_text(encoding="utf-8"))
     theirs["profiles"]["theirs.toml"] = {}
-    other = Locked(tmp_path, lambda: path.write_text(json.dumps(theirs), encoding="utf-8"))
-    assert run("check", "paper-4ms", *given, cwd=tmp_path).returncode == 0
-    assert other.written
+    (tmp_path / "theirs.toml").write_text(profile(), encoding="utf-8")
+    with other_run(tmp_path, lambda: path.write_text(json.dumps(theirs), encoding="utf-8"), monkeypatch):
+        assert run("check", "paper-4ms", *given, cwd=tmp_path).returncode == 0
     found = json.loads(path.read_text(encoding="utf-8"))["profiles"]
-    assert sorted(found) == ["paper-1ms.toml", "paper-4ms.toml", "theirs.toml"]
+    assert sorted(found) == ["paper-1ms", "paper-4ms", "theirs.toml"]
 
 
 @pytest.mark.parametrize("command", ["plan", "calibrate"])
-def test_what_another_run_writes_into_a_profile_is_not_lost(command: str, tmp_path: Path, refused: Refused) -> None:
+def test_what_another_run_writes_into_a_profile_is_not_lost(
+    command: str, tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "p.toml"
     text = profile()
     path.write_text(text, encoding="utf-8")
-    Locked(tmp_path, lambda: path.write_text(f"# theirs\n{text}", encoding="utf-8"))
-    said = refused(*CHANGES[command], cwd=tmp_path)
+    with other_run(tmp_path, lambda: path.write_text(f"# theirs\n{text}", encoding="utf-8"), monkeypatch):
+        said = refused(*CHANGES[command], cwd=tmp_path)
     assert said == "--apply: p.toml was changed meanwhile, and stays as it is now; run the command again"
     assert path.read_text(encoding="utf-8") == f"# theirs\n{text}"
 
@@ -168,8 +174,10 @@ def test_a_run_that_never_ends_is_not_waited_for_forever(
 ) -> None:
     monkeypatch.setattr(rewrite, "PATIENCE_S", 0.1)
     before = change.path.read_bytes()
-    Locked(tmp_path, lambda: None, for_s=30.0)  # longer than a command takes on a busy machine
+    descriptor = os.open(tmp_path, os.O_RDONLY)
+    flock(descriptor, LOCK_EX)
     assert "another run has been changing a file of this folder for 0.1 s" in refused(*change.command, cwd=tmp_path)
+    os.close(descriptor)
     assert change.path.read_bytes() == before
 
 

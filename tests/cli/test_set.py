@@ -61,7 +61,7 @@ EVERY = {
     "report": ("mine.toml", "--no-circle"),
     "plan": ("mine.toml", "--no-circle"),
     "sweep": ("mine.toml", "--vary", "bus.nodes=1:3"),
-    "diff": ("mine.toml", "paper-1ms", "--no-circle"),
+    "diff": ("mine.toml", "paper-1ms"),
     "calibrate": ("mine.toml", "table-1.csv"),
     "check": ("mine.toml", "--no-circle"),
 }
@@ -326,5 +326,5 @@ def test_rows_of_a_sweep_keep_their_form_and_the_change_is_said_beside_them(run:
     rows = run(*asked, "--format", "csv", "--columns", "margin_us", cwd=folder)
     assert rows.stdout.startswith("bus.nodes,timing_model,margin_us\n1,paper,")
     assert rows.stderr.startswith("With --set bus.speed=S200.\nmine: 2 points;")
-    first = run(*asked, "--format", "jsonl", cwd=folder).stdout.partition("\n")[0]
-    assert json.loads(first)["changes"] == {"bus.speed": "S200"}
+    document = json.loads(run(*asked, "--format", "json", cwd=folder).stdout)
+    assert document["changes"] == {"bus.speed": "S200"}

@@ -8,18 +8,19 @@ from busplan.cli.options import parse_axes
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.questions.sweep import axis_values
-from busplan.questions.sweep.grid import Listed, Values
+from busplan.questions.sweep.grid import Array
 
 PROFILE = load("paper-1ms").profile
 
 
-def axes(texts: list[str]) -> list[Values]:
+def axes(texts: list[str]) -> list[Array]:
     return [axis_values(PROFILE, key, text, name="--vary") for key, text in parse_axes(texts).items()]
 
 
 def values(spec: str) -> list[object]:
     (axis,) = axes([f"bus.gap_count={spec}"])
-    return list(axis.values) if isinstance(axis, Listed) else axis.part(0, axis.size).tolist()
+    found: list[object] = axis.tolist()
+    return found
 
 
 @pytest.mark.parametrize(
@@ -80,6 +81,8 @@ def test_values(spec: str, expected: list[object]) -> None:
         (["k=1:1:#3"], "are one"),
         (["k=5,6,5.0"], "5 is given twice"),
         (["k=0:1:0.0000000000000000000001"], "more digits than a number here can hold"),
+        (["k=1:1000001"], "k=1:1000001: 1,000,001 values are more than the 1,000,000 points a sweep takes"),
+        (["k=0:1:#1000001"], "1,000,001 values are more than"),
     ],
 )
 def test_nonsense_is_refused(texts: list[str], message: str) -> None:

@@ -2,9 +2,10 @@
 
 import json
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Sequence
 from html.parser import HTMLParser
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 from markdown_it import MarkdownIt
@@ -325,3 +326,13 @@ def test_markdown_says_a_chart_that_it_cannot_draw(caption: str) -> None:
 def test_a_text_that_no_spreadsheet_takes_says_so_in_its_cell() -> None:
     assert csv_cell("x" * 32_767) == "x" * 32_767
     assert csv_cell("x" * 131_073) == "(131,073 characters, too long for a cell: --format json has them)"
+
+
+def test_a_figure_below_zero_has_the_decimals_of_one_above(run: Callable[..., Any]) -> None:
+    shown = run("capacity", "paper-4ms", "--period", "500us").stdout
+    assert re.search(r"^corrected margin +us +- +-19\.936 !$", shown, re.MULTILINE)
+    assert re.search(r"^margin +us +42\.883 +-13\.320 !$", shown, re.MULTILINE)
+    # What has no digit among them is written with three of its own, of either sign.
+    assert [decimals_of(number, 3) for number in (-0.00012, 0.00012, -0.001, -123.4)] == [
+        "-0.00012", "0.00012", "-0.001", "-123.400",
+    ]  # fmt: skip

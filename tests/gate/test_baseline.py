@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from busplan.errors import BusplanError
-from busplan.gate.baseline import MODELS, Baseline, Record, fallen, read_baseline, write_baseline
+from busplan.gate.baseline import MODELS, Baseline, Record, read_baseline, worse, write_baseline
 from busplan.gate.gate import FileResult, check_document
 from busplan.profile.document import Document
 from busplan.profile.shipped import load
@@ -145,7 +145,7 @@ def test_it_goes_by_figure_and_not_by_line(clean: str, changed: Changed, check: 
 
 def test_both_timing_models_are_held() -> None:
     now = {"paper.margin_us": 10.0, "standard.margin_us": 5.0}
-    assert fallen(now, {"paper.margin_us": 10.0, "standard.margin_us": 6.0}) == {"standard.margin_us": (6.0, 5.0)}
+    assert worse(now, {"paper.margin_us": 10.0, "standard.margin_us": 6.0}) == {"standard.margin_us": (6.0, 5.0)}
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_both_timing_models_are_held() -> None:
     ],
 )
 def test_rounding_is_no_loss(before: float, now: float, lost: bool) -> None:
-    assert bool(fallen({"paper.margin_us": now}, {"paper.margin_us": before})) is lost
+    assert bool(worse({"paper.margin_us": now}, {"paper.margin_us": before})) is lost
 
 
 def test_what_is_written_can_be_read_and_is_sorted_by_path(check: Check, clean: str) -> None:

@@ -95,7 +95,7 @@ def test_shipped_names_mean_the_shipped_profiles_whatever_lies_here() -> None:
     write("paper-1ms/a.toml", "paper-4ms")
     for name in shipped_names():
         (source,) = collect([name]).sources
-        assert source == (shipped_folder() / f"{name}.toml", f"{name}.toml", None)
+        assert source == (shipped_folder() / f"{name}.toml", f"{name}.toml", None, True)
     assert names(collect(["./paper-1ms", "./paper-4ms"])) == ["paper-1ms/a.toml", "paper-4ms"]
 
 

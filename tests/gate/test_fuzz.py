@@ -25,7 +25,8 @@ from busplan.gate.rules import all_rules
 from busplan.profile.shipped import shipped_folder
 from busplan.profile.toml import decode
 
-LONGEST_S = 1.0
+LONGEST_S = 20.0
+"""CPU time that no file takes [s]: the longest takes a second on an idle machine."""
 MOST_BYTES = 120_000
 """A little more than a profile may have, so that the limit is crossed too."""
 
@@ -209,7 +210,7 @@ def test_hundreds_of_nasty_files_in_one_call(tmp_path: Path) -> None:
         encoding="utf-8",
         cwd=tmp_path,
         check=False,
-        timeout=120,
+        timeout=300,
     )
     assert run.returncode == 1
     assert re.fullmatch(rf"checked {len(names)} profiles: \d+ errors, \d+ warnings?\n", run.stderr)

@@ -46,6 +46,16 @@ def test_a_machine_within_its_plan_passes_and_one_outside_fails(run: Run, tmp_pa
     assert "BP902" not in run(*words[:3], cwd=tmp_path).stdout
 
 
+def test_a_share_and_its_uncertainty_are_in_one_unit(tmp_path: Path) -> None:
+    profile = tmp_path / "slow.toml"
+    profile.write_text((LOG.parent / "valid.toml").read_text().replace("period_us = 4000", "period_us = 8000"))
+    (seen,) = [one for one in busplan.measured(profile, LOG).figures if one.quantity == "load"]
+    assert seen.uncertainty is not None
+    messages = [one.finding.message for one in busplan.check(profile, recording=LOG).findings]
+    (said,) = [message for message in messages if message.startswith("name: load: ")]
+    assert f" +/- {100 * seen.uncertainty:.2g} % recorded, " in said
+
+
 def test_what_no_key_plans_is_at_the_name(tmp_path: Path) -> None:
     log = tmp_path / "bus.log"
     log.write_text(LOG.read_text() + "(1700000001.000000) can0 7AA#00\n")

@@ -58,12 +58,12 @@ def test_such_a_key_leaves_the_standard_alone_and_a_sentence_says_why(busplan: R
 def test_the_paper_is_refused_where_it_is_asked_for(busplan: Run, own: Path, command: str) -> None:
     own.write_text(text_with("bus.cycle_master", "host.transaction_us"), encoding="utf-8")
     more = {"sweep": ("--vary", "bus.nodes=1,2"), "explain": ("required_us",)}.get(command, ())
-    done = busplan(command, "own.toml", *more, "--timing", "paper", cwd=own.parent)
+    done = busplan(command, "own.toml", *more, "--timing-model", "paper", cwd=own.parent)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
         "--timing paper: not applicable, the paper model has no bus.cycle_master, host.transaction_us; use standard\n"
     )
-    assert busplan(command, "own.toml", *more, "--timing", "standard", cwd=own.parent).returncode == 0
+    assert busplan(command, "own.toml", *more, "--timing-model", "standard", cwd=own.parent).returncode == 0
     assert busplan(command, "own.toml", *more, cwd=own.parent).returncode == 0
 
 

@@ -2,9 +2,12 @@
 
 import pytest
 
+import busplan
 from busplan.profile.document import Document
+from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load
 from busplan.profile.toml import comment_grade, override, validate
+from busplan.profile.write import profile_text
 from busplan.questions.fit.inputs import given
 
 TEXT = """\
@@ -47,11 +50,24 @@ def test_a_comment_grades_its_key_and_that_of_a_table_its_keys(key: str, grade: 
     assert given(validate(Document("press.toml", TEXT)), key).grade == grade
 
 
-def test_a_key_that_was_changed_has_left_its_comment() -> None:
-    profile = override(validate(Document("press.toml", TEXT)), {"bus.master_us": 20.0})
-    assert comment_grade(profile, "bus.master_us") is None
+def test_a_key_that_was_changed_is_no_longer_measured_and_is_assumed_if_it_was() -> None:
+    profile = override(validate(Document("press.toml", TEXT)), {"bus.master_us": 20.0, "cycle.period_us": 250})
+    assert comment_grade(profile, "bus.master_us") == "assumed"
+    assert comment_grade(profile, "cycle.period_us") is None
     assert comment_grade(profile, "bus.master_jitter_us") == "measured"
-    assert comment_grade(override(profile, {"cycle.slice_ratio": 0.5}), "bus.master_us") is None
+    assert comment_grade(override(profile, {"bus.master_jitter_us": 6}), "cycle.period_us") is None
+    assert comment_grade(override(profile, {"bus.master_jitter_us": 6}), "bus.master_jitter_us") is None
+
+
+def test_a_profile_that_is_written_has_the_grades_of_its_comments() -> None:
+    profile = override(validate(Document("press.toml", TEXT)), {"bus.master_us": 20.0, "cycle.period_us": 250})
+    again = validate(Document("again.toml", profile_text(profile)))
+    assert again == profile
+    keys = [*dotted_keys(profile)]
+    assert [comment_grade(again, key) for key in keys] == [comment_grade(profile, key) for key in keys]
+    # So a check of a profile in memory warns of what is assumed, as that of its file does.
+    press = busplan.load_profile("ethercat-servo-8")
+    assert [one.finding.code for one in busplan.check(press, circle=False).findings] == ["BP112"]
 
 
 def test_comments_are_no_part_of_a_profile() -> None:

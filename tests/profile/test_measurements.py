@@ -11,7 +11,7 @@ from busplan.errors import BusplanError
 from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, parse_measurements
 from busplan.profile.shipped import locate_measurements
 
-EXPECTED = "expected payload_bytes,latency_us and, where known, transaction,request_and_acknowledge_us"
+EXPECTED = "expected payload_bytes,latency_us and, where known, transaction"
 
 
 def refusals(text: str | bytes) -> list[str]:
@@ -24,10 +24,9 @@ def test_the_shipped_example_is_table_1() -> None:
     path, name, shipped = locate_measurements("table-1.csv")
     found = parse_measurements(path.read_bytes(), name=name)
     assert (name, shipped) == ("table-1.csv", True)
-    _, halves, latencies, *_ = (table["rows"] for table in published("paper")["evidence"])
-    assert [one.request_and_acknowledge_us for one in found] == [row["published"] for row in halves]
+    _, _, latencies, *_ = (table["rows"] for table in published("paper")["evidence"])
     assert [one.latency_us for one in found] == [row["published"] for row in latencies]
-    assert {f"{one.payload_bytes} bytes" for one in found} == {row["quantity"] for row in halves}
+    assert {f"{one.payload_bytes} bytes" for one in found} == {row["quantity"] for row in latencies}
     assert {one.transaction for one in found} == {"write"}
 
 
@@ -35,8 +34,8 @@ def test_columns_in_any_order_comments_blank_lines_quotes_space_and_any_line_end
     header = '\ufeff# bench 3\r\n\r\n"latency_us", transaction ,payload_bytes # as logged\r\n'
     text = f'{header} 5e1 ,READ,"4"\n\r\n.5,write, 16#\n'
     assert parse_measurements(text.encode(), name="m.csv") == (
-        Measurement(4, "read", 4, 50.0, None),
-        Measurement(6, "write", 16, 0.5, None),
+        Measurement(4, "read", 4, 50.0),
+        Measurement(6, "write", 16, 0.5),
     )
 
 
@@ -46,14 +45,13 @@ measurements = st.builds(
     transaction=st.sampled_from(["read", "write"]),
     payload_bytes=st.integers(1, 10**6),
     latency_us=st.floats(1e-6, 1e9),
-    request_and_acknowledge_us=st.floats(1e-6, 1e9),
 )
 
 
 @given(st.lists(measurements, min_size=1, max_size=5))
 def test_what_is_written_is_read(rows: list[Measurement]) -> None:
     lines = [",".join(map(str, row[1:])) for row in rows]
-    text = "\n".join(["transaction,payload_bytes,latency_us,request_and_acknowledge_us", *lines])
+    text = "\n".join(["transaction,payload_bytes,latency_us", *lines])
     found = parse_measurements(text.encode(), name="m.csv")
     assert [one._replace(line=0) for one in found] == rows
     assert [one.line for one in found] == list(range(2, len(rows) + 2))
@@ -98,15 +96,15 @@ def test_a_column_in_another_unit_is_one_problem_and_not_a_missing_column_beside
 
 
 def test_all_rows_that_are_wrong_are_told_at_once() -> None:
-    text = """payload_bytes,latency_us,transaction,request_and_acknowledge_us
-4,nan,write,6
-4,-48.7,write,6
-3.5,48.7,write,6
-0,48.7,write,6
-x,1e400,dma,
-4,48,7,write,6
+    text = """payload_bytes,latency_us,transaction
+4,nan,write
+4,-48.7,write
+3.5,48.7,write
+0,48.7,write
+x,1e400,dma
+4,48,7,write
 4,48.7
-4,1_0,write,Infinity
+4,1_0,write
 """
     assert refusals(text) == [
         "m.csv:2:3: latency_us 'nan': expected a number with a point, as 48.7",
@@ -116,11 +114,9 @@ x,1e400,dma,
         "m.csv:6:1: payload_bytes 'x': expected a number with a point, as 48.7",
         "m.csv:6:3: latency_us '1e400': must be greater than 0 and no more than 1,000,000,000",
         "m.csv:6:9: transaction 'dma': expected read or write",
-        "m.csv:6:13: request_and_acknowledge_us '': expected a number with a point, as 48.7",
-        "m.csv:7:1: 5 values for 4 columns; is there a decimal comma? Write 48.7",
-        "m.csv:8:1: 2 values for 4 columns",
+        "m.csv:7:1: 4 values for 3 columns; is there a decimal comma? Write 48.7",
+        "m.csv:8:1: 2 values for 3 columns",
         "m.csv:9:3: latency_us '1_0': expected a number with a point, as 48.7",
-        "m.csv:9:13: request_and_acknowledge_us 'Infinity': expected a number with a point, as 48.7",
     ]
 
 

@@ -6,16 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import busplan
 from busplan.errors import PlacedError
 from busplan.profile.shipped import load
 from busplan.profile.toml import decode, override, validate
-from busplan.questions.explain.derivation import explain
+from busplan.questions.explain import explain
 from busplan.questions.fit.figures import capacity, figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.latency.figures import latency
 from busplan.questions.plan.planning import plan
-from busplan.questions.sweep.blocks import sweep
-from busplan.questions.sweep.grid import Steps, checked_grid
 from busplan.sections.profile import Profile
 
 TEXT = """schema_version = 1
@@ -88,9 +87,7 @@ def test_a_table_must_hold_what_all_axes_make() -> None:
 
 def test_a_sweep_over_the_axes_is_what_each_profile_gives() -> None:
     own = profile("read_bytes = 4\nread_bytes_per_axis = 8\nwrite_bytes_per_axis = 6")
-    grid = checked_grid(own, {"node.axes": Steps(1, 1, 1, 6)}, with_circle=False)
-    (block,) = sweep(own, grid, timing_models=("standard",))
-    swept = block.rows("required_us").tolist()
+    swept = busplan.sweep(own, vary={"node.axes": range(1, 7)}, timing_model="standard")["required_us"].tolist()
     assert swept == [figures(override(own, {"node.axes": n}), model="standard").required_us for n in range(1, 7)]
     assert len(set(swept)) == 6
 

@@ -695,7 +695,10 @@ def test_a_shipped_profile_after_any_accident_loads_or_is_refused_with_places_in
 
 @given(content=st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
 @example(content=b"\xef\xbb\xbf\xff")
+@example(content=b"\r\r\n")
 @example(content=b"a = [\r\r\n")
+@example(content=b"# a\r\r\nb = 1")
+@example(content=b"a = '\r\r\n'")
 @example(content=b"a = '''\r\n\r\n")
 @example(content=b"\n\n\n[")
 @example(content=b"a=1\n\r\n\r\n x")

@@ -607,8 +607,8 @@ def _outside_sentences(blocks: object) -> Iterator[ShownValue]:
 
 
 def _require(report: Report) -> int:
-    known = values_by_key(report.document())
-    found = [value for value in _outside_sentences(tuple(report.blocks())) if value.key in known]
+    known = values_by_key(report.document)
+    found = [value for value in _outside_sentences(tuple(report.blocks)) if value.key in known]
     for value in found:
         assert value.value in known[value.key], value
     return len(found)

@@ -22,7 +22,7 @@ ANSWERS: dict[str, Callable[[busplan.Profile], Answer]] = {
     "sweep": lambda profile: busplan.sweep(profile, vary={"bus.gap_count": [63, "optimal"], "bus.nodes": "1:3"}),
     "map": busplan.map_,
     "compare": lambda profile: busplan.compare(profile, buses=["ieee1394", "can"]),
-    "diff": lambda profile: busplan.diff(profile, "paper-optimal-gap", circle=False),
+    "diff": lambda profile: busplan.diff(profile, "paper-optimal-gap"),
     "explain": lambda profile: busplan.explain(profile, "margin_us"),
     "explain all": busplan.explain,
     "calibrate": lambda profile: busplan.calibrate(profile, "table-1.csv"),
@@ -104,11 +104,11 @@ HEADLINES = {
     "model).>",
     "map": "<MapAnswer: paper-1ms: 57 of 180 settings are shown to fit. This design (8 axes, period 1 ms): fits.>",
     "compare": "<CompareAnswer: paper-1ms at 1 ms: shown to fit on 1 of 2 kinds of bus: IEEE 1394.>",
-    "diff": "<DiffAnswer: B is better in 16 figures: corrected margin, safe nodes, safe axes, smallest safe period and "
-    "12 more.>",
+    "diff": "<DiffAnswer: paper-1ms (A) fits, paper-optimal-gap (B) fits; B is better in 16 figures: corrected margin, "
+    "safe nodes, safe axes, period with enough time and 12 more.>",
     "explain": "<ExplainAnswer: margin_us of paper-1ms at 1 ms, paper model: 292.8825 us>",
-    "explain all": "<ExplainAnswer: paper-1ms: 44 assumptions behind its figures>",
-    "calibrate": "<CalibrateAnswer: paper-1ms: Table: the median at each payload, 4 to 1024 bytes.>",
+    "explain all": "<ExplainAnswer: paper-1ms: 30 assumptions behind its verdict>",
+    "calibrate": "<CalibrateAnswer: paper-1ms: T_exec is the median at each payload, of 8 measurements at 8 payloads, table-1.csv.>",
     "report": "<ReportAnswer: paper-1ms: fits>",
 }
 

@@ -78,20 +78,20 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
         "paper-1ms", vary={"bus.nodes": range(1, 5), "bus.gap_count": [63, "optimal"]}
     ),
     "diff paper-1ms paper-optimal-gap": lambda: busplan.diff("paper-1ms", "paper-optimal-gap"),
-    "diff paper-4ms paper-dma --timing standard --no-circle": lambda: busplan.diff(
-        "paper-4ms", "paper-dma", timing_model="standard", circle=False
+    "diff paper-4ms paper-dma --timing-model standard": lambda: busplan.diff(
+        "paper-4ms", "paper-dma", timing_model="standard"
     ),
-    "explain paper-4ms required_us --period 1ms --period 500us --timing both": lambda: busplan.explain(
+    "explain paper-4ms required_us --period 1ms --period 500us --timing-model both": lambda: busplan.explain(
         "paper-4ms", "required_us", period_us=[1000, 500], timing_model=["paper", "standard"]
     ),
-    "explain paper-4ms latency.latency_us --transaction read --timing standard": lambda: busplan.explain(
+    "explain paper-4ms latency.latency_us --transaction read --timing-model standard": lambda: busplan.explain(
         "paper-4ms", "latency.latency_us", transaction="read", timing_model="standard"
     ),
     "evidence": busplan.evidence,
     "evidence can": lambda: busplan.evidence("can"),
     "paper": lambda: busplan.evidence(paper=True),
-    "calibrate paper-two-node table-1.csv --form linear --timing paper": lambda: busplan.calibrate(
-        "paper-two-node", "table-1.csv", form="linear", timing_model="paper"
+    "calibrate paper-two-node table-1.csv --timing-model paper": lambda: busplan.calibrate(
+        "paper-two-node", "table-1.csv", timing_model="paper"
     ),
     "report sercos2-servo-8 sercos3-servo-8 --set bus.nodes=3 --no-circle --title Two": lambda: busplan.report(
         [busplan.load_profile(name, changes={"bus.nodes": 3}) for name in ("sercos2-servo-8", "sercos3-servo-8")],

@@ -78,7 +78,7 @@ def test_what_simulates_nothing_loads_no_numpy() -> None:
         "timeline('paper-4ms')",
         "plan('paper-4ms', circle=False)",
         "check('paper-4ms', circle=False)",
-        "diff('paper-4ms', 'paper-dma', circle=False)",
+        "diff('paper-4ms', 'paper-dma')",
         "compare('paper-4ms')",
         "explain('paper-4ms', 'required_us')",
         "calibrate('paper-two-node', 'table-1.csv')",

@@ -142,7 +142,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         "origins: 2 for 1 profile; expected one for each",
     ),
     "a model of two kinds of bus": (
-        lambda: busplan.diff("paper-4ms", "can-servo-8", timing_model="standard", circle=False),
+        lambda: busplan.diff("paper-4ms", "can-servo-8", timing_model="standard"),
         "timing_model standard: the kinds of bus, ieee1394 and can, have no timing model in common; leave it out",
     ),
     "no axes": (lambda: busplan.plan("paper-4ms", axes=0), "axes 0: expected a whole number from 1"),
@@ -215,15 +215,15 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: busplan.plan("paper-4ms", period_us=Decimal(500)),  # type: ignore[arg-type]
         "period_us Decimal('500'): expected a finite number",
     ),
-    "no such figure": (lambda: busplan.explain("paper-4ms", "margin"), "margin"),
+    "no such figure": (lambda: busplan.explain("paper-4ms", "marginal"), "marginal: no such figure"),
     "a figure that is none": (lambda: busplan.explain("paper-4ms", 5), "figure 5: expected a key of the JSON"),  # type: ignore[arg-type]
     "a period of no figure": (
         lambda: busplan.explain("paper-4ms", period_us=500),
-        "period_us 500: goes with a figure, as busplan.explain(profile,",
+        "period_us: goes with a figure, as busplan explain PROFILE",
     ),
     "a transaction of no latency": (
         lambda: busplan.explain("paper-4ms", "margin_us", transaction="read"),
-        "margin_us: not a figure of latency, so it has no transaction",
+        "margin_us: a figure of capacity, which has no transactions",
     ),
     "another transaction": (
         lambda: busplan.explain("paper-4ms", "latency_us", transaction="both"),
@@ -235,7 +235,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "standard input to diff": (lambda: busplan.diff("paper-4ms", "-"), "-: standard input is read by the command line"),
     "a tolerance below nothing": (
-        lambda: busplan.diff("paper-4ms", "paper-1ms", circle=False).regressions(tolerance_percent=-1),
+        lambda: busplan.diff("paper-4ms", "paper-1ms").regressions(tolerance_percent=-1),
         "tolerance_percent -1: must be 0 or more",
     ),
     "no profiles": (lambda: busplan.report([]), "profiles: no values; give at least one"),

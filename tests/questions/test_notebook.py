@@ -100,7 +100,7 @@ def test_the_name_of_a_question_that_python_has_taken_is_said() -> None:
 
 def test_an_answer_without_a_picture_gives_none() -> None:
     assert busplan.capacity("paper-4ms")._repr_svg_() is None
-    assert busplan.diff("paper-4ms", "paper-1ms", circle=False)._repr_svg_() is None
+    assert busplan.diff("paper-4ms", "paper-1ms")._repr_svg_() is None
 
 
 def test_a_page_is_text_and_is_saved_in_the_form_of_its_ending(tmp_path: Path) -> None:
@@ -144,14 +144,13 @@ def test_the_commands_of_a_page_give_the_origin_that_is_said() -> None:
 
 
 def test_a_difference_calls_its_sides_as_it_is_told() -> None:
-    found = busplan.diff("paper-optimal-gap", "paper-1ms", circle=False, arguments=("before", "after"))
+    found = busplan.diff("paper-optimal-gap", "paper-1ms", arguments=("before", "after"))
     assert [found.to_dict()[side]["argument"] for side in "ab"] == ["before", "after"]
     assert found.regression_words(tolerance_percent=10).startswith("regression: B is worse by more than 10 % in ")
-    assert busplan.diff("paper-1ms", "paper-1ms", circle=False).regression_words() == ""
 
 
 def test_figures_that_are_worse_are_named_with_a_tolerance() -> None:
-    found = busplan.diff("paper-optimal-gap", "paper-1ms", timing_model="standard", circle=False)
+    found = busplan.diff("paper-optimal-gap", "paper-1ms", timing_model="standard")
     keys = [one.figure.key for one in found.regressions()]
     assert "margin_us" in keys
     assert "margin_us" not in [one.figure.key for one in found.regressions(tolerance_percent=50)]

@@ -21,7 +21,7 @@ COMMANDS: Mapping[str, Callable[[], Answer]] = {
 }
 FILES = [
     *((name, ending) for name in list(COMMANDS)[:3] for ending in (".png", ".svg")),
-    *(("sweep paper-4ms --vary bus.nodes=1:9", ending) for ending in (".csv", ".json", ".jsonl", ".parquet", ".svg")),
+    *(("sweep paper-4ms --vary bus.nodes=1:9", ending) for ending in (".csv", ".json", ".parquet", ".svg")),
     ("circle-test paper-4ms", ".png"),
 ]
 

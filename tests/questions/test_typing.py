@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 import busplan
 from busplan.gate.report import Located
 from busplan.questions.compare.kinds import MachineOnKind, NotOnKind
-from busplan.questions.diff.difference import KeyDifference
+from busplan.questions.diff import KeyDifference
 from busplan.questions.explain.derivation import Step
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.map.trade_off import Cell
@@ -30,7 +30,7 @@ def test_the_types_are_seen_through_the_lazy_names() -> None:
         assert_type(busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})["max_axes"], NDArray[Any])
         assert_type(busplan.map_("paper-4ms").own, Cell | None)
         assert_type(busplan.compare("paper-4ms").kinds, tuple[MachineOnKind | NotOnKind, ...])
-        assert_type(busplan.diff("paper-4ms", "paper-1ms", circle=False).keys, tuple[KeyDifference, ...])
+        assert_type(busplan.diff("paper-4ms", "paper-1ms").keys, tuple[KeyDifference, ...])
         assert_type(busplan.explain("paper-4ms", "margin_us").derivations[0].steps, tuple[Step, ...])
         assert_type(busplan.calibrate("paper-two-node", [(4, 48.7)]).payloads[0].execution_us, float)
         assert_type(busplan.calibrate("paper-two-node", {"payload_bytes": [4], "latency_us": [48.7]}).source, str)

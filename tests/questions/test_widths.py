@@ -17,20 +17,14 @@ from busplan.questions.circle.report import circle_report
 from busplan.questions.circle.roundness import circle_test
 from busplan.questions.compare.kinds import compare
 from busplan.questions.compare.report import compare_report
-from busplan.questions.diff.difference import difference
-from busplan.questions.diff.report import diff_report
-from busplan.questions.explain.derivation import assumptions, explain
-from busplan.questions.explain.report import assumptions_report, explain_report
+from busplan.questions.diff import diff
+from busplan.questions.explain import explain
 from busplan.questions.fit.figures import capacity
-from busplan.questions.fit.network import model_names
 from busplan.questions.latency.figures import latency
 from busplan.questions.latency.report import latency_report
 from busplan.questions.plan.planning import plan
 from busplan.questions.plan.report import plan_report
-from busplan.questions.sweep.asked import Sweep
-from busplan.questions.sweep.blocks import sweep
-from busplan.questions.sweep.digest import Digest, default_columns
-from busplan.questions.sweep.grid import Listed, checked_grid
+from busplan.questions.sweep import sweep
 from busplan.questions.timeline.events import schedule
 from busplan.questions.timeline.report import timeline_report
 from busplan.sections.profile import Profile
@@ -41,18 +35,7 @@ PROFILES = ("paper-optimal-gap", "gantry-24", "can-servo-8", "can-fd-arm-7", "et
 
 
 def swept(profile: Profile) -> Report:
-    grid = checked_grid(
-        profile,
-        {"cycle.period_us": Listed((500, 1000, 4000)), "limits.reserve": Listed((0, 0.25))},
-        with_circle=False,
-    )
-    models = model_names(profile)
-    asked = Sweep(profile, grid, tuple(models), ())
-    columns = (*grid.axes, "timing_model", *default_columns(asked))
-    digest = Digest(asked._replace(columns=columns), top=20)
-    for block in sweep(profile, grid, timing_models=models):
-        digest.add(block)
-    return digest.report(dict)
+    return sweep(profile, vary={"cycle.period_us": (500, 1000, 4000), "limits.reserve": (0, 0.25)}).report()
 
 
 def several(profile: Profile) -> Report:
@@ -70,10 +53,10 @@ ANSWERS: dict[str, Callable[[Profile], Report]] = {
     "capacity --sensitivity": moved,
     "latency": lambda profile: latency_report(latency(profile)),
     "plan": lambda profile: plan_report(plan(profile)),
-    "explain": lambda profile: assumptions_report(profile, assumptions(profile)),
-    "explain margin_us": lambda profile: explain_report(explain(profile, "margin_us")),
+    "explain": lambda profile: explain(profile).report(),
+    "explain margin_us": lambda profile: explain(profile, "margin_us").report(),
     "circle-test": lambda profile: circle_report(circle_test(profile)._replace(with_contributions=True)),
-    "diff": lambda profile: diff_report(difference(load("paper-dma").profile, profile), arguments=("a.toml", "b.toml")),
+    "diff": lambda profile: diff("paper-dma", profile, arguments=("a.toml", "b.toml")).report(),
     "timeline": lambda profile: timeline_report(schedule(profile)),
     "sweep": swept,
     "compare": lambda profile: compare_report(compare(profile, with_circle=True)),

@@ -23,6 +23,7 @@ from busplan.manual import FOLDER, topics
 from busplan.profile.kinds import models_of
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import decode, validate
+from busplan.questions.circle.figures import CIRCLE_BY_KEY
 from busplan.questions.explain.derivation import figures_of
 from busplan.questions.explain.report import constant_rows, equation_rows
 from busplan.sections.machine import AxisOverride
@@ -128,7 +129,7 @@ def reference_row(model: type[BaseModel], name: str, key: str) -> str:
         if field.default is PydanticUndefined
         else "required, without groups"
         if key == "bus.nodes"
-        else repr(field.default).replace("'", '"').replace("False", "false")
+        else repr(field.default).replace("'", '"').replace("False", "false").replace("True", "true")
     )
     range_ = allowed(properties(model)[name])
     return f"| `{key}` | {range_} | {default.replace('None', 'none')} | {field.description} |"
@@ -200,7 +201,7 @@ def tables() -> Iterator[list[str]]:
         for row in constants
     ]
     yield table(list(constants[0]), cells, left=6)
-    for command, figures in figures_of(kind_named("ieee1394")).items():
+    for command, figures in (*figures_of(kind_named("ieee1394")).items(), ("circle-test", CIRCLE_BY_KEY)):
         described = (
             [code(one.key), one.symbol, one.unit, one.meaning, one.reference, one.better.replace("neither", "")]
             for one in figures.values()

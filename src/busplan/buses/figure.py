@@ -227,13 +227,6 @@ FITS: Final = Figure(
     sort="truth",
     better="more",
 )
-CIRCLE_REFUSED_BY: Final = Figure(
-    "circle_refused_by",
-    "refused",
-    "profile",
-    "keys that prevent the profile's circle test from running",
-    sort="words",
-)
 _CERTAINTY: Final = "JCGM 100"
 BIAS: Final = Figure("bias_us", "bias", "residual", "mean time that the bus takes beyond the timing model", "bias")
 MARGIN_CORRECTED: Final = Figure(
@@ -286,7 +279,7 @@ SAFE_MIN_PERIOD: Final = Figure(
     "T_s,safe",
     _CERTAINTY,
     "smallest period shown to have enough time for these nodes, null without one; other limits may be broken",
-    "smallest safe period",
+    "period with enough time",
     better="less",
 )
 VERDICT: Final = Figure(
@@ -304,40 +297,6 @@ CERTAINTY: Final = (
     *(SAFE_LIMITED_BY, SAFE_MIN_PERIOD, NOT_SHOWN, VERDICT),
 )
 """Figures of the timing model that decides; under another they do not exist."""
-VERDICT_FIGURES: Final = (
-    Figure("missed_limits", "missed", _CYCLE, "keys of [limits] that are not kept", sort="words"),
-    Figure(
-        "models_agree",
-        "models agree",
-        _CYCLE,
-        "whether `fits` is the same under every timing model; null with a single model",
-        sort="truth",
-    ),
-    Figure(
-        "verdict_after_reset",
-        "verdict after reset",
-        _CERTAINTY,
-        "verdict after a bus reset, where it is worse than fits",
-        sort="word",
-    ),
-    Figure("uncertainty_parts", "parts of U", _CERTAINTY, "what the uncertainty is made of, the largest first"),
-    Figure(
-        "reserve",
-        "reserve",
-        "profile",
-        "share of the slice that must be free for a cycle to be shown to fit",
-        sort="number",
-    ),
-    Figure("not_in_it", "not in it", "profile", "keys that could add time to the cycle and are not set", sort="words"),
-    Figure("not_applicable", "not applicable", "profile", "timing models with the keys that they cannot express"),
-    Figure("cheapest_change", "change", _CYCLE, "cheapest change that makes it fit, or carries more nodes"),
-    Figure("warnings", "warnings", "table", "warnings that hold whatever the verdict", sort="words"),
-    Figure("text", "text", _CYCLE, "the verdict in words", sort="word"),
-    Figure("sensitivity", "sensitivity", _CERTAINTY, "how small changes move the corrected margin, the largest first"),
-    Figure("next_bottleneck", "next bottleneck", _CERTAINTY, "what binds once the largest term or the limit is gone"),
-)
-"""Figures of the verdict, which belong to no timing model."""
-
 TRANSACTION: Final = Figure("transaction", "kind", "profile", "what is timed", sort="word")
 PAYLOAD_BYTES: Final = Figure("payload_bytes", "P", "profile", "payload of the transaction", sort="count")
 
@@ -370,7 +329,7 @@ def capacity_figures(
         *terms,
         *(BINDING_TERM, UTILISATION, MARGIN),
         *counted,
-        *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS, CIRCLE_REFUSED_BY),
+        *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS),
         *CERTAINTY,
     )
 

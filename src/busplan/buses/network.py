@@ -1,10 +1,13 @@
 """Inputs of a cycle: groups of nodes, the period, and the kind's own keys."""
 
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from busplan.elementwise import Number, is_everywhere, larger, total
 from busplan.sections.alike_nodes import AlikeNodes
+
+if TYPE_CHECKING:
+    from busplan.buses.bus import Bus
 
 
 class Group(NamedTuple):
@@ -70,6 +73,8 @@ class Network(NamedTuple):
 
     profile: Any
     """The profile, of its kind's own model. Its values may be numbers of any sort."""
+    bus: "Bus"
+    """The kind of bus."""
     groups: tuple[Group, ...]
     period_us: Number
     slice_ratio: Number

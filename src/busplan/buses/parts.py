@@ -104,9 +104,6 @@ class Limit(NamedTuple):
     """A cycle fits without it, but nothing is advised that breaks it."""
     says: Callable[[Network], str] | None = None
     """Sentence on the broken limit, where it says more than its value: instead of `over`."""
-    breaks: Callable[[Network], Number] | None = None
-    """Whether a network breaks it, where that is quicker to tell than its value; of a limit without doubt."""
-
     is_of_period: bool = False
     """The period alone breaks it: a plan takes no period that does."""
     kept_from_us: Callable[[Network], float] | None = None
@@ -141,8 +138,6 @@ class Limit(NamedTuple):
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
-        if self.breaks is not None:
-            return self.breaks(network)
         return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
 
     def period_us(self, network: Network) -> Number:
@@ -281,28 +276,21 @@ class PayloadRange(NamedTuple):
     """Carrier that holds no more."""
 
 
-class Halves(NamedTuple):
-    """Parts of a measured latency beside the execution [us]."""
+class PacketTime(NamedTuple):
+    """What is not the execution in a measured latency [us]."""
 
-    latency_us: float
-    """All of it."""
-    request_and_acknowledge_us: float
-    """Up to the first acknowledge."""
+    us: float
+    """Time of the packets."""
     shortest_us: float = 0.0
     """The bus waits so long whatever the node does: a shorter execution cannot be told from a latency."""
-
-    @property
-    def response_and_acknowledge_us(self) -> float:
-        """Behind the execution."""
-        return self.latency_us - self.request_and_acknowledge_us
 
 
 class MeasuredLatencies(NamedTuple):
     """Calibration of execution times from latencies that were measured on a kind of bus."""
 
-    halves: Callable[[Network, str, str, str, int], Halves]
+    packets: Callable[[Network, str, str, str, int], PacketTime]
     """Time of the packets of a transaction, by network, name of the group, timing model, "read" or "write", and
     payload [bytes]; a BusplanError where its latency could not be measured."""
-    fit_keys: Callable[[Network, str | None], dict[str, Value]]
+    fit_keys: Callable[[Network, str], dict[str, Value]]
     """Keys of [node.execution] that say what an execution time was fitted against, by network and by timing model whose
-    packets were taken off; None where their time was measured."""
+    packets were taken off."""

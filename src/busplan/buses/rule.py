@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 
 if TYPE_CHECKING:
+    from busplan.buses.network import Network
+    from busplan.buses.parts import Value
     from busplan.sections.profile import Profile
 
 Severity = Literal["error", "warning"]
@@ -40,6 +42,10 @@ class RuleSubject(Protocol):
         """The profile."""
 
     @property
+    def network(self) -> "Network":
+        """Its network."""
+
+    @property
     def deciding(self) -> RuleFigures:
         """Capacity under the timing model that decides."""
 
@@ -51,8 +57,11 @@ class RuleSubject(Protocol):
     def others_fit(self) -> Sequence[tuple[str, bool]]:
         """The other timing models, each with whether the cycle fits; cheaper than their figures."""
 
-    def after(self, changes: Mapping[str, object]) -> RuleFigures:
+    def after(self, changes: Mapping[str, "Value"]) -> RuleFigures:
         """Capacity under the timing model that decides, with other values by dotted key."""
+
+    def counts(self, changes: Mapping[str, "Value"] | None = None) -> Sequence[Any]:
+        """How many nodes of each group, or of all, fit and are shown to fit, with other values by dotted key."""
 
     def limit_words(self, key: str) -> str:
         """Say by how much a limit of the bus is broken, or why it is not shown to be kept."""

@@ -1,6 +1,5 @@
 """Write the answer of a command: in the requested form, to standard output or a file."""
 
-import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -11,19 +10,16 @@ from typing import TYPE_CHECKING, Final
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file
 from busplan.cli.output import emit_document, emit_text, is_styled, say
-from busplan.errors import BusplanError, PlacedError, WorkerLostError
+from busplan.errors import BusplanError
 from busplan.files import document_bytes, new_file
 from busplan.forms import ENDINGS, Form, render
-from busplan.profile.changes import NO_CHANGES, SET, KeyChanges
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Report
 
-_KEY_AND_VALUE: Final = re.compile(r"\b[a-z][a-z_.]* = \S")
 _NARROWEST: Final = 40
 """Least width to lay out for; a narrower terminal breaks the lines itself."""
-_OPTIONS: Final = {"timing_model": "timing"}
-"""Option of each argument that has another name."""
 NOTHING_REFUSED: Final[Mapping[Form, str]] = MappingProxyType({})
 
 
@@ -71,11 +67,10 @@ def answer(
     if chosen in refused:
         raise BusplanError(f"--format {chosen}: {refused[chosen]}")
     if output is None:
-        with naming(changes):
-            yield lambda report: give(_completed(report, changes, is_whole=is_whole), chosen)
+        yield lambda report: give(_completed(report, changes, is_whole=is_whole), chosen)
         return
     require_apart({"--output": output}, inputs=inputs)
-    with new_file(output, overwrite=True) as file, naming(changes):
+    with new_file(output, overwrite=True) as file:
         yield lambda report: _write(file.write, _completed(report, changes, is_whole=is_whole), chosen)
     say(f"wrote {output}")
 
@@ -92,48 +87,6 @@ def report_with(changes: KeyChanges, report: "Report") -> "Report":
     from busplan.questions.words.documents import changed_report
 
     return changed_report(report, changes)
-
-
-@contextmanager
-def naming(changes: KeyChanges) -> Iterator[None]:
-    """Name the --set options in errors about values of the profile."""
-    try:
-        yield
-    except BusplanError as error:
-        if not changes.words or isinstance(error, PlacedError | WorkerLostError):
-            raise
-        raise BusplanError(*(_with_set_named(problem, changes) for problem in error.problems)) from None
-
-
-@contextmanager
-def naming_option(*arguments: str) -> Iterator[None]:
-    """Name arguments of a public function as options in its errors: buses, --buses; set a.key=1, --set a.key=1.
-
-    Parameters
-    ----------
-    *arguments
-        Names of arguments.
-    """
-    names = "|".join(arguments)
-    argument = re.compile(rf"^(?P<name>{names})(?=[ :])|\b(?P<flag>{names})=True\b|(?<!-)\bset(?= \w+(\.[\w-]+)+=)")
-    try:
-        yield
-    except BusplanError as error:
-        problems = [argument.sub(_option, problem) for problem in error.problems]
-        if problems == [*error.problems]:
-            raise
-        raise BusplanError(*problems) from None
-
-
-def _option(argument: re.Match[str]) -> str:
-    name = argument["name"] or argument["flag"] or argument[0]
-    return f"--{_OPTIONS.get(name, name)}"
-
-
-def _with_set_named(problem: str, changes: KeyChanges) -> str:
-    keys = (change.sections[-1] for change in changes.by_set)
-    is_of_profile = _KEY_AND_VALUE.search(problem) or any(key in problem for key in keys if "_" in key)
-    return f"{problem} (with {changes.words})" if is_of_profile and SET not in problem else problem
 
 
 def _write(write: Callable[[bytes], object], report: "Report", form: Form) -> None:

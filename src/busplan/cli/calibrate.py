@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -17,7 +17,6 @@ from busplan.cli.options import (
     OutputOption,
     ProfileArgument,
     option,
-    timing_model,
 )
 from busplan.cli.output import say
 from busplan.cli.rewrite import apply_changes, require_own_file
@@ -35,24 +34,15 @@ def calibrate_command(
             show_default=False,
         ),
     ],
-    form: Annotated[
-        Literal["table", "linear"] | None,
-        typer.Option(
-            "--form",
-            help="Form of the execution time: T_exec [us] at each payload, or a base [us] and us per byte.  "
-            "[default: the profile's node.execution.kind]",
-            show_default=False,
-        ),
-    ] = None,
     group: Annotated[
         str | None,
         option(
             "--group NAME", "In a profile with groups: the group of nodes that was measured.  [default: its one group]"
         ),
     ] = None,
-    timing: Annotated[
+    timing_model: Annotated[
         str | None,
-        option("--timing MODEL", "Timing model that computes the packets.  [default: the one that decides]"),
+        option("--timing-model MODEL", "Timing model that computes the packets.  [default: the one that decides]"),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
@@ -73,12 +63,12 @@ def calibrate_command(
     acknowledge, in us) and a line for each measurement; payloads may repeat, and lines that begin with # are comments.
     A column transaction says read or write (write without it).
 
-    T_exec is the latency less the time of its packets by the timing model, equation (3). If the bench differs from the
-    profile, say so: --set bus.nodes=2 --set bus.gap_count=63. With a column request_and_acknowledge_us, the measured
-    T1+T2, both halves come from it, and the report shows how far the timing model is from it. Outliers are named by
-    their line and are not in the fit; slow ones are in worst_extra_us. Times are in us. Exits 0 with any figures.
+    T_exec is the latency less the time of its packets by the timing model, equation (3); of each payload the median. If
+    the bench differs from the profile, say so: --set bus.nodes=2 --set bus.gap_count=63. Of three or more measurements
+    of a payload, those far from their median are named by their line and left out; slow ones are in worst_extra_us.
+    Times are in us. Exits 0 with any figures.
 
-    Example: busplan calibrate paper-two-node table-1.csv --form linear
+    Example: busplan calibrate paper-two-node table-1.csv
     """
     if profile == measurements == "-":
         raise BusplanError("only one of PROFILE and MEASUREMENTS can be standard input")
@@ -98,9 +88,8 @@ def calibrate_command(
             bench,
             # Read here: Python reads no standard input, and takes a name of several lines for CSV text.
             measurements if shipped else read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES),
-            form=form,
             group=group,
-            timing_model=None if timing is None else timing_model(timing, bench),
+            timing_model=timing_model,
             source=name,
         )
         if apply:

@@ -12,8 +12,8 @@ from busplan.cli.options import (
     FormatOption,
     OutputOption,
     ProfileArgument,
-    TimingOption,
-    timing_models,
+    TimingModelOption,
+    chosen_model,
 )
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
@@ -27,7 +27,7 @@ def capacity_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,
     changes: KeyChanges = NO_CHANGES,
-    timing: TimingOption = "both",
+    timing_model: TimingModelOption = "both",
     sensitivity: Annotated[
         bool,
         typer.Option(
@@ -56,7 +56,7 @@ def capacity_command(
         result = capacity(
             loaded,
             period_us=periods_us(period, loaded),
-            timing_model=timing_models(timing, loaded),
+            timing_model=chosen_model(timing_model),
             sensitivity=sensitivity,
         )
         give(result.report()._replace(next_commands=_next_commands(str(profile), result, changes)))

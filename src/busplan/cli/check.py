@@ -81,7 +81,19 @@ def check_command(
         option("--baseline FILE", "File with recorded axes and margins, which no profile may lose.  [default: none]"),
     ] = None,
     update_baseline: Annotated[
-        bool, typer.Option("--update-baseline", help="Record the present axes and margins in the --baseline file.")
+        bool,
+        typer.Option(
+            "--update-baseline",
+            help="Record the present axes and margins in the --baseline file, and drop records without a profile.",
+        ),
+    ] = False,
+    pass_on_unmatched: Annotated[
+        bool,
+        typer.Option(
+            "--pass-on-unmatched",
+            help="Let profiles without a record in the --baseline file pass, and records without a profile; without "
+            "it they exit 2.",
+        ),
     ] = False,
     recording: Annotated[
         Path | None,
@@ -125,7 +137,7 @@ def check_command(
         raise BusplanError("--circle-steps: goes without --no-circle")
     if quantile != 1 and recording is None:
         raise BusplanError("--quantile: goes with --recording FILE")
-    _require_baseline(baseline, update=update_baseline)
+    _require_baseline(baseline, update=update_baseline, passes=pass_on_unmatched)
     if update_baseline and changes.each:
         raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
     from busplan.gate.check import check
@@ -134,17 +146,13 @@ def check_command(
     collection = collect(paths, stdin_name=stdin_filename, skip_others=skip_others)
     _require_apart(collection.sources, recording, output=output, baseline=baseline, updated=update_baseline)
     recorded = None if baseline is None else _read_baseline(baseline, needed=not update_baseline)
-    if recorded is not None and not recorded.is_current and not update_baseline:
-        say(
-            f"warning: {baseline}: recorded by other timing models, so its figures are not compared; "
-            "record them again with --update-baseline"
-        )
     with _executor(min(jobs, len(collection.sources))) as where:
         report = check(
             collection,
             circle=circle,
             changes=changes,
-            baseline=None if update_baseline or recorded is None or not recorded.is_current else recorded,
+            baseline=None if update_baseline else recorded,
+            pass_on_unmatched=pass_on_unmatched,
             record=update_baseline,
             recording=recording,
             quantile=quantile,
@@ -154,11 +162,13 @@ def check_command(
         )
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
+    if pass_on_unmatched and report.unmatched:
+        say(f"warning: {report.unmatched}")
     if verbose:
         say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
         say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
     if update_baseline and baseline is not None:
-        _update_baseline(baseline, report, quiet=quiet)
+        _update_baseline(baseline, collection.sources, report, quiet=quiet)
     if not quiet:
         from busplan.forms.numbers import sentence_text
         from busplan.questions.words.documents import changes_sentences
@@ -170,10 +180,12 @@ def check_command(
         raise PlanFailsError
 
 
-def _require_baseline(baseline: Path | None, *, update: bool) -> None:
-    """Refuse to update a baseline that is not named or cannot be written."""
-    if update and baseline is None:
-        raise BusplanError("--update-baseline: needs --baseline FILE")
+def _require_baseline(baseline: Path | None, *, update: bool, passes: bool) -> None:
+    """Refuse options of a baseline that is not named, and to update one that cannot be written."""
+    if baseline is None and (update or passes):
+        raise BusplanError(f"{'--update-baseline' if update else '--pass-on-unmatched'}: needs --baseline FILE")
+    if update and passes:
+        raise BusplanError("--pass-on-unmatched: goes without --update-baseline")
     if update and baseline is not None:
         require_changeable(baseline)
 
@@ -212,21 +224,27 @@ def _read_baseline(path: Path, *, needed: bool) -> "Baseline | None":
     return load_baseline(path) if needed or path.exists() else None
 
 
-def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
-    """Record the checked profiles; others keep their record."""
-    from busplan.gate.baseline import Record, write_baseline
+def _update_baseline(path: Path, sources: "Sequence[ProfileSource]", report: "CheckReport", *, quiet: bool) -> None:
+    """Record the checked profiles; others that are still there keep their record."""
+    from busplan.gate.baseline import MODELS, Baseline, Record, write_baseline
 
-    now = {file.path: Record(file.figures, file.keys) for file in report.files if file.figures}
+    new = Baseline({}, MODELS, path)
+    names = [new.name_of(source) for source in sources]
+    checked = zip(names, report.files, strict=True)
+    now = {name: Record(file.figures, file.keys) for name, file in checked if file.fit is not None}
     with changing(path):
         # Read again: another run may have changed it since the check began.
-        old = _read_baseline(path, needed=False)
-        kept = old.profiles if old is not None and old.is_current else {}
+        old = _read_baseline(path, needed=False) or new
+        gone = old.without_profile(names)
+        kept = {name: record for name, record in old.profiles.items() if old.is_current and name not in gone}
         rewrite(path, write_baseline({**kept, **now}).encode())
     if not quiet:
         say(f"recorded {len(now)} profile{'s' * (len(now) != 1)} in {path}")
-    gone = [] if old is None or old.is_current else [name for name in old.profiles if name not in now]
     if gone:
-        say(f"warning: {path}: dropped {', '.join(gone)}, recorded by other timing models; check them, too")
+        say(f"warning: {path}: dropped {', '.join(gone)}: no such profile any more")
+    left = [name for name in old.profiles if not old.is_current and name not in (*now, *gone)]
+    if left:
+        say(f"warning: {path}: dropped {', '.join(left)}, recorded by other timing models; check them, too")
 
 
 def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -> None:

@@ -2,14 +2,10 @@
 
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import AllOption, ProfileArgument, option
 from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, show_drawn
-from busplan.cli.progress import progress_bar
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
@@ -39,27 +35,19 @@ def compare_command(
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
-    circle: Annotated[
-        bool,
-        typer.Option(
-            "--circle",
-            help="Also run the circle test of each kind at its smallest period, in the largest steps up to "
-            "servo.step_us that divide it.",
-        ),
-    ] = False,
     all_: AllOption = False,
     format_: DrawnFormatOption = None,
     output: DrawnOutputOption = None,
 ) -> None:
     """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
 
-    The machine is the part of a profile that every kind has: nodes and axes, bytes, execution times, period, servo and
-    circle. On its own kind the profile stays as it is. On another kind it gets the bus and the slice ratio of a new
+    The machine is the part of a profile that every kind has: nodes and axes, bytes, execution times and period.
+    On its own kind the profile stays as it is. On another kind it gets the bus and the slice ratio of a new
     profile, which are assumed; keys that only its own kind has are left out, and named. The smallest period [us] is the
     one at which this machine is shown to fit; the most axes are those at the profile's period. Exits 0 with any
     verdict.
 
-    Example: busplan compare gantry-24 --circle
+    Example: busplan compare gantry-24
     """
     chosen = drawn_form(format_, output)
 
@@ -67,8 +55,6 @@ def compare_command(
         from busplan.questions.compare import compare
 
         kinds = None if buses is None else [kind.strip() for kind in buses.split(",")]
-        loaded = load_changed(profile, changes)
-        with progress_bar("circle tests") as progress, naming_option("buses"):
-            return compare(loaded, buses=kinds, circle=circle, progress=progress)
+        return compare(load_changed(profile, changes), buses=kinds)
 
     show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)

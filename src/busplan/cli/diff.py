@@ -5,21 +5,19 @@ from typing import Annotated
 
 import typer
 
-from busplan.cli.answering import answer, naming_option
+from busplan.cli.answering import answer
 from busplan.cli.changes import load_each, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
-    ALL_MODELS,
     AllOption,
     FormatOption,
     OutputOption,
-    TimingOption,
+    TimingModelOption,
+    chosen_model,
     complete_profile,
     option,
-    timing_model,
 )
 from busplan.cli.output import PlanFailsError, say
-from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
@@ -43,10 +41,7 @@ def diff_command(
         ),
     ],
     changes: KeyChanges = NO_CHANGES,
-    timing: TimingOption = "both",
-    circle: Annotated[
-        bool, typer.Option("--circle/--no-circle", help="Run both circle tests when either profile asks for one.")
-    ] = True,
+    timing_model: TimingModelOption = "both",
     fail_on_regression: Annotated[
         bool, typer.Option("--fail-on-regression", help="Exit 1 when a figure of B is worse.")
     ] = False,
@@ -63,13 +58,12 @@ def diff_command(
 ) -> None:
     """Tell what changed between two profiles, and what that does to every figure.
 
-    It lists the keys whose values differ, defaults applied, then the figures of capacity, latency and circle-test that
-    differ, with B - A, its share of A, and whether B is better, worse or neutral. Settings and what describes them
-    (period, nodes, gap count, time available, largest term) are neutral. JSON and CSV list equal figures, too. Times
-    are in us, contour errors in um in the table and in mm in JSON. Markdown is for a pull request. Exits 0 with any
-    figures; with --fail-on-regression 1 when any figure is worse, under any timing model or in the circle. --timing and
-    --no-circle leave figures out, but never whether B is shown to fit. A circle that cannot be run counts as not
-    passed.
+    A sentence has both verdicts and says in what B is better or worse. Below it stand the keys whose values differ,
+    defaults applied, and the figures of capacity that differ, with B - A and its share of A. Settings and what
+    describes them (period, nodes, gap count, time available, a single term) are neither better nor worse. JSON and CSV
+    list equal figures, too. Times are in us. Markdown is for a pull request. Exits 0 with any figures; with
+    --fail-on-regression 1 when any figure is worse, under any timing model. --timing-model leaves figures out, but
+    never the verdict. Which key cost what is told by check, against its baseline.
 
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """
@@ -79,20 +73,9 @@ def diff_command(
         from busplan.questions.diff import diff
 
         first, second = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
-        if timing != ALL_MODELS and first.bus.kind == second.bus.kind:
-            for side in (second, first):
-                timing_model(timing, side)  # refuses it in the words of the option
-        with progress_bar("circle tests") as progress, naming_option("timing_model"):
-            difference = diff(
-                first,
-                second,
-                timing_model=None if timing == ALL_MODELS else timing,
-                circle=circle,
-                progress=progress,
-                arguments=(a, b),
-            )
+        difference = diff(first, second, timing_model=chosen_model(timing_model), arguments=(a, b))
         give(difference.report())
-    regressions = difference.regression_words(tolerance_percent=allowed)
+        regressions = difference.regression_words(tolerance_percent=allowed)
     if fail_on_regression and regressions:
         say(regressions)
         raise PlanFailsError

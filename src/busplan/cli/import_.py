@@ -3,7 +3,7 @@
 import shlex
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -11,7 +11,6 @@ from busplan.cli.destinations import require_apart
 from busplan.cli.options import STANDARD_OUTPUT
 from busplan.cli.output import emit_document, say
 from busplan.cli.progress import progress_bar
-from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
 from busplan.files import new_file
 
@@ -36,25 +35,6 @@ def import_command(
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
-    update: Annotated[
-        Path | None,
-        typer.Option(
-            "--update",
-            metavar="PROFILE",
-            help="Write the values of the files into this profile; its comments and other keys stay.  [default: a new "
-            "profile]",
-            show_default=False,
-        ),
-    ] = None,
-    take: Annotated[
-        Literal["file", "profile"] | None,
-        typer.Option(
-            "--take",
-            help="Which value to take where a file and the profile of --update differ.  [default: list them and write "
-            "nothing]",
-            show_default=False,
-        ),
-    ] = None,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
 
@@ -68,37 +48,27 @@ def import_command(
 
     Example: busplan import machine.xml slaves.txt -o machine.toml
     """
-    if update is None and take is not None:
-        raise BusplanError("--take: goes with --update PROFILE")
-    if update is not None and (output is not None or force):
-        raise BusplanError("--update and -o: give one of them; --update writes into PROFILE")
     if paths.count("-") > 1:
         raise BusplanError("-: only one FILE can be standard input")
     new = None if output == STANDARD_OUTPUT else output
     if new is not None and new.suffix.lower() != ".toml":
         raise BusplanError(f"--output {new}: expected a name ending in .toml, for it is a profile")
     inputs = [Path(path) for path in paths]
-    require_apart({"--output": new, "--update": update}, inputs=inputs, of_profiles=True)
+    require_apart({"--output": new}, inputs=inputs, of_profiles=True)
     with ExitStack() as files:
         # Opened before the work, so that a path that cannot be written fails at once.
         file = None if new is None else files.enter_context(new_file(new, overwrite=force))
-        if update is not None:
-            require_changeable(update)
-            files.enter_context(changing(update))
         from busplan.questions.import_ import import_profile
 
         name = None if new is None else new.stem
         with progress_bar("recording") as progress:
-            answer = import_profile(paths, update=update, take=take, name=name, progress=progress)
+            answer = import_profile(paths, name=name, progress=progress)
         sentences = answer.sentences()
-        if update is not None:
-            rewrite(update, answer.text.encode())
-        elif file is None:
+        if file is None:
             emit_document(answer.text)
         else:
             file.write(answer.text.encode())
-    written = new or update
-    say(*([f"wrote {written}"] if written else []), *sentences)
-    if written:
-        shown = shlex.quote(f"./{written}" if str(written).startswith("-") else str(written))
+    say(*([f"wrote {new}"] if new else []), *sentences)
+    if new:
+        shown = shlex.quote(f"./{new}" if str(new).startswith("-") else str(new))
         say(f"next: busplan capacity {shown}")

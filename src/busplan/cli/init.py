@@ -172,7 +172,7 @@ class _Values:
     """Values of options: given, asked for in a terminal, or defaults that are taken and said."""
 
     def __init__(self) -> None:
-        self.asks = sys.stdin.isatty() and sys.stderr.isatty()
+        self.asks = all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
         self.taken: list[str] = []
         """The defaults that nobody was asked about, as options."""
 

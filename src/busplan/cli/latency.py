@@ -10,10 +10,10 @@ from busplan.cli.options import (
     FormatOption,
     OutputOption,
     ProfileArgument,
-    TimingOption,
+    TimingModelOption,
+    chosen_model,
     option,
     parse_sizes,
-    timing_models,
 )
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
@@ -30,7 +30,7 @@ def latency_command(
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
-    timing: TimingOption = "both",
+    timing_model: TimingModelOption = "both",
     all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
@@ -51,6 +51,6 @@ def latency_command(
         latencies = latency(
             loaded,
             payload_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
-            timing_model=timing_models(timing, loaded),
+            timing_model=chosen_model(timing_model),
         )
         give(latencies.report())

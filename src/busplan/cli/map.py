@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import VALUES_HELP, AllOption, JobsOption, ProfileArgument, parse_axis
@@ -65,7 +64,7 @@ def map_command(
         from busplan.questions.map import map_
 
         loaded = load_changed(profile, changes)
-        with ExitStack() as run, naming_option("x", "y", "circle"):
+        with ExitStack() as run:
             return map_(
                 loaded,
                 x=_along(x, option="--x"),

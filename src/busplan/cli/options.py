@@ -14,8 +14,6 @@ from busplan.forms import ENDINGS, Form, ending_expected
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from busplan.sections.profile import Profile
-
 
 AnyForm = TypeVar("AnyForm", bound=str)
 
@@ -40,10 +38,10 @@ ProfileArgument = Annotated[
         show_default=False,
     ),
 ]
-TimingOption = Annotated[
+TimingModelOption = Annotated[
     str,
     typer.Option(
-        "--timing",
+        "--timing-model",
         metavar="MODEL|both",
         help="Timing model to report, by its name, or both. IEEE 1394 has paper, the paper's equations as published, "
         "and standard, with the standard's clock and packets; other kinds have their own.",
@@ -52,7 +50,7 @@ TimingOption = Annotated[
 
 
 ALL_MODELS: Final = "both"
-"""Value of --timing for all timing models."""
+"""Value of --timing-model for all timing models."""
 
 
 def time_us(text: str, *, option: str) -> float:
@@ -91,30 +89,9 @@ def parse_sizes(text: str, *, option: str) -> list[int]:
     return sizes
 
 
-def timing_models(timing: str, profile: "Profile") -> tuple[str, ...]:
-    """Timing models of --timing.
-
-    Raises
-    ------
-    BusplanError
-        The profile's kind of bus has no such model.
-    """
-    from busplan.questions.base.inputs import checked_models
-
-    return checked_models(None, profile) if timing == ALL_MODELS else (timing_model(timing, profile),)
-
-
-def timing_model(timing: str, profile: "Profile") -> str:
-    """The timing model of --timing, for commands that take a single model.
-
-    Raises
-    ------
-    BusplanError
-        The profile's kind of bus has no such model, or the model cannot express the profile.
-    """
-    from busplan.questions.base.inputs import known_model
-
-    return known_model(profile, timing, name="--timing")
+def chosen_model(timing_model: str | None) -> str | None:
+    """The argument of a question for --timing-model; None for all."""
+    return None if timing_model == ALL_MODELS else timing_model
 
 
 def option(usage: str, words: str, **settings: Any) -> Any:

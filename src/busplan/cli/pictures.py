@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal, Protocol
 
 import typer
 
-from busplan.cli.answering import answer, naming
+from busplan.cli.answering import answer
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file, output_option
 from busplan.cli.output import refuse_terminal, write_document
@@ -107,8 +107,7 @@ def show_drawn(
             from busplan.forms.svg import content
 
             require_apart({"--output": output}, inputs=inputs)
-            with naming(changes):
-                write_document(content(find().drawing(), form, note=_changes_words(changes)), output)
+            write_document(content(find().drawing(), form, note=_changes_words(changes)), output)
         case _:
             with answer(form, output, inputs=inputs, changes=changes, is_whole=is_whole) as give:
                 give(find().report())

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from busplan.cli.answering import answer, naming_option, report_with
+from busplan.cli.answering import answer, report_with
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument, option
 from busplan.cli.output import PlanFailsError, emit_document, say
-from busplan.cli.progress import progress_bar
 from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.errors import BusplanError
 from busplan.files import NewFile, new_file
 from busplan.forms import ENDINGS, Form
+from busplan.printable import printable
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 _PROFILE_ENDINGS = ("", ".toml")
 _MAX_AXES = 1_000_000
+_LONGEST_NAME = 100
+_LONGEST_DESCRIPTION = 2000
 
 
 @takes_changes(
@@ -56,31 +58,11 @@ def plan_command(
         str | None,
         option(
             "--free NAMES",
-            "Settings that may change, with commas, in the order of their cost: step (of the circle, where it does "
-            "not divide the period), gap_count, slice_ratio, responses (reads concatenated, writes unified), schedule "
-            "(where the bus has one), payload (less), period, nodes (fewer).  [default: "
-            "step,gap_count,slice_ratio,period]",
+            "Settings that may change, with commas, in the order of their cost: gap_count, slice_ratio, responses "
+            "(reads concatenated, writes unified), schedule (where the bus has one), payload (less), period, nodes "
+            "(fewer).  [default: gap_count,slice_ratio,period]",
         ),
     ] = None,
-    circle: Annotated[
-        bool,
-        typer.Option(
-            "--circle/--no-circle",
-            help="Run the circle test, where the profile has a section for it (servo, circle, tolerance, ...), or "
-            "leave it out.",
-        ),
-    ] = True,
-    max_circles: Annotated[
-        int,
-        typer.Option(
-            "--max-circles",
-            metavar="N",
-            min=1,
-            max=100_000,
-            help="Most periods to test one by one for the nearest that passes the circle; then the steps double, and "
-            "the answer is marked as not proven.",
-        ),
-    ] = 50,  # search.MAX_CIRCLES, which --help must not load
     apply: Annotated[
         bool,
         typer.Option(
@@ -94,8 +76,9 @@ def plan_command(
             "-o",
             metavar="FILE",
             help=f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
-            "name, as NEW.toml: write the recommended profile as a new file, without comments; - is standard output, "
-            "and the report goes to standard error.  [default: no file, and the report to standard output]",
+            "name, as NEW.toml: write a copy of PROFILE with the recommended values, whose name is that of the file; - "
+            "is standard output, and the report goes to standard error.  [default: no file, and the report to standard "
+            "output]",
         ),
     ] = None,
     force: Annotated[
@@ -106,15 +89,13 @@ def plan_command(
 ) -> None:
     """Tell what to set for a number of nodes or axes: gap count, slice ratio, period, or several of them.
 
-    One plan is recommended. It changes cheap settings first, costlier ones only if needed and as little as possible;
-    --free lists them by cost. With it the goal is shown to fit with its reserve, at a safe gap count, within all
-    [limits], with a circle that passes and a period that servo.step_us divides. The slice ratio goes up to 0.9; the
-    period changes only if nothing cheaper is enough. Values given by an option are kept.
+    It changes one thing at a time, the cheapest first and as little as possible, until the goal is shown to fit with
+    its reserve, at a safe gap count, within all [limits]; --free lists them by cost. The slice ratio goes up to 0.9;
+    the period changes only if nothing cheaper is enough. Values given by an option are kept.
 
-    The table has the steps of the search, then the smallest period, the largest payload (of read and write) and the
-    most nodes, each with all cheaper settings free. Margins are in us, less the model's bias. Without a plan the answer
-    names what prevents it and what would be enough. `busplan manual plan` has more. Exits 0 when there is a plan, 1
-    when there is none.
+    The table has a row for each thing that was tried. Margins are in us, less the model's bias. Without a plan the
+    answer names what prevents it and what would be enough. `busplan manual plan` has more. Exits 0 when there is a
+    plan, 1 when there is none.
 
     Example: busplan plan paper-1ms --axes 16
     """
@@ -140,18 +121,14 @@ def plan_command(
         with ExitStack() as files:
             # Opened before the search, so that a path that cannot be written fails at once.
             file = files.enter_context(new_file(new, overwrite=force)) if new and not piped else None
-            with progress_bar("circle tests") as progress, naming_option("axes", "free"):
-                result = plan(
-                    loaded.profile,
-                    axes=axes,
-                    wanted=changes,
-                    free=None if free is None else [name.strip() for name in free.split(",")],
-                    circle=circle,
-                    max_circles=max_circles,
-                    progress=progress,
-                )
+            result = plan(
+                loaded.profile,
+                axes=axes,
+                wanted=changes,
+                free=None if free is None else [name.strip() for name in free.split(",")],
+            )
             if new is not None:
-                _write_profile(result, file)
+                _write_profile(loaded, result, file, name=None if piped else new.stem)
         if result.recommended is None:
             if apply or new:
                 say(f"{profile if apply else new}: not written, for there is no plan")
@@ -183,28 +160,42 @@ def _check_options(
 
 def _apply(loaded: "LoadedProfile", result: "PlanAnswer") -> None:
     """Write the recommended values into the profile's file."""
-    from busplan.profile.write import whole
-
     if not result.recommended_changes:
         say(f"{loaded.document.name}: nothing to change, left as it is")
         return
-    apply_changes(loaded.document, {key: whole(value) for key, value in result.recommended_changes.items()})
+    apply_changes(loaded.document, _choices(result), are_choices=True)
     say(f"changed {loaded.document.name}: {result.recommended_words}")
 
 
-def _write_profile(result: "PlanAnswer", file: NewFile | None) -> None:
-    """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged."""
-    if result.recommended is not None:
-        from busplan.profile.write import profile_text
+def _write_profile(loaded: "LoadedProfile", result: "PlanAnswer", file: NewFile | None, *, name: str | None) -> None:
+    """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged.
 
+    A file is another plan than that of the profile: it has a name of its own, and what its description says is said
+    of the profile that it comes from.
+    """
+    if result.recommended is not None:
+        from busplan.profile.edit import edited_copy
+
+        profile, choices = loaded.profile, _choices(result)
+        if name is not None:
+            choices["name"] = printable(name).strip()[:_LONGEST_NAME] or profile.name
+            said = f"A plan of {profile.name}, which is: {profile.description.strip()}"[:_LONGEST_DESCRIPTION]
+            choices |= {"description": said} if profile.description.strip() else {}
         write = emit_document if file is None else file.write
-        write(profile_text(result.recommended.profile).encode())
+        write(edited_copy(loaded, choices))
     elif file is not None:
         file.abandon()
+
+
+def _choices(result: "PlanAnswer") -> dict[str, object]:
+    """The recommended values by key, as a file has them."""
+    from busplan.profile.write import whole
+
+    return {key: whole(value) for key, value in (result.recommended_changes or {}).items()}
 
 
 def _say_report(changes: KeyChanges, report: "Report") -> None:
     """Write the report to standard error: standard output has the profile."""
     from busplan.forms.terminal import block_lines
 
-    say(*(line.text for line in block_lines(report_with(changes, report).blocks())))
+    say(*(line.text for line in block_lines(report_with(changes, report).blocks)))

@@ -19,9 +19,9 @@ def profiles_report(profiles: Sequence[Profile]) -> Report:
     records = [_record(profile) for profile in profiles]
     return Report(
         Sentence(("Shipped profiles",)),
-        lambda: list(map(_section, records)),
-        lambda: document("profiles", profiles=records),
-        lambda: records,
+        list(map(_section, records)),
+        document("profiles", profiles=records),
+        records,
     )
 
 

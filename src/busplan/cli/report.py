@@ -5,7 +5,7 @@ from typing import Annotated, Final
 
 import typer
 
-from busplan.cli.answering import answer, naming
+from busplan.cli.answering import answer
 from busplan.cli.changes import load_changed, load_each, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import OutputOption, complete_profile, format_option, option
@@ -41,14 +41,19 @@ def report_command(
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     circle: Annotated[
-        bool, typer.Option("--circle/--no-circle", help="Run the circle test of profiles that ask for one.")
-    ] = True,
+        bool | None,
+        typer.Option(
+            "--circle/--no-circle",
+            help="Run the circle test of profiles that ask for one.  [default: where servo values are measured]",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Put all that busplan says of a profile on one page, for a screen, a machine's file or a repository.
+    """Put the answers for a profile on one page, for a screen, a machine's file or a repository.
 
-    The page has verdicts, each timing model, the cycle to scale, where the time goes, axes against period, the circle
-    with its error sources, and the assumptions; each figure names its command. Times are in us, contour errors in um.
-    Several profiles are compared at the top. The HTML needs no network and no script. Exits 0 with any verdict.
+    The first screen has the verdict and the map; every other answer is behind a fold, with its command, and is printed
+    whole. Times are in us, contour errors in um. Several profiles are compared at the top. The HTML needs no network
+    and no script. Exits 0 with any verdict.
 
     Example: busplan report paper-4ms paper-1ms -o report.html
     """
@@ -58,7 +63,7 @@ def report_command(
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
     files = profile_files(*profiles)
     # The answer names the changes itself, for they stand in the commands of the page, too.
-    with answer(format_, output, inputs=files, default="html", refused=_REFUSED) as give, naming(changes):
+    with answer(format_, output, inputs=files, default="html", refused=_REFUSED) as give:
         from busplan.questions.report import report
 
         loaded = load_each(profiles, partial(load_changed, changes=changes))

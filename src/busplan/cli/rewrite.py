@@ -141,7 +141,11 @@ def require_own_file(argument: str) -> None:
 
 
 def apply_changes(
-    document: "Document", changes: Mapping[str, object], *, notes: Mapping[str, str] | None = None
+    document: "Document",
+    changes: Mapping[str, object],
+    *,
+    notes: Mapping[str, str] | None = None,
+    are_choices: bool = False,
 ) -> None:
     """Change values in a profile's file; comments, layout and line ends stay.
 
@@ -149,7 +153,7 @@ def apply_changes(
     ----------
     document
         The text that the changes are made for, from a file of the user (see `require_own_file`).
-    changes, notes
+    changes, notes, are_choices
         As for `profile.edit.edited`.
 
     Raises
@@ -167,4 +171,4 @@ def apply_changes(
         content = read_bytes(path.absolute(), name=name)
         if decode(content, name=name) != document:
             raise BusplanError(f"--apply: {name} was changed meanwhile, and stays as it is now; run the command again")
-        rewrite(path, edited_file(content, changes, name=name, notes=notes))
+        rewrite(path, edited_file(content, changes, name=name, notes=notes, are_choices=are_choices))

@@ -1,39 +1,47 @@
 """`busplan sweep`: its options and their checks."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, BinaryIO, Final, Literal, NamedTuple, get_args
 
 import typer
 
-from busplan.cli.answering import naming_option
+from busplan.cli.answering import give, report_with
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
-    ALL_MODELS,
     VALUES_HELP,
     AllOption,
     JobsOption,
     ProfileArgument,
-    TimingOption,
+    TimingModelOption,
+    chosen_model,
     form_of_file,
     option,
     output_option,
     parse_axes,
 )
-from busplan.cli.output import refuse_terminal
+from busplan.cli.output import emit_document, refuse_terminal, say
 from busplan.cli.pictures import plot_form
-from busplan.cli.sweep_run import TOP_FORMS, SweepForm, SweepJob, run_sweep
+from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
-from busplan.files import partial_path
-from busplan.forms import ENDINGS, ROWS_ENDINGS
+from busplan.files import document_bytes, new_file
+from busplan.forms import ENDINGS, ROWS_ENDINGS, Form, RowsForm, render
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from busplan.questions.sweep import SweepAnswer
     from busplan.questions.sweep.asked import Sweep
 
+SweepForm = Literal[Form, RowsForm]
+_TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in get_args(RowsForm))
+"""Forms with the top rows, for people."""
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
 _DEFAULT_TOP: Final = 20
 
@@ -50,14 +58,14 @@ def sweep_command(
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
-    timing: TimingOption = "both",
+    timing_model: TimingModelOption = "both",
     format_: Annotated[
         SweepForm | None,
         typer.Option(
             "--format",
             help="Form of the answer: the top rows as a table (text in lines), markdown or html, or every row as csv, "
-            "json (one document), jsonl (a JSON object a line, the first describes the sweep) or parquet (typed "
-            "columns; needs the extra table, pyarrow).  [default: by the ending of --output, else table]",
+            "json (one document) or parquet (typed columns; needs the extra table, pyarrow).  [default: by the ending "
+            "of --output, else table]",
             show_default=False,
         ),
     ] = None,
@@ -90,8 +98,16 @@ def sweep_command(
         str | None,
         option(
             "--figure COLUMN",
-            "Figure that --plot draws, by its name in --columns.  [default: safe_axes; margin_corrected_us of groups "
-            "and where safe_axes does not vary]",
+            "Figure that --plot draws, by its name in --columns.  [default: safe_axes; margin_corrected_us where "
+            "safe_axes does not vary]",
+        ),
+    ] = None,
+    group: Annotated[
+        str | None,
+        option(
+            "--group NAME",
+            "Of a profile with groups: the one whose nodes vary for max_axes, safe_axes and so on; the others are as "
+            "they are.  [default: the one with the most axes]",
         ),
     ] = None,
     all_: AllOption = False,
@@ -118,85 +134,118 @@ def sweep_command(
             "same versions of Python, busplan and numpy. Needs the extra cluster (distributed).  [default: here]",
         ),
     ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume",
-            help="With --circle and -o FILE: continue a sweep that was interrupted or killed, after the finished "
-            "tests in FILE.parts.",
-        ),
-    ] = False,
     force: Annotated[
         bool, typer.Option("--force", help="Run more than 1,000 circle tests, which --circle alone refuses.")
     ] = False,
 ) -> None:
     """Compute capacity over a grid: every combination of values of any keys, under each timing model.
 
-    Each row has the figures of `busplan capacity` for one point. Memory does not grow with the grid; millions of points
-    take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in
-    FILE.partial.csv (or .json, .jsonl, .parquet) and leave FILE as it was. With --circle and -o FILE, finished tests
-    are kept in the folder FILE.parts until FILE is complete, and --resume continues from there, even after SIGKILL.
-    Exits 0 with any verdict.
+    Each row has the figures of `busplan capacity` for one point, of a million at most. Ctrl-C, SIGTERM and SIGHUP leave
+    FILE as it was. Exits 0 with any verdict.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
     form = format_ or _form_of(output)
     if form == "parquet":
         _require_parquet(output, typed=format_)
-    _require_sense(form, sort=sort, top=top)
-    _require_needed("--plot FILE", plot is not None, {"--figure": figure})
-    own = {"--cluster": cluster, "--resume": resume or None, "--force": force or None, "--summary": summary or None}
-    _require_needed("--circle", circle, {"--jobs": jobs, **own})
-    _require_needed("--output FILE, beside which the parts stand", output is not None, {"--resume": resume or None})
-    if cluster is not None:
-        _require_cluster(jobs)
-    for name, number in (("--top", top), ("--jobs", jobs)):
-        if number is not None and number < 1:
-            raise BusplanError(f"{name} {number}: must be 1 or more")
-    kept = None if output is None else partial_path(output)
-    outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
-    require_apart(outputs, inputs=profile_files(profile))
-    plot_form_ = None if plot is None else plot_form(plot)
-    from busplan.cli.workers import available_processors
-    from busplan.questions.sweep import checked_sweep
-
-    loaded = load_changed(profile, changes)
-    varied = parse_axes(vary or [])
-    for change in changes.each:
-        for key in varied:
-            require_separate(change, key, typed=f"--vary {key}")
+    _require_sense(form, {"--sort": sort, "--top": top})
+    _require_needed("--plot FILE", {"--figure": figure} if plot is None else {})
+    of_circle = {"--jobs": jobs, "--cluster": cluster, "--force": force or None, "--summary": summary or None}
+    _require_needed("--circle", {} if circle else of_circle)
+    _require_numbers({"--top": top, "--jobs": jobs})
+    _require_cluster(cluster, jobs)
+    require_apart({"--output": output, "--plot": plot}, inputs=profile_files(profile))
+    picture_form = None if plot is None else plot_form(plot)
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    with naming_option("vary", "timing_model", "circle", "summary", "force"):
-        asked = checked_sweep(
-            loaded,
-            varied,
-            timing_models=None if timing == ALL_MODELS else [timing],
-            circle=circle,
-            summary=summary,
-            force=force,
-            changes=changes,
-        )
-    _require_number(asked, {"--sort": sort_by or None, "--figure": figure})
-    chosen = _columns(asked, columns, short=form in TOP_FORMS, sort_by=sort_by)
-    run_sweep(
-        SweepJob(
-            asked._replace(columns=chosen),
-            form=form,
-            output=output,
-            top=top or _DEFAULT_TOP,
-            is_whole=all_,
-            sort_by=sort_by or None,
-            ascending=order == "asc",
-            plot=plot,
-            plot_form=plot_form_,
-            figure=figure,
-            jobs=jobs or available_processors(),
-            cluster=cluster,
-            resume=resume,
-        )
+    from busplan.questions.fit.network import network_of
+    from busplan.questions.sweep import checked_sweep, computed, require_drawable
+
+    loaded, varied = load_changed(profile, changes), parse_axes(vary or [])
+    for change, key in product(changes.each, varied):
+        require_separate(change, key, typed=f"--vary {key}")
+    model = chosen_model(timing_model)
+    asked = checked_sweep(
+        network_of(loaded),
+        varied,
+        timing_models=None if model is None else [model],
+        group=group,
+        circle=circle,
+        summary=summary,
+        force=force,
+        changes=changes,
     )
+    asked.require_number(sort_by or None, name="--sort")
+    asked.require_number(figure, name="--figure")
+    chosen = [name.strip() for name in columns.split(",")] if columns is not None else []
+    asked.require_columns(chosen, name="--columns")
+    if plot is not None:
+        require_drawable(asked.grid, option="--plot")
+    rows = _Rows(chosen, top or _DEFAULT_TOP, sort_by or None, ascending=bool(order), is_whole=all_)
+    with ExitStack() as run:
+        # Opened before the work, so that a path that cannot be written fails at once.
+        picture_file = run.enter_context(new_file(plot, overwrite=True)) if plot else None
+        file = run.enter_context(new_file(output, overwrite=True)) if output else None
+        with progress_bar("sweep") as progress, _crew(asked, jobs=jobs, cluster=cluster) as crew:
+            answer = computed(asked, executor=crew, progress=progress)
+        _write(answer, form, rows, file)
+        if picture_file is not None and picture_form is not None:
+            from busplan.forms.svg import content
+
+            picture_file.write(document_bytes(content(answer.drawing(figure=figure), picture_form)))
+    for path in (output, plot):
+        if path is not None:
+            say(f"wrote {path}")
+
+
+class _Rows(NamedTuple):
+    """Which rows and columns are written."""
+
+    columns: list[str]
+    """Those asked for; none without --columns."""
+    top: int
+    sort_by: str | None
+    ascending: bool
+    is_whole: bool
+    """If True, a narrow terminal leaves out no column of the top rows."""
+
+
+def _write(answer: "SweepAnswer", form: SweepForm, rows: _Rows, file: BinaryIO | None) -> None:
+    """Write a sweep to a file, and say how much fits; or to standard output."""
+    from busplan.forms.numbers import sentence_text
+    from busplan.questions.words.documents import changes_sentences
+
+    changes = answer.sweep.changes
+    match form:
+        case "csv" | "json" | "parquet":
+            for piece in answer.rows_in(form, rows.columns):
+                (emit_document if file is None else file.write)(piece)
+        case _:
+            top = answer.report(columns=rows.columns, top=rows.top, sort_by=rows.sort_by, ascending=rows.ascending)
+            report = report_with(changes, top)._replace(is_whole=rows.is_whole)
+            if file is None:
+                give(report, form)
+                return
+            file.write(document_bytes(render(report, form)))
+    say(*map(sentence_text, (*changes_sentences(changes), *answer.sentences())))
+
+
+@contextmanager
+def _crew(asked: "Sweep", *, jobs: int | None, cluster: str | None) -> Iterator["Executor | None"]:
+    """Where circle tests run: in worker processes or on a cluster; None for this thread."""
+    if cluster is not None:
+        from busplan.cli.cluster import dask_executor
+
+        with dask_executor(cluster) as there:
+            yield there
+    elif asked.circle:
+        from busplan.cli.workers import available_processors, executor
+
+        with executor(min(jobs or available_processors(), asked.tests.points)) as here:
+            yield here
+    else:
+        yield None
 
 
 def _form_of(output: Path | None) -> SweepForm:
@@ -205,7 +254,7 @@ def _form_of(output: Path | None) -> SweepForm:
     if ending == ".npz":
         raise BusplanError(
             f"--output {output}: a sweep writes no NumPy file; in Python, busplan.sweep(...) gives arrays, "
-            "and FILE.csv, FILE.jsonl or FILE.parquet holds every row"
+            "and FILE.csv, FILE.json or FILE.parquet holds every row"
         )
     return form_of_file(None, output, forms=_ENDINGS, default="table")
 
@@ -217,48 +266,33 @@ def _require_parquet(output: Path | None, *, typed: str | None) -> None:
     require_pyarrow("--format parquet" if typed else f"--output {output}")
 
 
-def _require_cluster(jobs: int | None) -> None:
+def _require_cluster(cluster: str | None, jobs: int | None) -> None:
     """Refuse a cluster without its library, or beside processes of our own."""
-    if jobs is not None:
+    if cluster is not None and jobs is not None:
         raise BusplanError(
             "--jobs: is the number of processes here, and --cluster runs the tests elsewhere; leave one out"
         )
-    require_extra("distributed", extra="cluster", option="--cluster", module="distributed")
+    if cluster is not None:
+        require_extra("distributed", extra="cluster", option="--cluster", module="distributed")
 
 
-def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> None:
-    """Refuse options that do not apply to the form."""
-    for name, value in (("--sort", sort), ("--top", top)):
-        if value is not None and form not in TOP_FORMS:
-            forms = f"{', '.join(TOP_FORMS[:-1])} or {TOP_FORMS[-1]}"
+def _require_numbers(options: Mapping[str, int | None]) -> None:
+    """Refuse numbers below 1."""
+    for name, number in options.items():
+        if number is not None and number < 1:
+            raise BusplanError(f"{name} {number}: must be 1 or more")
+
+
+def _require_sense(form: SweepForm, options: Mapping[str, object]) -> None:
+    """Refuse options of the top rows where every row is written."""
+    for name, value in options.items():
+        if value is not None and form not in _TOP_FORMS:
+            forms = f"{', '.join(_TOP_FORMS[:-1])} or {_TOP_FORMS[-1]}"
             raise BusplanError(f"{name}: goes with --format {forms}; {form} has every row in the order of the grid")
 
 
-def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> None:
-    """Refuse options that need another name."""
+def _require_needed(needed: str, options: Mapping[str, object]) -> None:
+    """Refuse options that need another, which is not there."""
     for name, value in options.items():
-        if value is not None and not is_there:
+        if value is not None:
             raise BusplanError(f"{name}: goes with {needed}")
-
-
-def _require_number(sweep: "Sweep", asked: dict[str, str | None]) -> None:
-    """Refuse a column that does not exist or is not numeric."""
-    for name, column in asked.items():
-        if column is not None and column not in sweep.numbers:
-            raise BusplanError(f"{name} {column}: expected a column in numbers: {', '.join(sweep.numbers)}")
-
-
-def _columns(sweep: "Sweep", asked: str | None, *, short: bool, sort_by: str) -> tuple[str, ...]:
-    """Columns to write: the varied keys and timing_model, then those asked for, or all, or the main ones."""
-    if asked is not None:
-        chosen = tuple(name.strip() for name in asked.split(","))
-        for name in chosen:
-            if name not in sweep.columns:
-                raise BusplanError(f"--columns {name}: no such column; there are {', '.join(sweep.columns)}")
-    elif short:
-        from busplan.questions.sweep import default_columns
-
-        chosen = default_columns(sweep)
-    else:
-        chosen = sweep.columns
-    return tuple(dict.fromkeys((*sweep.grid.axes, "timing_model", *chosen, *([sort_by] if sort_by else []))))

@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING, Annotated
 
-from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
@@ -10,7 +9,6 @@ from busplan.cli.options import (
     ProfileArgument,
     option,
     time_us,
-    timing_model,
 )
 from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, show_drawn
 from busplan.errors import BusplanError
@@ -56,10 +54,10 @@ def timeline_command(
         ),
     ] = None,
     changes: KeyChanges = NO_CHANGES,
-    timing: Annotated[
+    timing_model: Annotated[
         str | None,
         option(
-            "--timing MODEL",
+            "--timing-model MODEL",
             "Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard.  [default: the "
             "profile's bus.timing_model, where it is applicable]",
         ),
@@ -87,14 +85,8 @@ def timeline_command(
         from busplan.questions.timeline import timeline
 
         loaded = load_changed(profile, changes)
-        with naming_option("transaction", "cycle"):
-            return timeline(
-                loaded,
-                timing_model=None if timing is None else timing_model(timing, loaded),
-                from_us=from_us,
-                to_us=to_us,
-                transaction=transaction,
-                cycle=cycle,
-            )
+        return timeline(
+            loaded, timing_model=timing_model, from_us=from_us, to_us=to_us, transaction=transaction, cycle=cycle
+        )
 
     show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)

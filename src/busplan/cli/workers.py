@@ -23,12 +23,10 @@ def available_processors() -> int:
 
 
 @contextmanager
-def executor(number: int) -> Iterator[Executor]:
-    """Give an executor that works here, or in several processes, as `workers`."""
+def executor(number: int) -> Iterator[Executor | None]:
+    """Give an executor of several processes, as `workers`; None for this process alone."""
     if number == 1:
-        from busplan.questions.sweep import Here
-
-        yield Here()
+        yield None
         return
     with workers(number) as crew:
         yield crew

@@ -8,16 +8,14 @@ if TYPE_CHECKING:
     from busplan.forms.blocks import Report
 
 Form = Literal["table", "markdown", "html", "csv", "json"]
-RowsForm = Literal["csv", "json", "jsonl", "parquet"]
-"""Forms with every row of a sweep, written during it."""
+RowsForm = Literal["csv", "json", "parquet"]
+"""Forms with every row of a sweep."""
 Picture = Literal["svg", "png"]
 """Forms of a picture that is a file of its own. A PNG needs the extra `plot` (resvg-py)."""
 ENDINGS: Final[Mapping[str, Form]] = MappingProxyType(
     {".txt": "table", ".md": "markdown", ".html": "html", ".csv": "csv", ".json": "json"}
 )
-ROWS_ENDINGS: Final[Mapping[str, RowsForm]] = MappingProxyType(
-    {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".parquet": "parquet"}
-)
+ROWS_ENDINGS: Final[Mapping[str, RowsForm]] = MappingProxyType({".csv": "csv", ".json": "json", ".parquet": "parquet"})
 PICTURES: Final[Mapping[str, Picture]] = MappingProxyType({".svg": "svg", ".png": "png"})
 """Form by file name extension."""
 
@@ -70,6 +68,6 @@ def render(report: "Report", form: Form) -> str:
         case "json":
             from busplan.printable import to_json
 
-            return to_json(report.document())
+            return to_json(report.document)
         case _:
             assert_never(form)

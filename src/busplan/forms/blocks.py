@@ -4,7 +4,7 @@ A block holds content, not appearance: a figure keeps its exact value, and a sta
 writes every block in its own way.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from string import Formatter
 from typing import Any, Final, Literal, NamedTuple
 
@@ -259,6 +259,8 @@ class Chapter(NamedTuple):
     """Name for the style sheet: the section has the CSS class `part-<kind>`."""
     key: str = ""
     """Anchor that links point to; empty if none does."""
+    is_folded: bool = False
+    """Whether a screen shows its title alone until it is opened; print shows all."""
 
 
 Block = Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Card | Detail | Chapter
@@ -268,15 +270,15 @@ ALL_SHOWS: Final = "--all shows all."
 
 
 class Report(NamedTuple):
-    """An answer, ready for every form; each part is computed when a form needs it."""
+    """An answer, ready for every form; plain values."""
 
     title: Sentence
     """Title of a page."""
-    blocks: Callable[[], Sequence[Block]]
+    blocks: Sequence[Block]
     """Content for people."""
-    document: Callable[[], Mapping[str, Any]]
+    document: Mapping[str, Any]
     """Content for JSON: plain data, not blocks."""
-    records: Callable[[], Sequence[Record]] | None = None
+    records: Sequence[Record] | None = None
     """Rows for CSV; None if the answer is more than one table."""
     is_page: bool = False
     """If True, every form shows the title; other answers may be part of a page."""
@@ -358,9 +360,10 @@ def attribute_value(figure: Figure, owner: object) -> ShownValue:
     figure
         The figure.
     owner
-        Object with an attribute named `figure.key`.
+        Figures by key, or an object with an attribute named `figure.key`.
     """
-    return figure_value(figure, getattr(owner, figure.key))
+    value = owner[figure.key] if isinstance(owner, Mapping) else getattr(owner, figure.key)
+    return figure_value(figure, value)
 
 
 def count_value(value: float, key: str = "", *, grouped: bool = False) -> ShownValue:

@@ -70,7 +70,7 @@ def spelled(value: object) -> object:
         return ""
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return " ".join(map(str, value))
     return value
 
@@ -85,4 +85,4 @@ def text(report: Report) -> str:
     """
     if report.records is None:
         raise BusplanError("--format csv: this answer has several tables and CSV holds one; use --format json")
-    return to_csv(report.records())
+    return to_csv(report.records)

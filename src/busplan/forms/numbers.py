@@ -218,7 +218,7 @@ def shown_blocks(report: Report) -> Sequence[Block]:
     report
         The answer.
     """
-    blocks = report.blocks()
+    blocks = report.blocks
     return list(_with_details(blocks) if report.is_whole else _without_details(blocks, report.whole_by))
 
 

@@ -45,7 +45,7 @@ def text(report: Report, *, width: int | None = None, height: int | None = None,
     styled
         If True, write the colours of a terminal.
     """
-    blocks = [*report.blocks()]
+    blocks = [*report.blocks]
     last = max((number for number, block in enumerate(blocks) if isinstance(block, Card)), default=None)
     if last is not None and width is not None:
         card = cast("Card", blocks[last])
@@ -140,6 +140,10 @@ def _caption(caption: Sentence | None, width: int | None) -> list[Line]:
     return wrapped(sentence_line(caption)._replace(tone="title"), width) if caption else []
 
 
+_INDENT: Final = " " * 5
+"""Before what is below the number of a step."""
+
+
 def _step(number: int, step: CalculationStep, width: int | None) -> Iterator[Line]:
     """A line in symbols, one in numbers and one with the result; empty ones are left out."""
     head = f"{number:>3}  {step.reference:<13}  {step.symbol} "
@@ -147,6 +151,9 @@ def _step(number: int, step: CalculationStep, width: int | None) -> Iterator[Lin
     distinct = (text for text in (step.formula, step.numbers, result) if text)
     if number > 1:
         yield BLANK
+    if width is not None and len(head) > width // 2:
+        yield from wrapped(Line(head.rstrip(), "drawn"), width, hang=len(_INDENT))
+        head = _INDENT
     for at, line in enumerate(distinct):
         before = f"{head if at == 0 else ' ' * len(head)}= "
         yield from wrapped(Line(f"{before}{line}", "drawn"), width, hang=len(before))

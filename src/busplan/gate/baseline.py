@@ -1,20 +1,38 @@
 """The baseline: recorded axes and margins of each profile, and what a profile has lost since."""
 
 import json
-from collections.abc import Iterator, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from itertools import chain
 from math import isfinite
 from pathlib import Path
 from sys import float_info
 from typing import Final, NamedTuple
 
-from busplan.buses.figure import MARGIN, MARGIN_CORRECTED, MAX_AXES, MAX_NODES, SAFE_AXES, SAFE_NODES, by_key
+from busplan.buses import kind_named, kind_names
+from busplan.buses.figure import (
+    MARGIN,
+    MARGIN_CORRECTED,
+    MAX_AXES,
+    MAX_NODES,
+    SAFE_AXES,
+    SAFE_NODES,
+    Figure,
+    by_key,
+)
 from busplan.buses.rule import RuleProblem, told_apart
 from busplan.errors import BusplanError
+from busplan.forms.numbers import plural
 from busplan.gate.finding import Subject
 from busplan.printable import to_json
+from busplan.profile.collect import ProfileSource, claims
 from busplan.profile.keys import default_of, flat
+from busplan.profile.shipped import shipped_names
 from busplan.profile.toml import LoadedProfile, override, read_bytes
 from busplan.profile.write import value_text
+from busplan.questions.fit.figures import capacity_figures
+from busplan.questions.fit.network import model_names
 from busplan.sections.profile import Profile
 
 _SCHEMA: Final = 1
@@ -41,12 +59,16 @@ class Record(NamedTuple):
 def figures_of(subject: Subject) -> dict[str, float]:
     """Figures of a profile to record, by name."""
     figures: dict[str, float | None] = {}
-    for capacity in sorted((subject.deciding, *subject.others), key=lambda capacity: capacity.timing_model):
+    for model in sorted(model_names(subject.network)):
+        capacity = capacity_figures(subject.network, model=model)
         for name in ("max_axes", "margin_us", "safe_axes", "margin_corrected_us"):
             figures[f"{capacity.timing_model}.{name}"] = getattr(capacity, name)
         for group in capacity.groups:
             for name in ("max_nodes", "safe_nodes"):
                 figures[f"{capacity.timing_model}.group.{group.name}.{name}"] = getattr(group, name)
+        if not subject.profile.has_cycle:
+            for figure in _of_all(capacity.kind):
+                figures[f"{capacity.timing_model}.{figure.key}"] = getattr(capacity, figure.key)
     return {name: value for name, value in figures.items() if value is not None}
 
 
@@ -56,22 +78,71 @@ def keys_of(profile: Profile) -> dict[str, object]:
     return {key: value for key, value in said if key not in _WORDS}
 
 
-def record_of(name: str, recorded: Mapping[str, Record] | None) -> Record | None:
-    """Record of a file in a baseline: an empty one where it has none; None without a baseline."""
-    return None if recorded is None else recorded.get(name, Record({}))
+def _of_all(kind: str) -> Iterable[Figure]:
+    """Figures of a kind of bus that are worse the larger they are, of all that is sent: a load."""
+    return (figure for figure in kind_named(kind).figures.compared if figure.better == "less")
 
 
 class Baseline(NamedTuple):
     """A recorded baseline."""
 
     profiles: dict[str, Record]
+    """By the path of the profile, relative to the folder of the baseline's file; a shipped profile by its name."""
     models: int
     """Version of the timing models."""
+    path: Path | None = None
+    """Its file; without one, paths are relative to the working folder."""
 
     @property
     def is_current(self) -> bool:
         """Whether its figures may be compared with those of today."""
         return self.models == MODELS
+
+    def __str__(self) -> str:
+        return "baseline" if self.path is None else str(self.path)
+
+    def name_of(self, source: ProfileSource) -> str:
+        """Name of a profile's record, whatever the working folder is."""
+        if source.is_shipped:
+            return Path(source.name).stem
+        # Standard input is the file that it is called.
+        path = Path(source.name) if str(source.path) == "-" else source.path
+        return Path(os.path.relpath(os.path.realpath(path.parent) / Path(path.name), self._folder)).as_posix()
+
+    @property
+    def _folder(self) -> Path:
+        return Path.cwd() if self.path is None else Path(os.path.realpath(self.path)).parent
+
+    def without_profile(self, checked: Iterable[str]) -> list[str]:
+        """Names of the records, beside those of profiles that are checked, whose profile is gone."""
+        left = self.profiles.keys() - set(checked) - set(shipped_names())
+        return sorted(name for name in left if not (self._folder / name).is_file() or not claims(self._folder / name))
+
+    def unmatched(self, profiles: Sequence[str], *, checked: Iterable[str]) -> str:
+        """Say which profiles have no record, and which records have no profile; empty where there is none.
+
+        Parameters
+        ----------
+        profiles
+            Paths of the profiles without a record, as a message has them.
+        checked
+            Names of the records that are compared.
+        """
+        records = self.without_profile(checked)
+        counts = (
+            f"{plural(len(names), noun)} {'has' if len(names) == 1 else 'have'} no {other} ({_first(names)})"
+            for names, noun, other in ((profiles, "profile", "record"), (records, "record", "profile"))
+            if names
+        )
+        words = ", ".join(counts)
+        cure = "--update-baseline records and drops them, --pass-on-unmatched lets them pass"
+        return f"{self}: {words}; {cure}" if words else ""
+
+
+def _first(names: Sequence[str]) -> str:
+    """The first of some names, and how many more there are."""
+    more = len(names) - _MOST_NAMED
+    return ", ".join((*names[:_MOST_NAMED], *([f"{more} more"] if more > 0 else ())))
 
 
 def load_baseline(path: Path) -> Baseline:
@@ -92,7 +163,7 @@ def load_baseline(path: Path) -> Baseline:
         text = content.decode()
     except UnicodeDecodeError:
         raise BusplanError(f"{path}: is not UTF-8, so it is no baseline; give another") from None
-    return read_baseline(text, name=str(path))
+    return read_baseline(text, name=str(path))._replace(path=path)
 
 
 def read_baseline(text: str, *, name: str) -> Baseline:
@@ -155,11 +226,9 @@ def write_baseline(recorded: Mapping[str, Record]) -> str:
 _ROUNDING: Final = 1e-9
 """Relative tolerance for rounding by JSON or by another machine."""
 _MOST_NAMED: Final = 3
-"""Most keys that a finding names."""
+"""Most keys that a finding names, and most files that a message does."""
 _LONGEST: Final = 30
 """Longest value that a finding repeats in full."""
-_NAMES: Final = by_key((MARGIN_CORRECTED, SAFE_NODES, SAFE_AXES, MARGIN, MAX_NODES, MAX_AXES))
-"""Figures of a baseline, in the order in which a finding says them."""
 _MOST_FIGURES: Final = 3
 """Most figures that a finding says; the diff of a new record shows all."""
 
@@ -181,10 +250,10 @@ def regression(subject: Subject, recorded: Record) -> Iterator[RuleProblem]:
     recorded
         Its record. One without keys cannot say which of them changed.
     """
-    lost = fallen(figures_of(subject), recorded.figures)
+    lost = worse(figures_of(subject), recorded.figures)
     if not lost:
         return
-    figures = _figures(lost, deciding=subject.deciding.timing_model)
+    figures = _words(lost, deciding=subject.deciding.timing_model)
     changes = {} if recorded.keys is None else _causes(subject, recorded.keys, lost)
     if changes:
         key, words = next(iter(changes)), f"{_keys(changes)}: {figures}"
@@ -193,15 +262,31 @@ def regression(subject: Subject, recorded: Record) -> Iterator[RuleProblem]:
     yield RuleProblem(key, words, "if that is meant, record it with --update-baseline, whose diff shows every figure")
 
 
-def fallen(now: Mapping[str, float], before: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Figures that have become smaller, each as it was and as it is."""
+def worse(now: Mapping[str, float], before: Mapping[str, float]) -> dict[str, tuple[float, float | None]]:
+    """Recorded figures that have become worse, each as it was and as it is; None where it is no more."""
     return {
-        name: (before[name], value) for name, value in now.items() if name in before and _is_less(value, before[name])
+        name: (value, now.get(name)) for name, value in before.items() if _is_worse(name, now.get(name), than=value)
     }
 
 
-def _is_less(value: float, before: float) -> bool:
-    return before - value > _ROUNDING * max(abs(before), 1.0)
+def _is_worse(name: str, value: float | None, *, than: float | None) -> bool:
+    if value is None or than is None:
+        return value is None and than is not None
+    loss = value - than if _figure(name).better == "less" else than - value
+    return loss > _ROUNDING * max(abs(than), 1.0)
+
+
+def _figure(name: str) -> Figure:
+    """The figure of a recorded name; one that no bus has any more is called by its key."""
+    key = name.rpartition(".")[2]
+    return _figures().get(key) or Figure(key, "", "", "", key.replace("_", " "))
+
+
+@cache
+def _figures() -> Mapping[str, Figure]:
+    """Figures of a baseline by key, in the order in which a finding says them."""
+    margins = (MARGIN_CORRECTED, SAFE_NODES, SAFE_AXES, MARGIN, MAX_NODES, MAX_AXES)
+    return by_key((*margins, *chain.from_iterable(map(_of_all, kind_names()))))
 
 
 def _causes(subject: Subject, before: Mapping[str, object], lost: Mapping[str, object]) -> dict[str, ChangedValue]:
@@ -230,7 +315,7 @@ def _wins_back(subject: Subject, key: str, value: object, lost: Mapping[str, obj
     except BusplanError:  # a value that goes with others, or a group that is gone
         return False
     now, then = figures_of(subject), figures_of(Subject(LoadedProfile(profile, subject.document)))
-    return any(name in then and _is_less(now[name], then[name]) for name in lost)
+    return any(_is_worse(name, now.get(name), than=then.get(name)) for name in lost)
 
 
 def _keys(changes: Mapping[str, ChangedValue]) -> str:
@@ -248,28 +333,38 @@ def _shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
-def _figures(lost: Mapping[str, tuple[float, float]], *, deciding: str) -> str:
-    """Say what fell: the margin first, and the figures of the deciding timing model before those of the others."""
-    names = sorted(lost, key=lambda name: (not name.startswith(f"{deciding}."), _order(name)))
-    said = []
-    for name in names[:_MOST_FIGURES]:
-        model, _, figure = name.partition(".")
+def _words(lost: Mapping[str, tuple[float, float | None]], *, deciding: str) -> str:
+    """Say what became worse: the margin first, and the figures of the deciding timing model before those of others."""
+    order = list(_figures())
+
+    def place(name: str) -> tuple[bool, int]:
+        key = _figure(name).key
+        return not name.startswith(f"{deciding}."), order.index(key) if key in order else len(order)
+
+    said, verb = [], ""
+    for name in sorted(lost, key=place)[:_MOST_FIGURES]:
+        model, _, path = name.partition(".")
+        figure, before = _figure(name), verb
+        verb = " rose" if figure.better == "less" else " fell"
         by_model = "" if model == deciding else f" by the {model} timing"
-        said.append(f"{_fell(figure, *lost[name])}{by_model}")
+        # A figure says the verb for those behind it.
+        said.append(f"{_label(path, figure)}{verb if verb != before else ''} {_change(figure, *lost[name])}{by_model}")
     more = len(lost) - len(said)
-    words = ", ".join(said).replace(" from ", " fell from ", 1)  # the first says the verb for all of them
+    words = ", ".join(said)
     return f"{words}, and {more} more" if more else words
 
 
-def _order(name: str) -> int:
-    return list(_NAMES).index(name.rpartition(".")[2])
+def _label(path: str, figure: Figure) -> str:
+    """Name of a figure, and the group that it is of."""
+    section = path.rpartition(".")[0]
+    return f"{figure.label} of {section.partition('.')[2]}" if section else figure.label
 
 
-def _fell(figure: str, before: float, now: float) -> str:
-    section, _, last = figure.rpartition(".")
-    described = _NAMES[last]
-    of_group = f" of {section.partition('.')[2]}" if section else ""
-    if not described.unit:
-        return f"{described.label}{of_group} from {before:g} to {now:g}"
-    was, is_ = told_apart(before, now)
-    return f"{described.label}{of_group} from {was} to {is_} {described.unit}"
+def _change(figure: Figure, before: float, now: float | None) -> str:
+    unit, factor = (" %", 100) if figure.column == "%" else (f" {figure.unit}" if figure.unit else "", 1)
+    if now is None:
+        return f"from {factor * before:.6g}{unit} to none"
+    if not unit:
+        return f"from {before:g} to {now:g}"
+    was, is_ = told_apart(factor * before, factor * now)
+    return f"from {was} to {is_}{unit}"

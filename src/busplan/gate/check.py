@@ -1,7 +1,7 @@
 """`busplan.check`."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path as FilePath
@@ -10,17 +10,17 @@ from typing import Any
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
-from busplan.gate.baseline import Baseline, Record, load_baseline, record_of
-from busplan.gate.gate import check_document, check_source
+from busplan.gate.baseline import Baseline, load_baseline
+from busplan.gate.circle import MOST_STEPS
+from busplan.gate.gate import FileResult, check_document, check_source
 from busplan.gate.recording import Recording
 from busplan.gate.report import CheckReport, Located, check_report, summary_sentence
 from busplan.profile.changes import NO_CHANGES, KeyChanges
-from busplan.profile.collect import Collection, collect
+from busplan.profile.collect import Collection, ProfileSource, collect
 from busplan.profile.document import Document
 from busplan.profile.write import profile_text
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, argument, items, key_changes
-from busplan.questions.circle.check import MOST_STEPS
 from busplan.sections.profile import Profile
 
 
@@ -36,7 +36,7 @@ class CheckAnswer(Answer, CheckReport):
 
     @property
     def passed(self) -> bool:
-        """Whether every file could be checked, and none has an error."""
+        """Whether every file could be checked and held against the baseline, and none has an error."""
         return not self.failed and not self.has_findings("error")
 
     def report(self) -> Report:
@@ -59,6 +59,7 @@ def check(
     circle_steps: int = MOST_STEPS,
     changes: Mapping[str, object] | KeyChanges = NO_CHANGES,
     baseline: str | os.PathLike[str] | Baseline | None = None,
+    pass_on_unmatched: bool = False,
     record: bool = False,
     recording: Path | None = None,
     quantile: float = 1.0,
@@ -81,7 +82,9 @@ def check(
         New values by dotted key, in the key's unit, for every file; each must be valid without them.
     baseline
         A file that `busplan check --update-baseline` recorded, or what stands in it: a profile that lost axes or margin
-        against it has an error.
+        against it has an error. Profiles without a record and records without a profile are a `failure` of its file.
+    pass_on_unmatched
+        Let those pass; `unmatched` of the answer still says them.
     record
         Also give the `figures` and `keys` of each file that a baseline records.
     recording
@@ -127,19 +130,38 @@ def check(
         "changes": changed,
         "record": record,
     }
-    check_file = partial(check_source, recorded=recorded, options=options)
+    check_file = partial(check_source, options=options)
+    in_memory = [Document(f"{profile.name}.toml", profile_text(profile)) for profile in profiles]
+    sources = (*collection.sources, *(ProfileSource(FilePath(document.name), document.name) for document in in_memory))
+    names = [source.name if recorded is None else recorded.name_of(source) for source in sources]
+    records = [None if recorded is None else recorded.profiles.get(name) for name in names]
     if executor is None:
-        results = list(map(check_file, collection.sources))
+        results = list(map(check_file, collection.sources, records))
     else:
         # Only this process has standard input.
-        own = {source: check_file(source) for source in collection.sources if str(source.path) == "-"}
-        others = [source for source in collection.sources if source not in own]
-        by_source = own | dict(zip(others, executor.map(check_file, others), strict=True))
+        both = list(zip(collection.sources, records, strict=False))
+        own = {source: check_file(source, record) for source, record in both if str(source.path) == "-"}
+        others = [pair for pair in both if pair[0] not in own]
+        checked = executor.map(check_file, *zip(*others, strict=True)) if others else ()
+        by_source = own | dict(zip((source for source, _ in others), checked, strict=True))
         results = [by_source[source] for source in collection.sources]
-    for profile in profiles:
-        document = Document(f"{profile.name}.toml", profile_text(profile))
-        results.append(check_document(document, baseline=record_of(document.name, recorded), **options))
-    return CheckAnswer(tuple(results), changed, len(collection.skipped) if skip_others else 0)
+    results += [
+        check_document(document, baseline=record, **options)
+        for document, record in zip(in_memory, records[len(results) :], strict=True)
+    ]
+    unmatched = "" if recorded is None else _unmatched(recorded, names, results)
+    if unmatched and not pass_on_unmatched:
+        results.append(FileResult(str(recorded), None, (), {}, failure=unmatched))
+    return CheckAnswer(tuple(results), changed, len(collection.skipped) if skip_others else 0, unmatched)
+
+
+def _unmatched(recorded: Baseline, names: Sequence[str], results: Sequence[FileResult]) -> str:
+    unknown = [
+        result.path
+        for name, result in zip(names, results, strict=True)
+        if result.fit is not None and name not in recorded.profiles
+    ]
+    return recorded.unmatched(unknown, checked=names)
 
 
 def _collected(paths: ProfileLike | Iterable[ProfileLike], *, skip_others: bool) -> tuple[Collection, list[Profile]]:
@@ -151,8 +173,11 @@ def _collected(paths: ProfileLike | Iterable[ProfileLike], *, skip_others: bool)
     return collect(files, skip_others=skip_others), profiles
 
 
-def _recorded(baseline: str | os.PathLike[str] | Baseline) -> Mapping[str, Record]:
+def _recorded(baseline: str | os.PathLike[str] | Baseline) -> Baseline:
     known = baseline if isinstance(baseline, Baseline) else load_baseline(FilePath(baseline))
     if not known.is_current:
-        raise BusplanError("baseline: recorded by other timing models; record it again with --update-baseline")
-    return known.profiles
+        raise BusplanError(
+            f"{known}: recorded by other timing models, so its figures cannot be compared; record it again with "
+            "--update-baseline"
+        )
+    return known

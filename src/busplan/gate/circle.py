@@ -6,14 +6,16 @@ They share one run of the test, for profiles with a section for it.
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from busplan.buses.rule import Mending, RuleProblem
+from busplan.buses.rule import RuleProblem
 from busplan.gate.finding import Subject
-from busplan.questions.fit.circle_refusal import STEP, circle_refusals, path_steps
+from busplan.questions.fit.circle_refusal import path_steps, refusals
 from busplan.sections.base import value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.checks import Refused
 
+MOST_STEPS: Final = 10_000_000
+"""Most steps of a circle that the gate runs: seconds, and a few hundred megabytes."""
 _NOT_RUN: Final = ("BP203", "BP204")
 
 
@@ -28,20 +30,20 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     subject
         The profile, and the most simulated steps of each axis: a longer circle is not run.
     """
-    profile, most_steps = subject.profile, subject.circle_steps
-    refused = circle_refusals(profile) if subject.deciding.circle_refused_by else ()
-    yield from (("BP203", _refused(cause, subject)) for cause in refused)
+    profile, network, most_steps = subject.profile, subject.network, subject.circle_steps
+    refused = refusals(network) if profile.asks_for_circle else ()
+    yield from (("BP203", _refused(cause, profile)) for cause in refused)
     if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
         return
     from busplan.questions.circle.failures import STABILITY
     from busplan.questions.circle.roundness import circle_test, to_attack
 
-    steps = path_steps(profile)
+    steps = path_steps(network)
     if steps > most_steps:
         words = f"the circle takes {steps:,} steps, more than {most_steps:,}: not run"
         yield "BP204", RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
         return
-    result = circle_test(profile).results[0]
+    result = circle_test(network).results[0]
     # A cycle that is not shown to fit has a rule of its own: nothing of the circle mends it.
     failures = [failure for failure in result.failures if not failure.is_of_bus]
     first = to_attack(result)
@@ -58,12 +60,12 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
         yield "BP202" if stability else "BP201", RuleProblem(key, failure.text, way_out)
 
 
-def _refused(cause: Refused, subject: Subject) -> RuleProblem:
+def _refused(cause: Refused, profile: Profile) -> RuleProblem:
     """Why a circle cannot be run, at a key of the file."""
-    key = _key_in_file(cause.name, *cause.beside, profile=subject.profile)
+    key = _key_in_file(cause.name, *cause.beside, profile=profile)
     # A key that is the cause says its name already.
     words, _, way_out = (f"{cause.value}: {cause.right}" if key == cause.name else cause.message).partition("; ")
-    return RuleProblem(key, words, *(subject.cure() if cause.name == STEP else Mending(way_out)))
+    return RuleProblem(key, words, way_out)
 
 
 def _key_in_file(*keys: str, profile: Profile) -> str:

@@ -4,19 +4,18 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import NamedTuple
 
+from busplan.buses.parts import Value
 from busplan.buses.rule import Mending, Rule, RuleProblem, Severity
 from busplan.forms.numbers import listed
 from busplan.printable import printable
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import Spot
-from busplan.profile.toml import LoadedProfile, override
+from busplan.profile.toml import LoadedProfile
 from busplan.profile.write import short_text
-from busplan.questions.circle.check import MOST_STEPS
-from busplan.questions.fit.certainty import available_us, cycle_of, fits_in
-from busplan.questions.fit.figures import CapacityFigures, figures
-from busplan.questions.fit.network import bus_of, model_names, network_of
-from busplan.questions.plan.advice import UNTESTED_CIRCLE, changeable, cure
-from busplan.questions.plan.freedoms import PERIOD
+from busplan.questions.fit.certainty import available_us, fits_in
+from busplan.questions.fit.figures import FitFigures, GroupCapacity, figures, node_counts
+from busplan.questions.fit.network import PERIOD, changed, model_names, network_of
+from busplan.questions.plan.changes import changeable, cure
 
 
 class Finding(NamedTuple):
@@ -90,69 +89,65 @@ class Subject:
     changes
         Changes of the profile, which the text does not show.
     circle_steps
-        Most simulated steps of each axis of the circle that a cure gives the profile; None for no circle.
+        Most simulated steps of each axis of its circle; None for no circle.
     """
 
     def __init__(
-        self,
-        loaded: LoadedProfile,
-        changes: KeyChanges = NO_CHANGES,
-        *,
-        circle_steps: int | None = MOST_STEPS,
+        self, loaded: LoadedProfile, changes: KeyChanges = NO_CHANGES, *, circle_steps: int | None = None
     ) -> None:
         self.profile = loaded.profile
+        self.network = network_of(loaded.profile)
         self.circle_steps = circle_steps
         self.document = loaded.document
         self.origin = f" (with {changes.words})" if changes.words else ""
         """End of the messages: the changes, which the document does not show."""
 
     @cached_property
-    def deciding(self) -> CapacityFigures:
-        """Capacity under the timing model that decides."""
-        return figures(self.profile, model=bus_of(self.profile).deciding_model)
+    def deciding(self) -> FitFigures:
+        """The verdict, by the timing model that decides."""
+        return figures(self.network, model=self.network.bus.deciding_model)
 
     @cached_property
-    def others(self) -> tuple[CapacityFigures, ...]:
-        """Capacity under the other timing models."""
-        return tuple(figures(self.profile, model=model) for model in self._other_models)
+    def others(self) -> tuple[FitFigures, ...]:
+        """Figures under the other timing models."""
+        return tuple(figures(self.network, model=model) for model in self._other_models)
 
     @property
     def others_fit(self) -> tuple[tuple[str, bool], ...]:
         """The other timing models, each with whether the cycle fits; no figures are computed for that."""
-        given_us = available_us(network_of(self.profile))
+        given_us, cycle = available_us(self.network), self.network.bus.cycle
         return tuple(
-            (model, bool(fits_in(cycle_of(self.profile, model=model).required_us, available_us=given_us)))
+            (model, bool(fits_in(cycle(self.network, model=model).required_us, available_us=given_us)))
             for model in self._other_models
         )
 
     @property
     def _other_models(self) -> tuple[str, ...]:
-        deciding = bus_of(self.profile).deciding_model
-        return tuple(model for model in model_names(self.profile) if model != deciding)
+        deciding = self.network.bus.deciding_model
+        return tuple(model for model in model_names(self.network) if model != deciding)
 
-    def after(self, changes: Mapping[str, object]) -> CapacityFigures:
-        """Capacity under the timing model that decides, with new values by dotted key."""
-        return figures(override(self.profile, dict(changes)), model=self.deciding.timing_model)
+    def after(self, changes: Mapping[str, Value]) -> FitFigures:
+        """The verdict with other values by dotted key."""
+        return figures(changed(self.network, changes), model=self.deciding.timing_model)
+
+    def counts(self, changes: Mapping[str, Value] | None = None) -> tuple[GroupCapacity, ...]:
+        """How many nodes of each group, or of all, fit and are shown to fit, with other values by dotted key."""
+        network = changed(self.network, changes) if changes else self.network
+        return node_counts(network, model=self.deciding.timing_model)
 
     def limit_words(self, key: str) -> str:
         """Say by how much a limit of the bus is broken, or why it is not shown to be kept."""
-        limit = bus_of(self.profile).limit(key)
-        return "" if limit is None else limit.words(network_of(self.profile))
-
-    def cure(self) -> Mending:
-        """The least change after which the profile holds every constraint of a plan; one for all rules."""
-        return self._cure
+        limit = self.network.bus.limit(key)
+        return "" if limit is None else limit.words(self.network)
 
     @cached_property
     def _cure(self) -> Mending:
-        mending = cure(self.profile, circle_steps=self.circle_steps)
+        mending = cure(self.network)
         if mending.changes is None:
-            return Mending(f"no change of {listed(changeable(self.profile), 'and')} is a cure: {mending.why}")
+            return Mending(f"no change of {listed(changeable(self.network), 'and')} is a cure: {mending.why}")
         lines = tuple(f"{key} = {short_text(value)}" for key, value in mending.changes.items())
-        if mending.circle_failures:
-            return Mending(f"with {', '.join(lines)} it fits, and then {mending.circle_failures[0]}; `plan` tries more")
-        words = (
-            "the period must change" if PERIOD in mending.changes else "",
-            UNTESTED_CIRCLE if mending.circle_failures is None else "",
-        )
-        return Mending("; ".join(filter(None, words)), lines)
+        return Mending("the period must change" if PERIOD in mending.changes else "", lines)
+
+    def cure(self) -> Mending:
+        """The change after which the profile holds every constraint of a plan; one for all rules."""
+        return self._cure

@@ -7,7 +7,8 @@ from typing import Any, Final, Literal, NamedTuple
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
 from busplan.gate import circle
-from busplan.gate.baseline import Record, figures_of, keys_of, record_of, regression
+from busplan.gate.baseline import Record, figures_of, keys_of, regression
+from busplan.gate.circle import MOST_STEPS
 from busplan.gate.finding import Finding, Subject, Violation, finding_of
 from busplan.gate.recording import Recording, beside_plan
 from busplan.gate.rules import (
@@ -25,7 +26,6 @@ from busplan.profile.collect import ProfileSource
 from busplan.profile.document import Document, Spot
 from busplan.profile.keys import path_of
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
-from busplan.questions.circle.check import MOST_STEPS
 
 MARK: Final = "busplan:"
 _ADDRESSED: Final = re.compile(r"#\s*busplan:")
@@ -144,9 +144,7 @@ class FileResult(NamedTuple):
         return "findings" if self.findings else "ok"
 
 
-def check_source(
-    source: ProfileSource, *, recorded: Mapping[str, Record] | None, options: Mapping[str, Any]
-) -> FileResult:
+def check_source(source: ProfileSource, recorded: Record | None = None, *, options: Mapping[str, Any]) -> FileResult:
     """Read one file and check it against all rules.
 
     Parameters
@@ -154,7 +152,7 @@ def check_source(
     source
         The file; if it cannot be read, the result has a failure.
     recorded
-        Records of a baseline by file name; None for no baseline.
+        Its record in a baseline; None for none.
     options
         Named arguments of `check_document`.
     """
@@ -168,7 +166,7 @@ def check_source(
         document = decode(content, name=source.name)
     except PlacedError as error:
         return unreadable(source.name, error, content)
-    return check_document(document, baseline=record_of(document.name, recorded), **options)
+    return check_document(document, baseline=recorded, **options)
 
 
 def check_document(

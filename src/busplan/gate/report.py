@@ -1,7 +1,6 @@
 """Answer of `busplan check`: its findings and their summary, as sentences and as JSON."""
 
 from collections.abc import Iterator
-from functools import partial
 from hashlib import sha256
 from typing import NamedTuple
 
@@ -40,6 +39,8 @@ class CheckReport(NamedTuple):
     """What was changed in every file."""
     others: int = 0
     """Number of files that were skipped because they are no profiles."""
+    unmatched: str = ""
+    """Which profiles have no record in the baseline, and which records no profile; empty where there is none."""
 
     @property
     def summary(self) -> Summary:
@@ -76,9 +77,9 @@ def check_report(report: CheckReport) -> Report:
     """Report of `check`."""
     return Report(
         Sentence(("Check of profiles",)),
-        lambda: tuple(_sentences(report)),
-        partial(check_document, report),
-        partial(check_records, report),
+        tuple(_sentences(report)),
+        check_document(report),
+        check_records(report),
     )
 
 

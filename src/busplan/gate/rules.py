@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache, partial
+from functools import cache
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Final
@@ -112,9 +112,9 @@ def rules_report(rules: Sequence[Rule]) -> Report:
     """
     return Report(
         Sentence(("Rules of the gate",)),
-        lambda: (_table(rules),),
-        partial(_rules_document, rules),
-        lambda: _rules_records(rules),
+        (_table(rules),),
+        _rules_document(rules),
+        _rules_records(rules),
     )
 
 
@@ -128,9 +128,9 @@ def rule_report(rule: Rule) -> Report:
     """
     return Report(
         Sentence((Code(rule.code), f" {rule.name}")),
-        lambda: tuple(_rule_blocks(rule)),
-        partial(_rules_document, [rule]),
-        lambda: _rules_records([rule]),
+        tuple(_rule_blocks(rule)),
+        _rules_document([rule]),
+        _rules_records([rule]),
     )
 
 

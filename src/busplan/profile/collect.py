@@ -21,6 +21,8 @@ class ProfileSource(NamedTuple):
     name: str
     failure: str | None = None
     """Why there is no profile to read."""
+    is_shipped: bool = False
+    """Whether it is a shipped profile, named as such."""
 
 
 class Collection(NamedTuple):
@@ -72,10 +74,10 @@ def _meant(argument: str, *, stdin_name: str, skipped: list[str], skip_others: b
         if argument == "-":
             yield ProfileSource(path, stdin_name)
         elif name != argument:  # a shipped name, whatever lies in the working folder
-            yield ProfileSource(path, name)
+            yield ProfileSource(path, name, is_shipped=True)
         elif path.is_dir():
             yield from _below(path, skipped)
-        elif skip_others and path.is_file() and not _claims(path):
+        elif skip_others and path.is_file() and not claims(path):
             skipped.append(_name(path))
         else:
             yield ProfileSource(path, _name(path))
@@ -108,7 +110,7 @@ def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
             if not name.endswith(".toml"):
                 continue
             path = Path(root) / name
-            if _claims(path):
+            if claims(path):
                 has_profile = True
                 yield ProfileSource(path, _name(path))
             else:
@@ -121,7 +123,7 @@ def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
         yield ProfileSource(folder, name, f"{name}: no profile below this folder (a *.toml with a schema_version)")
 
 
-def _claims(path: Path) -> bool:
+def claims(path: Path) -> bool:
     """Whether a TOML file has a `schema_version`; True if it cannot be read, so that reading it reports the error."""
     try:
         if not path.is_file():

@@ -80,7 +80,7 @@ class Spot(NamedTuple):
 
 @dataclass(frozen=True)
 class Document:
-    """A TOML text with its name in messages."""
+    """A TOML text, whose lines end in LF, with its name in messages."""
 
     name: str
     text: str
@@ -173,6 +173,9 @@ class Document:
         long_key = self._long_key()
         if long_key:
             raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
+        # Lines end in LF here: what is left of CR CR LF is no line end, and tomllib would take it for one.
+        if "\r\n" in self.text:
+            raise self.syntax_error(self.text.index("\r\n"), "not valid TOML: illegal character '\\r'")
         try:
             return tomllib.loads(self.text)
         except RecursionError:

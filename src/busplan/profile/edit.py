@@ -2,7 +2,8 @@ r"""Change values in the text of a profile and keep everything else: bytes, comm
 
 A value is replaced, or a line is added to or removed from a section. A layout that needs more is refused, with the
 lines to change by hand. As a check, the new text is parsed and compared with the wanted data. A comment that grades a
-value, as `# measured: by whom`, was said of the old one: it becomes `# was measured: by whom`.
+value, as `# measured: by whom`, was said of the old one: it becomes `# was measured: by whom`. But a choice is known no
+better than what was assumed before it: it stays assumed.
 """
 
 import re
@@ -19,9 +20,11 @@ from busplan.printable import printable
 from busplan.profile.document import GRADING, Document
 from busplan.profile.keys import flat, holder, path_of
 from busplan.profile.positions import KeyPath, Place
-from busplan.profile.toml import decode, validate
-from busplan.profile.write import value_text
+from busplan.profile.shipped import SHIPPED_SCHEMA
+from busplan.profile.toml import LoadedProfile, decode, override, validate
+from busplan.profile.write import profile_text, value_text
 
+_ASSUMED: Final = "assumed"
 _HEADER_END: Final = re.compile(r"[ \t]*\]")
 _BEFORE_COMMENT: Final = re.compile(r"  +(?=#)")
 
@@ -31,7 +34,12 @@ class _LayoutError(Exception):
 
 
 def edited_file(
-    content: bytes, changes: Mapping[str, object], *, name: str, notes: Mapping[str, str] | None = None
+    content: bytes,
+    changes: Mapping[str, object],
+    *,
+    name: str,
+    notes: Mapping[str, str] | None = None,
+    are_choices: bool = False,
 ) -> bytes:
     r"""Return a profile's file with new values; a byte order mark and CRLF line ends are kept.
 
@@ -48,6 +56,9 @@ def edited_file(
     notes
         One-line comment by section, for the line above it: {"node.execution": "busplan calibrate: ..."}. It says where
         the section's values are from, and replaces a comment there with the same beginning, up to the colon.
+    are_choices
+        Whether the values are chosen, as those of a plan, and not measured or read: then what was assumed stays
+        assumed, and nothing is measured by the comment of its section.
 
     Returns
     -------
@@ -85,15 +96,34 @@ def edited_file(
     changed = {key: after.get(key) for key in {**after, **before} if after.get(key) != before.get(key)}
     # A note speaks of its whole section, of values that stay equal, too.
     noted = {path_of(data, key) for key in (*notes, *changes) if key in notes or key.rpartition(".")[0] in notes}
-    document = _with_old_grades(document, noted | {path_of(data, key) for key in changed})
+    document = _with_old_grades(document, noted | {path_of(data, key) for key in changed}, are_choices=are_choices)
     try:
-        result = _encoded(_edited(document, changed, notes, wanted=after), like=content)
+        result = _encoded(_edited(document, changed, notes, wanted=after, are_choices=are_choices), like=content)
     except _LayoutError as error:
         raise BusplanError(
             f"{name}: {error}, so that it stays as it is; change these lines by hand:", *_by_hand(changed, notes)
         ) from None
     decode(result, name=name)
     return result
+
+
+def edited_copy(loaded: LoadedProfile, choices: Mapping[str, object]) -> bytes:
+    """Return a copy of a profile with chosen values, for another file; grades that comments give are kept.
+
+    So are all comments and the layout, unless the layout does not allow the changes.
+
+    Parameters
+    ----------
+    loaded
+        The profile and its text.
+    choices
+        New value by dotted key, as for `edited_file`.
+    """
+    text = loaded.document.text.removeprefix(SHIPPED_SCHEMA)
+    try:
+        return edited_file(text.encode(), choices, name=loaded.document.name, are_choices=True)
+    except BusplanError:
+        return profile_text(override(loaded.profile, dict(choices))).encode()
 
 
 def _texts(data: Mapping[str, Any]) -> dict[str, str]:
@@ -147,7 +177,12 @@ def _header_text(section: str) -> str:
 
 
 def _edited(
-    document: Document, changed: Mapping[str, str | None], notes: Mapping[str, str], *, wanted: dict[str, str]
+    document: Document,
+    changed: Mapping[str, str | None],
+    notes: Mapping[str, str],
+    *,
+    wanted: dict[str, str],
+    are_choices: bool,
 ) -> str:
     """Make the changes one after the other."""
     data = document.data()
@@ -158,6 +193,8 @@ def _edited(
         else:
             new = (_replaced if path in document.places else _with_line)(document, path, text)
         document = Document(document.name, new)
+        if are_choices and text is not None:
+            document = _without_grade_of_table(document, path)
     for section, note in notes.items():
         document = Document(document.name, _noted(document, path_of(data, section), note))
     if not _reads_to(document.text, wanted):
@@ -200,12 +237,25 @@ def _without(document: Document, path: KeyPath) -> str:
     return text[:start] + "".join(f"{_indent(text, start)}{comment}\n" for comment in comments) + text[end:]
 
 
-def _with_old_grades(document: Document, paths: set[KeyPath]) -> Document:
-    """The document with "was" in the comments that grade some keys."""
+def _with_old_grades(document: Document, paths: set[KeyPath], *, are_choices: bool) -> Document:
+    """The document with "was" in the comments that grade some keys, but for choices instead of what was assumed."""
     text, beside = document.text, document.comments_beside
     for at in sorted({beside[path] for path in paths & set(beside)}, reverse=True):
-        text = text[:at] + GRADING.sub(r"# was \1", text[at:], count=1) if GRADING.match(text, at) else text
+        match = GRADING.match(text, at)
+        if match and not (are_choices and match[1] == _ASSUMED):
+            text = f"{text[:at]}# was {text[match.start(1) :]}"
     return Document(document.name, text)
+
+
+def _without_grade_of_table(document: Document, path: KeyPath) -> Document:
+    """The document with a comment beside a chosen key, where that of its table would call it measured or published."""
+    text, beside = document.text, document.comments_beside
+    at = None if path in beside else beside.get(path[:-1])
+    match = None if at is None else GRADING.match(text, at)
+    if match is None or match[1] == _ASSUMED:
+        return document
+    end = document.places[path].value_end
+    return Document(document.name, f"{text[:end]}  # not {match[1]}{text[end:]}")
 
 
 def _noted(document: Document, table: KeyPath, note: str) -> str:

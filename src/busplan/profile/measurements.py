@@ -14,14 +14,14 @@ MAX_MEASUREMENTS_BYTES: Final = 20_000_000
 """About a million measurements; a larger file is something else."""
 
 REQUIRED_COLUMNS: Final = ("payload_bytes", "latency_us")
-OPTIONAL_COLUMNS: Final = ("transaction", "request_and_acknowledge_us")
+OPTIONAL_COLUMNS: Final = ("transaction",)
 _COLUMNS: Final = (*REQUIRED_COLUMNS, *OPTIONAL_COLUMNS)
 _EXPECTED: Final = f"expected {','.join(REQUIRED_COLUMNS)} and, where known, {','.join(OPTIONAL_COLUMNS)}"
 
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _OTHER_DELIMITER: Final = re.compile(r"[;\t|]|(?<=[a-z]) +(?=[a-z])")
 _DELIMITER_NAMES: Final = {"\t": "tabs", ";": "semicolons", "|": "bars"}
-_QUANTITY: Final = re.compile(r"(?P<quantity>payload|latency|request_and_acknowledge)(?P<unit>.*)")
+_QUANTITY: Final = re.compile(r"(?P<quantity>payload|latency)(?P<unit>.*)")
 _TIMES: Final = {
     **dict.fromkeys(("", "usec", "µs", "μs"), ""),  # the micro sign, and the Greek letter that looks like it
     **dict.fromkeys(("ms", "msec"), "multiply by 1000"),
@@ -41,8 +41,6 @@ class Measurement(NamedTuple):
     payload_bytes: int
     latency_us: float
     """T_lant, measured."""
-    request_and_acknowledge_us: float | None
-    """T1 + T2, if measured."""
 
 
 class MeasuredCell(NamedTuple):
@@ -57,8 +55,8 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
     r"""Read measurements from the bytes of a CSV file.
 
     The first line that is neither empty nor a comment (#) is the header. Columns are payload_bytes and latency_us, and
-    optionally transaction (read or write, default write) and request_and_acknowledge_us, the measured T1 + T2, in any
-    order. Values are separated by commas; numbers have a decimal point.
+    optionally transaction (read or write, default write), in any order. Values are separated by commas; numbers have a
+    decimal point.
 
     Parameters
     ----------
@@ -222,14 +220,12 @@ def _measurement(
 
     payload_bytes = number("payload_bytes", most=MAX_COUNT)
     latency_us = number("latency_us", most=MAX_TIME_US)
-    half_name = "request_and_acknowledge_us"
-    half_us = number(half_name, most=MAX_TIME_US) if half_name in values else None
     kind = values["transaction"].text.lower() if "transaction" in values else "write"
     transaction = next((known_kind for known_kind in TRANSACTION_KINDS if known_kind == kind), None)
     if transaction is None:
         refuse("transaction", "out-of-range", "expected read or write")
         return problems
-    return problems or Measurement(line, transaction, int(payload_bytes), latency_us, half_us)
+    return problems or Measurement(line, transaction, int(payload_bytes), latency_us)
 
 
 def _shown(text: str) -> str:
@@ -239,8 +235,7 @@ def _shown(text: str) -> str:
 
 _EXPECTED_TABLE: Final = (
     "expected a CSV file, CSV text, columns by name, or rows: each a mapping, as "
-    '{"payload_bytes": 4, "latency_us": 48.7}, or values in the order payload_bytes, latency_us, transaction, '
-    "request_and_acknowledge_us"
+    '{"payload_bytes": 4, "latency_us": 48.7}, or values in the order payload_bytes, latency_us, transaction'
 )
 
 

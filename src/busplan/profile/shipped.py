@@ -3,10 +3,13 @@
 import os
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from busplan.errors import BusplanError
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
+
+SHIPPED_SCHEMA: Final = "#:schema ./busplan.schema.json\n"
+"""First line of a shipped profile: the path is valid only in its folder."""
 
 
 @cache

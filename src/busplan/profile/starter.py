@@ -7,7 +7,7 @@ from busplan.buses import kind_named
 from busplan.buses.parts import Starter
 from busplan.errors import BusplanError, PlacedError
 from busplan.nearest import did_you_mean
-from busplan.profile.shipped import locate, shipped_names
+from busplan.profile.shipped import SHIPPED_SCHEMA, locate, shipped_names
 from busplan.profile.toml import decode, read_bytes, validate
 from busplan.profile.write import short_text, value_text
 from busplan.servo.checks import dividing_step_us
@@ -24,7 +24,7 @@ _COMMENTS_AT: Final = 27
 _MACHINE: Final = """\
 schema_version = 1
 name = {name}
-description = "{nodes} nodes, {axes} axes, {period} us{bytes}: assumed until somebody measures"
+description = "A new machine: what is assumed here stays so until somebody measures it"
 
 {bus}
 {count}
@@ -147,17 +147,13 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     starter = kind_named(kind).starter
     first = machine.groups[0]
     step_us = dividing_step_us(machine.period_us, most_us=_LONGEST_STEP_US)
-    by_axis = any(group.read_bytes is None for group in machine.groups)
     text = _MACHINE.format(
         name=value_text(name),
         bus=starter.section(machine.host),
         ratio=starter.slice_ratio,
-        nodes=sum(group.nodes for group in machine.groups),
-        axes=sum(group.nodes * group.axes for group in machine.groups),
         count="" if first.name else _COUNT.format(nodes=first.nodes),
         parts="\n".join(_part(group, machine=machine, starter=starter, file=file) for group in machine.groups),
         period=short_text(machine.period_us),
-        bytes=f", {machine.bytes_per_axis} bytes an axis each way" if by_axis else "",
         step=f"step_us = {short_text(step_us)} ".ljust(_COMMENTS_AT),
         more=starter.more and f"\n{starter.more}",
     )
@@ -233,8 +229,7 @@ def starter_text(source: str, *, name: str) -> str:
     if ("circle", "path") not in document.places:
         after = _CIRCLE.sub(rf"\1{_TURN}", after)
     text = before + value_text(name) + after
-    # The path to the schema is valid only in the shipped folder.
-    text = text.removeprefix("#:schema ./busplan.schema.json\n")
+    text = text.removeprefix(SHIPPED_SCHEMA)
     return _checked(
         f"# A copy of the shipped profile {source}: its values stay those until you change them.\n{text}", name=name
     )

@@ -12,7 +12,8 @@ from typing import Final, NamedTuple
 from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
-from busplan.profile.document import Document, TomlTable, text_of
+from busplan.files import is_unwritten_pipe
+from busplan.profile.document import GRADING, Document, TomlTable, text_of
 from busplan.profile.keys import holder
 from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
@@ -20,8 +21,6 @@ from busplan.sourced import Grade
 
 MAX_FILE_BYTES: Final = 2_000_000
 """Some 10,000 messages of a CAN network with their comments; a larger file is something else."""
-_OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
-"""Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
 PERIOD_KEY: Final = "cycle.period_us"
 _KINDS: Final = ("bus", "bus.kind")
 """Keys whose change may ask for tables of another kind of bus."""
@@ -86,8 +85,7 @@ def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
             if sys.stdin is None:
                 raise BusplanError(f"{name}: standard input is closed")
             return sys.stdin.buffer.read(limit + 1)
-        if path.is_fifo() and not str(path).startswith(_OPENED):
-            # Opening it would wait for a writer forever.
+        if is_unwritten_pipe(path):
             raise BusplanError(f"{name}: is a named pipe; give a regular file")
         with path.open("rb") as file:
             return file.read(limit + 1)
@@ -211,8 +209,16 @@ def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Pro
     ]
 
 
+def has_comment_grades(profile: Profile) -> bool:
+    """Whether comments of its file may grade keys; one that was read from no file has no comments."""
+    document, _ = profile.__dict__.get(_SOURCE, (None, ()))
+    return document is not None and GRADING.search(document.text) is not None
+
+
 def comment_grade(profile: Profile, key: str) -> Grade | None:
     """The grade that a comment of its file, at the key or at its table, gives the value of a key.
+
+    Another value is not measured because the old one was; but an assumption that is made otherwise is still one.
 
     Parameters
     ----------
@@ -222,7 +228,9 @@ def comment_grade(profile: Profile, key: str) -> Grade | None:
         Dotted key.
     """
     document, changed = profile.__dict__.get(_SOURCE, (None, ()))
-    if document is None or any(key == changed_key or key.startswith(f"{changed_key}.") for changed_key in changed):
+    if document is None:
         return None
     grades: dict[str, Grade] = document.grades
-    return grades.get(key)
+    grade = grades.get(key)
+    is_changed = any(key == changed_key or key.startswith(f"{changed_key}.") for changed_key in changed)
+    return None if is_changed and grade != "assumed" else grade

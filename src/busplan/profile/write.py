@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from busplan.printable import printable
+from busplan.profile.document import Document
+from busplan.profile.keys import named_path
+from busplan.profile.toml import comment_grade, has_comment_grades
 from busplan.sections.profile import Profile
 
 
@@ -59,7 +62,7 @@ def short_text(value: object) -> str:
 
 
 def profile_text(profile: Profile) -> str:
-    """Write a profile as TOML, without keys that it does not set.
+    """Write a profile as TOML, without keys that it does not set; grades that comments gave are comments again.
 
     Parameters
     ----------
@@ -69,7 +72,7 @@ def profile_text(profile: Profile) -> str:
     Returns
     -------
     str
-        TOML that parses to the same profile, without comments; `profile.edit` keeps the comments of a file.
+        TOML that parses to the same profile, without other comments; `profile.edit` keeps those of a file.
 
     Examples
     --------
@@ -81,4 +84,19 @@ def profile_text(profile: Profile) -> str:
 
     # TOML has no null: leave out keys that are None.
     data = profile.model_dump(exclude_unset=True, exclude_none=True)
-    return tomli_w.dumps(data, multiline_strings=True)
+    return _graded(tomli_w.dumps(data, multiline_strings=True), profile)
+
+
+def _graded(text: str, profile: Profile) -> str:
+    """The text with the grade of each key that a comment of the profile's file grades."""
+    if not has_comment_grades(profile):
+        return text
+    document = Document("", text)
+    known: dict[int, Any] = {}
+    lines = text.split("\n")
+    for path, place in document.places.items():
+        grade = comment_grade(profile, ".".join(map(str, named_path(document.data(), path, known))))
+        # A string of several lines has no room beside its key, and is no value that has a grade.
+        if grade is not None and place.value_start > place.key_end and not text.startswith('"""', place.value_start):
+            lines[document.lines.line_and_column(place.key_start)[0] - 1] += f"  # {grade}"
+    return "\n".join(lines)

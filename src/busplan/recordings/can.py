@@ -1,11 +1,13 @@
 """Frames of CAN logs as arrays, and the bits that each of them had on the wire."""
 
 import logging
+import zlib
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from pathlib import Path
+from struct import Struct
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -33,6 +35,19 @@ _PIECE: Final = 50_000
 _CLASSICAL_BYTES: Final = 8
 _LONG_BYTES: Final = (16, 20, 24, 32, 48, 64)
 """Length codes 10 to 15, as python-can gives them even of classical frames; they have 8 bytes in those."""
+
+
+_DAY_S: Final = 86_400.0
+_LONGEST_S: Final = _DAY_S
+"""Longest time from one frame to the next that is no damage [s]."""
+_END_S: Final = float(1 << 33)
+"""Stamps from here on, in the year 2242, are no times [s]."""
+_MOST_CONTAINER_BYTES: Final = 16_000_000
+"""Most data of a container of BLF; Vector's and python-can's have 131,072 bytes."""
+_BLF_OBJECT: Final = Struct("<4s4xII")
+"""Head of an object: signature, size and kind, as python-can has it."""
+_BLF_METHOD: Final = Struct("<H14x")
+_BLF_CONTAINER, _BLF_DEFLATED = 10, 2
 
 
 class CanFrames(NamedTuple):
@@ -75,6 +90,9 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
         The file cannot be read, is of no known format, has no frame, or those of several channels; or python-can is
         not installed.
     """
+    if path.is_fifo():
+        # Opening it may wait for ever, and it is opened twice.
+        raise BusplanError(f"{path}: is a named pipe; give a regular file")
     try:
         with path.open("rb") as file:
             head = file.read(4)
@@ -92,15 +110,54 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
     log = _Log()
     reader: Any = None
     try:
-        reader = getattr(can, name)(str(path))
+        reader = (_bounded_blf() if name == "BLFReader" else getattr(can, name))(str(path))
         stream = getattr(reader, "file", None)
         log.read(reader, lambda: progress(min(stream.tell() if stream else 0, size), size))
+    except _DamageError as error:
+        log.broken = str(error)
     except Exception as error:  # noqa: BLE001 - a damaged log fails in many ways
         log.broken = f"{type(error).__name__}: {error}"
     finally:
         with suppress(Exception):
             reader.stop()
     return log.frames(path)
+
+
+class _DamageError(Exception):
+    """What no log can say, in words."""
+
+
+def _bounded_blf() -> Any:
+    """The reader of BLF of python-can, with a bound for what a container is inflated to."""
+    from can.io import blf  # noqa: PLC0415 - as above
+
+    class Reader(blf.BLFReader):  # type: ignore[misc,unused-ignore]
+        def __iter__(self) -> Generator[Any, None, None]:
+            while head := self.file.read(_BLF_OBJECT.size):
+                signature, size, kind = _BLF_OBJECT.unpack(head)
+                if signature != b"LOBJ" or size < _BLF_OBJECT.size:
+                    raise _DamageError("what should be an object of the log is none")
+                content = self.file.read(size - _BLF_OBJECT.size)
+                self.file.read(size % 4)
+                if kind == _BLF_CONTAINER:
+                    yield from self._parse_container(_inflated(content, held=len(self._tail)))
+
+    return Reader
+
+
+def _inflated(content: bytes, *, held: int) -> bytes:
+    """Data of a container; with what is held of the container before, they are bounded."""
+    (method,), data = _BLF_METHOD.unpack_from(content), content[_BLF_METHOD.size :]
+    if method == 0:
+        return data
+    if method != _BLF_DEFLATED:
+        raise _DamageError(f"a container that is compressed by method {method}")
+    most = max(_MOST_CONTAINER_BYTES - held, 0)
+    # A byte more than there is room for tells that there is more.
+    data = zlib.decompressobj().decompress(data, most + 1)
+    if len(data) > most:
+        raise _DamageError(f"a container of over {_MOST_CONTAINER_BYTES:,} bytes")
+    return data
 
 
 class _Log:
@@ -122,7 +179,7 @@ class _Log:
             self._sizes.append,
             self._flags.append,
         )
-        number = 0
+        number, last_s = 0, None
         for message in messages:
             number += 1
             if not number % _TURN:
@@ -131,8 +188,10 @@ class _Log:
             if message.is_error_frame:
                 self._errors += 1
                 continue
+            _require_frame(message, last_s)
+            last_s = message.timestamp
             self._channels[message.channel] += 1
-            times(message.timestamp)
+            times(last_s)
             identifiers(message.arbitration_id)
             data(int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"))
             sizes(message.dlc)
@@ -173,6 +232,20 @@ class _Log:
             self._errors,
             self.broken,
         )
+
+
+def _require_frame(message: Any, before_s: float | None) -> None:
+    """Refuse what is no frame at a time: then nothing of it is taken."""
+    stamp_s, identifier = message.timestamp, message.arbitration_id
+    if not 0 <= stamp_s < _END_S:  # which is so of no number, too
+        raise _DamageError(f"a stamp of {stamp_s:g} s")
+    if before_s is not None and stamp_s - before_s > _LONGEST_S:
+        raise _DamageError(f"a stamp {(stamp_s - before_s) / _DAY_S:,.1f} days after the one before")
+    bits = 29 if message.is_extended_id else 11
+    if not 0 <= identifier < 1 << bits:
+        raise _DamageError(f"an identifier of {identifier:#x}, which has no room in {bits} bits")
+    if not 0 <= message.dlc <= _LONG_BYTES[-1] or len(message.data) > _LONG_BYTES[-1]:
+        raise _DamageError(f"data of {max(message.dlc, len(message.data))} bytes")
 
 
 def written_bits(

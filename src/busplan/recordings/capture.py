@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from busplan.errors import BusplanError
+from busplan.files import is_unwritten_pipe
 from busplan.progress import Progress
 
 Numbers = npt.NDArray[np.int64]
@@ -22,6 +23,10 @@ _MOST_RECORD_BYTES: Final = 1_000_000
 """Longest record that is no damage; a packet has 262,144 bytes at most."""
 _ETHERNET: Final = 1
 _NS: Final = 1_000_000_000
+_END_NS: Final = (1 << 33) * _NS
+"""Stamps from here on, in the year 2242, are no times [ns]."""
+_LONGEST_NS: Final = 86_400 * _NS
+"""Longest time from one packet to the next that is no damage: a day [ns]."""
 _PCAP: Final = {
     b"\xd4\xc3\xb2\xa1": ("<", 1000),
     b"\xa1\xb2\xc3\xd4": (">", 1000),
@@ -31,9 +36,13 @@ _PCAP: Final = {
 """Byte order, and the nanoseconds of a tick, by the first bytes of a pcap file."""
 _SECTION: Final = b"\x0a\x0d\x0d\x0a"
 _ORDER: Final = {b"\x4d\x3c\x2b\x1a": "<", b"\x1a\x2b\x3c\x4d": ">"}
-_INTERFACE, _OLD_PACKET, _SIMPLE_PACKET, _PACKET = 1, 2, 3, 6
+_INTERFACE, _OLD_PACKET, _SIMPLE_PACKET, _STATISTICS, _PACKET = 1, 2, 3, 5, 6
 _RESOLUTION, _OFFSET = 9, 14
 """Options of an interface: the tick of its stamps, and the seconds to add."""
+_DROPPED: Final = {_PACKET: (4,), _STATISTICS: (5, 7)}
+"""Options of a block that count dropped packets: before a packet; by the interface, and by the operating system."""
+_NOT_COUNTED: Final = 0xFFFF
+"""Dropped packets of an old packet block that does not know them."""
 
 
 class CapturedPackets(NamedTuple):
@@ -56,7 +65,9 @@ class CaptureNotes:
     other_links: int = 0
     """CapturedPackets of interfaces that are no Ethernet."""
     without_time: int = 0
-    """CapturedPackets in records that have no stamp."""
+    """CapturedPackets in records that have no stamp, or one that is no time."""
+    dropped: int = 0
+    """Packets that the recorder says it dropped; a pcap file has no word of them."""
     broken_at: int | None = None
     """Byte of the file from which on nothing can be read; None of a whole file."""
 
@@ -83,6 +94,8 @@ def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[
     BusplanError
         The file cannot be read, or is no such file.
     """
+    if is_unwritten_pipe(path):
+        raise BusplanError(f"{path}: is a named pipe; give a regular file")
     try:
         with path.open("rb") as file:
             yield from _pieces(file, path, notes, progress)
@@ -100,13 +113,21 @@ def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress)
         walker, held, at = _PcapNg(notes), head, 0
     else:
         raise BusplanError(f"{path}: is no pcap or pcapng file")
+    before: int | None = None
     while True:
         content = held + file.read(_PIECE_BYTES)
         rows, used = walker.walk(content)
         if rows:
-            notes.packets += len(rows)
             starts, sizes, times = np.array(rows, dtype=np.int64).T
-            yield CapturedPackets(np.frombuffer(content, dtype=np.uint8), starts, sizes, times)
+            late = np.flatnonzero(np.diff(times, prepend=times[0] if before is None else before) > _LONGEST_NS)
+            whole = slice(late[0] if len(late) else None)
+            notes.packets += len(starts[whole])
+            if len(starts[whole]):
+                yield CapturedPackets(np.frombuffer(content, dtype=np.uint8), starts[whole], sizes[whole], times[whole])
+            if len(late):
+                notes.broken_at = at + int(starts[late[0]])
+                return
+            before = int(times[-1])
         at += used
         is_last = len(content) - len(held) < _PIECE_BYTES
         held = content[used:]
@@ -187,7 +208,11 @@ class _PcapNg(_Walker):
                 break
             if kind == _PACKET and size >= 32:  # noqa: PLR2004 - the fields of a packet
                 number, high, low, kept = packet.unpack_from(content, at + 8)
-                self._packet(rows, number, high << 32 | low, at + 28, min(kept, size - 32))
+                kept = min(kept, size - 32)
+                self._packet(rows, number, high << 32 | low, at + 28, kept)
+                options = at + 28 + (kept + 3) // 4 * 4
+                if options < at + size - 4:
+                    self._notes.dropped += self._dropped(content[options : at + size - 4], _PACKET)
             else:
                 self._other(content, at, kind, size, rows)
             at += size
@@ -204,7 +229,7 @@ class _PcapNg(_Walker):
         time_ns = ticks * _NS // interface.ticks + interface.offset_ns
         if interface.link != _ETHERNET:
             self._notes.other_links += 1
-        elif not -(2**63) <= time_ns < 2**63:
+        elif not 0 <= time_ns < _END_NS:
             self._notes.without_time += 1
         else:
             rows.append((at, size, time_ns))
@@ -216,23 +241,41 @@ class _PcapNg(_Walker):
         elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
             self._interfaces.append(self._interface(content[at + 8 : at + size - 4]))
         elif kind == _OLD_PACKET and size >= 32:  # noqa: PLR2004 - its fields
-            number, _, high, low, kept = Struct(f"{order}HHIII").unpack_from(content, at + 8)
+            number, dropped, high, low, kept = Struct(f"{order}HHIII").unpack_from(content, at + 8)
+            self._notes.dropped += dropped if dropped != _NOT_COUNTED else 0
             self._packet(rows, number, high << 32 | low, at + 28, min(kept, size - 32))
         elif kind == _SIMPLE_PACKET:
             self._notes.without_time += 1
+        elif kind == _STATISTICS:
+            # Each counts from the start of its interface, and what packets count is among it.
+            dropped = self._dropped(content[at + 20 : at + size - 4], _STATISTICS)
+            self._notes.dropped = max(self._notes.dropped, dropped)
+
+    def _dropped(self, options: bytes, kind: int) -> int:
+        """Packets that the options of a block say were dropped."""
+        number = Struct(f"{self._order}Q")
+        return sum(
+            number.unpack(value)[0]
+            for code, value in self._options(options)
+            if code in _DROPPED[kind] and len(value) == number.size
+        )
+
+    def _options(self, content: bytes) -> Iterator[tuple[int, bytes]]:
+        """Code and value of each option."""
+        field, at = Struct(f"{self._order}HH"), 0
+        while at + 4 <= len(content):
+            code, size = field.unpack_from(content, at)
+            yield code, content[at + 4 : at + 4 + size]
+            at += 4 + (size + 3) // 4 * 4
 
     def _interface(self, body: bytes) -> _Interface:
         (link,) = Struct(f"{self._order}H").unpack_from(body)
-        ticks, offset_ns, at = 1_000_000, 0, 8
-        field = Struct(f"{self._order}HH")
-        while at + 4 <= len(body):
-            code, size = field.unpack_from(body, at)
-            value = body[at + 4 : at + 4 + size]
+        ticks, offset_ns = 1_000_000, 0
+        for code, value in self._options(body[8:]):
             if code == _RESOLUTION and value:
                 ticks = 2 ** (value[0] & 0x7F) if value[0] & 0x80 else 10 ** min(value[0], 18)
             elif code == _OFFSET and len(value) == 8:  # noqa: PLR2004 - a number of 64 bits
                 offset_ns = Struct(f"{self._order}q").unpack(value)[0] * _NS
-            at += 4 + (size + 3) // 4 * 4
         return _Interface(link, ticks, offset_ns)
 
 

@@ -3,6 +3,7 @@
 import importlib.util
 from collections.abc import Callable
 from itertools import pairwise
+from math import sqrt
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import busplan
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.kind import packets_of
 from busplan.buses.ieee1394.section import Ieee1394Profile
@@ -267,3 +269,24 @@ def test_the_bus_alone_gains_about_two() -> None:
         required_us(DVRK, cycle__schedule=word, host__transaction_us=40.0) for word in ("individual", "broadcast")
     ]
     assert called_us[0] / called_us[1] > 3
+
+
+@pytest.mark.parametrize("schedule", ["individual", "broadcast"])
+@pytest.mark.parametrize("retries", [0, 1, 4])
+@pytest.mark.parametrize("cycle_master", [False, True])
+def test_the_doubt_of_a_phy_is_as_large_as_the_time_that_it_moves(
+    schedule: str, retries: int, cycle_master: bool
+) -> None:
+    """A PHY that is 1 ns slower makes the cycle slower once for each time that its delay stands in it."""
+    changes = {"cycle.schedule": schedule, "cycle.retries": retries, "bus.cycle_master": cycle_master}
+
+    def required_us(phy_us: float) -> float:
+        profile = busplan.load_profile("dvrk", changes={**changes, "bus.gap_count": 21, "bus.phy_delay_us": phy_us})
+        return busplan.capacity(profile, timing_model="standard").results[0].required_us
+
+    own_us, step_us = 14 / 98.304, 0.001
+    counted = (required_us(own_us + step_us) - required_us(own_us)) / step_us
+    profile = busplan.load_profile("dvrk", changes={**changes, "bus.gap_count": 21})
+    (doubt_us,) = (one.us for one in busplan.capacity(profile).verdicts[0].deciding.doubts if "phy" in one.key)
+    # 20 ns either way, none likelier than another.
+    assert doubt_us == pytest.approx(counted * 0.02 / sqrt(3), rel=1e-6)

@@ -48,37 +48,36 @@ class Frame:
 def test_all_ways_to_give_measurements_are_the_same(given: Any, tmp_path: Path) -> None:
     file = tmp_path / "bench.csv"
     file.write_text(TEXT, encoding="utf-8")
-    wanted = busplan.calibrate("paper-two-node", file, form="linear")
-    found = busplan.calibrate("paper-two-node", given, form="linear")
+    wanted = busplan.calibrate("paper-two-node", file)
+    found = busplan.calibrate("paper-two-node", given)
     assert (found.execution, found.changes, found.payloads) == (wanted.execution, wanted.changes, wanted.payloads)
     assert (wanted.source, found.source) == (str(file), "measurements")
-    assert busplan.calibrate("paper-two-node", str(file), form="linear") == wanted
-    read = busplan.calibrate("paper-two-node", TEXT.encode(), form="linear", source="bench 7")
+    assert busplan.calibrate("paper-two-node", str(file)) == wanted
+    read = busplan.calibrate("paper-two-node", TEXT.encode(), source="bench 7")
     assert (read.execution, read.source, read.to_dict()["source"]) == (wanted.execution, "bench 7", "bench 7")
     assert wanted.notes == {"node.execution": read.notes["node.execution"].replace("bench 7", "bench.csv")}
 
 
-@pytest.mark.parametrize("form", ["linear", "table"])
-def test_the_changes_are_those_that_apply_writes(form: Any, tmp_path: Path) -> None:
+def test_the_changes_are_those_that_apply_writes(tmp_path: Path) -> None:
     own, bench = tmp_path / "own.toml", tmp_path / "bench.csv"
     text = (shipped_folder() / "paper-two-node.toml").read_text(encoding="utf-8")
     own.write_text(text.replace("[node.execution]", "[node.execution]\nworst_extra_us = 2.5"), encoding="utf-8")
     bench.write_text(TEXT, encoding="utf-8")
     before = busplan.load_profile(own)
-    changes = busplan.calibrate(own, bench, form=form).changes
+    changes = busplan.calibrate(own, bench).changes
     assert busplan.load_profile(own) == before
-    done = CliRunner().invoke(app, ["calibrate", str(own), str(bench), "--form", form, "--apply"])
+    done = CliRunner().invoke(app, ["calibrate", str(own), str(bench), "--apply"])
     assert done.exit_code == 0, done.stderr
     written = busplan.load_profile(own)
     assert busplan.load_profile(before, changes=changes) == written
     (nodes,) = written.alike_nodes
-    assert (nodes.node.execution.kind, nodes.node.execution.worst_extra_us) == (form, 2.5)
+    assert (nodes.node.execution.kind, nodes.node.execution.worst_extra_us) == ("table", 2.5)
 
 
 def test_an_outlier_is_named_by_its_row() -> None:
     rows = [(4, 48.7 + number / 100) for number in range(12)]
     rows[7] = (4, 148.7)
-    (found,) = busplan.calibrate("paper-two-node", rows, form="table").outliers
+    (found,) = busplan.calibrate("paper-two-node", rows).outliers
     assert (found.line, found.latency_us) == (8, 148.7)
 
 

@@ -2,16 +2,21 @@
 
 import re
 from math import floor, log10
+from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
+from busplan.buses import kind_named
 from busplan.forms.blocks import Card, Command, Gauge
 from busplan.forms.numbers import sentence_text
 from busplan.forms.terminal import text
+from busplan.profile.toml import override
 from busplan.questions.capacity import CapacityAnswer
+from busplan.sections.profile import Profile
 
 SHIPPED = ("paper-4ms", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos2-servo-8", "sercos3-servo-8")
 
@@ -56,6 +61,80 @@ def test_a_period_mends_no_limit_that_it_plays_no_part_in() -> None:
         "the bus allows no period of 300 us; the next are 250 and 500 us",
         "250 us",
     )
+
+
+US = {"us": 1.0, "ms": 1e3, "s": 1e6}
+
+
+def fastest(answer: CapacityAnswer) -> tuple[float, float] | None:
+    """The fastest period that the card names, and the next one that is faster, in the digits that it has [us]."""
+    said = card_of(answer)[1]["fastest period"]
+    matched = re.match(r"([\d.e+]+) (us|ms|s)\b", said)
+    if matched is None:
+        assert said in ("none: no period keeps the limit", "no period that the bus allows is long enough")
+        return None
+    us, doubt_us = float(matched[1]) * US[matched[2]], answer.verdicts[0].deciding.uncertainty_us
+    known = [one for one in kind_named(answer.profile.bus.kind).periods.us if one < us]
+    if kind_named(answer.profile.bus.kind).periods.us:
+        return us, max(known, default=0.0)
+    # The digits that its doubt allows; three without one.
+    decimals = -floor(log10(doubt_us)) if doubt_us else 2 - floor(log10(us))
+    return us, us - 10.0 ** -min(max(0, decimals), 6)
+
+
+def verdict(profile: Profile, **changes: float) -> str | None:
+    """Verdict after changes; none where no profile has such values, or its bus would not be set safely."""
+    try:
+        found = busplan.capacity(override(profile, {key.replace("__", "."): value for key, value in changes.items()}))
+    except busplan.BusplanError:
+        return None
+    deciding = found.verdicts[0].deciding
+    return deciding.verdict if deciding.safe else None
+
+
+def with_tight_deadlines(profile: Any, share: float) -> Any:
+    """The same traffic with the deadlines of messages at a share of their worst responses in slow cycles."""
+    slow: dict[str, object] = {f"message.{message.name}.deadline_us": 1e6 for message in profile.message}
+    rows = busplan.latency(override(profile, {**slow, "cycle.period_us": 50_000}), timing_model="worst-stuffing")
+    responses = {row.transaction: row.phases.worst_response_us for row in rows.transactions}
+    keys = {message.name: f"message.{message.name}.deadline_us" for message in profile.message}
+    return override(profile, {keys[name]: us * share for name, us in responses.items() if us and name in keys})
+
+
+KINDS = ("ieee1394", "can", "ethercat", "sercos2", "sercos3")
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "can with deadlines"])
+@given(data=st.data())
+def test_the_period_and_the_nodes_that_it_names_fit_and_the_next_do_not(
+    kind: str, data: st.DataObject, profiles_by_kind: dict[str, st.SearchStrategy[Profile]]
+) -> None:
+    drawn = data.draw(profiles_by_kind[kind.partition(" ")[0]])
+    profile = with_tight_deadlines(drawn, data.draw(st.sampled_from([1.0, 1.02, 1.3]))) if " " in kind else drawn
+    found = fastest(busplan.capacity(profile))
+    if found is None or found[0] > 1e9:
+        return
+    us, faster_us = found
+    at_fastest: Any = override(profile, {"cycle.period_us": us})
+    answer = busplan.capacity(at_fastest)
+    assert answer.verdicts[0].deciding.verdict == "fits"
+    assert faster_us < 1 or verdict(profile, cycle__period_us=faster_us) != "fits"
+    words = card_of(answer)[1].get("room for", "")
+    if words:
+        nodes = at_fastest.bus.nodes + (0 if words == "no more nodes" else int(words.removesuffix(" more nodes")))
+        assert verdict(at_fastest, bus__nodes=nodes) in ("fits", None if nodes == at_fastest.bus.nodes else "fits")
+        assert verdict(at_fastest, bus__nodes=nodes + 1) != "fits"
+
+
+def test_a_deadline_asks_for_a_slower_cycle_than_time_does() -> None:
+    # 1.115 ms have room for the cycle; m2 has to be there within 1000 us, which PDOs every 1.386 ms leave it.
+    answer = busplan.capacity(Path(__file__).with_name("fastest-period.toml"))
+    assert card_of(answer)[1]["fastest period"] == "1.386 ms, limited by deadline"
+    profile = answer.profile
+    (least,) = [one for one in busplan.plan(profile).options if one.title == "smallest period"]
+    assert least.changes["cycle.period_us"] == 1390  # the next one of three digits
+    assert verdict(profile, cycle__period_us=1386) == "fits"
+    assert verdict(profile, cycle__period_us=1385) == "does not fit"
 
 
 def test_the_cure_stands_where_there_is_something_to_cure() -> None:

@@ -5,11 +5,11 @@ from collections.abc import Callable
 from math import fsum
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import busplan
 from busplan.buses.ieee1394.constants import PHY_DELAY_HALF_WIDTH_US
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.elementwise import plain, value_of
@@ -19,16 +19,13 @@ from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load
 from busplan.profile.toml import decode, override, validate
 from busplan.profile.write import profile_text
-from busplan.questions.explain.bus import capacity_figures
+from busplan.questions.explain import explain
 from busplan.questions.fit.certainty import certainty, cycle_of, fits_in
 from busplan.questions.fit.figures import COUNTS, figures
 from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.plan.constraints import nodes_for_axes, rooms
 from busplan.questions.plan.planning import plan
-from busplan.questions.sweep.blocks import figure_names, sweep
-from busplan.questions.sweep.grid import checked_grid
-from busplan.questions.sweep.values import listed
 from busplan.sections.profile import Profile
 
 GANTRY = load("gantry-24").profile
@@ -208,37 +205,30 @@ def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: Profile)
 
 @given(profile=grouped())
 def test_a_derivation_gives_the_figures(profile: Profile) -> None:
-    for model in model_names(profile):
-        known, derived = figures(profile, model=model).by_key(), capacity_figures(profile, model=model)
-        for key, value in known.items():
-            if key in derived:
-                assert value_of(derived[key]) == (list(value) if isinstance(value, tuple) else value), key
-            else:
-                assert value is None
+    network = network_of(profile)
+    for model in model_names(network):
+        known = figures(network, model=model).values()
+        for key in ("required_us", "margin_us", "read_latency_us", "axes"):
+            if known[key] is not None:
+                (one,) = explain(profile, key, timing_model=model).derivations
+                assert one.value == known[key]
 
 
 @settings(max_examples=12)
 @given(profile=grouped(), nodes=st.lists(st.integers(1, 20), min_size=2, max_size=4, unique=True))
 def test_a_sweep_gives_what_each_profile_gives(profile: Profile, nodes: list[int]) -> None:
     name = profile.group[-1].name
-    vary = {
-        f"group.{name}.nodes": listed(nodes, name="nodes"),
-        f"group.{profile.group[0].name}.axes": listed([1, 2], name="axes"),
-    }
-    grid, models = checked_grid(profile, vary, with_circle=False), model_names(profile)
-    (block,) = sweep(profile, grid, timing_models=models)
-    names = figure_names(profile)
-    for index in range(grid.points * len(models)):
-        row = block.row(index, (*vary, *names))
-        where = override(profile, {key: int(row[key]) for key in vary})  # type: ignore[arg-type]
-        alone = figures(where, model=models[index % len(models)])
+    vary = {f"group.{name}.nodes": nodes, f"group.{profile.group[0].name}.axes": [1, 2]}
+    answer = busplan.sweep(profile, vary=vary)
+    models, rows = answer.sweep.timing_models, answer.to_dict()["rows"]
+    assert len(rows) == len(nodes) * 2 * len(models)
+    for row in rows:
+        alone = figures(override(profile, {key: row[key] for key in vary}), model=row["timing_model"])
         own = {f"group.{one.name}.{key}": getattr(one, key) for one in alone.groups for key in COUNTS}
-        for key, value in ({**alone.by_key(), **own}).items():
-            found = None if isinstance(row[key], float) and np.isnan(row[key]) else row[key]  # type: ignore[arg-type]
-            expected = list(value) if isinstance(value, tuple) else value
-            assert found == (
-                pytest.approx(expected, rel=1e-9, abs=1e-9) if isinstance(expected, float) else expected
-            ), key
+        # Those of the whole are of the group that varies.
+        whole = {key: value for key, value in alone.by_key().items() if key not in COUNTS}
+        for key, value in {**whole, **own}.items():
+            assert row[key] == (pytest.approx(value, rel=1e-9, abs=1e-9) if isinstance(value, float) else value), key
 
 
 def test_the_figures_of_the_gantry_by_hand() -> None:

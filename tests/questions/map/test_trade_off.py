@@ -18,7 +18,7 @@ from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.map.direction import AXES, MOST_VALUES, PERIOD, Direction, checked_direction
 from busplan.questions.map.trade_off import Cell, NotDrawn, TradeOff, trade_off
-from busplan.questions.sweep.grid import Listed, Steps
+from busplan.questions.sweep.grid import axis_of
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
 
@@ -185,7 +185,7 @@ def test_groups_are_directions_too() -> None:
     with pytest.raises(BusplanError, match=r"both vary group\.drives\.nodes"):
         trade_off(GANTRY, x=Direction(AXES, (24,)), y=Direction("group.drives.nodes", (1, 2)))
     with pytest.raises(BusplanError, match=r"--x bus\.nodes: "):
-        checked_direction(GANTRY, "bus.nodes", Listed((1,)), option="--x")
+        checked_direction(GANTRY, "bus.nodes", axis_of([1]), option="--x")
 
 
 def test_nodes_without_axes_are_counted_themselves() -> None:
@@ -238,17 +238,17 @@ def test_a_map_of_nothing_is_refused(x: Direction, y: Direction | None, message:
 
 
 def test_a_direction_is_sorted_and_has_no_more_values_than_gap_counts() -> None:
-    assert checked_direction(PAPER, PERIOD, Listed((500.0, 0.5, 4000)), option="--y").values == (0.5, 500, 4000)
-    assert checked_direction(PAPER, "bus.speed", Listed(("S400", "S100")), option="--x").values == ("S400", "S100")
-    assert len(checked_direction(PAPER, "bus.gap_count", Steps(0, 1, 1, 64), option="--x").values) == MOST_VALUES
+    assert checked_direction(PAPER, PERIOD, axis_of([500.0, 0.5, 4000]), option="--y").values == (0.5, 500, 4000)
+    assert checked_direction(PAPER, "bus.speed", axis_of(["S400", "S100"]), option="--x").values == ("S400", "S100")
+    assert len(checked_direction(PAPER, "bus.gap_count", axis_of(range(64)), option="--x").values) == MOST_VALUES
     with pytest.raises(BusplanError, match=re.escape("--x bus.nodes: 65 values; a map shows up to 64 of a key")):
-        checked_direction(PAPER, "bus.nodes", Steps(1, 1, 1, 65), option="--x")
+        checked_direction(PAPER, "bus.nodes", axis_of(range(1, 66)), option="--x")
     with pytest.raises(
         BusplanError, match=re.escape("--x bus.node: no such key of this profile; did you mean bus.nodes?")
     ):
-        checked_direction(PAPER, "bus.node", Listed((1,)), option="--x")
+        checked_direction(PAPER, "bus.node", axis_of([1]), option="--x")
     with pytest.raises(BusplanError, match=re.escape("add --circle to run circle tests")):
-        checked_direction(PAPER, "circle.radius_mm", Listed((1,)), option="--x", circle_option="--circle")
+        checked_direction(PAPER, "circle.radius_mm", axis_of([1]), option="--x", circle_option="--circle")
 
 
 # --- circles ----------------------------------------------------------------------------------------------

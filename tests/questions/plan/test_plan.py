@@ -1,213 +1,249 @@
-"""A plan says the steps of its search and what the network could reach; every option does what it says."""
+"""`busplan.plan`: one thing is changed at a time, the cheapest first, until the goal holds; what it writes passes."""
 
-from collections.abc import Callable
-from fractions import Fraction
+from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import busplan
 from busplan.errors import BusplanError
+from busplan.gate.gate import check_document
 from busplan.profile.shipped import load, shipped_names
-from busplan.profile.toml import override
-from busplan.questions.circle.check import CircleCheck
-from busplan.questions.circle.roundness import circle_test
-from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.figures import figures
-from busplan.questions.fit.node_limit import safe_nodes
-from busplan.questions.plan.freedoms import freed
-from busplan.questions.plan.options import Option
-from busplan.questions.plan.planning import plan
-from busplan.questions.plan.search import Search
+from busplan.profile.toml import decode, override
+from busplan.profile.write import profile_text
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
-Safely = Callable[[Profile, int], Fraction]
-Carries = Callable[[Profile, int], bool]
-Around = Callable[[int, Callable[[int], bool]], list[int]]
-
-GAP_COUNTS = [5, 7, 8, 10, 13, 16, 18, 21, 24, 26, 29, 32, 35, 37, 40, 43, 46, 48, 51, 54, 57, 59, 62]
+ALL = ("gap_count", "slice_ratio", "responses", "payload", "period", "nodes")
 
 
-def titled(title: str, profile: Profile, **asked: Any) -> Option:
-    (found,) = (one for one in plan(profile, **asked).options if one.title == title)
-    return found
+def errors_of(profile: Profile) -> list[str]:
+    """The errors of the gate on what would be written, the circle left out."""
+    text = profile_text(profile).encode()
+    found = check_document(decode(text, name="new.toml"), with_circle=False, record=False).findings
+    return [one.message for one in found if one.severity == "error"]
+
+
+def changes_of(profile: Profile, free: Sequence[str] | None = None, **asked: Any) -> dict[str, Any] | None:
+    option = busplan.plan(profile, free=free, **asked).recommended
+    return None if option is None else option.changes
+
+
+limits: st.SearchStrategy[dict[str, object]] = st.fixed_dictionaries(
+    {},
+    optional={
+        "limits.reserve": st.sampled_from([0.1, 0.2, 0.5]),
+        "limits.max_utilisation": st.sampled_from([0.05, 0.3, 0.6, 0.8, 1.0]),
+        "limits.min_spare_nodes": st.integers(0, 6),
+        "limits.min_spare_axes": st.integers(0, 12),
+    },
+)
+
+
+@given(data=st.data())
+def test_what_a_plan_writes_passes_the_gate(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
+    profile = override(data.draw(any_profile), data.draw(limits))
+    free = data.draw(st.none() | st.lists(st.sampled_from(ALL), min_size=1, unique=True))
+    answer, errors = busplan.plan(profile, free=free), errors_of(profile)
+    best = answer.recommended
+    assert (best is None) == (answer.binding is not None)
+    if best is None:
+        assert errors
+        assert answer.binding is not None
+        assert answer.binding.why
+    else:
+        assert errors_of(best.profile) == []
+        assert (errors == []) == (best.changes == {})
+    for relaxation in answer.relaxations:
+        assert errors_of(override(profile, dict(relaxation.changes))) == []
+
+
+@pytest.mark.parametrize("kind", ["can", "ethercat", "sercos2", "sercos3"])
+@settings(max_examples=15)
+@given(data=st.data())
+def test_other_kinds_of_bus_have_plans_too(
+    kind: str, data: st.DataObject, profiles_by_kind: dict[str, st.SearchStrategy[Profile]]
+) -> None:
+    best = busplan.plan(data.draw(profiles_by_kind[kind])).recommended
+    assert best is None or errors_of(best.profile) == []
 
 
 @pytest.mark.parametrize("name", shipped_names())
 def test_shipped_profiles_have_a_plan(name: str) -> None:
-    assert plan(load(name).profile).recommended is not None
+    assert busplan.plan(name).recommended is not None
+
+
+# --- by brute force -------------------------------------------------------------------------------------------
+
+
+def single_changes(profile: Profile, name: str) -> Iterator[dict[str, Any]]:
+    """Every value of a single thing, the least change first."""
+    write = profile.alike_nodes[0].payload.write_bytes or 0
+    read = profile.alike_nodes[0].payload.read_bytes or 0
+    match name:
+        case "slice_ratio":
+            own = profile.cycle.slice_ratio
+            yield from ({"cycle.slice_ratio": n / 100} for n in range(1, 91) if n / 100 > own)
+        case "period":
+            own = profile.cycle.period_us
+            yield from ({"cycle.period_us": float(us)} for us in range(int(own) + 1, 1000) if us > own)
+            yield from ({"cycle.period_us": float(us)} for us in range(1000, 10_000, 10) if us > own)
+        case "payload":
+            for size in range(max(read, write) // 4 * 4, 0, -4):
+                cut = {f"payload.{kind}_bytes": size for kind, own in (("read", read), ("write", write)) if own > size}
+                if cut:
+                    yield cut
+        case "nodes":
+            yield from ({"bus.nodes": nodes} for nodes in range(profile.bus.nodes - 1, 0, -1))
+
+
+@pytest.mark.parametrize("name", ["slice_ratio", "period", "payload", "nodes"])
+@settings(max_examples=12)
+@given(data=st.data())
+def test_the_least_change_that_is_enough_is_taken(name: str, data: st.DataObject, make: Make) -> None:
+    profile = override(
+        make(
+            cycle__period_us=data.draw(st.sampled_from([90.0, 200.0, 450.0, 700.0])),
+            cycle__slice_ratio=data.draw(st.sampled_from([0.3, 0.5, 0.8])),
+        ),
+        {
+            "bus.nodes": data.draw(st.integers(1, 5)),
+            "bus.gap_count": "optimal",
+            "payload.write_bytes": data.draw(st.sampled_from([4, 16, 120])),
+            "limits.reserve": data.draw(st.sampled_from([0.0, 0.2])),
+        },
+    )
+    if not errors_of(profile):
+        assert changes_of(profile, [name]) == {}
+        return
+    expected = next(
+        (change for change in single_changes(profile, name) if not errors_of(override(profile, change))), None
+    )
+    assert changes_of(profile, [name]) == expected
+
+
+def test_two_things_are_changed_where_no_single_one_is_enough(make: Make) -> None:
+    # The slice must give 287.5 us at gap count 63 and 223.4 us at 7; of 300 us, 0.9 is 270 us.
+    profile = make(cycle__period_us=300.0)
+    for name in ("gap_count", "slice_ratio"):
+        assert changes_of(profile, [name]) is None
+    found = changes_of(profile, ["gap_count", "slice_ratio"])
+    assert found == {"cycle.slice_ratio": 0.75, "bus.gap_count": 7}
+    assert errors_of(override(profile, found)) == []
+
+
+def test_what_is_not_needed_beside_the_last_change_stays_as_it_was(make: Make) -> None:
+    # Fewer bytes alone are enough; other responses were tried before them.
+    profile = make(cycle__period_us=1000.0, payload={"read_bytes": 12, "write_bytes": 2000}, cycle__slice_ratio=0.3)
+    found = changes_of(profile, ["slice_ratio", "period"])
+    assert found is not None
+    for key in found:
+        assert errors_of(override(profile, {other: value for other, value in found.items() if other != key}))
+
+
+# --- steps, what is kept, and what stands in the way --------------------------------------------------------------
+
+
+def test_every_step_changes_one_thing_more_until_one_is_enough() -> None:
+    answer = busplan.plan("paper-1ms", nodes=8)
+    assert [(one.title, one.recommended, one.held_by) for one in answer.options] == [
+        ("as it is", False, "time"),
+        ("gap count", False, "time"),
+        ("+ slice ratio", False, "time"),
+        ("+ period", True, None),
+    ]
+    # A step that is not enough goes as far as it can.
+    assert answer.options[2].changes == {"cycle.slice_ratio": 0.9, "bus.gap_count": 21}
+    assert answer.period_is_kept is False
 
 
 def test_nothing_to_change(make: Make) -> None:
-    result = plan(make())
-    best = result.recommended
-    assert best is not None
-    assert (best.title, best.changes, result.wanted) == ("as it is", {}, {})
-    assert (result.period_is_kept, result.binding, result.relaxations) == (True, None, ())
-    assert result.free == ("gap_count", "slice_ratio", "period")
+    answer = busplan.plan(make())
+    assert [(one.title, one.changes, one.recommended) for one in answer.options] == [("as it is", {}, True)]
+    assert (answer.wanted, answer.binding, answer.relaxations) == ({}, None, ())
+    assert [freedom.name for freedom in answer.free] == ["gap_count", "slice_ratio", "period"]
 
 
-def test_every_step_frees_one_setting_more_until_one_is_enough() -> None:
-    result = plan(load("paper-1ms").profile, wanted={"bus.nodes": 8})
-    steps = [(one.title, one.passes, one.recommended, one.held_by) for one in result.options[:4]]
-    assert steps == [
-        ("as it is", False, False, "time"),
-        ("gap count", False, False, "time"),
-        ("+ slice ratio", False, False, "time"),
-        ("+ period", True, True, None),
+def test_what_was_asked_for_is_kept_and_part_of_the_changes(make: Make) -> None:
+    wanted = {"bus.nodes": 5, "bus.gap_count": 63, "cycle.period_us": 1000.0}
+    answer = busplan.plan(make(), wanted=wanted)
+    assert answer.wanted == {"bus.nodes": 5, "cycle.period_us": 1000.0}
+    assert [freedom.name for freedom in answer.free] == ["slice_ratio"]
+    assert answer.recommended is not None
+    assert answer.recommended_changes == {
+        "bus.nodes": 5,
+        "cycle.period_us": 1000.0,
+        "cycle.slice_ratio": answer.recommended.changes["cycle.slice_ratio"],
+    }
+    with pytest.raises(BusplanError, match=r"free period: cycle\.period_us was given a value"):
+        busplan.plan(make(), period_us=1000.0, free=["period"])
+
+
+def test_an_unsafe_gap_count_is_never_recommended(make: Make) -> None:
+    assert busplan.plan(make(), gap_count=3).recommended is None
+    assert busplan.plan(make(bus__gap_count=3)).recommended is not None
+    # Nobody knows a safe one for cables that the table does not hold for.
+    assert busplan.plan(make(bus__gap_count=3, bus__cable_length_m=10.0)).recommended is None
+
+
+def test_a_bus_with_some_periods_takes_the_nearest_that_holds() -> None:
+    assert changes_of(load("sercos3-servo-8").profile, period_us=None) == {}
+    odd = busplan.load_profile("sercos3-servo-8", changes={"cycle.period_us": 300})
+    assert changes_of(odd) == {"cycle.period_us": 250.0}
+    full = busplan.load_profile("sercos3-servo-8", changes={"bus.nodes": 100})
+    assert changes_of(full) == {"cycle.period_us": 750.0}
+
+
+def test_what_stands_in_the_way_is_said_with_what_would_be_enough() -> None:
+    answer = busplan.plan("ethercat-servo-8", period_us=125)
+    assert answer.binding is not None
+    assert answer.binding.why == "node needs a period of 290.000 us, and 125.000 us is the longest"
+    assert [(one.relaxed, one.changes) for one in answer.relaxations] == [
+        ("period", {"cycle.period_us": 290.0, "bus.sync_shift": 0.9})
     ]
-    # A step that is not enough goes as far as it can.
-    assert result.options[2].changes == {"cycle.slice_ratio": 0.9, "bus.gap_count": 21}
-    assert [one.title for one in result.options[4:]] == ["smallest period", "most nodes"]
-    assert [one.title for one in result.impossible] == ["largest payload"]
 
 
-def test_what_was_asked_for_is_part_of_the_changes_but_no_proposal(make: Make) -> None:
-    result = plan(make(), wanted={"bus.nodes": 5, "bus.gap_count": 63, "cycle.period_us": 1000.0})
-    assert result.wanted == {"bus.nodes": 5, "cycle.period_us": 1000.0}
-    assert result.free == ("slice_ratio",)
-    best = result.recommended
-    assert best is not None
-    assert list(best.changes) == ["cycle.slice_ratio"]
-    assert list(result.all_changes(best)) == ["bus.nodes", "cycle.period_us", "cycle.slice_ratio"]
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"nodes": 0}, "bus.nodes 0"),
+        ({"nodes": 4, "axes": 16}, "nodes 4 and axes 16: give one of them"),
+        ({"free": ["steps"]}, "free steps: there is nothing of that name to free on a bus of kind ieee1394"),
+        ({"free": []}, "free: no values"),
+    ],
+)
+def test_goals_that_no_profile_can_have_are_refused(asked: dict[str, Any], words: str) -> None:
+    with pytest.raises(BusplanError) as refused:
+        busplan.plan("paper-1ms", **asked)
+    assert words in str(refused.value)
 
 
-def test_an_unsafe_gap_count_is_never_recommended_even_when_asked_for(make: Make) -> None:
-    assert plan(make(), wanted={"bus.gap_count": 3}).recommended is None
-    assert plan(make(bus__gap_count=3)).recommended is not None
-    assert plan(make(bus__gap_count=3, bus__cable_length_m=10.0)).recommended is None
-
-
-def test_no_gap_count_for_cables_that_the_table_does_not_know(make: Make) -> None:
-    result = plan(make(bus__cable_length_m=10.0, cycle__period_us=550.0))
-    assert all("bus.gap_count" not in option.changes for option in result.options)
-    assert result.recommended is not None
-    assert list(result.recommended.changes) == ["cycle.slice_ratio"]
-
-
-def test_a_reserve_that_is_asked_for_is_kept_and_part_of_the_changes(make: Make) -> None:
-    result = plan(make(), wanted={"limits.reserve": 0.2, "cycle.period_us": 600.0})
-    best = result.recommended
-    assert best is not None
-    assert result.all_changes(best)["limits.reserve"] == 0.2
-    one = best.deciding
-    assert (one.margin_corrected_us or 0) - (one.uncertainty_us or 0) >= 0.2 * one.available_us
-
-
-def test_the_circle_is_not_run_where_the_bus_does_not_fit(make: Make) -> None:
-    def circle(profile: Profile) -> tuple[str, ...]:
-        assert figures(profile, model="standard").verdict == FITS
-        return ()
-
-    result = plan(make(cycle__period_us=200.0, tolerance={"max_contour_error_mm": 0.1}), circle=circle)
-    assert result.options[0].circle_passed is None
-    assert result.recommended is not None
-    assert result.recommended.circle_passed
-
-
-def test_bad_values_are_refused(make: Make) -> None:
-    with pytest.raises(BusplanError, match=r"bus\.nodes 0"):
-        plan(make(), wanted={"bus.nodes": 0})
-
-
-# --- what the network could reach ---------------------------------------------------------------------------
-
-
-def test_the_smallest_period_is_the_first_that_a_count_finds(make: Make) -> None:
-    for nodes in (1, 8):
-        goal = make(bus__nodes=nodes)
-        found = titled("smallest period", goal)
-        period_us = found.deciding.period_us
-        assert found.passes
-        shorter = override(goal, {"cycle.period_us": period_us - (10 if period_us > 1000 else 1)})
-        assert Search(shorter).least(freed(shorter, ["gap_count", "slice_ratio"])) is None
-
-
-def test_the_smallest_period_passes_the_circle_however_it_grows(make: Make) -> None:
-    # The mean error falls with the period here, because the ramps grow: a bisection from above would not find this.
-    circle = {"radius_mm": 20.0, "feed_mm_per_min": 3000.0, "ramp_periods": 20}
-    profile = make(
-        servo={"position_gain_per_s": 50.0, "velocity_feedforward": 0.0, "step_us": 500.0},
-        circle=circle,
-        cycle__period_us=4000.0,
-        bus__gap_count=7,
-    )
-    grid = [500.0 * n for n in range(1, 40)]
-    means = circle_test(profile, periods_us=grid, explain=False).results
-    wanted_mm = next(one.mean_contour_error_mm for one in means if one.period_us == 5000.0)
-    strict = override(profile, {"tolerance.mean_contour_error_mm": wanted_mm})
-    passing = [one.period_us for one in circle_test(strict, periods_us=grid, explain=False).results if one.passed]
-    found = titled("smallest period", strict, circle=CircleCheck())
-    assert (found.deciding.period_us, found.held_by, found.proven) == (passing[0], "circle", True)
-    assert 500.0 < passing[0] <= 5000.0
-
-
-def test_a_circle_that_never_passes_ends_the_search_without_a_proof(make: Make) -> None:
-    goal = make(tolerance={"max_contour_error_mm": 0.1})
-    result = plan(goal, circle=lambda _: ("no",), max_circles=5)
-    assert result.recommended is None
-    (why,) = (one for one in result.impossible if one.title == "smallest period")
-    assert (why.reason, why.proven) == ("no", False)
-
-
-def test_no_period_beyond_the_schema(make: Make) -> None:
-    goal = make(cycle__slice_ratio=1e-6, cycle__nonperiodic_us=2000.0)
-    result = plan(goal, free=["gap_count", "period"])
-    assert result.recommended is None
-    assert "it would be over 1000 s" in [one.reason for one in result.impossible]
-
-
-def test_a_payload_stays_inside_the_execution_table_which_need_not_ascend(make: Make) -> None:
-    def table(times: list[float], *, sizes: tuple[int, ...] = (10, 100, 203), period: float) -> Any:
-        execution = {"kind": "table", "payload_bytes": list(sizes), "time_us": times}
-        payload = {"read_bytes": sizes[0], "write_bytes": sizes[0]}
-        goal = make(node__execution=execution, cycle__period_us=period, payload=payload)
-        result = plan(goal, free=["gap_count"])
-        options = [one for one in result.options if one.title == "largest payload"]
-        if options:
-            return options[0].changes["payload.read_bytes"], options[0].held_by
-        return next(one.reason for one in result.impossible if one.title == "largest payload")
-
-    assert table([30.0, 60.0, 90.0], period=1e4) == (200, "execution")
-    # 100 bytes take longer than 200: a search that takes the time for monotone stops below them.
-    assert table([30.0, 500.0, 40.0], period=1000.0) == (200, "execution")
-    assert table([30.0, 60.0, 90.0], period=10.0).startswith("not even the smallest fits: the cycle needs a slice of ")
-    assert table([9.0, 9.1, 9.2], sizes=(9, 10, 11), period=1e4) == (
-        "the execution table holds no whole step of the payload"
-    )
+# --- the change that `capacity` and `check` advise -----------------------------------------------------------------
 
 
 @given(data=st.data())
-def test_most_nodes_are_safe_for_their_gap_count(
-    data: st.DataObject,
-    any_profile: st.SearchStrategy[Profile],
-    safely: Safely,
-    start: Safely,
-    carries: Carries,
-    around: Around,
+def test_capacity_and_check_advise_what_plan_finds(
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
 ) -> None:
-    profile = override(data.draw(any_profile), {"payload.read_bytes": 12, "payload.write_bytes": 12})
-    bus, cycle = profile.bus, profile.cycle
-
-    def safe(hops: int) -> int:
-        return GAP_COUNTS[hops - 1] if hops <= len(GAP_COUNTS) else 63
-
-    def good(nodes: int) -> bool:
-        hops = bus.max_hops or nodes
-        gap_count = safe(hops) if bus.gap_count == "optimal" else bus.gap_count
-        given_us = Fraction(cycle.slice_ratio) * Fraction(cycle.period_us) * (1 + Fraction(1, 10**12))
-        is_carried = carries(profile, nodes) and start(profile, nodes) <= 124
-        is_possible = hops <= 16 and gap_count >= safe(hops) and is_carried
-        return is_possible and safely(profile, nodes) <= given_us
-
-    found, _ = safe_nodes(profile)
-    assert around(found, good) == [found][:found]
+    profile = override(data.draw(any_profile), data.draw(limits))
+    verdict, planned = busplan.capacity(profile).verdicts[0], changes_of(profile)
+    if not verdict.all_well:
+        assert (None if verdict.change is None else verdict.change.changes) == planned
+        assert (verdict.change is None) == bool(verdict.no_change)
+    elif verdict.has_room:
+        assert (verdict.change, verdict.no_change) == (None, "")
+    elif verdict.change is not None:
+        more = override(profile, {"bus.nodes": verdict.change.nodes, **dict(verdict.change.changes)})
+        assert verdict.change.nodes == profile.bus.nodes + 1
+        assert errors_of(override(more, {"limits.min_spare_nodes": 0, "limits.min_spare_axes": 0})) == []
 
 
-def test_values_that_need_each_other_are_asked_together() -> None:
-    result = plan(load("dvrk").profile, wanted={"bus.cycle_master": True, "bus.isochronous_us": 120.0})
-    assert result.wanted == {"bus.cycle_master": True, "bus.isochronous_us": 120.0}
-    assert result.binding is not None
-    assert result.binding.key == "cycle starts"
+def test_every_pair_of_freedoms_gives_what_each_gives_alone(make: Make) -> None:
+    profile = make(cycle__period_us=280.0)
+    for first, second in product(("gap_count", "slice_ratio"), ("payload", "period")):
+        alone = changes_of(profile, [first])
+        if alone is not None:
+            assert changes_of(profile, [first, second]) == alone

@@ -1,6 +1,7 @@
 """A sweep as columns: the rows of the document, as arrays."""
 
 import re
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,8 +11,8 @@ import polars as pl
 import pytest
 
 import busplan
-from busplan.questions.sweep import MOST_POINTS
-from busplan.questions.sweep.blocks import figure_names
+from busplan.questions.sweep.grid import MOST_POINTS
+from busplan.questions.sweep.table import figure_names
 
 GRID: Mapping[str, Any] = {
     "bus.gap_count": [63, "optimal"],
@@ -24,7 +25,7 @@ GRID: Mapping[str, Any] = {
 def test_columns_are_the_rows_of_the_document(models: list[Any]) -> None:
     answer = busplan.sweep("paper-4ms", vary=GRID, timing_model=models)
     document = answer.to_dict()
-    assert (document["points"], document["complete"], document["timing_models"]) == (16, True, models)
+    assert (document["points"], document["timing_models"]) == (16, models)
     assert isinstance(answer, Mapping)
     assert len(document["rows"]) == 16 * len(models)
     assert len(answer) == len(answer.columns)
@@ -87,17 +88,8 @@ def test_whole_numbers_as_floats_count_nodes() -> None:
     assert answer["bus.nodes"].tolist() == [1, 2, 3]
 
 
-def test_many_blocks_are_one_table() -> None:
-    answer = busplan.sweep("paper-4ms", vary={"cycle.nonperiodic_us": range(20_000)}, timing_model=["paper"])
-    assert len(answer.blocks) > 1
-    assert answer["cycle.nonperiodic_us"].tolist() == list(range(20_000))
-    assert [row["margin_us"] for row in answer.to_dict()["rows"]] == answer["margin_us"].tolist()
-
-
 def test_a_table_has_every_column_and_null_where_nothing_is() -> None:
-    vary = {**GRID, "cycle.nonperiodic_us": range(1500)}
-    answer = busplan.sweep("paper-4ms", vary=vary)
-    assert len(answer.blocks) > 1  # whose words have dictionaries of their own
+    answer = busplan.sweep("paper-4ms", vary={**GRID, "cycle.nonperiodic_us": range(1500)})
     arrow, pandas, polars = answer.to_arrow(), answer.to_pandas(), answer.to_polars()
     assert list(pandas) == polars.columns == arrow.column_names == list(answer)
     rows = len(answer["fits"])
@@ -122,7 +114,35 @@ def test_pandas_makes_no_column_of_the_names() -> None:
     assert len({answer, answer}) == 1
 
 
-@pytest.mark.parametrize(("method", "library"), [("pandas", "pandas"), ("polars", "polars"), ("arrow", "pyarrow")])
+def test_pandas_needs_no_pyarrow(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("pyarrow", "pyarrow.parquet"):
+        monkeypatch.setitem(sys.modules, name, None)
+    answer = busplan.sweep("paper-4ms", vary={"bus.gap_count": [63, "optimal"], "bus.cycle_master": [True, False]})
+    frame = answer.to_pandas()
+    kinds = {name: str(frame[name].dtype) for name in ("margin_us", "max_axes", "fits", "bus.cycle_master", "verdict")}
+    assert kinds == {
+        "margin_us": "float64", "max_axes": "int64", "fits": "bool", "bus.cycle_master": "bool", "verdict": "category"
+    }  # fmt: skip
+    assert frame["bus.gap_count"].cat.categories.tolist() == ["63", "optimal"]
+
+
+def test_xarray_has_a_dimension_for_each_key() -> None:
+    xarray = pytest.importorskip("xarray")
+    answer = busplan.sweep("paper-4ms", vary=GRID)
+    found = answer.to_xarray()
+    assert isinstance(found, xarray.Dataset)
+    assert dict(found.sizes) == {"bus.gap_count": 2, "cycle.period_us": 4, "bus.nodes": 2, "timing_model": 2}
+    for row in answer.to_dict()["rows"]:
+        one = found.sel({name: row[name] for name in found.dims})
+        for name in ("margin_us", "safe_axes", "fits", "limited_by"):
+            assert one[name].item() == row[name] or (row[name] is None and np.isnan(one[name].item()))
+    assert found["margin_us"].attrs["units"] == found["cycle.period_us"].attrs["units"] == "us"
+    assert found["margin_us"].attrs["long_name"]
+
+
+@pytest.mark.parametrize(
+    ("method", "library"), [("pandas", "pandas"), ("polars", "polars"), ("arrow", "pyarrow"), ("xarray", "xarray")]
+)
 def test_a_missing_library_is_named(method: str, library: str, monkeypatch: pytest.MonkeyPatch) -> None:
     answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})
     monkeypatch.setattr("busplan.extras.find_spec", lambda _: None)
@@ -153,7 +173,7 @@ def test_circle_tests_add_their_columns() -> None:
 def test_circles_without_a_contour_tolerance_are_not_judged() -> None:
     vary = {"circle.radius_mm": [10.0], "servo.position_gain_per_s": [50.0, 30_000.0]}
     both = str(busplan.sweep("paper-two-node", vary=vary, circle=True))
-    assert "The circle is not judged at 1: no contour tolerance is asked for." in both
+    assert "The circle is not judged at 1: no contour tolerance is asked for, or no error source matters." in both
     assert "The circle holds every tolerance at 0 " in both
     one = str(busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, circle=True))
     assert "not judged" in one
@@ -174,6 +194,19 @@ def test_a_column_that_is_not_there_is_a_key_error() -> None:
         _ = answer["axis"]
     assert "axis" not in answer
     assert "max_axes" in answer
+
+
+def test_columns_that_are_not_there_or_no_numbers_are_refused() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]})
+    calls: list[tuple[Any, str]] = [
+        (lambda: answer.drawing(figure="verdict"), "figure verdict: expected a column in numbers: bus.nodes, "),
+        (lambda: answer.report(sort_by="axis"), "sort_by axis: expected a column in numbers: bus.nodes, "),
+        (lambda: answer.report(columns=["axis"]), "columns axis: no such column; there are bus.nodes, timing_model"),
+        (lambda: answer.rows_in("csv", ["axis"]), "columns axis: no such column; there are bus.nodes, timing_model"),
+    ]
+    for call, message in calls:
+        with pytest.raises(busplan.BusplanError, match=f"^{re.escape(message)}"):
+            call()
 
 
 def test_the_text_is_the_table_of_the_command() -> None:
@@ -197,11 +230,18 @@ def test_what_makes_no_sweep_is_refused() -> None:
         ({"bus.nodes": [1, 1]}, {}, "vary bus.nodes: 1 is given twice"),
         ({"bus.nodes": [1, 2.5]}, {}, "bus.nodes 2.5: expected a whole number"),
         ({"bus.nodes": [True]}, {}, "vary bus.nodes: True is not a finite number"),
-        ({"bus.nodes": range(10**30, 10**30 + 2)}, {}, "vary bus.nodes: numbers of"),
+        ({"bus.nodes": range(10**30, 10**30 + 2)}, {}, f"bus.nodes {10**30}: must be 1,000,000 or less"),
+        ({"bus.nodes": [10**400]}, {}, "bus.nodes 1000000000"),
+        ({"bus.nodes": [float("inf")]}, {}, "vary bus.nodes: inf is not a finite number"),
+        ({"bus.nodes": ["optimal"]}, {}, "vary bus.nodes: 'optimal' is not a finite number"),
+        ({"bus.gap_count": [63, "best"]}, {}, "vary bus.gap_count: 'best' is not a finite number and none of optimal"),
+        ({"bus.nodes": [None]}, {}, "vary bus.nodes: None is not a finite number"),
+        ({"bus.nodes": [1, 2, 1.0]}, {}, "vary bus.nodes: 1.0 is given twice"),
         ({"cycle.period_us": np.array([1.0, np.nan])}, {}, "vary cycle.period_us: nan is not a finite number"),
         ({"cycle.period_us": np.ones((2, 2))}, {}, "vary cycle.period_us: [1.0, 1.0] is not a finite number"),
-        ({"cycle.period_us": range(1, MOST_POINTS + 2)}, {}, "more than the 2,000,000 that are kept in memory"),
-        ({"cycle.period_us": "1:1e9", "bus.nodes": "1:10000"}, {}, "vary: 10,000,000,000,000 points are more than"),
+        ({"cycle.period_us": range(1, MOST_POINTS + 2)}, {}, "more values than the 1,000,000 points a sweep takes"),
+        ({"cycle.period_us": "1:1e9"}, {}, "vary cycle.period_us=1:1e9: 1,000,000,000 values are more than"),
+        ({"cycle.period_us": "1:10000", "bus.nodes": "1:101"}, {}, "vary: 1,010,000 points are more than"),
         (
             {"servo.drive_lag_us": [1]},
             {},
@@ -213,17 +253,3 @@ def test_what_makes_no_sweep_is_refused() -> None:
     for vary, options, message in cases:
         with pytest.raises(busplan.BusplanError, match=re.escape(message)):
             busplan.sweep("paper-4ms", vary=vary, **options)
-
-
-def test_a_truth_that_is_missing_is_none_beside_the_others() -> None:
-    own = {
-        "servo": {"position_gain_per_s": 50.0},
-        "circle": {"radius_mm": 5.0, "feed_mm_per_min": 3000.0, "ramp_periods": 5},
-    }
-    profile = busplan.load_profile("paper-two-node", changes=own)
-    # At 100 us the cycle does not fit, which fails; at 2 ms nothing is asked of the circle.
-    found = busplan.sweep(profile, vary={"cycle.period_us": [100, 2000]}, timing_model=["standard"], circle=True)
-    assert list(found["passed"]) == [False, None]
-    judged = busplan.load_profile("paper-two-node", changes={**own, "tolerance.max_contour_error_mm": 1.0})
-    found = busplan.sweep(judged, vary={"cycle.period_us": [100, 2000]}, timing_model=["standard"], circle=True)
-    assert found["passed"].tolist() == [False, True]

@@ -12,30 +12,23 @@ from busplan.forms.charts import Curves, Drawing, Grid, legend
 from busplan.forms.picture import INKS
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.questions.sweep.asked import Sweep
-from busplan.questions.sweep.blocks import sweep
-from busplan.questions.sweep.grid import Values, checked_grid
+from busplan.questions.sweep.grid import Array, axis_of
 from busplan.questions.sweep.panels import sweep_drawing
 from busplan.questions.sweep.plot import FigureData
 from busplan.questions.sweep.plotted import Plotted, caption, key_label, plot_scale, plotted_figure
-from busplan.questions.sweep.values import listed, stepped
 
 PAPER = load("paper-4ms").profile
 MODELS = ("paper", "standard")
 
 
-def values(given: Sequence[Any] | range) -> Values:
-    if isinstance(given, range):
-        return stepped(given, name="vary")
-    return listed(list(given), name="vary", words=("optimal",))
+def values(given: Sequence[Any] | range) -> Array:
+    return axis_of(list(given))
 
 
 def plotted(figure: str | None, profile: Any = PAPER, **vary: Any) -> Plotted:
-    grid = checked_grid(profile, {key.replace("__", "."): values(one) for key, one in vary.items()}, with_circle=False)
-    data = FigureData(Sweep(profile, grid, MODELS, ()), figure=figure)
-    for block in sweep(profile, grid, timing_models=MODELS, chunk_points=7):
-        data.add(block)
-    return data.plotted()
+    own = {key.replace("__", "."): one for key, one in vary.items()}
+    answer = busplan.sweep(profile, vary=own, timing_model=MODELS)
+    return FigureData(answer.sweep, answer.table, figure=figure).plotted()
 
 
 def drawn(one: Plotted) -> Drawing:

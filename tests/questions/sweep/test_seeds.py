@@ -11,8 +11,8 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.questions.sweep.asked import column_figures
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS
-from busplan.questions.sweep.grid import Array, Grid, Listed, Steps, Values
-from busplan.questions.sweep.seeds_run import SUMMARY_COLUMNS, summary, without_seed
+from busplan.questions.sweep.grid import Array, Grid
+from busplan.questions.sweep.seeds_run import SUMMARY_COLUMNS, summaries, without_seed
 
 LENGTHS = st.floats(1e-6, 10.0)
 
@@ -26,7 +26,13 @@ def results(errors: list[float], *, margins: list[float] | None = None, limit: f
         "gain_margin_db": [12.0] * len(errors),
         "passed": [None if limit is None else one <= limit for one in errors],
     }
-    return np.array([own[name] for name in CIRCLE_COLUMNS], dtype=float).T
+    return np.array([own[name] for name in CIRCLE_COLUMNS], dtype=float)
+
+
+def summary(found: Array) -> dict[str, float]:
+    """The summary of one point, that of the second of two."""
+    both = summaries(np.stack([np.zeros_like(found), found], axis=1))
+    return {name: column[1] for name, column in both.items()}
 
 
 @given(st.lists(LENGTHS, min_size=2, max_size=50))
@@ -74,22 +80,20 @@ def test_what_any_seed_lacks_is_missing() -> None:
     one = summary(results([0.1]))
     assert one["max_contour_error_mean_mm"] == 0.1
     assert np.isnan(one["max_contour_error_std_mm"])
-    mixed = summary(np.concatenate([results([0.1]), results([0.1], limit=None)]))
-    assert np.isnan(mixed["failed_share"])
+    mixed = summary(np.concatenate([results([0.1]), results([0.1], limit=None)], axis=1))
+    assert mixed["failed_share"] == 0
 
 
 def test_the_seed_leaves_the_grid_wherever_it_stands() -> None:
-    seeds, periods = Steps(1, 1, 1, 9), Listed((1000, 4000))
-    orders: list[dict[str, Values]] = [
-        {"delivery.seed": seeds, "cycle.period_us": periods},
-        {"cycle.period_us": periods, "delivery.seed": seeds},
-    ]
-    for axes in orders:
-        assert without_seed(Grid(axes), option="--summary") == (Grid({"cycle.period_us": periods}), seeds)
-    alone, _ = without_seed(Grid({"delivery.seed": seeds}), option="--summary")
-    assert (alone.points, [chunk.points for chunk in alone.chunks(7)]) == (1, [1])
-    with pytest.raises(BusplanError, match=r"--summary: is over seeds, and none vary"):
-        without_seed(Grid({"cycle.period_us": periods}), option="--summary")
+    seeds, periods = np.arange(1, 10), np.array([1000, 4000])
+    for key in ("delivery.seed", "cycle.period_us"):
+        axes = {"delivery.seed": seeds, "cycle.period_us": periods}
+        grid, found = without_seed(Grid({key: axes.pop(key), **axes}))
+        assert (list(grid.axes), found.tolist()) == (["cycle.period_us"], seeds.tolist())
+    alone, _ = without_seed(Grid({"delivery.seed": seeds}))
+    assert (alone.points, [chunk.shape for chunk in alone.chunks(7)], [*alone.each_point()]) == (1, [()], [{}])
+    with pytest.raises(BusplanError, match=r"summary=True: is over seeds, and none vary"):
+        without_seed(Grid({"cycle.period_us": periods}))
 
 
 def test_every_column_has_its_figure_with_its_unit() -> None:

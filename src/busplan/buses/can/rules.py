@@ -12,7 +12,7 @@ def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """All messages together take more of the bus than the plan allows."""
     if "load" in subject.deciding.exceeded:
         most: float = getattr(subject.profile.limits, "max_load")  # noqa: B009 - a key of this kind alone
-        load = subject.deciding.bus_load
+        load = subject.deciding.own["bus_load"]
         yield RuleProblem(
             "limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{when_full(load)}", *subject.cure()
         )

@@ -60,7 +60,10 @@ def _identifier_bits(network: Network) -> Setting:
     empty = Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), ())
     if plain(traffic.identifier_bits) == BASE_BITS:
         return empty._replace(reason=f"they have {BASE_BITS} bits")
-    own = (stream for stream in streams(traffic, is_stuffed=True) if stream.identifier_bits == traffic.identifier_bits)
-    if max(stream.last for stream in own) > MAX_IDENTIFIER[BASE_BITS]:
+    each = streams(traffic, is_stuffed=True)
+    own = [stream.last for stream in each if stream.identifier_bits == traffic.identifier_bits]
+    if not own:
+        return empty._replace(reason="no message has the length of the bus")
+    if max(own) > MAX_IDENTIFIER[BASE_BITS]:
         return empty._replace(reason=f"some are over {MAX_IDENTIFIER[BASE_BITS]:#x}")
     return empty._replace(values=({key: BASE_BITS},))

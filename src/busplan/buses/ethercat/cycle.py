@@ -39,7 +39,7 @@ from busplan.buses.network import Network
 from busplan.buses.parts import EventKind
 from busplan.buses.rates import Rate
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, choose, is_everywhere, larger, named, plain, total
+from busplan.elementwise import Number, choose, larger, named, plain, total
 
 TimingModelName = Literal["last-byte", "vendors"]
 LAST_BYTE: Final[TimingModelName] = "last-byte"
@@ -243,9 +243,10 @@ class EthercatCycle(BusCycle):
         return self._beside_us + sending_us(mean_bytes)
 
     @property
-    def _is_last_again(self) -> bool:
+    def _is_last_again(self) -> Number:
         """Whether the last frame of process data is counted once more."""
-        return self.counts_reception and is_everywhere(self.network.profile.bus.mailbox_polls <= 0)
+        polls: Number = self.network.profile.bus.mailbox_polls
+        return polls <= 0 if self.counts_reception else False
 
     @property
     def _beside_us(self) -> Number:
@@ -253,7 +254,7 @@ class EthercatCycle(BusCycle):
         return (
             self.required_us
             - process_us(self.network, self._devices)
-            - (self._receive_us if self._is_last_again else 0.0)
+            - choose(self._is_last_again, self._receive_us, 0.0)
         )
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:

@@ -76,7 +76,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     before: Number = 0.0
     if not is_off(first_bytes):
         # The first device may have no room beside it, and then it goes alone.
-        has_room = room - first_bytes - devices[0].data_bytes >= 0
+        has_room = room - first_bytes - _first_bytes(devices) >= 0
         free = choose(has_room, room - first_bytes, 0.0)
         present = first_bytes + choose(has_room, headers, 0.0)
         whole = present
@@ -102,6 +102,15 @@ def _with_data(devices: Devices) -> Devices:
         return devices
     number = choose(devices.data_bytes > 0, devices.number, 0)
     return Devices(number, larger(devices.data_bytes, 1))
+
+
+def _first_bytes(devices: Sequence[Devices]) -> Number:
+    """Data of the first device that is there: at points of an array the first groups may have none [bytes]."""
+    first: Number = devices[-1].data_bytes
+    for group in reversed(devices[:-1]):
+        is_there = group.number > 0
+        first = group.data_bytes if is_everywhere(is_there) else choose(is_there, group.data_bytes, first)
+    return first
 
 
 class Frames(NamedTuple):

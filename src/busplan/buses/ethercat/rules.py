@@ -100,7 +100,7 @@ def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
     figures = subject.deciding
     if SYNC0.key not in (*figures.exceeded, *(figures.not_shown or ())):
         return
-    late = max(ceil((figures.command_us - figures.sync0_us) / figures.period_us), 1)
+    late = max(ceil((figures.own["command_us"] - figures.own["sync0_us"]) / figures.period_us), 1)
     maybe = "" if SYNC0.key in figures.exceeded else "maybe "
     yield RuleProblem(
         "bus.sync_shift",

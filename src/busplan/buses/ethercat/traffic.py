@@ -125,10 +125,10 @@ def has_rates(network: Network) -> bool:
     return any(group.is_slower for group in network.groups)
 
 
-def mean_wire_bytes(network: Network, *, with_last: bool) -> Number:
-    """Frames of process data of the mean cycle, with the last frame of each once more where asked [bytes]."""
+def mean_wire_bytes(network: Network, *, with_last: Number) -> Number:
+    """Frames of process data of the mean cycle, with the last frame of each once more where that holds [bytes]."""
 
-    def plainly(*numbers: float) -> float:
+    def plainly(with_last: float, *numbers: float) -> float:
         cycles = _unit_cycles(network, numbers)
         each = []
         for cycle in cycles:
@@ -137,9 +137,8 @@ def mean_wire_bytes(network: Network, *, with_last: bool) -> Number:
             each.append((len(cycle.numbers), cycle.wire_bytes + last_bytes))
         return sum(number * own_bytes for number, own_bytes in each) / sum(number for number, _ in each)
 
-    return pointwise(
-        plainly, *_of_units(network, _each(network)), words="the mean over the common multiple of the rates"
-    )
+    words = "the mean over the common multiple of the rates"
+    return pointwise(plainly, with_last, *_of_units(network, _each(network)), words=words)
 
 
 def cycles_of(network: Network) -> tuple[UnitCycle, ...]:

@@ -26,9 +26,9 @@ from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link,
 from busplan.buses.network import Network
 from busplan.buses.parts import (
     Cost,
-    Halves,
     Key,
     MeasuredLatencies,
+    PacketTime,
     PayloadRange,
     Perturbation,
     Safety,
@@ -44,7 +44,7 @@ _HOST_STEP_US: Final = 10.0
 """Step by which the host is made slower, for the sensitivity of the margin."""
 
 
-def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
+def packets_of(network: Network, group: str, model: str, kind: str, payload_bytes: int) -> PacketTime:
     """Time of the packets of a split transaction with the farthest node of a group.
 
     Raises
@@ -72,13 +72,12 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
         overhead_bytes=said.payload.overhead_bytes,
         responder=Responder(0.0),
     )
-    parts_us = (phases.latency_us, phases.request_and_acknowledge_us, phases.subaction_gap_us)
-    return Halves(*map(plain, parts_us))
+    return PacketTime(plain(phases.latency_us), plain(phases.subaction_gap_us))
 
 
-def fitted_against(network: Network, model: str | None) -> dict[str, Value]:
+def fitted_against(network: Network, model: str) -> dict[str, Value]:
     """The timing model and the gap count."""
-    return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
+    return {"residual": model, "measured_gap_count": int(gap_count_of(network))}
 
 
 _UNSPLIT: Final = {"read_response": "concatenated", "write_response": "unified"}

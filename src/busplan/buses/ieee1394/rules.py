@@ -128,12 +128,13 @@ def paper_disagrees(subject: RuleSubject) -> Iterator[RuleProblem]:
 def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The plan rests on a gap count that a bus reset takes away."""
     figures = subject.deciding
-    if figures.verdict == "fits" and figures.gap_count < MAX_GAP_COUNT:
+    if figures.verdict == "fits" and figures.own["gap_count"] < MAX_GAP_COUNT:
         after = subject.after({"bus.gap_count": MAX_GAP_COUNT})
         if after.verdict != "fits":
             yield RuleProblem(
                 "bus.gap_count",
-                f"fits at {figures.gap_count}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: {margin(after)}",
+                f"fits at {figures.own['gap_count']}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: "
+                f"{margin(after)}",
                 "have the bus manager write the gap count after each reset",
             )
 
@@ -155,7 +156,7 @@ def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
         way_out = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if chain else "rewire the tree"
         yield RuleProblem(
             subject.profile.alike_nodes[-1].nodes_key if chain else "bus.max_hops",
-            f"{subject.deciding.hops} hops are over the {MAX_HOPS:g} of one bus",
+            f"{subject.deciding.own['hops']} hops are over the {MAX_HOPS:g} of one bus",
             way_out,
         )
 
@@ -191,12 +192,12 @@ def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
 def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A gap count below the table."""
     figures = subject.deciding
-    if not figures.gap_count_safe:
+    if not figures.own["gap_count_safe"]:
         is_standard = _bus(subject).cable_is_standard
         yield RuleProblem(
             "bus.gap_count",
-            f"gap count {figures.gap_count} is unsafe for {figures.hops} hops; "
-            f"the smallest safe one is {figures.safe_gap_count}"
+            f"gap count {figures.own['gap_count']} is unsafe for {figures.own['hops']} hops; "
+            f"the smallest safe one is {figures.own['safe_gap_count']}"
             f"{'' if is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}",
             *subject.cure(),
         )
@@ -207,20 +208,22 @@ def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
     figures = subject.deciding
     if "cycle starts" in figures.exceeded:
         return  # no time is left, so none can be saved
-    if figures.gap_count > figures.safe_gap_count and _bus(subject).cable_is_standard:
+    if figures.own["gap_count"] > figures.own["safe_gap_count"] and _bus(subject).cable_is_standard:
         yield RuleProblem("bus.gap_count", partial(_wasted, subject))
 
 
 def _wasted(subject: RuleSubject) -> str:
     """Say what a gap count above the table costs."""
-    figures, after = subject.deciding, subject.after({"bus.gap_count": "optimal"})
+    changes = {"bus.gap_count": "optimal"}
+    figures, after = subject.deciding, subject.after(changes)
     saved, _ = told_apart(figures.required_us - after.required_us, 0.0)
-    safe, nodes = figures.safe_gap_count, figures.safe_nodes
-    above = f"gap count {figures.gap_count} is above the {safe} that {figures.hops} hops need"
+    safe = figures.own["safe_gap_count"]
+    above = f"gap count {figures.own['gap_count']} is above the {safe} that {figures.own['hops']} hops need"
     words = f"{above}; {safe} saves {saved} us a cycle"
-    if nodes is None:
+    if subject.profile.group:
         return words
-    won = (after.safe_nodes or 0) - nodes
+    (now,), (then,) = subject.counts(), subject.counts(changes)
+    won = then.safe_nodes - now.safe_nodes
     return f"{words} and wins {won} node{'s' * (won != 1)}"
 
 

@@ -51,7 +51,7 @@ class Answer(ABC):
         ----------
         path
             A name ending in .html, .md, .txt, .json or .csv; .svg or .png (with the extra `plot`) for an answer with
-            a picture; .jsonl or .parquet (with the extra `table`) for a sweep.
+            a picture; .parquet (with the extra `table`) for a sweep.
 
         Raises
         ------
@@ -78,7 +78,7 @@ class Answer(ABC):
         BusplanError
             The answer has no picture.
         """
-        drawing = first_drawing(self.report().blocks())
+        drawing = first_drawing(self.report().blocks)
         if drawing is None:
             raise BusplanError(
                 "there is nothing to draw: this answer has no picture; those of timeline, map_, compare, circle_test, "
@@ -122,7 +122,7 @@ class Answer(ABC):
 
     def _headline(self) -> str:
         """The answer in one line."""
-        return " ".join(next(block_lines(self.report().blocks())).text.split())
+        return " ".join(next(block_lines(self.report().blocks)).text.split())
 
     def __str__(self) -> str:
         return render(self._shown(), "table").removesuffix("\n")

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, TypeVar
 
+from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.forms.numbers import listed
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
@@ -12,7 +13,7 @@ from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.profile.write import value_text
-from busplan.questions.fit.network import bus_of, model_names, network_of
+from busplan.questions.fit.network import model_names, network_of
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
@@ -62,6 +63,11 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     new = values_by_key(changes, name="changes")
     loaded = profile if isinstance(profile, Profile) else load(argument(profile)).profile
     return override(loaded, new)
+
+
+def load_network(profile: ProfileLike) -> Network:
+    """Read and check a profile as `load_profile` does, as the network that questions take."""
+    return network_of(load_profile(profile))
 
 
 def with_cycle(profile: Profile, *, question: str, instead: str = "") -> Profile:
@@ -153,7 +159,7 @@ def one_or_several(values: Any, *, name: str) -> list[Any]:
     return [plain_values] if is_one else items(plain_values, name=name)
 
 
-def checked_models(timing_model: Models | None, profile: Profile) -> tuple[str, ...]:
+def checked_models(timing_model: Models | None, network: Network) -> tuple[str, ...]:
     """Check the name of a timing model, or of several; None means all of the profile's kind of bus.
 
     Raises
@@ -162,17 +168,17 @@ def checked_models(timing_model: Models | None, profile: Profile) -> tuple[str, 
         An unknown or a repeated name, no name, or a model that cannot express the profile.
     """
     if timing_model is None:
-        return model_names(profile)
+        return model_names(network)
     names_asked = one_or_several(timing_model, name="timing_model")
-    names = [model.name for model in bus_of(profile).timing_models]
+    names = [model.name for model in network.bus.timing_models]
     if len(set(map(str, names_asked))) != len(names_asked) or not set(map(str, names_asked)) <= set(names):
         raise BusplanError(
             f"timing_model {timing_model!r}: expected {listed([*map(repr, names)], 'or')}, or a list of them, each once"
         )
-    return tuple(known_model(profile, name, name="timing_model") for name in names_asked)
+    return tuple(known_model(network, name, name="timing_model") for name in names_asked)
 
 
-def known_model(profile: Profile, model: str, *, name: str) -> str:
+def known_model(network: Network, model: str, *, name: str) -> str:
     """Check the name of a timing model.
 
     Parameters
@@ -189,13 +195,11 @@ def known_model(profile: Profile, model: str, *, name: str) -> str:
     BusplanError
         The profile's kind of bus has no such model, or the model cannot express the profile.
     """
-    bus = bus_of(profile)
+    bus = network.bus
     names = [model.name for model in bus.timing_models]
     if model not in names:
-        raise BusplanError(
-            f"{name} {model}: no timing model of bus.kind {profile.bus.kind}; there are {', '.join(names)}"
-        )
-    keys = bus.cannot_express(network_of(profile), model=model)
+        raise BusplanError(f"{name} {model}: no timing model of bus.kind {bus.kind}; there are {', '.join(names)}")
+    keys = bus.cannot_express(network, model=model)
     if keys:
         raise BusplanError(
             f"{name} {model}: not applicable, the {model} model has no {', '.join(keys)}; use {bus.deciding_model}"

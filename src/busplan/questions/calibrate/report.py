@@ -1,17 +1,15 @@
 """Answer of `busplan calibrate`."""
 
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator
 from typing import Final
 
 from busplan.forms.blocks import (
     Block,
     Cell,
     Code,
-    JsonDocument,
-    Record,
     Report,
     Sentence,
+    ShownValue,
     Snippet,
     Table,
     TableColumn,
@@ -20,20 +18,12 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.numbers import nouns, plural, sentence_text, with_unit
+from busplan.forms.numbers import nouns, sentence_text
 from busplan.profile.write import value_text
-from busplan.questions.calibrate.calibration import Calibration, PayloadFit
-from busplan.questions.calibrate.sentences import fit_sentences, slow_and_fast, time_value, warning_sentences
-from busplan.questions.fit.certainty import cycle_of
-from busplan.questions.fit.network import bus_of
+from busplan.questions.calibrate import CalibrateAnswer
+from busplan.questions.calibrate.fit import REPETITIONS_TO_COMPARE, Outlier
 from busplan.questions.words.documents import document, with_profile
-from busplan.sections.execution import LinearExecution, TableExecution
-
-
-def section(result: Calibration) -> str:
-    """Dotted key of the section that the execution time stands in."""
-    return result.nodes.node_key("execution")
-
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 _COLUMNS: Final = {
     "payload_bytes": TableColumn("payload", "bytes"),
@@ -43,108 +33,77 @@ _COLUMNS: Final = {
     "packets_us": TableColumn("packets", "us", rank=2),
     "execution_us": TableColumn("T_exec", "us"),
     "deviation_us": TableColumn("std dev", "us", rank=1),
-    "fitted_us": TableColumn("fitted", "us"),
-    "residual_us": TableColumn("residual", "us"),
 }
-_MEASURED_COLUMNS: Final = {
-    "request_and_acknowledge_us": TableColumn("measured", "us", group="T1+T2"),
-    "model_request_and_acknowledge_us": TableColumn("model", "us", group="T1+T2"),
-    "unexplained_us": TableColumn("unexplained", "us", group="T1+T2"),
-}
-"""Further columns if T1+T2 was measured, too."""
+_DECIMALS: Final = 3
+_MOST_LINES: Final = 10
+_LONG_EXECUTION_US: Final = 10_000.0
+"""Longer than the execution time of any motion node: the latencies are probably in ns."""
 
 
-_WORST: Final = "worst_extra_us"
-_OF_OUTLIERS: Final = ("expected_us", "off_us")
+def time_value(value_us: float, key: str) -> ShownValue:
+    """A time of a calibration."""
+    return ShownValue(value_us, key, "us", _DECIMALS)
 
 
-def execution_keys(result: Calibration) -> dict[str, object]:
-    """Keys and values of the execution time, as in a profile."""
-    keys = {**result.execution.model_dump(exclude_none=True, exclude={_WORST}), **result.fit_keys}
-    if result.uncertainty_us is not None:
-        keys["uncertainty_us"] = result.uncertainty_us
-    if result.worst_extra_us is not None:
-        # The profile may know of a slower one.
-        keys[_WORST] = max(result.worst_extra_us, result.nodes.node.execution.worst_extra_us)
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in keys.items()}
-
-
-def execution_changes(result: Calibration) -> dict[str, object]:
-    """Changes that set a profile's execution time; None removes a key of the other form, or of the old one."""
-    gone = dict.fromkeys((*LinearExecution.model_fields, *TableExecution.model_fields))
-    del gone[_WORST]
-    return {f"{section(result)}.{key}": value for key, value in {**gone, **execution_keys(result)}.items()}
-
-
-def execution_section(result: Calibration) -> dict[str, object]:
-    """The whole section of the execution time, with what the measurements do not say as it was."""
-    old = result.nodes.node.execution
-    kept = {_WORST: getattr(old, _WORST)} if _WORST in old.model_fields_set else {}
-    return {**kept, **execution_keys(result)}
-
-
-def provenance(result: Calibration, *, source: str) -> str:
-    """Origin of an execution time, as a one-line comment for the profile, without a date."""
-    taken = "T1+T2 as measured" if result.way == "measured-halves" else f"packets by the {result.timing_model} model"
-    return (
-        f"busplan calibrate: {result.execution.kind} ({result.method}) of "
-        f"{plural(len(result.residuals), 'measurement')} in {source}, {_doubts(result)}{taken}, "
-        f"rms residual {with_unit(time_value(result.rms_residual_us, 'rms_residual_us'))}"
-    )
-
-
-def _doubts(result: Calibration) -> str:
-    """Outliers, for a list in words."""
-    slow, fast = slow_and_fast(result)
-    said = (f"{len(slow)} slow in {_WORST}, " if slow else "", f"{len(fast)} fast left out, " if fast else "")
-    return "".join(said)
-
-
-def calibration_report(result: Calibration, *, source: str, applied_to: str | None) -> Report:
+def calibration_report(answer: CalibrateAnswer, *, applied_to: str | None) -> Report:
     """Report of `calibrate`.
 
     Parameters
     ----------
-    result
+    answer
         The calibration.
-    source
-        Name of the measurements.
     applied_to
         The profile that the execution time was written into; None if it was not written.
     """
-    name = result.profile.name
+    name, network = answer.profile.name, answer.network
+    payloads = [fit._asdict() for fit in answer.payloads]
+    warned = [*_warnings(answer)]
+    figures = network.bus.cycle(network, model=answer.timing_model).figures()
     return Report(
-        Sentence(("Execution time of ", Code(name), " from ", Code(source))),
-        lambda: tuple(_blocks(result, source)),
-        partial(calibration_document, result, source=source, applied_to=applied_to),
-        lambda: with_profile(name, calibration_records(result)),
+        Sentence(("Execution time of ", Code(name), " from ", Code(answer.source))),
+        tuple(_blocks(answer, warned)),
+        document(
+            "calibrate",
+            profile=name,
+            source=answer.source,
+            timing_model=answer.timing_model,
+            nodes=network.nodes,
+            **{key: figures[key] for key in network.bus.figures.headings},
+            measurements=answer.measurements,
+            execution=answer.section,
+            uncertainty_us=answer.uncertainty_us,
+            at_most_us=answer.at_most_us,
+            outliers=[outlier._asdict() for outlier in answer.outliers],
+            worst_extra_us=answer.worst_extra_us,
+            unchecked_bytes=list(answer.unchecked_bytes),
+            payloads=payloads,
+            warnings=[sentence_text(warning) for warning in warned],
+            applied_to=applied_to,
+        ),
+        with_profile(name, payloads),
     )
 
 
-def _blocks(result: Calibration, source: str) -> Iterator[Block]:
+def _blocks(answer: CalibrateAnswer, warned: list[Sentence]) -> Iterator[Block]:
     """The fit in sentences, the figures by payload, and the section for the profile."""
-    measurements, sizes = result.measurements, len(result.payloads)
-    yield sentence(
-        f"{{}}: T_exec from {{}} {nouns(measurements, 'measurement')} at {{}} {nouns(sizes, 'payload')}, {{}}.",
-        Code(result.profile.name),
-        count_value(measurements, "measurements"),
-        count_value(sizes),
-        Code(source),
-    )
-    yield from fit_sentences(result)
-    yield from (joined(sentence("Warning: ", state="warns"), warning, by="") for warning in warning_sentences(result))
-    yield _by_payload(result.payloads, measured=result.way == "measured-halves")
-    keys = (f"{key} = {value_text(value)}" for key, value in execution_keys(result).items())
-    where = f"[group.execution]  # of {result.nodes.name}" if result.nodes.name else f"[{section(result)}]"
-    yield Snippet((where, *keys))
-
-
-def _by_payload(payloads: Sequence[PayloadFit], *, measured: bool) -> Table:
-    shown = {**_COLUMNS, **(_MEASURED_COLUMNS if measured else {})}
-    if not any(fit.left_out for fit in payloads):
-        del shown["left_out"]
-    rows = (TableRow(tuple(_cell(getattr(fit, key), key) for key in shown)) for fit in payloads)
-    return Table(tuple(shown.values()), tuple(rows))
+    network = answer.network
+    yield fit_sentence(answer)
+    where = ", ".join((network.bus.payloads(network).carrier, *network.bus.setup_words(network)))
+    yield sentence(f"T_exec = T_lant - packets, eq (3): by the {answer.timing_model} timing model for {where}.")
+    if answer.unchecked_bytes:
+        sizes_said = ", ".join(map(str, answer.unchecked_bytes))
+        words = f"it takes {REPETITIONS_TO_COMPARE} measurements of a payload"
+        yield sentence(f"No outlier can be told at {sizes_said} bytes: {words}.")
+    yield from (joined(sentence("Warning: ", state="warns"), warning, by="") for warning in warned)
+    absent = {"left_out"} if not answer.outliers else set()
+    if all(fit.deviation_us is None for fit in answer.payloads):
+        absent.add("deviation_us")
+    shown = {key: column for key, column in _COLUMNS.items() if key not in absent}
+    rows = (TableRow(tuple(_cell(getattr(fit, key), key) for key in shown)) for fit in answer.payloads)
+    yield Table(tuple(shown.values()), tuple(rows))
+    keys = (f"{key} = {value_text(value)}" for key, value in answer.section.items())
+    header = f"[group.execution]  # of {answer.nodes.name}" if answer.nodes.name else f"[{answer.key}]"
+    yield Snippet((header, *keys))
 
 
 def _cell(value: float | None, key: str) -> Cell:
@@ -154,40 +113,73 @@ def _cell(value: float | None, key: str) -> Cell:
     return time_value(value, key)._replace(fixed=True) if key.endswith("_us") else count_value(value, key)
 
 
-def calibration_warnings(result: Calibration) -> list[str]:
-    """Warnings: things to check before these figures are used."""
-    return list(map(sentence_text, warning_sentences(result)))
+def fit_sentence(answer: CalibrateAnswer) -> Sentence:
+    """Say what the execution time was found from."""
+    number, sizes = answer.measurements, len(answer.payloads)
+    without = ", without the outliers" if answer.outliers else ""
+    return sentence(
+        f"{{}}: T_exec is the median at each payload, of {{}} {nouns(number, 'measurement')} at {{}} "
+        f"{nouns(sizes, 'payload')}{without}, {{}}.",
+        Code(answer.profile.name),
+        count_value(number, "measurements"),
+        count_value(sizes),
+        Code(answer.source),
+    )
 
 
-def calibration_records(result: Calibration) -> list[Record]:
-    """One row for each payload."""
-    return [fit._asdict() for fit in result.payloads]
+def _warnings(answer: CalibrateAnswer) -> Iterator[Sentence]:
+    """Say what to check before using these figures."""
+    for word, outliers in (
+        ("slow", [outlier for outlier in answer.outliers if outlier.off_us > 0]),
+        ("fast", [outlier for outlier in answer.outliers if outlier.off_us <= 0]),
+    ):
+        if outliers:
+            yield _outliers(outliers, word, answer.worst_extra_us or 0.0)
+    execution = answer.execution
+    sizes = dict.fromkeys(int(answer.nodes.bytes_of(kind)) for kind in TRANSACTION_KINDS)
+    for size in sizes:
+        if not execution.covers(size):
+            yield sentence(
+                f"the profile's payload of {{}} is outside what was measured, {execution.range_bytes}: measure it.",
+                ShownValue(size, "payload_bytes", "bytes"),
+            )
+    short = [fit for fit in answer.payloads if fit.execution_us <= answer.at_most_us]
+    if short:
+        yield sentence(
+            "the bus waits {} before any response, so a shorter execution cannot be told from a latency: T_exec is "
+            f"at most that at {', '.join(str(fit.payload_bytes) for fit in short)} bytes.",
+            time_value(answer.at_most_us, "at_most_us"),
+        )
+    longest_us = max(fit.execution_us for fit in answer.payloads)
+    if longest_us > _LONG_EXECUTION_US:
+        yield sentence(
+            "an execution time of {} is long for a motion node: is latency_us in us?",
+            ShownValue(longest_us, "execution_us", "us", 0),
+        )
 
 
-def calibration_document(result: Calibration, *, source: str, applied_to: str | None) -> JsonDocument:
-    """Document of `busplan calibrate --format json`."""
-    bus, cycle = bus_of(result.profile), cycle_of(result.profile, model=result.timing_model)
-    figures = cycle.figures()
-    return document(
-        "calibrate",
-        profile=result.profile.name,
-        source=source,
-        timing_model=result.timing_model,
-        nodes=cycle.network.nodes,
-        **{key: figures[key] for key in bus.figures.headings},
-        way=result.way,
-        form=result.execution.kind,
-        method=result.method,
-        measurements=result.measurements,
-        execution=execution_keys(result),
-        uncertainty_us=result.uncertainty_us,
-        at_most_us=result.at_most_us,
-        rms_residual_us=result.rms_residual_us,
-        largest_residual={key: value for key, value in result.largest._asdict().items() if key not in _OF_OUTLIERS},
-        outliers=[outlier._asdict() for outlier in result.outliers],
-        worst_extra_us=result.worst_extra_us,
-        unchecked_bytes=list(result.unchecked_bytes),
-        payloads=calibration_records(result),
-        warnings=calibration_warnings(result),
-        applied_to=applied_to,
+def _outliers(outliers: list[Outlier], word: str, worst_us: float) -> Sentence:
+    """Name the slow executions, or the measurements that the others contradict."""
+    count, more = len(outliers), len(outliers) - _MOST_LINES
+    lines = joined(*(_outlier(outlier) for outlier in outliers[:_MOST_LINES]), by=", ")
+    parts = [
+        sentence(f"{{}} {word} {nouns(count, 'measurement')}: ", count_value(count)),
+        lines,
+        *([sentence(" and {} more", count_value(more))] if more > 0 else []),
+    ]
+    if word == "fast":
+        parts.append(sentence("; left out: measure again."))
+    else:
+        worst = time_value(worst_us, "worst_extra_us")
+        parts.append(sentence("; left out: the slowest execution takes {} more, worst_extra_us.", worst))
+    return joined(*parts, by="")
+
+
+def _outlier(outlier: Outlier) -> Sentence:
+    return sentence(
+        "line {} ({} at {}: T_exec {} off the median)",
+        count_value(outlier.line, "line"),
+        ShownValue(outlier.latency_us, "latency_us", "us"),
+        ShownValue(outlier.payload_bytes, "payload_bytes", "bytes"),
+        time_value(outlier.off_us, "off_us")._replace(signed=True, decimals=1),
     )

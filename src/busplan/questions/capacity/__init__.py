@@ -11,14 +11,14 @@ from busplan.questions.base.inputs import (
     Periods,
     ProfileLike,
     checked_models,
-    load_profile,
+    load_network,
     one_or_several,
     with_cycle,
 )
-from busplan.questions.capacity.verdict import Verdict, verdicts
-from busplan.questions.fit import figures as analysis
+from busplan.questions.capacity.verdict import Verdict, verdict_of
 from busplan.questions.fit.certainty import FITS, VerdictWord
-from busplan.questions.fit.figures import Capacity, CapacityFigures
+from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.network import at_periods, model_names
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -73,21 +73,17 @@ class CapacityAnswer(Answer):
     @property
     def results(self) -> tuple[CapacityFigures, ...]:
         """All sets of figures, period by period, and in each period timing model by timing model."""
-        return self._capacity.results
+        return tuple(figures for at_period in self.periods for figures in at_period)
 
     def report(self) -> Report:
         """The answer in blocks."""
+        if self.sensitivities:
+            from busplan.questions.capacity.sensitivity_report import sensitivity_report
+
+            return sensitivity_report(self)
         from busplan.questions.capacity.report import capacity_report
 
-        if not self.sensitivities:
-            return capacity_report(self._capacity, self.verdicts)
-        from busplan.questions.capacity.sensitivity_report import sensitivity_report
-
-        return sensitivity_report(self._capacity, self.verdicts, self.sensitivities)
-
-    @property
-    def _capacity(self) -> Capacity:
-        return Capacity(self.profile, self.periods)
+        return capacity_report(self)
 
 
 def capacity(
@@ -143,16 +139,15 @@ def capacity(
     >>> sensitivity.next_bottleneck.next_binding_term.name
     'idle'
     """
-    network = load_profile(profile)
+    network = load_network(profile)
     if sensitivity:
-        with_cycle(network, question="the effect of small changes on its margin")
-    result = analysis.capacity(
-        network,
-        periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
-        timing_models=checked_models(timing_model, network),
-    )
+        with_cycle(network.profile, question="the effect of small changes on its margin")
+    models = checked_models(timing_model, network) or model_names(network)
+    networks = at_periods(network, None if period_us is None else one_or_several(period_us, name="period_us"))
+    periods = tuple(tuple(capacity_figures(at, model=model) for model in models) for at in networks)
+    verdicts = tuple(verdict_of(at, figures) for at, figures in zip(networks, periods, strict=True))
     if not sensitivity:
-        return CapacityAnswer(*result, verdicts=verdicts(result))
-    from busplan.questions.capacity.sensitivity import sensitivities
+        return CapacityAnswer(network.profile, periods, verdicts)
+    from busplan.questions.capacity.sensitivity import sensitivity_of
 
-    return CapacityAnswer(*result, verdicts=verdicts(result), sensitivities=sensitivities(result))
+    return CapacityAnswer(network.profile, periods, verdicts, tuple(map(sensitivity_of, networks)))

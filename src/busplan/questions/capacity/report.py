@@ -1,8 +1,7 @@
 """Answer of `busplan capacity`."""
 
-from collections.abc import Iterator, Sequence
-from functools import partial
-from typing import Final
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
 
 from busplan.buses import figure
 from busplan.buses.bus import Bus
@@ -11,7 +10,6 @@ from busplan.forms.blocks import (
     Block,
     Cell,
     Code,
-    Detail,
     JsonDocument,
     Record,
     Report,
@@ -26,69 +24,59 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import nouns, period, sentence_text
-from busplan.questions.capacity.card import card
-from busplan.questions.capacity.sentences import uncertainty_parts, verdict_sentences
+from busplan.questions.capacity import CapacityAnswer
+from busplan.questions.capacity.lines import card, card_text, uncertainty_parts
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import FITS, TIME
-from busplan.questions.fit.figures import COUNTS, Capacity, CapacityFigures
-from busplan.questions.fit.network import bus_of, leading_model, network_of
+from busplan.questions.fit.figures import COUNTS, CapacityFigures
+from busplan.questions.fit.network import leading_model
 from busplan.questions.words.documents import Owner, document, fields, figure_table, with_profile
-from busplan.questions.words.sentences import safety_record, warnings
+from busplan.questions.words.sentences import safety_record
 
 
-def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
+def capacity_report(answer: CapacityAnswer) -> Report:
     """Report of `capacity`."""
     return Report(
-        Sentence(("Capacity of ", Code(result.profile.name))),
-        lambda: tuple(_blocks(result, verdicts)),
-        partial(capacity_document, result, verdicts),
-        lambda: with_profile(result.profile.name, capacity_records(result)),
+        Sentence(("Capacity of ", Code(answer.profile.name))),
+        tuple(_blocks(answer)),
+        capacity_document(answer),
+        with_profile(answer.profile.name, capacity_records(answer)),
         is_card_enough=True,
     )
 
 
-def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
+def _blocks(answer: CapacityAnswer) -> Iterator[Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
-    for number, verdict in enumerate(verdicts, start=1):
-        yield card(verdict, result.profile, is_brief=number < len(verdicts))
-    said = [list(verdict_sentences(verdict, result.profile)) for verdict in verdicts]
-    yield Detail(tuple(said[0] if len(said) == 1 else _of_all(said)))
-    yield capacity_table(result)
-    if result.profile.group:
-        yield groups_table(result)
+    for number, verdict in enumerate(answer.verdicts, start=1):
+        yield card(verdict, is_brief=number < len(answer.verdicts))
+    yield capacity_table(answer)
+    if answer.profile.group:
+        yield groups_table(answer)
 
 
-def _of_all(said: Sequence[Sequence[Sentence]]) -> Iterator[Sentence]:
-    """The sentences of each period, and at the end once those that are the same for all."""
-    texts = [{sentence_text(words) for words in sentences} for sentences in said]
-    common = set.intersection(*texts)
-    for sentences in said:
-        yield from (words for words in sentences if sentence_text(words) not in common)
-    yield from (words for words in said[0] if sentence_text(words) in common)
-
-
-def capacity_table(result: Capacity) -> Table:
+def capacity_table(answer: CapacityAnswer) -> Table:
     """Figures of all periods, the timing models side by side; what does not decide is detail.
 
     Parameters
     ----------
-    result
-        The capacity.
+    answer
+        The answer.
     """
-    profile, bus = result.profile, bus_of(result.profile)
-    network = network_of(profile)
+    network = answer.verdicts[0].network
+    profile, bus = network.profile, network.bus
     setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network)),) if words)
     counts = bus.counted(network)
     caption = sentence(
         f"{', '.join(f'{{}} {nouns(number, noun)}' for number, noun in counts)}{setup}",
         *(count_value(number, nouns(2, noun)) for number, noun in counts),
     )
-    owners = list(_owners(result))
+    owners = list(_owners(answer))
     rows, shown = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)], _DECIDES
     if not profile.has_cycle:
-        rows = [row for row in rows if any(getattr(figures, row[0].key) is not None for figures in result.results)]
+        found = [figures.values() for figures in answer.results]
+        rows = [row for row in rows if any(values[row[0].key] is not None for values in found)]
         shown |= {figure.key for figure in bus.figures.table}
-    shown |= {term.key for figures in result.results for term in figures.terms if term.us}
+    shown |= {term.key for figures in answer.results for term in figures.terms if term.us}
     return figure_table(
         rows,
         owners,
@@ -99,54 +87,56 @@ def capacity_table(result: Capacity) -> Table:
     )
 
 
-def _owners(result: Capacity) -> Iterator[Owner]:
+def _owners(answer: CapacityAnswer) -> Iterator[Owner]:
     """A column for each period and timing model, the profile's own model first."""
-    leading, deciding = leading_model(result.profile), bus_of(result.profile).deciding_model
-    for results in result.periods:
-        several = len(result.periods) > 1
+    network = answer.verdicts[0].network
+    leading, deciding = leading_model(network), network.bus.deciding_model
+    for results in answer.periods:
+        several = len(answer.periods) > 1
         group = period(results[0].period_us) if several else ""
         for figures in sorted(results, key=lambda figures: figures.timing_model != leading):
             rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
-            yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures)
+            yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures.values())
 
 
-def _state(key: Figure, figures: CapacityFigures) -> State:
+def _state(key: Figure, values: Mapping[str, Any]) -> State:
     """State of a figure that, by itself, decides whether the cycle fits."""
     match key:
         case figure.VERDICT:
-            return "neutral" if figures.verdict is None else state_of(figures.verdict == FITS)
+            return "neutral" if values["verdict"] is None else state_of(values["verdict"] == FITS)
         case figure.MARGIN_CORRECTED:
-            is_short = figures.safe_required_us is not None and figures.safe_required_us > figures.available_us
+            needed_us = values["safe_required_us"]
+            is_short = needed_us is not None and needed_us > values["available_us"]
             return "fails" if is_short else "neutral"
         case figure.MARGIN:
-            return "fails" if TIME in figures.exceeded else "neutral"
+            return "fails" if TIME in values["exceeded"] else "neutral"
     return "neutral"
 
 
-def groups_table(result: Capacity) -> Table:
+def groups_table(answer: CapacityAnswer) -> Table:
     """How many nodes of each group fit each period, the other groups as they are.
 
     Parameters
     ----------
-    result
-        The capacity.
+    answer
+        The answer.
     """
     columns = [TableColumn("group", kind="words"), TableColumn("nodes"), TableColumn("axes")]
     shown: list[tuple[int, tuple[Figure, ...]]] = []
-    for number, figures in enumerate(result.results):
+    for number, figures in enumerate(answer.results):
         keys = _GROUP_CLOSED if figures.verdict is None else _GROUP_SAFE
         shown.append((number, keys))
         models = (
-            f"{period(figures.period_us)}, {figures.timing_model}" if len(result.periods) > 1 else figures.timing_model
+            f"{period(figures.period_us)}, {figures.timing_model}" if len(answer.periods) > 1 else figures.timing_model
         )
         columns += (
             TableColumn(key.label, kind="words" if key.sort == "word" else "figures", group=models) for key in keys
         )
     rows = []
-    for place, group in enumerate(result.results[0].groups):
+    for place, group in enumerate(answer.results[0].groups):
         cells: list[Cell] = [Code(group.name), count_value(group.nodes, "nodes"), count_value(group.axes, "axes")]
         for number, keys in shown:
-            cells += (attribute_value(key, result.results[number].groups[place]) for key in keys)
+            cells += (attribute_value(key, answer.results[number].groups[place]) for key in keys)
         rows.append(TableRow(tuple(cells)))
     return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, the others as they are",)))
 
@@ -190,61 +180,61 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
     ]
 
 
-def capacity_records(result: Capacity) -> list[Record]:
+def capacity_records(answer: CapacityAnswer) -> list[Record]:
     """One row for each period and timing model; what each group has for itself stands in columns of its name."""
     return [
         {
             **figures.by_key(),
             **{f"group.{group.name}.{key}": getattr(group, key) for group in figures.groups for key in COUNTS},
         }
-        for figures in result.results
+        for figures in answer.results
     ]
 
 
-def _results(result: Capacity) -> Iterator[Record]:
+def _results(answer: CapacityAnswer) -> Iterator[Record]:
     """As the rows, with a list of groups where the profile has some."""
-    for figures in result.results:
+    for figures in answer.results:
         record: Record = figures.by_key()
-        yield {**record, "groups": [group.record() for group in figures.groups]} if figures.groups else record
+        yield {**record, "groups": [vars(group) for group in figures.groups]} if figures.groups else record
 
 
-def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocument:
+def capacity_document(answer: CapacityAnswer) -> JsonDocument:
     """Document of `busplan capacity --format json`."""
     return document(
         "capacity",
-        profile=result.profile.name,
-        results=list(_results(result)),
-        verdicts=[_verdict(verdict, result) for verdict in verdicts],
+        profile=answer.profile.name,
+        results=list(_results(answer)),
+        verdicts=list(map(_verdict, answer.verdicts)),
     )
 
 
-def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
-    change, figures, bus = verdict.change, verdict.deciding, bus_of(result.profile)
-    network = network_of(result.profile)
-    left_out = bus.cycle(network, model=bus.deciding_model).left_out()
-    unable = {model.name: bus.cannot_express(network, model=model.name) for model in bus.timing_models}
+def _verdict(verdict: Verdict) -> JsonDocument:
+    change, figures, bus = verdict.change, verdict.deciding, verdict.network.bus
+    unable = {model.name: bus.cannot_express(verdict.network, model=model.name) for model in bus.timing_models}
+    words = card(verdict)
     return {
         "period_us": verdict.period_us,
-        **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
-        "missed_limits": [need.key for need in verdict.missed_limits],
+        **fields(figures, "timing_model", "verdict", "fits"),
+        "missed_limits": [key for key, _ in verdict.missed_limits],
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
-        **safety_record(figures, result.profile),
+        **safety_record(figures, verdict.network),
         **fields(figures, "available_us", "required_us", "margin_us"),
         **certainty_record(figures),
         "uncertainty_parts": uncertainty_parts(figures),
-        "reserve": result.profile.limits.reserve,
-        "not_in_it": [missing.key for missing in left_out],
+        "reserve": verdict.network.profile.limits.reserve,
+        "not_in_it": [part.key for part in verdict.left_out],
         "not_applicable": {model: list(keys) for model, keys in unable.items() if keys},
         "cheapest_change": change
         and {
             "changes": change.changes,
             "nodes": change.nodes,
             **fields(change.figures, "fits", "margin_us", "verdict", "margin_corrected_us", "uncertainty_us"),
-            "circle_is_untested": change.circle_is_untested,
         },
-        "warnings": warnings(result.profile, nodes=figures.nodes, most=figures.safe_nodes or 0),
-        "text": " ".join(map(sentence_text, verdict_sentences(verdict, result.profile))),
+        "fastest_period_us": verdict.fastest and verdict.fastest.us,
+        "warnings": list(verdict.warnings),
+        "text": card_text(words),
+        "lines": [{"label": label, "text": sentence_text(line)} for label, line in words.lines],
     }
 
 

@@ -8,7 +8,6 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Perturbation
 from busplan.elementwise import existing, plain
 from busplan.errors import BusplanError
-from busplan.profile.toml import override
 from busplan.questions.fit.certainty import (
     TIME,
     VERDICTS,
@@ -20,12 +19,10 @@ from busplan.questions.fit.certainty import (
     time_code,
     verdict_code,
 )
-from busplan.questions.fit.figures import Capacity
-from busplan.questions.fit.network import bus_of, network_of, with_execution, with_payloads, without_execution
+from busplan.questions.fit.network import changed, network_of, with_execution, with_payloads, without_execution
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.base import value_at, with_unchecked
-from busplan.sections.profile import Profile
 
 
 class NextLimit(NamedTuple):
@@ -59,7 +56,7 @@ class NextBottleneck(NamedTuple):
     """Corrected margin without the largest term; None where nothing takes it out."""
 
 
-def next_bottleneck(profile: Profile) -> NextBottleneck:
+def next_bottleneck(network: Network) -> NextBottleneck:
     """Find what binds a network once its first bottleneck is gone.
 
     A term is taken out at its cause, and the cycle is computed anew: without execution, for
@@ -67,16 +64,16 @@ def next_bottleneck(profile: Profile) -> NextBottleneck:
 
     Parameters
     ----------
-    profile
+    network
         The network.
     """
-    network, bus = network_of(profile), bus_of(profile)
+    bus = network.bus
     cycle = bus.cycle(network, model=bus.deciding_model)
     binding = _largest(cycle)
     cycles = (bus.cycle(relieved, model=bus.deciding_model) for relieved in _relieved(network))
     without = next((cycle for cycle in cycles if not _of(cycle, binding.key)), None)
     return NextBottleneck(
-        limits=tuple(_next_limit(profile, name) for name in network.names),
+        limits=tuple(_next_limit(network, name) for name in network.names),
         binding_term=binding,
         is_gone=without is not None,
         next_binding_term=_largest(without or cycle, but=binding.key),
@@ -84,17 +81,17 @@ def next_bottleneck(profile: Profile) -> NextBottleneck:
     )
 
 
-def _next_limit(profile: Profile, group: str) -> NextLimit:
-    nodes, limit = safe_nodes(profile, group=group)
-    return NextLimit(group, nodes, limit, *safe_nodes(profile, group=group, without=limit))
+def _next_limit(network: Network, group: str) -> NextLimit:
+    nodes, limit = safe_nodes(network, group=group)
+    return NextLimit(group, nodes, limit, *safe_nodes(network, group=group, without=limit))
 
 
 def _relieved(network: Network) -> Iterator[Network]:
     """The network without each cause of a term that can be taken away."""
     yield without_execution(network)
     yield network._replace(nonperiodic_us=0.0)
-    for changes in bus_of(network.profile).term_removals:
-        yield network_of(override(network.profile, dict(changes)))
+    for changes in network.bus.term_removals:
+        yield changed(network, changes)
 
 
 def _largest(cycle: BusCycle, *, but: str = "") -> Term:
@@ -131,14 +128,14 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     Those of every kind of bus are 10 % more execution time, a node and an axis more of each group, four bytes more of
     every payload, and a bus reset; a kind has its own before the last.
     """
-    bus = bus_of(network.profile)
+    bus = network.bus
     yield _slower(network, if_nothing="" if bus.has_execution(network) else "no execution time is on the bus")
     yield from (_one_node_more(network, alike) for alike in network.alike)
     yield from (_one_axis_more(network, alike) for alike in network.alike)
     yield _more_bytes(network)
     own = bus.perturbations(network)
     reset = Perturbation("a bus reset", bus.safety.after_reset, if_nothing="it is set so already")
-    yield from (_with_keys(network.profile, change) for change in (*own, *((reset,) if bus.safety.after_reset else ())))
+    yield from (_with_keys(network, change) for change in (*own, *((reset,) if bus.safety.after_reset else ())))
 
 
 def _slower(network: Network, *, if_nothing: str) -> Perturbed:
@@ -157,15 +154,15 @@ def _slower(network: Network, *, if_nothing: str) -> Perturbed:
 
 def _one_node_more(network: Network, alike: AlikeNodes) -> Perturbed:
     more = alike.nodes + 1
-    changed = network.asking(alike.name).with_nodes(more)
-    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, changed, "")
+    then = network.asking(alike.name).with_nodes(more)
+    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, then, "")
 
 
 def _one_axis_more(network: Network, alike: AlikeNodes) -> Perturbed:
     key, axes = alike.node_key("axes"), alike.node.axes + 1
-    changed, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
+    then, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
     note = unknown or ("" if alike.payload.follows_axes else "no payload follows the axes")
-    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, changed, note)
+    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, then, note)
 
 
 def _more_bytes(network: Network) -> Perturbed:
@@ -185,19 +182,19 @@ def _more_bytes(network: Network) -> Perturbed:
     return Perturbed(f"payload +{_PAYLOAD_STEP_BYTES} bytes", "payload_bytes", before, after, changed, unknown)
 
 
-def _with_keys(profile: Profile, perturbation: Perturbation) -> Perturbed:
+def _with_keys(network: Network, perturbation: Perturbation) -> Perturbed:
     """A change that a kind of bus names by keys of the profile."""
     key, before, after = ", ".join(perturbation.changes), None, None
     if len(perturbation.changes) == 1:
         ((_, after),) = perturbation.changes.items()
-        before = value_at(profile, key)
+        before = value_at(network.profile, key)
     if perturbation.why_not:
         return Perturbed(perturbation.label, key, before, None, None, perturbation.why_not)
     try:
-        changed = network_of(override(profile, dict(perturbation.changes)))
+        then = changed(network, perturbation.changes)
     except BusplanError as error:
         return Perturbed(perturbation.label, key, before, after, None, "; ".join(error.problems))
-    return Perturbed(perturbation.label, key, before, after, changed, perturbation.if_nothing)
+    return Perturbed(perturbation.label, key, before, after, then, perturbation.if_nothing)
 
 
 def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:
@@ -248,13 +245,13 @@ class Effect(NamedTuple):
     then: Standing | None
     """Where the network stands with the change."""
     note: str
-    """Why the change cannot be made, or why the margin stays as it is."""
+    """Why the change cannot be made, or why the margin stays as it is, and which limits come nearer then."""
 
 
 class Sensitivity(NamedTuple):
     """Effects of small changes on the margin at one period, by the timing model that decides."""
 
-    profile: Profile
+    network: Network
     """At that period."""
     timing_model: str
     now: Standing
@@ -263,37 +260,23 @@ class Sensitivity(NamedTuple):
     next_bottleneck: NextBottleneck
 
 
-def sensitivity(profile: Profile) -> Sensitivity:
+def sensitivity_of(network: Network) -> Sensitivity:
     """Make every small change of a network, and compute its cycle anew.
 
     Parameters
     ----------
-    profile
+    network
         The network.
-
-    Examples
-    --------
-    >>> from busplan.profile.shipped import load
-    >>> result = sensitivity(load("paper-1ms").profile)
-    >>> [effect.change for effect in result.effects[:2]]
-    ['one node more', 'one busy retry more']
     """
-    network = network_of(profile)
     now = standing(network)
-    effects = [_effect(change, now) for change in perturbed(network)]
+    effects = [_effect(change, now, network) for change in perturbed(network)]
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
-    return Sensitivity(profile, bus_of(profile).deciding_model, now, tuple(effects), next_bottleneck(profile))
-
-
-def sensitivities(capacity: Capacity) -> tuple[Sensitivity, ...]:
-    """Sensitivity at each period of a capacity result."""
-    periods_us = (results[0].period_us for results in capacity.periods)
-    return tuple(sensitivity(override(capacity.profile, {"cycle.period_us": period_us})) for period_us in periods_us)
+    return Sensitivity(network, network.bus.deciding_model, now, tuple(effects), next_bottleneck(network))
 
 
 def standing(network: Network) -> Standing:
     """Compute where a network stands: what `capacity` says of a profile, of any network."""
-    bus = bus_of(network.profile)
+    bus = network.bus
     cycle = bus.cycle(network, model=bus.deciding_model)
     sure, codes = certainty(cycle), limit_codes(network)
     broken = tuple(key for key, code in codes.items() if code == BROKEN)
@@ -309,10 +292,28 @@ def standing(network: Network) -> Standing:
     )
 
 
-def _effect(cause: Perturbed, now: Standing) -> Effect:
+def _effect(cause: Perturbed, now: Standing, network: Network) -> Effect:
     change_us, then = None, None
     if cause.network is not None:
         then = standing(cause.network)
         change_us = then.margin_corrected_us - now.margin_corrected_us
-    note = "" if change_us else cause.note
+    note = ""
+    if not change_us:
+        note = "; ".join(
+            filter(None, (cause.note, *(() if cause.network is None else _nearer(network, cause.network))))
+        )
     return Effect(cause.change, cause.key, cause.before, cause.after, change_us, then, note)
+
+
+def _nearer(network: Network, changed: Network) -> Iterator[str]:
+    """Say how much nearer a change comes to limits that are times, each with its doubt as a shown verdict has it."""
+    for limit in network.bus.limits:
+        if limit.period is None:
+            continue
+        left_us, then_us = (
+            plain(limit.most(of)) - plain(limit.value(of)) - plain(limit.uncertainty(of)) for of in (network, changed)
+        )
+        if then_us < left_us and left_us > 0:
+            yield f"it takes {left_us - then_us:.1f} us of the {left_us:.1f} us before the limit of {limit.key}"
+        elif then_us < left_us:
+            yield f"it adds {left_us - then_us:.1f} us to the {-left_us:.1f} us beyond the limit of {limit.key}"

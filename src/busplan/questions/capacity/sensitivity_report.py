@@ -1,11 +1,11 @@
 """Report of `busplan capacity --sensitivity`: sentences, a table and a chart for each period."""
 
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from busplan.buses.cycle import Term
 from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
+from busplan.buses.network import Network
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -25,14 +25,11 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
 from busplan.forms.numbers import decimals_of, listed, nouns, period_value, sentence_text
-from busplan.questions.capacity.report import capacity_document, capacity_report
+from busplan.questions.capacity import CapacityAnswer
+from busplan.questions.capacity.report import capacity_report
 from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Sensitivity, Standing
-from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import FITS, limits_behind
-from busplan.questions.fit.figures import Capacity
-from busplan.questions.fit.network import bus_of
 from busplan.questions.words.documents import fields, with_profile
-from busplan.sections.profile import Profile
 
 _DECIMALS: Final = 3
 
@@ -69,17 +66,17 @@ def _bar(us: float) -> Iterator[Span]:
         yield Span(Entry("hides", "adds to it"), 0.0, us)
 
 
-def next_bottleneck_sentence(bottlenecks: NextBottleneck, profile: Profile) -> Sentence:
+def next_bottleneck_sentence(bottlenecks: NextBottleneck, network: Network) -> Sentence:
     """Say what binds once the largest term, or the limit of the nodes, is gone.
 
     Parameters
     ----------
     bottlenecks
         The bottleneck now, and the next one.
-    profile
+    network
         The network.
     """
-    term, behind = (_term(term, profile) for term in (bottlenecks.binding_term, bottlenecks.next_binding_term))
+    term, behind = (_term(term, network) for term in (bottlenecks.binding_term, bottlenecks.next_binding_term))
     term_us, behind_us, margin_us = (
         ShownValue(us, key, "us", 3)
         for us, key in (
@@ -109,11 +106,11 @@ def _limit(limit: NextLimit) -> Sentence:
     )
 
 
-def _term(term: Term, profile: Profile) -> str:
-    return by_key(bus_of(profile).figures.terms)[term.key].label
+def _term(term: Term, network: Network) -> str:
+    return by_key(network.bus.figures.terms)[term.key].label
 
 
-def next_bottleneck_record(bottleneck: NextBottleneck, profile: Profile) -> Record:
+def next_bottleneck_record(bottleneck: NextBottleneck, network: Network) -> Record:
     """Of the document: what binds now and next, with the sentence that says it."""
     return {
         "binding_term": bottleneck.binding_term.name,
@@ -122,7 +119,7 @@ def next_bottleneck_record(bottleneck: NextBottleneck, profile: Profile) -> Reco
         "next_binding_term_us": bottleneck.next_binding_term.us,
         "next_margin_corrected_us": bottleneck.next_margin_corrected_us,
         **_limits(bottleneck.limits),
-        "text": sentence_text(next_bottleneck_sentence(bottleneck, profile)),
+        "text": sentence_text(next_bottleneck_sentence(bottleneck, network)),
     }
 
 
@@ -147,25 +144,13 @@ _DIGITS = 4
 """Digits of what changes: enough to see a tenth of it."""
 
 
-def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], sensitivities: Sequence[Sensitivity]) -> Report:
-    """Report of `capacity --sensitivity`.
-
-    Parameters
-    ----------
-    result
-        The capacity.
-    verdicts
-        One for each period.
-    sensitivities
-        Effects of small changes, one for each period.
-    """
-    report = capacity_report(result, verdicts)
+def sensitivity_report(answer: CapacityAnswer) -> Report:
+    """Report of `capacity --sensitivity`."""
+    report, sensitivities = capacity_report(answer), answer.sensitivities
     return report._replace(
-        blocks=lambda: (*report.blocks(), *_of_periods(sensitivities)),
-        document=partial(sensitivity_document, result, verdicts, sensitivities),
-        records=lambda: with_profile(
-            result.profile.name, [row for sensitivity in sensitivities for row in _rows(sensitivity)]
-        ),
+        blocks=(*report.blocks, *_of_periods(sensitivities)),
+        document=_document(report.document, sensitivities),
+        records=with_profile(answer.profile.name, [row for sensitivity in sensitivities for row in _rows(sensitivity)]),
         is_card_enough=False,
     )
 
@@ -193,7 +178,7 @@ def sensitivity_blocks(sensitivity: Sensitivity) -> Iterator[Block]:
     yield from (
         Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in sensitivity.effects if effect.note
     )
-    yield next_bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.profile)
+    yield next_bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.network)
 
 
 def sensitivity_table(sensitivity: Sensitivity) -> Table:
@@ -207,7 +192,7 @@ def sensitivity_table(sensitivity: Sensitivity) -> Table:
     caption = sentence(
         f"What moves the margin of {{}} at {{}}, by the {sensitivity.timing_model} model",
         figure_value(MARGIN_CORRECTED, sensitivity.now.margin_corrected_us),
-        period_value(sensitivity.profile.cycle.period_us),
+        period_value(sensitivity.network.profile.cycle.period_us),
     )
     columns = (
         TableColumn("what changes", kind="words"),
@@ -226,7 +211,7 @@ def _cells(effect: Effect, sensitivity: Sensitivity) -> Iterator[Cell]:
     yield ShownValue(effect.margin_change_us, "margin_change_us", "us", 3, signed=True)
     then = None if effect.then is None else effect.then.margin_corrected_us
     yield figure_value(MARGIN_CORRECTED, then)
-    yield _verdict(effect.then, sensitivity.profile)
+    yield _verdict(effect.then, sensitivity.network)
 
 
 def _step(effect: Effect) -> Cell:
@@ -238,14 +223,14 @@ def _step(effect: Effect) -> Cell:
     return sentence("{} -> {}", before, after)
 
 
-def _verdict(then: Standing | None, profile: Profile) -> Cell:
+def _verdict(then: Standing | None, network: Network) -> Cell:
     """The verdict with the limits that are broken, or that the bus is unsafe."""
     shown = figure_value(VERDICT, None if then is None else then.verdict)
     if then is None:
         return shown
     why = list(limits_behind(then))
     if not why and then.verdict == FITS and not then.safe:
-        why = [f"unsafe {bus_of(profile).safety.setting}"]
+        why = [f"unsafe {network.bus.safety.setting}"]
     return Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if _is_well(then) else "fails")
 
 
@@ -277,7 +262,7 @@ def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
     if lost:
         yield Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
     if unsafe:
-        yield Sentence((f"Its {bus_of(sensitivity.profile).safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
+        yield Sentence((f"Its {sensitivity.network.bus.safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
     if not lost and not unsafe:
         yield Sentence(("The cycle is shown to fit after each of them alone.",))
 
@@ -286,30 +271,32 @@ def _capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
-def sensitivity_document(
-    result: Capacity, verdicts: Sequence[Verdict], sensitivities: Sequence[Sensitivity]
-) -> JsonDocument:
-    """Document of `busplan capacity --sensitivity --format json`: that of `capacity`, with more in each verdict."""
-    whole = capacity_document(result, verdicts)
-    for verdict, sensitivity in zip(whole["verdicts"], sensitivities, strict=True):
-        verdict["sensitivity"] = [_record(effect, sensitivity.profile) for effect in sensitivity.effects]
-        verdict["next_bottleneck"] = next_bottleneck_record(sensitivity.next_bottleneck, sensitivity.profile)
-    return whole
+def _document(whole: Mapping[str, Any], sensitivities: Sequence[Sensitivity]) -> JsonDocument:
+    """That of `capacity`, with more in each verdict."""
+    verdicts = [
+        {
+            **verdict,
+            "sensitivity": [_record(effect, sensitivity.network) for effect in sensitivity.effects],
+            "next_bottleneck": next_bottleneck_record(sensitivity.next_bottleneck, sensitivity.network),
+        }
+        for verdict, sensitivity in zip(whole["verdicts"], sensitivities, strict=True)
+    ]
+    return {**whole, "verdicts": verdicts}
 
 
 def _rows(sensitivity: Sensitivity) -> Iterator[Record]:
     """One row for each change."""
     for effect in sensitivity.effects:
         yield {
-            "period_us": sensitivity.profile.cycle.period_us,
+            "period_us": sensitivity.network.profile.cycle.period_us,
             "timing_model": sensitivity.timing_model,
-            **_record(effect, sensitivity.profile),
+            **_record(effect, sensitivity.network),
         }
 
 
-def _record(effect: Effect, profile: Profile) -> Record:
+def _record(effect: Effect, network: Network) -> Record:
     then = effect.then
-    safety = bus_of(profile).safety.figure
+    safety = network.bus.safety.figure
     own: dict[str, Any] = {} if safety is None else {safety.key: None if then is None else then.safe}
     return {
         "change": effect.change,

@@ -7,7 +7,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Periods, ProfileLike, load_profile, one_or_several, whole
+from busplan.questions.base.inputs import Periods, ProfileLike, load_network, one_or_several, whole
 from busplan.questions.circle.figures import CircleTest
 
 
@@ -94,7 +94,7 @@ def circle_test(
     Raises
     ------
     BusplanError
-        Not a profile, a period that is no multiple of the step, a feed that the drive cannot reach, or a circle too
+        Not a profile, a feed that the drive cannot reach, or a circle too
         short for its ramps.
 
     References
@@ -113,7 +113,7 @@ def circle_test(
     from busplan.questions.circle import roundness
 
     test = roundness.circle_test(
-        load_profile(profile),
+        load_network(profile),
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         with_contributions=contributions,
         progress=progress,

@@ -5,10 +5,10 @@ from math import inf
 from string import Formatter
 from typing import Any, Final, NamedTuple
 
+from busplan.buses.network import Network
 from busplan.elementwise import existing
 from busplan.questions.fit.certainty import FITS, TIME, limits_behind
-from busplan.questions.fit.figures import CapacityFigures
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.figures import FitFigures
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
@@ -158,7 +158,7 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
     return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
 
 
-def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, ...]:
+def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
     """Tell which limits of the bus a cycle breaks, or that it is not shown to fit.
 
     Parameters
@@ -168,9 +168,8 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
     capacity
         Its figures under the timing model that decides.
     """
-    network = network_of(profile)
     behind = limits_behind(capacity)
-    broken = [limit for limit in bus_of(profile).limits if limit.key in behind]
+    broken = [limit for limit in network.bus.limits if limit.key in behind]
     late: tuple[Failure, ...] = ()
     if TIME in capacity.exceeded:
         late = (Failure("required_us", capacity.required_us, capacity.available_us),)

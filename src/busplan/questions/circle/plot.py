@@ -162,11 +162,7 @@ def extremes(values: Floats, *, most: int) -> NDArray[np.int64]:
 
 _ROOM: Final = 0.08
 """Empty room above and below the errors, as a share of their range."""
-_VERDICTS: Final[dict[bool | None, tuple[str, Tone]]] = {
-    True: ("PASSED", "passes"),
-    False: ("FAILED", "fails"),
-    None: ("NOT JUDGED", "neutral"),
-}
+_TONES: Final[dict[bool | None, Tone]] = {True: "passes", False: "fails", None: "neutral"}
 _DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
 
 
@@ -195,7 +191,6 @@ def test_drawing(test: CircleTest) -> Drawing:
 def _circle(row: CircleRow, scales: Scales) -> Panel:
     """The setup, the verdict, and the circle on the scale of all periods."""
     result, scale = row.result, scales.circle
-    word, tone = _VERDICTS[result.passed]
     setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
     deviation = measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
     whole = "no G on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}"
@@ -203,7 +198,7 @@ def _circle(row: CircleRow, scales: Scales) -> Panel:
     plot = None
     if scale is not None and not row.run.diverged:
         plot = dial(contour_profile(row.run), scale, row.run.path.direction)
-    return Panel(plot, f"{word}: {setup}", words, tone)
+    return Panel(plot, f"{result.verdict_word}: {setup}", words, _TONES[result.passed])
 
 
 def _shown(row: CircleRow, scales: Scales) -> str:

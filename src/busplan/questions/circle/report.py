@@ -1,7 +1,6 @@
 """Answer of `busplan circle-test`: its verdict in sentences, tables and the drawing."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Final
 
 from busplan.forms.blocks import (
@@ -24,11 +23,11 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.numbers import period, period_value
+from busplan.forms.numbers import listed, period, period_value
 from busplan.questions.circle.contour import ContourProfile, drawn_profile
 from busplan.questions.circle.drawing import circle_drawing, largest_mm, magnified
 from busplan.questions.circle.failures import MARGINS, Stated
-from busplan.questions.circle.figures import CIRCLE_BY_KEY, JITTER, CircleFigures, CircleTest
+from busplan.questions.circle.figures import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTest
 from busplan.questions.circle.roundness import failed_measure, to_attack
 from busplan.questions.words.documents import Owner, document, figure_table, with_profile
 from busplan.sections.profile import Profile
@@ -42,11 +41,9 @@ def verdict_words(result: CircleFigures) -> Words:
     result
         The circle test at one period.
     """
-    if result.stable is None:
-        return Words("NOT RUN", "fails")
-    if result.passed is None:
-        return Words("NOT JUDGED", "warns")
-    return Words("PASSED", "passes") if result.passed else Words("FAILED", "fails")
+    if result.passed is None and result.stable is not None:
+        return Words(result.verdict_word, "warns")
+    return Words(result.verdict_word, "passes" if result.passed else "fails")
 
 
 def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
@@ -68,6 +65,13 @@ def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Senten
         return
     if result.passed:
         yield Sentence((*subject, ": ", Words("the circle holds every tolerance", verdict.state), "."), verdict.state)
+    elif result.sources_matter is False:
+        none = Words("no error source of this profile matters", verdict.state)
+        labels = [CIRCLE_BY_KEY[key].label for key in profile.tolerance.judged or ("max_contour_error_mm",)]
+        least = f"{listed(labels, 'and')} below {NEGLIGIBLE_MM * 1e3:g} um"
+        yield Sentence(
+            (*subject, ": ", none, f"; {least}, which says nothing of how round a machine is."), verdict.state
+        )
     else:
         yield Sentence((*subject, ": ", *_unjudged(result), "."), verdict.state)
     yield sentence(
@@ -181,9 +185,9 @@ def circle_report(test: CircleTest) -> Report:
     """Report of `circle-test`."""
     return Report(
         Sentence(("Circle test of ", Code(test.profile.name))),
-        lambda: tuple(_blocks(test)),
-        partial(circle_document, test),
-        lambda: with_profile(test.profile.name, circle_records(test)),
+        tuple(_blocks(test)),
+        circle_document(test),
+        with_profile(test.profile.name, circle_records(test)),
     )
 
 

@@ -7,20 +7,20 @@ delay of a host loop can make the circle rounder while it reduces the margins, s
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from busplan.profile.toml import at_periods
+from busplan.buses.network import Network
 from busplan.progress import Progress
 from busplan.questions.circle.failures import (
     bus_failures,
     circle_failures,
     tightest_margins,
 )
-from busplan.questions.circle.figures import CircleFigures, CircleTest
+from busplan.questions.circle.figures import NEGLIGIBLE_MM, CircleFigures, CircleTest
 from busplan.questions.circle.setup import Contribution, Setup, announce, bus, contributions, estimate, setup, sources
 from busplan.questions.fit.circle_refusal import loop_timing, path_setpoints, require_circle
-from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.fit.figures import FitFigures
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us
+from busplan.questions.fit.network import at_periods
 from busplan.sections.machine import CONTOUR_MEASURES
-from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.parameters import LoopTiming
 
@@ -62,19 +62,19 @@ def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
 
 
 def circle_test(
-    profile: Profile,
+    network: Network,
     *,
     periods_us: Sequence[float] | None = None,
     with_contributions: bool = False,
     explain: bool = True,
     progress: Progress | None = None,
 ) -> CircleTest:
-    """Run the circle test of a profile.
+    """Run the circle test of a network.
 
     Parameters
     ----------
-    profile
-        The network, its servo and its circle.
+    network
+        The network; its profile has the servo and the circle.
     periods_us
         Communication periods T_s [us]; by default the profile's own.
     with_contributions
@@ -92,13 +92,13 @@ def circle_test(
     Raises
     ------
     BusplanError
-        A circle that cannot be run: the period is no multiple of the step, say, or the drive cannot reach the feed.
+        A circle that cannot be run: the drive cannot reach the feed, say.
 
     References
     ----------
     ISO 230-4 for the measures; the paper's section IV-B for the test.
     """
-    variants = at_periods(profile, periods_us)
+    variants = at_periods(network, periods_us)
     counter = _Counter(progress)
     # Set up every period before the first simulation, so that errors come at once. A period that does not fit the bus
     # needs no path.
@@ -116,13 +116,15 @@ def circle_test(
         _test(variant, capacity, prepared, without if with_contributions else None, explain=explain, counter=counter)
         for variant, capacity, prepared, without in zip(variants, capacities, setups, ranked, strict=True)
     ]
-    return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs), with_contributions)
+    return CircleTest(
+        network.profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs), with_contributions
+    )
 
 
-def _timing(profile: Profile) -> LoopTiming:
+def _timing(network: Network) -> LoopTiming:
     """Timing of a circle that could be run, on a bus that does not carry it."""
-    require_circle(profile)
-    return loop_timing(profile)
+    require_circle(network)
+    return loop_timing(network.profile)
 
 
 class _Counter:
@@ -158,8 +160,8 @@ class _Counter:
 
 
 def _test(
-    profile: Profile,
-    capacity: CapacityFigures,
+    network: Network,
+    capacity: FitFigures,
     prepared: Setup | LoopTiming,
     without: Mapping[str, Setup] | None,
     *,
@@ -168,9 +170,9 @@ def _test(
 ) -> tuple[CircleFigures, CircleRun | None]:
     """Test one period; `without` has the setup without each error source, if they are to be ranked."""
     if isinstance(prepared, LoopTiming):
-        return _figures(profile, prepared, capacity, None, settled=True), None
+        return _figures(network, prepared, capacity, None, settled=True), None
     run = counter.run(prepared)
-    result = _figures(profile, prepared.timing, capacity, run, settled=prepared.settled)
+    result = _figures(network, prepared.timing, capacity, run, settled=prepared.settled)
     if without is None and explain and failed_measure(result):
         without = sources(prepared)
         counter.expect(*without.values())
@@ -182,18 +184,22 @@ def _test(
 
 
 def _figures(
-    profile: Profile, timing: LoopTiming, capacity: CapacityFigures, run: CircleRun | None, *, settled: bool
+    network: Network, timing: LoopTiming, capacity: FitFigures, run: CircleRun | None, *, settled: bool
 ) -> CircleFigures:
+    profile = network.profile
     phase_deg, gain_db, crossover_hz = tightest_margins(run) if run else (None, None, None)
     contour = run.contour if run and settled else None
     is_turn = profile.circle.path != "trapezoid"
     # The least-squares centre of a short arc is meaningless.
     round_ = contour if run and run.constant_speed_deg >= _LEAST_ARC_DEG else None
-    delay_x_us, delay_y_us = loop_delays_us(profile)
+    delay_x_us, delay_y_us = loop_delays_us(network)
     circle = profile.circle
-    setpoints = path_setpoints(profile)
+    setpoints = path_setpoints(network)
+    judged = profile.tolerance.judged
+    measures = [getattr(contour, key) for key in judged or ("max_contour_error_mm",)] if contour else []
+    matter = any(value is None or value >= NEGLIGIBLE_MM for value in measures) if contour else None
     circle_fails = () if run is None else circle_failures(profile, run, settled=settled)
-    failures = (*bus_failures(profile, capacity), *circle_fails)
+    failures = (*bus_failures(network, capacity), *circle_fails)
     return CircleFigures(
         period_us=profile.cycle.period_us,
         feed_mm_per_min=circle.feed_mm_per_min,
@@ -208,7 +214,7 @@ def _figures(
         delay_us=max(delay_x_us, delay_y_us),
         delay_x_us=delay_x_us,
         delay_y_us=delay_y_us,
-        jitter_us=jitter_us(profile),
+        jitter_us=jitter_us(network),
         timing_model=capacity.timing_model,
         bus_fits=capacity.fits,
         verdict=capacity.verdict or "",
@@ -229,7 +235,8 @@ def _figures(
         radius_deviation_mm=round_.radius_deviation_mm if round_ else None,
         centre_offset_mm=round_.centre_offset_mm if round_ else None,
         constant_speed_deg=run.constant_speed_deg if run else None,
-        passed=False if failures else True if profile.tolerance.judges_contour else None,
+        sources_matter=matter,
+        passed=False if failures else True if judged and matter else None,
         failures=failures,
         contributions=None,
     )

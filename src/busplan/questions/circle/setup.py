@@ -6,6 +6,7 @@ from dataclasses import replace
 from math import inf
 from typing import Any, Final, NamedTuple
 
+from busplan.buses.network import Network
 from busplan.questions.fit.circle_refusal import (
     delivery_of,
     loop_axes,
@@ -14,9 +15,7 @@ from busplan.questions.fit.circle_refusal import (
     path_settling_us,
     require_circle,
 )
-from busplan.questions.fit.figures import CapacityFigures, figures
-from busplan.questions.fit.network import bus_of
-from busplan.sections.profile import Profile
+from busplan.questions.fit.figures import FitFigures, figures
 from busplan.servo.circle import CircleRun
 from busplan.servo.engine import compiled_kernel
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
@@ -151,22 +150,23 @@ def contributions(
     return tuple(sorted(ranked, key=lambda contribution: -contribution.removed_mm))
 
 
-def bus(profile: Profile) -> CapacityFigures:
+def bus(network: Network) -> FitFigures:
     """Capacity under the timing model that decides."""
-    return figures(profile, model=bus_of(profile).deciding_model)
+    return figures(network, model=network.bus.deciding_model)
 
 
-def setup(profile: Profile) -> Setup:
-    """Input of a profile's circle simulation.
+def setup(network: Network) -> Setup:
+    """Input of the circle simulation of a network.
 
     Raises
     ------
     BusplanError
         As `circle_test`.
     """
-    require_circle(profile)
-    circle, settling_us = profile.circle, path_settling_us(profile)
-    x, y = loop_axes(profile)
+    require_circle(network)
+    profile, settling_us = network.profile, path_settling_us(network)
+    circle = profile.circle
+    x, y = loop_axes(network)
     return Setup(
         path=circle_path(
             circle.radius_mm,
@@ -179,7 +179,7 @@ def setup(profile: Profile) -> Setup:
         x=x,
         y=y,
         timing=loop_timing(profile),
-        delivery=delivery_of(profile),
+        delivery=delivery_of(network),
         mechanics=Mechanics(**parameters_in(profile.mechanics, Mechanics)),
         settled=settling_us != inf,
     )

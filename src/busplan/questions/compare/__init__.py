@@ -5,11 +5,11 @@ from collections.abc import Iterable
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
-from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, with_cycle
 from busplan.questions.compare import kinds as analysis
 from busplan.questions.compare.kinds import KindComparison, MachineOnKind, NotOnKind
+from busplan.questions.fit.network import network_of
 
 
 class CompareAnswer(Answer, KindComparison):
@@ -56,8 +56,6 @@ def compare(
     profile: ProfileLike,
     *,
     buses: str | Iterable[str] | None = None,
-    circle: bool = False,
-    progress: Progress | None = None,
 ) -> CompareAnswer:
     """Put the machine of a profile on each kind of bus: `busplan compare`.
 
@@ -67,10 +65,6 @@ def compare(
         The profile: a `Profile`, a path or a shipped name. On its own kind it stays as it is.
     buses
         Name of a kind of bus, or several; by default all, the profile's own first.
-    circle
-        Also run the circle test of each kind at its smallest period.
-    progress
-        Called from time to time with the steps simulated and the steps known to be needed.
 
     Returns
     -------
@@ -91,8 +85,8 @@ def compare(
     >>> [term.key for term in answer.on("can").assumed if term.source == "new profile"]
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
-    network = with_cycle(load_profile(profile), question="compare")
+    network = network_of(with_cycle(load_profile(profile), question="compare"))
     kinds = None
     if buses is not None:
         kinds = analysis.checked_kinds([str(kind) for kind in one_or_several(buses, name="buses")], option="buses")
-    return CompareAnswer(*analysis.compare(network, kinds=kinds, with_circle=circle, progress=progress))
+    return CompareAnswer(*analysis.compare(network, kinds=kinds))

@@ -1,30 +1,24 @@
-"""The machine of a profile on several kinds of bus: verdict, smallest period, most axes, and its circle."""
+"""The machine of a profile on several kinds of bus: verdict, smallest period and most axes."""
 
 from collections.abc import Iterator, Sequence
 from math import ceil, floor, log2
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
-from busplan.buses import kind_named, kind_names
+from busplan.buses import kind_names
+from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.nearest import did_you_mean
 from busplan.profile.conversion import AssumedKey, converted
-from busplan.profile.toml import override
-from busplan.progress import Progress
-from busplan.questions.circle.check import ComputeCircleFigures, circle_tests
+from busplan.questions.fit.assumed import assumed_rates
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.circle_refusal import STEP
-from busplan.questions.fit.figures import CapacityFigures, after_reset, figures
+from busplan.questions.fit.figures import FitFigures, after_reset, figures
 from busplan.questions.fit.inputs import given
-from busplan.questions.fit.network import varied_nodes
+from busplan.questions.fit.network import at_period, changed, network_of, varied_nodes
 from busplan.questions.fit.node_limit import safe_nodes
-from busplan.questions.plan.freedoms import PERIOD
-from busplan.questions.plan.smallest_period import SmallestPeriod, needed_settings, smallest_period
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
+from busplan.questions.plan.changes import settings_to_be_carried
+from busplan.questions.plan.needs import SmallestPeriod, smallest_period
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
-from busplan.servo.checks import dividing_step_us
-
-if TYPE_CHECKING:
-    from busplan.questions.circle.figures import CircleFigures
 
 _ROUND_US: Final = 1000.0
 """Periods of a curve are halves and doubles of it, which buses with some periods alone know, too [us]."""
@@ -44,42 +38,35 @@ class SafeAxes(NamedTuple):
     """Key of the limit that keeps them from being more."""
 
 
-class CircleAtSmallest(NamedTuple):
-    """The circle test at the smallest period."""
-
-    step_us: float
-    """The longest round step, up to the profile's own, that divides the period [us]."""
-    figures: "CircleFigures | None"
-    """None if it could not be run."""
-    problems: tuple[str, ...]
-    """Its failures, or why it could not be run."""
-
-
 class MachineOnKind(NamedTuple):
     """The machine on one kind of bus."""
 
-    profile: Profile
+    network: Network
     is_own: bool
     """Whether this is the kind of the profile, which stays as it is."""
     assumed: tuple[AssumedKey, ...]
     left_out: tuple[str, ...]
     """Keys and sections that the profile sets and this kind does not have."""
-    figures: CapacityFigures
+    figures: FitFigures
     """Under the timing model that decides, at the profile's period."""
-    after_reset: CapacityFigures | None
+    after_reset: FitFigures | None
     """After a bus reset, where it is shown to fit as it is set and not then."""
     safe: SafeAxes
     """At the profile's period."""
     smallest: SmallestPeriod
-    circle: CircleAtSmallest | None
-    """None if no circle was to be run, or no period is shown to fit."""
     curve: tuple[SafeAxes, ...]
     """The most axes over the period."""
 
     @property
+    def profile(self) -> Profile:
+        """The profile of the network."""
+        profile: Profile = self.network.profile
+        return profile
+
+    @property
     def assumed_host(self) -> tuple[AssumedKey, ...]:
         """Assumptions about the host's own time, of its own profile, too; with any it has no rank."""
-        key = kind_named(self.profile.bus.kind).key_of("host")
+        key = self.network.bus.key_of("host")
         inputs = [given(self.profile, key)] if self.is_own and key else []
         own = (
             AssumedKey(known.name, known.value, "profile")
@@ -99,10 +86,15 @@ class NotOnKind(NamedTuple):
 class KindComparison(NamedTuple):
     """Answer of `compare`."""
 
-    profile: Profile
+    network: Network
     kinds: tuple[MachineOnKind | NotOnKind, ...]
     """In the order asked for; of all, the profile's own first."""
-    with_circle: bool
+
+    @property
+    def profile(self) -> Profile:
+        """The profile of the network."""
+        profile: Profile = self.network.profile
+        return profile
 
     @property
     def compared(self) -> tuple[MachineOnKind, ...]:
@@ -138,82 +130,70 @@ def checked_kinds(names: Sequence[str], *, option: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def compare(
-    profile: Profile,
-    *,
-    kinds: Sequence[str] | None = None,
-    with_circle: bool = False,
-    progress: Progress | None = None,
-) -> KindComparison:
-    """Put the machine of a profile on several kinds of bus.
+def compare(network: Network, *, kinds: Sequence[str] | None = None) -> KindComparison:
+    """Put the machine of a network on several kinds of bus.
 
     Parameters
     ----------
-    profile
-        The profile; on its own kind it stays as it is.
+    network
+        The network; on its own kind it stays as it is.
     kinds
-        Names of kinds, from `checked_kinds`; all without it, the profile's own first.
-    with_circle
-        Run the circle test of each kind at its smallest period.
-    progress
-        Called now and then with the parts of all circle tests that are done, and all of them.
+        Names of kinds, from `checked_kinds`; all without it, the network's own first.
     """
-    own = profile.bus.kind
+    own = network.bus.kind
     names = tuple(kinds) if kinds is not None else (own, *(kind for kind in kind_names() if kind != own))
-    machines = [_on_kind(profile, name) for name in names]
-    periods_us = _curve_periods(
-        profile, [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
-    )
-    machines = [
-        machine if isinstance(machine, NotOnKind) else machine._replace(curve=_curve(machine, periods_us))
-        for machine in machines
-    ]
-    if with_circle:
-        run = circle_tests(progress, of=len(machines))
-        machines = [
-            machine if isinstance(machine, NotOnKind) else machine._replace(circle=_circle(machine, run))
+    machines = [_on_kind(network, name) for name in names]
+    smallest = [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
+    periods_us = _curve_periods(network.profile.cycle.period_us, smallest)
+    return KindComparison(
+        network,
+        tuple(
+            machine if isinstance(machine, NotOnKind) else machine._replace(curve=_curve(machine, periods_us))
             for machine in machines
-        ]
-    return KindComparison(profile, tuple(machines), with_circle)
+        ),
+    )
 
 
-def _on_kind(profile: Profile, kind: str) -> MachineOnKind | NotOnKind:
+def _on_kind(network: Network, kind: str) -> MachineOnKind | NotOnKind:
     try:
-        conversion = converted(profile, kind)
+        conversion = converted(network.profile, kind)
     except BusplanError as error:
         return NotOnKind(kind, error.problems)
-    needed = {} if kind == profile.bus.kind else needed_settings(conversion.profile)
+    on_kind, assumed = network_of(conversion.profile), conversion.assumed
+    is_own = kind == network.bus.kind
+    needed = {} if is_own else settings_to_be_carried(on_kind)
     if needed:
-        assumed = (assumed for assumed in conversion.assumed if assumed.key not in needed)
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
-        conversion = conversion._replace(profile=override(conversion.profile, dict(needed)), assumed=(*tried, *assumed))
-    capacity = figures(conversion.profile, model=kind_named(kind).deciding_model)
+        assumed = (*tried, *(each for each in assumed if each.key not in needed))
+        on_kind = changed(on_kind, needed)
+    rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
+    capacity = figures(on_kind, model=on_kind.bus.deciding_model)
     return MachineOnKind(
-        profile=conversion.profile,
-        is_own=kind == profile.bus.kind,
-        assumed=conversion.assumed,
+        network=on_kind,
+        is_own=is_own,
+        assumed=tuple(rates) if is_own else assumed,
         left_out=conversion.left_out,
         figures=capacity,
-        after_reset=after_reset(conversion.profile, capacity),
-        safe=most_safe_axes(conversion.profile),
-        smallest=smallest_period(conversion.profile),
-        circle=None,
+        after_reset=after_reset(on_kind, capacity),
+        safe=most_safe_axes(on_kind),
+        smallest=smallest_period(on_kind, with_limits=False),
         curve=(),
     )
 
 
-def most_safe_axes(profile: Profile) -> SafeAxes:
-    """Count the most axes that are shown to fit a profile's period, on a bus that is set safely for them.
+def most_safe_axes(network: Network) -> SafeAxes:
+    """Count the most axes that are shown to fit a network's period, on a bus that is set safely for them.
 
     Where nodes are in groups, the one with the most axes gets more nodes and the others stay.
 
     Parameters
     ----------
-    profile
+    network
         The network.
     """
+    profile = network.profile
     varied = varied_nodes(profile)
-    nodes, limit = safe_nodes(profile, group=varied.name)
+    nodes, limit = safe_nodes(network, group=varied.name)
     node_axes = int(varied.node.axes)
     axes_beside = sum(
         int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name
@@ -222,9 +202,8 @@ def most_safe_axes(profile: Profile) -> SafeAxes:
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
 
 
-def _curve_periods(profile: Profile, smallest_us: Sequence[float | None]) -> tuple[float, ...]:
-    """Periods about the smallest ones and the profile's own, which is among them [us]."""
-    own_us = profile.cycle.period_us
+def _curve_periods(own_us: float, smallest_us: Sequence[float | None]) -> tuple[float, ...]:
+    """Periods about the smallest ones and the machine's own, which is among them [us]."""
     marks_us = [own_us, *(us for us in smallest_us if us is not None)]
     first, last = floor(log2(min(marks_us) / _ROUND_US)) - 1, ceil(log2(max(marks_us) / _ROUND_US)) + 1
     every = ceil((last - first + 1) / _MOST_POINTS)
@@ -233,19 +212,7 @@ def _curve_periods(profile: Profile, smallest_us: Sequence[float | None]) -> tup
 
 
 def _curve(machine: MachineOnKind, periods_us: Sequence[float]) -> tuple[SafeAxes, ...]:
-    return tuple(most_safe_axes(override(machine.profile, {PERIOD: period_us})) for period_us in periods_us)
-
-
-def _circle(machine: MachineOnKind, run: ComputeCircleFigures) -> CircleAtSmallest | None:
-    """The circle at the smallest period, in steps that divide it."""
-    if machine.smallest.us is None:
-        return None
-    step_us = dividing_step_us(machine.smallest.us, most_us=machine.profile.servo.step_us)
-    try:
-        result = run(override(machine.profile, {PERIOD: machine.smallest.us, STEP: step_us}))
-    except BusplanError as error:
-        return CircleAtSmallest(step_us, None, error.problems)
-    return CircleAtSmallest(step_us, result, tuple(failure.text for failure in result.failures))
+    return tuple(most_safe_axes(at_period(machine.network, period_us)) for period_us in periods_us)
 
 
 def fitting(comparison: KindComparison) -> Iterator[MachineOnKind]:

@@ -1,12 +1,12 @@
 """Answer of `busplan compare`: its blocks, and its document."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Final
 
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.figure import SAFE_AXES, VERDICT
+from busplan.buses.network import Network
 from busplan.buses.published import parts_tested
 from busplan.elementwise import plain
 from busplan.forms.blocks import (
@@ -33,7 +33,6 @@ from busplan.profile.conversion import AssumedKey
 from busplan.profile.write import short_text
 from busplan.questions.compare.drawing import CAPTION, compare_drawing
 from busplan.questions.compare.kinds import (
-    CircleAtSmallest,
     KindComparison,
     MachineOnKind,
     NotOnKind,
@@ -41,22 +40,19 @@ from busplan.questions.compare.kinds import (
     fitting,
 )
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
-from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.words.documents import document, fields, parts_by, with_profile
-from busplan.questions.words.sentences import evidence_sentence, execution_sentence, refused_circle, reset_sentence
-from busplan.sections.profile import Profile
+from busplan.questions.words.sentences import evidence_sentence, execution_sentence, reset_sentence
 
 _FIGURES = (
-    *("timing_model", "verdict", "safe", "exceeded", "not_shown", "circle_refused_by", "available_us", "required_us"),
+    *("timing_model", "verdict", "safe", "exceeded", "not_shown", "available_us", "required_us"),
     *("bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
 )
 _SAFE = ("safe_nodes", "safe_axes", "safe_limited_by")
-_MEASURES = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
 
 
 def compare_document(comparison: KindComparison) -> JsonDocument:
     """Document of `busplan compare --format json`."""
-    network = network_of(comparison.profile)
+    network = comparison.network
     return document(
         "compare",
         profile=comparison.profile.name,
@@ -65,45 +61,38 @@ def compare_document(comparison: KindComparison) -> JsonDocument:
         nodes=int(plain(network.nodes)),
         axes=int(plain(network.axes)),
         counted_group=comparison.counted or None,
-        with_circle=comparison.with_circle,
         buses=[_bus_record(machine) for machine in comparison.kinds],
     )
 
 
 def compare_records(comparison: KindComparison) -> list[Record]:
-    """One row for each kind, for CSV: of the lists the keys, of the circle what was decided."""
+    """One row for each kind, for CSV: of the lists the keys."""
     return with_profile(comparison.profile.name, [_flat(record) for record in map(_bus_record, comparison.kinds)])
 
 
 def _flat(record: Record) -> Record:
-    circle = record["circle"] or {"passed": None, "step_us": None}
-    flat = {key: value for key, value in record.items() if key not in {"circle", "curve", "assumed"}}
+    flat = {key: value for key, value in record.items() if key not in {"curve", "assumed"}}
     return {
         **flat,
         **{key: [row["part"] for row in record[key]] for key in ("set_by", "tested")},
         "assumed": [row["key"] for row in record["assumed"]],
-        "circle_passed": circle["passed"],
-        "circle_step_us": circle["step_us"],
     }
 
 
 def _bus_record(machine: MachineOnKind | NotOnKind) -> Record:
     """A kind of bus as plain data; what a kind that cannot have the machine lacks is null."""
     if isinstance(machine, NotOnKind):
-        empty: Record = dict.fromkeys(
-            (*_FIGURES, "verdict_after_reset", *_SAFE, "smallest_period_us", "no_period", "circle")
-        )
+        empty: Record = dict.fromkeys((*_FIGURES, "verdict_after_reset", *_SAFE, "smallest_period_us", "no_period"))
         lists: Record = {"assumed": [], "assumed_host": [], "left_out": [], "curve": []}
         return {**_head(machine.kind, is_own=False, why_not=list(machine.why)), **empty, **lists}
-    bus = bus_of(machine.profile)
+    bus = machine.network.bus
     return {
         **_head(bus.kind, is_own=machine.is_own, why_not=[]),
         **fields(machine.figures, *_FIGURES),
         "verdict_after_reset": None if machine.after_reset is None else machine.after_reset.verdict,
         **_safe_record(machine.safe),
         "smallest_period_us": machine.smallest.us,
-        "no_period": machine.smallest.why or None,
-        "circle": None if machine.circle is None else _circle_record(machine.circle),
+        "no_period": None if machine.smallest.us else machine.smallest.need.why,
         "assumed": [fields(assumed, *assumed._fields) for assumed in machine.assumed],
         "assumed_host": [assumed.key for assumed in machine.assumed_host],
         "left_out": list(machine.left_out),
@@ -127,16 +116,6 @@ def _safe_record(safe: SafeAxes) -> Record:
     return dict(zip(_SAFE, (safe.nodes, safe.axes, safe.limited_by), strict=True))
 
 
-def _circle_record(circle: CircleAtSmallest) -> Record:
-    figures = circle.figures
-    return {
-        "step_us": circle.step_us,
-        "passed": False if figures is None else figures.passed,
-        **fields(figures, *_MEASURES),
-        "problems": list(circle.problems),
-    }
-
-
 def notes(comparison: KindComparison) -> Iterator[Sentence]:
     """Say of each kind what stands in the way and what nobody has tested, and what of the profile is left out.
 
@@ -152,13 +131,12 @@ def notes(comparison: KindComparison) -> Iterator[Sentence]:
         else:
             said = [
                 *_obstacles(machine),
-                *reset_sentence(machine.after_reset, machine.profile),
-                *_circle_problems(machine),
+                *reset_sentence(machine.after_reset, machine.network),
             ]
-            said += _execution(machine, comparison.profile)
-            said += evidence_sentence(bus_of(machine.profile))
+            said += _execution(machine, comparison.network)
+            said += evidence_sentence(machine.network.bus)
             if said:
-                yield joined(Sentence((f"{bus_of(machine.profile).title}:",)), *said)
+                yield joined(Sentence((f"{machine.network.bus.title}:",)), *said)
     yield from _left_out(comparison)
 
 
@@ -167,7 +145,7 @@ def _left_out(comparison: KindComparison) -> Iterator[Sentence]:
     titles: dict[tuple[str, ...], list[str]] = {}
     for machine in comparison.compared:
         if machine.left_out:
-            titles.setdefault(machine.left_out, []).append(bus_of(machine.profile).title)
+            titles.setdefault(machine.left_out, []).append(machine.network.bus.title)
     for left_out, names in titles.items():
         keys = joined(*(Sentence((Code(key),)) for key in left_out), by=", ")
         rates = " Data at a slower rate go in every cycle there." if any(map(_is_rate, left_out)) else ""
@@ -181,28 +159,21 @@ def _is_rate(key: str) -> bool:
 
 def _obstacles(machine: MachineOnKind) -> Iterator[Sentence]:
     """The limits that are broken, and why no period is shown to fit."""
-    bus, network = bus_of(machine.profile), network_of(machine.profile)
+    bus, network = machine.network.bus, machine.network
     broken = [limit.words(network) for limit in map(bus.limit, limits_behind(machine.figures)) if limit]
     if broken:
         yield Sentence((f"At {period(machine.figures.period_us)} {'; '.join(broken)}.",))
     if machine.smallest.us is None:
-        yield Sentence((f"No period is shown to fit: {machine.smallest.why}.",))
+        yield Sentence((f"No period is shown to fit: {machine.smallest.need.why}.",))
 
 
-def _circle_problems(machine: MachineOnKind) -> Iterator[Sentence]:
-    """Why the circle fails or cannot be run."""
-    if machine.circle is not None and machine.circle.problems:
-        at = f"{machine.smallest.us:.3f} us"
-        yield Sentence((f"The circle at {at}: {', and '.join(machine.circle.problems)}.",))
-
-
-def _execution(machine: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
+def _execution(machine: MachineOnKind, network: Network) -> Iterator[Sentence]:
     """Meaning of the profile's execution times on other kinds."""
-    bus, own = bus_of(machine.profile), bus_of(profile)
-    owns_any = own.has_execution(network_of(profile))
+    bus, own = machine.network.bus, network.bus
+    owns_any = own.has_execution(network)
     if machine.is_own:
         return
-    if not bus.has_execution(network_of(machine.profile)):
+    if not bus.has_execution(machine.network):
         if owns_any:
             yield Sentence(("No execution time is in its cycle.",))
         return
@@ -222,15 +193,6 @@ _COLUMNS: Final = (
     TableColumn("limited by", kind="words", group="safe axes", rank=3, leaves="below", wraps=True),
     TableColumn("assumed", kind="words", rank=2, leaves="below", wraps=True),
 )
-_CIRCLE: Final = (
-    TableColumn("", kind="words", group="circle"),
-    TableColumn("step", "us", group="circle"),
-)
-_CIRCLE_WORDS: Final = {
-    True: Words("PASSED", "passes"),
-    False: Words("FAILED", "fails"),
-    None: Words("NOT JUDGED", "warns"),
-}
 _ASSUMED: Final = (
     TableColumn("bus", kind="words"),
     TableColumn("key", kind="words", wraps=True),
@@ -243,15 +205,14 @@ def compare_report(comparison: KindComparison) -> Report:
     """Report of `compare`."""
     return Report(
         Sentence((Code(comparison.profile.name), " on each kind of bus")),
-        lambda: tuple(_blocks(comparison)),
-        partial(compare_document, comparison),
-        lambda: compare_records(comparison),
+        tuple(_blocks(comparison)),
+        compare_document(comparison),
+        compare_records(comparison),
     )
 
 
 def _blocks(comparison: KindComparison) -> Iterator[Block]:
     """How many kinds carry the machine, their figures, the picture, and what each rests on."""
-    yield from refused_circle(comparison.profile)
     yield headline(comparison)
     yield from _best(comparison)
     yield from _remarks(comparison)
@@ -259,14 +220,14 @@ def _blocks(comparison: KindComparison) -> Iterator[Block]:
     if comparison.compared:
         yield compare_chart(comparison)
     yield from notes(comparison)
-    yield from execution_sentence(comparison.profile)
+    yield from execution_sentence(comparison.network)
     if any(machine.assumed for machine in comparison.compared):
         yield assumed_table(comparison)
 
 
 def headline(comparison: KindComparison) -> Sentence:
     """Say on how many kinds of bus the machine is shown to fit its period, and on which."""
-    carrying = [bus_of(machine.profile).title for machine in fitting(comparison)]
+    carrying = [machine.network.bus.title for machine in fitting(comparison)]
     of = len(comparison.kinds)
     where = f": {', '.join(carrying)}" if carrying else ""
     return sentence(
@@ -286,17 +247,17 @@ def _best(comparison: KindComparison) -> Iterator[Sentence]:
     if shortest:
         us, machine = min(shortest, key=lambda each: each[0])
         value = ShownValue(us, "smallest_period_us", "us", 3)
-        yield sentence(f"The smallest period is {{}} on {bus_of(machine.profile).title}.", value)
+        yield sentence(f"The smallest period is {{}} on {machine.network.bus.title}.", value)
     most = [(machine.safe.axes, machine) for machine in ranked if machine.safe.axes]
     if most:
         axes, machine = max(most, key=lambda each: each[0])
         yield sentence(
-            f"The most axes at {{}} are {{}} on {bus_of(machine.profile).title}.",
+            f"The most axes at {{}} are {{}} on {machine.network.bus.title}.",
             period_value(comparison.profile.cycle.period_us),
             count_value(axes, SAFE_AXES.key),
         )
     unranked = [
-        f"{bus_of(machine.profile).title} ({_words(machine.assumed_host)})"
+        f"{machine.network.bus.title} ({_words(machine.assumed_host)})"
         for machine in comparison.compared
         if machine.assumed_host
     ]
@@ -310,8 +271,8 @@ def _words(assumed: Sequence[AssumedKey]) -> str:
 
 
 def _assumed(machine: MachineOnKind) -> str:
-    """Values that a kind takes from a new profile, with the number of its defaults."""
-    new = [assumed for assumed in machine.assumed if assumed.source == "new profile"]
+    """Values that a kind takes from a new profile or its own, with the number of its defaults."""
+    new = [assumed for assumed in machine.assumed if assumed.source in ("new profile", "profile")]
     defaults = len(machine.assumed) - len(new)
     return ", ".join(filter(None, (_words(new), f"{defaults} {nouns(defaults, 'default')}" if defaults else ""))) or "-"
 
@@ -335,46 +296,33 @@ def kinds_table(comparison: KindComparison) -> Table:
     comparison
         The comparison.
     """
-    columns = (*_COLUMNS, *(_CIRCLE if comparison.with_circle else ()))
-    rows = (_row(machine, columns=len(columns), with_circle=comparison.with_circle) for machine in comparison.kinds)
-    circle = " and its circle at the smallest period" if comparison.with_circle else ""
-    return Table(columns, tuple(rows), Sentence((f"The machine on each kind of bus{circle}",)))
+    return Table(_COLUMNS, tuple(map(_row, comparison.kinds)), Sentence(("The machine on each kind of bus",)))
 
 
-def _row(machine: MachineOnKind | NotOnKind, *, columns: int, with_circle: bool) -> TableRow:
+def _row(machine: MachineOnKind | NotOnKind) -> TableRow:
     if isinstance(machine, NotOnKind):
-        empty = (ShownValue(None),) * (columns - 2)
+        empty = (ShownValue(None),) * (len(_COLUMNS) - 2)
         return TableRow((kind_named(machine.kind).title, Words("not compared", "warns"), *empty))
     figures = machine.figures
     cells: tuple[Cell, ...] = (
-        f"{bus_of(machine.profile).title}{', as it is' if machine.is_own else ''}",
+        f"{machine.network.bus.title}{', as it is' if machine.is_own else ''}",
         _verdict(machine),
         *(ShownValue(getattr(figures, key), key, "us", 3) for key in ("margin_corrected_us", "uncertainty_us")),
-        bus_of(machine.profile).figures.term_label(figures.binding_term),
+        machine.network.bus.figures.term_label(figures.binding_term),
         ShownValue(machine.smallest.us, "smallest_period_us", "us", 3),
         ShownValue(machine.safe.axes, SAFE_AXES.key),
         machine.safe.limited_by,
         _assumed(machine),
     )
-    return TableRow((*cells, *(_circle(machine) if with_circle else ())))
+    return TableRow(cells)
 
 
 def _verdict(machine: MachineOnKind) -> Words:
     figures = machine.figures
     is_unsafe = not figures.safe and figures.verdict != DOES_NOT_FIT
-    unsafe = f", unsafe {bus_of(machine.profile).safety.setting}" if is_unsafe else ""
-    refused = ", circle cannot be run" if figures.circle_refused_by else ""
-    is_well = figures.verdict == FITS and figures.safe and not refused
-    return Words(f"{figures.verdict}{unsafe}{refused}", state_of(is_well))
-
-
-def _circle(machine: MachineOnKind) -> tuple[Cell, ...]:
-    if machine.circle is None:
-        return Words("NOT RUN", "warns"), ShownValue(None, "step_us", "us")
-    step = ShownValue(machine.circle.step_us, "step_us", "us", 3)
-    if machine.circle.figures is None:
-        return Words("NOT RUN", "warns"), step
-    return _CIRCLE_WORDS[machine.circle.figures.passed], step
+    unsafe = f", unsafe {machine.network.bus.safety.setting}" if is_unsafe else ""
+    is_well = figures.verdict == FITS and figures.safe
+    return Words(f"{figures.verdict}{unsafe}", state_of(is_well))
 
 
 def compare_chart(comparison: KindComparison) -> Chart:
@@ -383,7 +331,7 @@ def compare_chart(comparison: KindComparison) -> Chart:
 
 
 def assumed_table(comparison: KindComparison) -> Table:
-    """Values that each kind needs and the machine does not give; defaults are details.
+    """Values that each kind needs and nobody knows; defaults are details.
 
     Parameters
     ----------
@@ -392,11 +340,11 @@ def assumed_table(comparison: KindComparison) -> Table:
     """
     rows = [
         TableRow(
-            (bus_of(machine.profile).title, Code(assumed.key), short_text(assumed.value), assumed.source),
+            (machine.network.bus.title, Code(assumed.key), short_text(assumed.value), assumed.source),
             is_detail=assumed.source == "default",
         )
         for machine in comparison.compared
         for assumed in machine.assumed
     ]
-    words = "Assumed, as a new profile of the kind has it or by default, until somebody knows better"
+    words = "Assumed, by the profile, as a new profile of the kind has it or by default, until somebody knows better"
     return Table(_ASSUMED, tuple(rows), Sentence((words,)))

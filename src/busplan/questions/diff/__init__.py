@@ -1,18 +1,90 @@
-"""`busplan.diff`."""
+"""`busplan.diff`: the keys that differ between two profiles, and what that does to every figure."""
 
 import os
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isclose, isfinite
+from typing import Any, Final, Literal, TypeAlias, TypeGuard
 
+from busplan.buses import figure as known
+from busplan.buses.bus import Bus
+from busplan.buses.figure import Figure, by_key
+from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
+from busplan.profile.keys import KeyValue, dotted_keys
 from busplan.profile.revision import load_revision
-from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, ProfileLike, argument, checked_models, finite, load_profile
-from busplan.questions.circle.check import circle_tests
-from busplan.questions.diff import difference as analysis
-from busplan.questions.diff.difference import CircleSide, ComparedFigure, Difference, KeyDifference
+from busplan.questions.base.inputs import Models, ProfileLike, argument, checked_models, finite, load_network
+from busplan.questions.fit.certainty import VERDICTS, VerdictWord
+from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.network import model_names, network_of
+from busplan.questions.plan.needs import missed_limits
 from busplan.sections.profile import Profile
+
+Judgement = Literal["better", "worse", "same", "neutral"]
+
+ROUNDING: Final = 1e-9
+"""Relative difference that float rounding can cause; figures that differ by less are the same."""
+_Figures: TypeAlias = Mapping[str, Any]
+"""Figures by key."""
+
+
+@dataclass(frozen=True)
+class KeyDifference:
+    """A key whose values differ; None for a profile without the key."""
+
+    key: str
+    a: KeyValue | None
+    b: KeyValue | None
+
+
+@dataclass(frozen=True)
+class ComparedFigure:
+    """One figure of both profiles. A value that does not exist is None."""
+
+    part: str
+    """"plan" under the timing models that decide, or the name of a timing model."""
+    figure: Figure
+    a: Any
+    b: Any
+    judgement: Judgement
+    """B compared with A."""
+    difference: float | None
+    """B minus A; None unless both are numbers."""
+    relative_difference: float | None
+    """`difference` as a share of the absolute value of A; None if that is meaningless."""
+
+    def is_regression(self, *, tolerance: float) -> bool:
+        """Whether B is worse by more than a share of A; without numbers, whether it is worse at all."""
+        if self.judgement != "worse" or self.difference is None:
+            return self.judgement == "worse"
+        allowed: float = tolerance * abs(self.a) * (1 + ROUNDING)
+        return abs(self.difference) > allowed
+
+
+@dataclass(frozen=True)
+class DiffSide:
+    """One of the two profiles."""
+
+    argument: str
+    """As it was given; the name of a `Profile`."""
+    network: Network
+    deciding: CapacityFigures
+    """Figures of the timing model that decides."""
+    missed_limits: tuple[str, ...]
+    """Keys of [limits] that are not kept."""
+
+    @property
+    def profile(self) -> Profile:
+        """The profile."""
+        profile: Profile = self.network.profile
+        return profile
+
+    @property
+    def verdict(self) -> VerdictWord | None:
+        """The verdict of the timing model that decides."""
+        return self.deciding.verdict
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -22,28 +94,26 @@ class DiffAnswer(Answer):
     Parameters
     ----------
     a, b
-        The profiles; B is judged against A.
+        The profiles with their verdicts; B is judged against A.
     keys
         The keys whose values differ, defaults applied.
     figures
         Every figure of both, with B - A and its `judgement`: "better", "worse", "same" or "neutral".
-    circles
-        Circle tests of A and B; None if neither asks for one, or none was to be run.
-    arguments
-        Names of A and B in the report: as they were given, and the name of a `Profile`.
     """
 
-    a: Profile
-    b: Profile
+    a: DiffSide
+    b: DiffSide
     keys: tuple[KeyDifference, ...]
     figures: tuple[ComparedFigure, ...]
-    circles: tuple[CircleSide, CircleSide] | None
-    arguments: tuple[str, str]
 
     @property
     def same(self) -> bool:
         """Whether no key differs."""
         return not self.keys
+
+    def judged(self, judgement: Judgement) -> tuple[ComparedFigure, ...]:
+        """The figures with one judgement, in order."""
+        return tuple(figure for figure in self.figures if figure.judgement == judgement)
 
     def regressions(self, *, tolerance_percent: float = 0.0) -> tuple[ComparedFigure, ...]:
         """List the figures of B that are worse: those that `--fail-on-regression` fails for.
@@ -61,35 +131,19 @@ class DiffAnswer(Answer):
         allowed = finite(tolerance_percent, name="tolerance_percent")
         if allowed < 0:
             raise BusplanError(f"tolerance_percent {allowed:g}: must be 0 or more")
-        return tuple(self._found.regressions(tolerance=allowed / 100))
+        return tuple(figure for figure in self.figures if figure.is_regression(tolerance=allowed / 100))
 
     def regression_words(self, *, tolerance_percent: float = 0.0) -> str:
-        """Name the figures of B that are worse, in a sentence; empty if there are none.
-
-        Parameters
-        ----------
-        tolerance_percent
-            As for `regressions` [%].
-
-        Raises
-        ------
-        BusplanError
-            As for `regressions`.
-        """
+        """Name the `regressions` in a sentence; empty if there are none."""
         from busplan.questions.diff.report import regression_words
 
-        worse = self.regressions(tolerance_percent=tolerance_percent)
-        return regression_words(self._found, worse, tolerance=tolerance_percent) if worse else ""
+        return regression_words(self, tolerance_percent=tolerance_percent)
 
     def report(self) -> Report:
         """The answer in blocks."""
         from busplan.questions.diff.report import diff_report
 
-        return diff_report(self._found, arguments=self.arguments)
-
-    @property
-    def _found(self) -> Difference:
-        return Difference(self.a, self.b, self.keys, self.figures, self.circles)
+        return diff_report(self)
 
 
 def diff(
@@ -97,8 +151,6 @@ def diff(
     b: ProfileLike,
     *,
     timing_model: Models | None = None,
-    circle: bool = True,
-    progress: Progress | None = None,
     arguments: tuple[str, str] | None = None,
 ) -> DiffAnswer:
     """Tell what changed between two profiles, and what that does to every figure.
@@ -109,19 +161,15 @@ def diff(
         The profile to compare with, and the one to judge: a `Profile`, a path, a shipped name, or REV:path for a file
         of a git revision, as "HEAD~1:profiles/line.toml".
     timing_model
-        Name of a timing model, or several; by default all of the kind of bus. The verdict is always that of the
-        model that decides.
-    circle
-        Run both circle tests if either profile asks for one.
-    progress
-        Called from time to time with the steps simulated and the steps known to be needed.
+        Name of a timing model, or several; by default all that can express both profiles. The verdict is always that
+        of the model that decides.
     arguments
         Names of A and B in the report; by default as they are given, and the name of a `Profile`.
 
     Returns
     -------
     DiffAnswer
-        Its `figures` have the unit in their key: times are in us, contour errors in mm, shares 0..1.
+        Its `figures` have the unit in their key: times are in us, shares 0..1.
 
     Raises
     ------
@@ -131,37 +179,164 @@ def diff(
     Examples
     --------
     >>> import busplan
-    >>> answer = busplan.diff("paper-1ms", "paper-optimal-gap", timing_model="standard", circle=False)
+    >>> answer = busplan.diff("paper-1ms", "paper-optimal-gap", timing_model="standard")
     >>> [(change.a.value, change.b.value) for change in answer.keys if change.key == "bus.gap_count"]
     [(63, 'optimal')]
     >>> [round(row.difference, 3) for row in answer.figures if row.figure.key == "margin_us"]
     [75.195]
-    >>> answer.regressions()
-    ()
+    >>> answer.a.verdict, answer.b.verdict, answer.regressions()
+    ('fits', 'fits', ())
     """
-    (given_a, profile_a), (given_b, profile_b) = _given(a), _given(b)
-    difference = analysis.difference(
-        profile_a,
-        profile_b,
-        timing_models=None if timing_model is None else _models(timing_model, profile_a, profile_b),
-        circle=circle_tests(progress) if circle else None,
+    (name_a, network_a), (name_b, network_b) = _given(a), _given(b)
+    names = arguments or (name_a, name_b)
+    models = model_names(network_a)
+    if timing_model is not None:
+        models = _models(timing_model, network_a, network_b)
+    elif network_a.bus is network_b.bus:
+        models = tuple(model for model in models if model in model_names(network_b))
+    side_a, side_b = (_side(name, at) for name, at in zip(names, (network_a, network_b), strict=True))
+    return DiffAnswer(
+        side_a,
+        side_b,
+        tuple(_keys(side_a.profile, side_b.profile)),
+        tuple(_figures(side_a, side_b, models)),
     )
-    return DiffAnswer(*difference, arguments=arguments or (given_a, given_b))
 
 
-def _given(side: ProfileLike) -> tuple[str, Profile]:
-    """One side as it was given, and its profile."""
+def _given(side: ProfileLike) -> tuple[str, Network]:
+    """One side as it was given, and its network."""
     if isinstance(side, Profile):
-        return side.name, side
-    profile = load_revision(argument(side)).profile if isinstance(side, str) else load_profile(side)
-    return os.fspath(side), profile
+        return side.name, network_of(side)
+    return os.fspath(side), network_of(load_revision(argument(side)).profile) if isinstance(
+        side, str
+    ) else load_network(side)
 
 
-def _models(timing_model: Models, a: Profile, b: Profile) -> tuple[str, ...]:
-    if a.bus.kind != b.bus.kind:
+def _models(timing_model: Models, a: Network, b: Network) -> tuple[str, ...]:
+    if a.bus is not b.bus:
         raise BusplanError(
             f"timing_model {timing_model}: the kinds of bus, {a.bus.kind} and {b.bus.kind}, have no timing "
             "model in common; leave it out"
         )
     checked_models(timing_model, b)  # refuses a model that cannot express this one
     return checked_models(timing_model, a)
+
+
+def _side(name: str, network: Network) -> DiffSide:
+    deciding = capacity_figures(network, model=network.bus.deciding_model)
+    return DiffSide(name, network, deciding, tuple(need.key for need in missed_limits(network)))
+
+
+def _keys(a: Profile, b: Profile) -> Iterator[KeyDifference]:
+    of_a, of_b = dotted_keys(a), dotted_keys(b)
+    for key in dict.fromkeys((*of_a, *of_b)):
+        value_a, value_b = of_a.get(key), of_b.get(key)
+        if value_a is None or value_b is None or value_a.value != value_b.value:
+            yield KeyDifference(key, value_a, value_b)
+
+
+def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
+    """Figures of the plan: the verdict of the model that decides, and what all models share.
+
+    A longer period or one more node is a choice, neither good nor bad by itself. Nor are the bias and the uncertainty:
+    the corrected margin and the smallest safe period have them.
+    """
+    setup = by_key(figure for bus in buses for figure in bus.figures.setup)
+    return (
+        *(known.TIMING_MODEL, known.VERDICT, known.PERIOD, known.NODES, known.AXES),
+        *setup.values(),
+        *(known.AVAILABLE, known.TIME_SLICE),
+        *(known.MARGIN_CORRECTED, known.UNCERTAINTY, known.BIAS, known.SAFE_NODES, known.SAFE_AXES),
+        *(known.SAFE_LIMITED_BY, known.SAFE_MIN_PERIOD),
+    )
+
+
+def cycle_figures(*buses: Bus) -> tuple[Figure, ...]:
+    """Figures of the cycle under one timing model.
+
+    A single term is neither good nor bad: only their sum counts.
+    """
+    own = by_key(figure for bus in buses for figure in bus.figures.compared)
+    terms = by_key(figure._replace(better="neither") for bus in buses for figure in bus.figures.terms)
+    return (
+        *(known.FITS, known.MARGIN, known.UTILISATION, known.REQUIRED),
+        *terms.values(),
+        *(known.MAX_NODES, known.MAX_AXES, known.LIMITED_BY, known.MIN_PERIOD),
+        *own.values(),
+        known.BINDING_TERM,
+    )
+
+
+def _figures(a: DiffSide, b: DiffSide, models: Sequence[str]) -> Iterator[ComparedFigure]:
+    buses = (a.network.bus, b.network.bus)
+    groups = tuple(dict.fromkeys(group.name for side in (a, b) for group in side.profile.group))
+    plan = (*plan_figures(*buses), *_of_groups(groups, known.SAFE_NODES))
+    yield from _compared("plan", plan, a.deciding, b.deciding)
+    cycle = (*cycle_figures(*buses), *_of_groups(groups, known.MAX_NODES))
+    if buses[0] is not buses[1]:
+        yield from _compared("deciding", cycle, a.deciding, b.deciding)
+        return
+    for model in models:
+        yield from _compared(model, cycle, *(capacity_figures(side.network, model=model) for side in (a, b)))
+
+
+def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:
+    """A figure that each group has for itself."""
+    for name in names:
+        yield figure._replace(key=f"group.{name}.{figure.key}", label=f"{figure.label} of {name}")
+
+
+def _by_key(figures: CapacityFigures) -> _Figures:
+    """Figures of one profile by key, those of its groups among them."""
+    keys = (known.SAFE_NODES.key, known.MAX_NODES.key)
+    groups = {f"group.{group.name}.{key}": getattr(group, key) for group in figures.groups for key in keys}
+    return {**figures.values(), **groups}
+
+
+def _compared(
+    part: str, measures: Sequence[Figure], of_a: CapacityFigures, of_b: CapacityFigures
+) -> Iterator[ComparedFigure]:
+    a, b = _by_key(of_a), _by_key(of_b)
+    for measure in measures:
+        value_a, value_b = a.get(measure.key), b.get(measure.key)
+        noise = 0.0 if measure.scale is None else ROUNDING * max(side.get(measure.scale) or 0.0 for side in (a, b))
+        change = value_b - value_a if _is_number(value_a) and _is_number(value_b) else None
+        yield ComparedFigure(
+            part=part,
+            figure=measure,
+            a=value_a,
+            b=value_b,
+            judgement=_judgement(measure, value_a, value_b, noise=noise),
+            difference=change,
+            relative_difference=_share(change, value_a, noise=noise) if measure.relative else None,
+        )
+
+
+def _judgement(measure: Figure, a: Any, b: Any, *, noise: float) -> Judgement:
+    rank_a, rank_b = _rank(measure, a), _rank(measure, b)
+    if rank_a is None or rank_b is None:
+        return "same" if a == b else "neutral"
+    if isclose(rank_a, rank_b, rel_tol=ROUNDING, abs_tol=noise):
+        return "same"
+    if measure.better == "neither":
+        return "neutral"
+    return "better" if (rank_b > rank_a) == (measure.better == "more") else "worse"
+
+
+def _rank(measure: Figure, value: Any) -> float | None:
+    """A figure as a number that ranks it; None if it has no rank. True ranks above False."""
+    if measure.key == known.VERDICT.key and value is not None:
+        return -float(VERDICTS.index(value))
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _share(change: float | None, of: Any, *, noise: float) -> float | None:
+    """A change as a share of the absolute value of a figure; None if that value is only rounding."""
+    if change is None or abs(of) <= noise:
+        return None
+    share = change / abs(of)
+    return share if isfinite(share) else None
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,7 +1,6 @@
 """Report of `evidence`, and of `paper`, which is the part of the paper."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Final
 
 from busplan.buses import kind_named
@@ -44,9 +43,9 @@ def evidence_report(kinds: Sequence[KindEvidence], *, paper: bool = False) -> Re
     title = "Published figures beside" if paper else "What others have published or measured, beside"
     return Report(
         Sentence((f"{title} computed {'ones' if paper else 'figures'}",)),
-        lambda: tuple(_blocks(kinds, paper=paper)),
-        partial(_document, kinds, paper=paper),
-        lambda: _records(kinds, paper=paper),
+        tuple(_blocks(kinds, paper=paper)),
+        _document(kinds, paper=paper),
+        _records(kinds, paper=paper),
     )
 
 

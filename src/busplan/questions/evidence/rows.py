@@ -25,7 +25,7 @@ from busplan.profile.toml import override
 from busplan.progress import Progress
 from busplan.questions.circle.figures import CircleFigures
 from busplan.questions.circle.roundness import circle_test
-from busplan.questions.fit.figures import CapacityFigures, figures
+from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.sections.base import Section
 from busplan.sourced import Grade
@@ -194,23 +194,24 @@ class _Case:
 
     def __init__(self, row: Row, progress: Progress | None) -> None:
         self.profile = override(load(row.profile).profile, row.set)
-        self.bus = bus_of(self.profile)
+        self.network = network_of(self.profile)
+        self.bus = self.network.bus
         self.model = row.model or self.bus.deciding_model
         self._progress = progress
-        if self.model not in model_names(self.profile):
-            raise BusplanError(f"model: {self.model!r} is none of {', '.join(model_names(self.profile))}")
+        if self.model not in model_names(self.network):
+            raise BusplanError(f"model: {self.model!r} is none of {', '.join(model_names(self.network))}")
 
     @cached_property
     def _figures(self) -> CapacityFigures:
-        return figures(self.profile, model=self.model)
+        return capacity_figures(self.network, model=self.model)
 
     @cached_property
     def _cycle(self) -> BusCycle:
-        return self.bus.cycle(network_of(self.profile), model=self.model)
+        return self.bus.cycle(self.network, model=self.model)
 
     @cached_property
     def _circle(self) -> CircleFigures:
-        return circle_test(self.profile, progress=self._progress).results[0]
+        return circle_test(self.network, progress=self._progress).results[0]
 
     def sum_of(self, row: Row) -> float:
         """The figures of a row with this profile and this model, added up."""
@@ -233,7 +234,7 @@ class _Case:
             transactions = {f"latency.{each.name}": each.phases for each in self._cycle.latencies()}
             value = transactions.get(source, {}).get(key)
         else:
-            value = getattr(self._figures, name, None)
+            value = self._figures.values().get(name)
         if not isinstance(value, (int, float)):
             raise BusplanError(f"figures: {name!r} is no number of {self.profile.name}, a bus of kind {self.bus.kind}")
         return value

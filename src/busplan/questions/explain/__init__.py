@@ -4,15 +4,23 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from busplan.buses import kind_named, kind_names
+from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import plural
-from busplan.progress import Progress
+from busplan.forms.numbers import listed, plural
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
-from busplan.questions.explain import derivation as analysis
-from busplan.questions.explain.bus import latency_names
-from busplan.questions.explain.derivation import Derivation, Explanation, figures_of
+from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_network, one_or_several
+from busplan.questions.explain.derivation import (
+    CommandName,
+    Derivation,
+    assumptions,
+    derive,
+    explained_figures,
+    figures_of,
+    latency_names,
+)
+from busplan.questions.fit.figures import COUNTS
+from busplan.questions.fit.network import at_periods
 from busplan.sections.profile import Profile
 from busplan.sourced import Input
 
@@ -29,25 +37,28 @@ class ExplainAnswer(Answer):
         The figure under each period, transaction and timing model, with its `value`, `steps` and `inputs`; empty
         without a figure.
     assumptions
-        Without a figure, what all figures rest on, the least well known first; empty with one.
+        Without a figure, what the verdict rests on, the least well known first; empty with one.
+    figures
+        Without a figure, each figure that can be explained, with its command; empty with one.
     """
 
     profile: Profile
-    derivations: tuple[Derivation, ...]
-    assumptions: tuple[Input, ...]
+    derivations: tuple[Derivation, ...] = ()
+    assumptions: tuple[Input, ...] = ()
+    figures: tuple[tuple[CommandName, Figure], ...] = ()
 
     def report(self) -> Report:
         """The answer in blocks."""
         from busplan.questions.explain.report import assumptions_report, explain_report
 
         if self.derivations:
-            return explain_report(Explanation(self.profile, self.derivations))
-        return assumptions_report(self.profile, self.assumptions)
+            return explain_report(self.profile.name, self.derivations)
+        return assumptions_report(self.profile, self.assumptions, self.figures)
 
     def _headline(self) -> str:
         if self.derivations:
             return Answer._headline(self)  # noqa: SLF001 - super() knows no class with slots made anew
-        return f"{self.profile.name}: {plural(len(self.assumptions), 'assumption')} behind its figures"
+        return f"{self.profile.name}: {plural(len(self.assumptions), 'assumption')} behind its verdict"
 
 
 def explain(
@@ -57,26 +68,25 @@ def explain(
     period_us: Periods | None = None,
     timing_model: Models | None = None,
     transaction: str | Iterable[str] | None = None,
-    progress: Progress | None = None,
 ) -> ExplainAnswer:
-    """Show where a figure comes from: every step in symbols and in numbers, and what it starts from.
+    """Show where a figure of the bus comes from: every step in symbols and in numbers, and what it starts from.
 
     Parameters
     ----------
     profile
         The network: a `Profile`, a path or a shipped name.
     figure
-        A key of the JSON of latency, capacity or circle-test: "required_us"; "circle-test.required_us" where several
-        have it and the first is not meant. Without it, what all figures rest on.
+        A key of the JSON of capacity or latency that an equation leads to: "required_us"; "latency.gaps_us" where both
+        have it and the first is not meant. So do the number of an equation, "(11)"; a label of a table, "arbitration";
+        and the name of a transaction, a message or a group of nodes, for its latency. Without it, what the verdict
+        rests on, and all these figures.
     period_us
         Communication period T_s [us], or several; by default the profile's own.
     timing_model
-        Name of a timing model, or several; by default the one that leads. A circle test and a verdict have only the
-        one that decides.
+        Name of a timing model, or several; by default the one that leads, for bias and uncertainty
+        the one that decides.
     transaction
         Name of a transaction, such as "read", or several, for a figure of `latency`; by default all.
-    progress
-        Called from time to time with the steps simulated and the steps known to be needed.
 
     Returns
     -------
@@ -86,7 +96,7 @@ def explain(
     Raises
     ------
     BusplanError
-        Not a profile, no such figure, or an argument that the figure does not have.
+        Not a profile, no such figure, one without an equation, or an argument that the figure does not have.
 
     Examples
     --------
@@ -99,43 +109,37 @@ def explain(
     >>> busplan.explain("paper-4ms").assumptions[0].grade
     'assumed'
     """
-    network = load_profile(profile)
+    network = load_network(profile)
     if figure is None:
         given = {"period_us": period_us, "timing_model": timing_model, "transaction": transaction}
-        for name, value in given.items():
-            if value is not None:
-                raise BusplanError(f'{name} {value!r}: goes with a figure, as busplan.explain(profile, "required_us")')
-        return ExplainAnswer(network, (), analysis.assumptions(network))
+        asked = [name for name, value in given.items() if value is not None]
+        if asked:
+            raise BusplanError(f"{listed(asked, 'and')}: goes with a figure, as busplan explain PROFILE required_us")
+        return ExplainAnswer(
+            network.profile, assumptions=assumptions(network), figures=tuple(explained_figures(network))
+        )
     if not isinstance(figure, str):
         raise BusplanError(f'figure {figure!r}: expected a key of the JSON, as "required_us"')
-    explanation = analysis.explain(
-        network,
+    transactions: list[str] | None = None if transaction is None else one_or_several(transaction, name="transaction")
+    known = latency_names(network)
+    for name in transactions or ():
+        if name not in known:
+            raise BusplanError(f"transaction {name!r}: expected {listed([*map(repr, known)], 'or')}")
+    derivations = derive(
+        at_periods(network, None if period_us is None else one_or_several(period_us, name="period_us")),
         figure,
-        periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         timing_models=None if timing_model is None else checked_models(timing_model, network),
-        transactions=None if transaction is None else _transactions(transaction, network),
-        progress=progress,
+        transactions=transactions,
     )
-    return ExplainAnswer(network, explanation.derivations, ())
+    return ExplainAnswer(network.profile, derivations)
 
 
 def figure_names() -> list[str]:
-    """Names of the figures that `explain` takes, on all kinds of bus: each key, alone and after its command."""
-    registers = (figures_of(kind_named(kind)) for kind in kind_names())
-    names = (
-        name
-        for register in registers
-        for command, figures in register.items()
-        for key in figures
-        for name in (key, f"{command}.{key}")
+    """Keys of figures that `explain` takes, on all kinds of bus; of one kind not all exist."""
+    registers = (figures for kind in kind_names() for figures in figures_of(kind_named(kind)).values())
+    figures = (figure for register in registers for figure in register.values())
+    return list(
+        dict.fromkeys(
+            figure.key for figure in figures if figure.sort in ("number", "count") and figure.key not in COUNTS
+        )
     )
-    return list(dict.fromkeys(names))
-
-
-def _transactions(transaction: str | Iterable[str], profile: Profile) -> list[str]:
-    asked: list[str] = one_or_several(transaction, name="transaction")
-    known = latency_names(profile)
-    for name in asked:
-        if name not in known:
-            raise BusplanError(f"transaction {name!r}: expected {' or '.join(map(repr, known))}")
-    return asked

@@ -1,138 +1,61 @@
-"""Derive a figure: every step to it, in symbols and in numbers, and all its inputs."""
+"""Derive the figures of a bus: the equations run once more, with numbers that record how they were computed."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import product
+from math import isinf
 from types import MappingProxyType
 from typing import Final, Literal, NamedTuple
 
 from busplan.buses.bus import Bus
-from busplan.buses.figure import BIAS, CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, VERDICT_FIGURES, Figure, by_key
-from busplan.elementwise import Traced
+from busplan.buses.cycle import BusCycle
+from busplan.buses.figure import CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure, by_key, term_name
+from busplan.buses.network import Network
+from busplan.elementwise import Number, Traced, value_of
 from busplan.errors import BusplanError
-from busplan.profile.toml import at_periods
-from busplan.progress import Progress
-from busplan.questions.circle.figures import CIRCLE_BY_KEY
-from busplan.questions.explain.bus import (
-    VERDICT_KEYS,
-    TracedLatencies,
-    capacity_figures,
-    latency_figures,
-    latency_names,
-    traced_latencies,
-    verdict_figure,
-)
+from busplan.forms.numbers import listed
 from busplan.questions.explain.formulas import formula_text, inputs, lines
-from busplan.questions.fit.inputs import choosing_keys
-from busplan.questions.fit.network import bus_of, leading_model, model_names, network_of
-from busplan.sections.profile import Profile
-from busplan.sourced import Input
+from busplan.questions.fit.certainty import certainty
+from busplan.questions.fit.figures import certainty_numbers, numeric_figures
+from busplan.questions.fit.inputs import choosing_keys, traced_profile
+from busplan.questions.fit.network import leading_model, model_names, network_of
+from busplan.sourced import Input, Sourced, short
 
-CommandName = Literal["latency", "capacity", "circle-test"]
-
-_HOLDERS: Final[Mapping[str, tuple[CommandName, str]]] = MappingProxyType(
-    {
-        **dict.fromkeys(("changes", "circle_is_untested"), ("capacity", "cheapest_change")),
-        **dict.fromkeys(("change", "key", "from", "to", "margin_change_us", "note"), ("capacity", "sensitivity")),
-        **dict.fromkeys(
-            (
-                *("binding_term_us", "next_binding_term", "next_binding_term_us", "next_margin_corrected_us"),
-                *("next_safe_nodes", "next_safe_limited_by"),
-            ),
-            ("capacity", "next_bottleneck"),
-        ),
-        **dict.fromkeys(("input", "label", "standard_uncertainty_us", "share"), ("capacity", "uncertainty_parts")),
-        **dict.fromkeys(("name", "value", "limit", "limit_is_default"), ("circle-test", "failures")),
-        **dict.fromkeys(("source", "removed_mm"), ("circle-test", "contributions")),
-    }
-)
-"""Figure that contains a key, for keys inside a figure."""
-
-
-def figures_of(bus: Bus) -> dict[CommandName, dict[str, Figure]]:
-    """Figures by command and key. Without a command, a key means that of the first command that has it."""
-    return {
-        "capacity": by_key((*bus.figures.capacity, *VERDICT_FIGURES)),
-        "latency": by_key(bus.figures.latency),
-        "circle-test": dict(CIRCLE_BY_KEY),
-    }
-
-
-def figure_named(name: str, *, bus: Bus) -> tuple[CommandName, Figure]:
-    """Find a figure by its name.
-
-    Parameters
-    ----------
-    name
-        A key ("required_us"), or a command and a key ("circle-test.required_us"). A key inside a figure ("removed_mm")
-        means that figure.
-    bus
-        The kind of bus.
-
-    Raises
-    ------
-    BusplanError
-        There is none; the message suggests similar names.
-
-    Examples
-    --------
-    >>> from busplan.buses import kind_named
-    >>> figure_named("latency.gaps_us", bus=kind_named("ieee1394"))[1].meaning
-    'both gaps, after each transaction'
-    """
-    register = figures_of(bus)
-    for command, figures in register.items():
-        key = name.removeprefix(f"{command}.")
-        if key in figures and name in (key, f"{command}.{key}"):
-            return command, figures[key]
-    before, _, inner = name.rpartition(".")
-    held = _HOLDERS.get(inner)
-    if held is not None and before in ("", held[0]):
-        return held[0], register[held[0]][held[1]]
-    known = [key for figures in register.values() for key in figures]
-    close = get_close_matches(name.rpartition(".")[2], known, n=3, cutoff=0.5)
-    hint = f", did you mean {' or '.join(dict.fromkeys(close))}" if close else ""
-    raise BusplanError(f"{name or repr(name)}: no such figure{hint}? Without a figure, explain lists them all")
-
+CommandName = Literal["capacity", "latency"]
+_Numbers = Mapping[str, Traced]
 
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 """From the weakest to the strongest; "given" values are choices, not knowledge."""
-
-
-_BESIDE: Final = {MARGIN_CORRECTED.key: (UNCERTAINTY,)}
+_BESIDE: Final = MappingProxyType({MARGIN_CORRECTED.key: (UNCERTAINTY,)})
 """Figures that are derived beside another: a margin says nothing without its uncertainty."""
 
 
-class Step(NamedTuple):
-    """One line of a derivation.
+_MOST_HINTS: Final = 3
 
-    Parameters
-    ----------
-    key
-        Key of the figure in the results; a name used only here if it is no figure.
-    symbol
-        Symbol in formulas.
-    reference
-        Numbers of its equations, or another source.
-    formula
-        The computation in symbols.
-    numbers
-        The computation in numbers.
-    value
-        The result: a number, a truth value, a word or a list; None if there is none.
-    unit
-        Unit of the result; empty for counts, shares and words.
-    """
+
+class Step(NamedTuple):
+    """One line of a derivation."""
 
     key: str
+    """Key of the figure in the results; a name used only here if it is no figure."""
     symbol: str
+    """Symbol in formulas."""
     reference: str
+    """Numbers of its equations, or another source."""
     formula: str
+    """The computation in symbols."""
     numbers: str
+    """The computation in numbers."""
     value: object
+    """The result: a number, or a truth value; None of what does not exist."""
     unit: str
+    """Unit of the result; empty for counts and shares."""
 
 
-class Derivation(NamedTuple):
+@dataclass(frozen=True)
+class Derivation:
     """A figure and its steps."""
 
     command: CommandName
@@ -143,7 +66,7 @@ class Derivation(NamedTuple):
     period_us: float | None
     """None of a network without a cycle."""
     value: object
-    """Value as in the command's JSON."""
+    """Value as in the command's JSON; None of what does not exist."""
     steps: tuple[Step, ...]
     """In the order of computation; the last step is the figure, unless that is an input."""
     inputs: tuple[Input, ...]
@@ -154,187 +77,295 @@ class Derivation(NamedTuple):
         return min((given.grade for given in self.inputs), key=_GRADES.index, default=_GRADES[-1])
 
 
-class Explanation(NamedTuple):
-    """Answer of `explain`."""
+class Wanted(NamedTuple):
+    """What a name stands for."""
 
-    profile: Profile
-    derivations: tuple[Derivation, ...]
+    command: CommandName
+    figures: tuple[Figure, ...]
+    transactions: tuple[str, ...] | None = None
+    """Transactions that the name stands for; None for all."""
 
 
-def explain(
-    profile: Profile,
-    figure: str,
-    *,
-    periods_us: Sequence[float] | None = None,
-    timing_models: Sequence[str] | None = None,
-    transactions: Sequence[str] | None = None,
-    progress: Progress | None = None,
-) -> Explanation:
-    """Derive a figure of `latency`, `capacity` or `circle-test`.
+def derive(
+    networks: Sequence[Network], name: str, *, timing_models: Sequence[str] | None, transactions: Sequence[str] | None
+) -> tuple[Derivation, ...]:
+    """Derive a figure at each of some periods.
 
     Parameters
     ----------
-    profile
-        The network.
-    figure
-        Its key, with or without its command; see `figure_named`.
-    periods_us
-        Communication periods T_s [us]; by default the profile's own.
+    networks
+        The network at each period.
+    name
+        Name of the figure; see `wanted`.
     timing_models
-        Timing models; by default the one that leads. Figures of a circle test and of how sure the verdict is have the
-        one that decides, and no other.
+        Timing models; by default the one that leads, or the one that decides for figures that it alone has.
     transactions
-        Transactions, for a figure of `latency`; by default all.
-    progress
-        As for `circle_test`.
-
-    Returns
-    -------
-    Explanation
-        One derivation for each period, transaction and model, nested in this order; after that of the corrected margin
-        stands that of its uncertainty.
+        Transactions, for a figure of `latency`; by default all that have it.
 
     Raises
     ------
     BusplanError
-        There is no such figure, an option does not apply to it, or the command fails.
+        There is no such figure, no equation leads to it, or an option does not apply to it.
     """
-    command, asked = figure_named(figure, bus=bus_of(profile))
-    if (command, asked) not in explained_figures(profile):
-        why = f"no bias is known for this bus, {bus_of(profile).title}" if asked == BIAS else "messages have no circle"
-        raise BusplanError(f"{asked.key}: {why}")
-    deciding = bus_of(profile).deciding_model
-    is_decided = command == "circle-test" or asked in CERTAINTY
-    has_one_model = is_decided or asked.key in VERDICT_KEYS
-    models = [deciding if has_one_model else leading_model(profile)] if timing_models is None else timing_models
-    kinds: Sequence[str | None] = (transactions or latency_names(profile)) if command == "latency" else [None]
-    if is_decided and list(models) != [deciding]:
-        raise BusplanError(f"{asked.key}: belongs to the timing model that decides and to no other, {deciding}")
-    if asked.key in VERDICT_KEYS and timing_models is not None:
-        raise BusplanError(f"{asked.key}: compares the timing models, so it has no timing model of its own")
-    if command != "latency" and transactions is not None:
-        raise BusplanError(f"{asked.key}: not a figure of latency, so it has no transaction")
-    derivations = []
-    for where in at_periods(profile, periods_us):
-        latencies = {model: traced_latencies(where, model=model) for model in models if command == "latency"}
-        for kind in kinds:
-            for model in models:
-                for shown in (asked, *_BESIDE.get(asked.key, ())):
-                    known = latencies.get(model)
-                    traced = _traced(
-                        where, command, shown.key, model=model, kind=kind, latencies=known, progress=progress
-                    )
-                    steps = tuple(_steps(where, traced, command, shown))
-                    derivations.append(
-                        Derivation(
-                            command,
-                            shown,
-                            model,
-                            kind,
-                            where.cycle.period_us if where.has_cycle else None,
-                            traced.value,
-                            steps,
-                            tuple(inputs(traced)),
-                        )
-                    )
-    return Explanation(profile, tuple(derivations))
+    network = networks[0]
+    command, figures, named = wanted(name, network)
+    if transactions is not None and command != "latency":
+        keys = (f"latency.{figure.key}" for figure in figures if figure.key in figures_of(network.bus)["latency"])
+        instead = next((f"; {key} has" for key in keys), "")
+        raise BusplanError(f"{name}: a figure of {command}, which has no transactions{instead}")
+    found = [
+        derivation
+        for at in networks
+        for derivation in _at_period(at, command, figures, timing_models, transactions or named)
+    ]
+    if not found:
+        raise BusplanError(_why_none(network, command, figures[0], timing_models))
+    return tuple(found)
 
 
-def explained_figures(profile: Profile) -> Iterator[tuple[CommandName, Figure]]:
-    """Every figure that can be derived for a profile, with its command: no bias where nobody has measured one.
+def _at_period(
+    network: Network,
+    command: CommandName,
+    figures: Sequence[Figure],
+    timing_models: Sequence[str] | None,
+    transactions: Sequence[str] | None,
+) -> Iterator[Derivation]:
+    """The derivations of some figures, nested by transaction, figure and timing model."""
+    deciding, leading = network.bus.deciding_model, leading_model(network)
+    models = timing_models or (leading, deciding)
+    numbers = {model: numbers_of(network, command, model=model) for model in models}
+    for transaction, figure in product(transactions or numbers[models[0]], figures):
+        for model in timing_models or [deciding if figure in CERTAINTY else leading]:
+            known = numbers[model][transaction]
+            for shown in (figure, *_BESIDE.get(figure.key, ())):
+                if shown.key in known:
+                    yield _derivation(network, known[shown.key], command, shown, model, transaction or None)
+
+
+def _derivation(
+    network: Network, number: Traced, command: CommandName, figure: Figure, model: str, transaction: str | None
+) -> Derivation:
+    register = figures_of(network.bus)
+    known = {**register["latency"], **register["capacity"], **register[command]}
+    steps = []
+    for line in lines(number):
+        own = figure if line is number else known.get(line.key, Figure(line.key, line.key, "", ""))
+        formula, numbers = (_INFINITE.sub("none", formula_text(line, in_numbers=way)) for way in (False, True))
+        symbol = own.symbol if line is number else line.symbol
+        steps.append(Step(own.key, symbol, own.reference, formula, numbers, _existing(line.value), own.unit))
+    period_us = value_of(network.period_us) if network.groups else None
+    value = _existing(number.value)
+    return Derivation(command, figure, model, transaction, period_us, value, tuple(steps), tuple(inputs(number)))
+
+
+_INFINITE: Final = re.compile(r"\binf\b")
+
+
+def _existing(value: object) -> object:
+    """A value; None for infinity, which stands for what does not exist."""
+    return None if isinstance(value, float) and isinf(value) else value
+
+
+def _why_none(network: Network, command: CommandName, figure: Figure, timing_models: Sequence[str] | None) -> str:
+    deciding = network.bus.deciding_model
+    if timing_models is not None and figure in CERTAINTY and deciding not in timing_models:
+        return f"{figure.key}: belongs to the timing model that decides and to no other, {deciding}"
+    if (command, figure) in explained_figures(network):
+        return f"{figure.key}: does not exist under this timing model, or for this transaction"
+    return (
+        f"{figure.key}: no equation leads to it in {network.profile.name} ({figure.meaning}); busplan explain "
+        f"{network.profile.name} lists the figures with an equation"
+    )
+
+
+def figures_of(bus: Bus) -> dict[CommandName, dict[str, Figure]]:
+    """Figures by command and key. Without a command, a key means that of the first command that has it."""
+    return {"capacity": by_key(bus.figures.capacity), "latency": by_key(bus.figures.latency)}
+
+
+def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[str, _Numbers]:
+    """All figures of a command that equations lead to, in traced numbers: by transaction and key.
 
     Parameters
     ----------
-    profile
+    network
+        The network, of plain numbers.
+    command
+        The command; figures of `capacity` have the transaction "".
+    model
+        Timing model.
+
+    Returns
+    -------
+    dict
+        What is infinite does not exist.
+    """
+    # Traced for each command: a number keeps the name that it is given first.
+    network = network_of(traced_profile(network.profile))
+    cycle = network.bus.cycle(network, model=model)
+    known = figures_of(network.bus)[command]
+    if command == "capacity":
+        return {"": _known(_of_capacity(cycle, is_decided=model == network.bus.deciding_model), known)}
+    return {
+        latency.label: _known({"payload_bytes": latency.payload_bytes, "nodes": network.nodes, **latency.phases}, known)
+        for latency in cycle.latencies()
+    }
+
+
+def _of_capacity(cycle: BusCycle, *, is_decided: bool) -> dict[str, Number | None]:
+    if not cycle.network.groups:
+        return {**cycle.figures()}
+    numbers: dict[str, Number | None] = {
+        **{term.key: term.us for term in cycle.terms},
+        **cycle.figures(),
+        **numeric_figures(cycle),
+    }
+    if is_decided:
+        weighed = certainty(cycle)
+        for doubt in weighed.doubts:
+            _named(doubt.us, f"{doubt.key}.uncertainty_us", f"u({doubt.label})")
+        numbers |= certainty_numbers(weighed, cycle)
+    return numbers
+
+
+def _known(numbers: Mapping[str, Number | None], known: Mapping[str, Figure]) -> dict[str, Traced]:
+    """Numbers of the known figures, each with its symbol; None is left out."""
+    return {
+        key: _named(number, key, known[key].symbol)
+        for key, number in numbers.items()
+        if key in known and number is not None
+    }
+
+
+def _named(number: Number, key: str, symbol: str) -> Traced:
+    """Name a number; a constant becomes a line of its own."""
+    if isinstance(number, Traced):
+        return number.named(key, symbol)
+    if isinstance(number, Sourced):
+        return Traced(float(number), formula=number.meaning, numbers=short(number), parts=(number,)).named(key, symbol)
+    return Traced(number, formula=short(number), numbers=short(number)).named(key, symbol)
+
+
+def explained_figures(network: Network) -> list[tuple[CommandName, Figure]]:
+    """Every figure of a network that an equation leads to, with its command, in the order of their documents."""
+    models = {leading_model(network), network.bus.deciding_model}
+    found: list[tuple[CommandName, Figure]] = []
+    for command, figures in figures_of(network.bus).items():
+        known = set[str]().union(
+            *(keys for model in models for keys in numbers_of(network, command, model=model).values())
+        )
+        found += [(command, figure) for key, figure in figures.items() if key in known]
+    return found
+
+
+def latency_names(network: Network) -> tuple[str, ...]:
+    """Names of the transactions in `latency`, or of the cycle."""
+    return tuple(latency.label for latency in network.bus.cycle(network, model=network.bus.deciding_model).latencies())
+
+
+def wanted(name: str, network: Network) -> Wanted:
+    """Find what a name stands for.
+
+    Parameters
+    ----------
+    name
+        A key ("required_us"), also behind its command ("latency.gaps_us"); the number of an equation ("(11)"); the
+        label or the symbol of a figure in tables ("arbitration"); or the name of a transaction, a message or a group.
+    network
         The network.
+
+    Raises
+    ------
+    BusplanError
+        There is none; the message suggests similar names.
+
+    Examples
+    --------
+    >>> from busplan.questions.base.inputs import load_network
+    >>> [figure.key for figure in wanted("(11)", load_network("paper-4ms")).figures]
+    ['nodes_eq11']
+    >>> wanted("sdo-request", load_network("can-servo-8")).transactions
+    ('sdo-request',)
     """
-    bus = bus_of(profile)
-    has_bias = bus.cycle(network_of(profile), model=bus.deciding_model).bias_us() is not None
-    for command, figures in figures_of(bus).items():
-        if command != "circle-test" or profile.has_cycle:
-            yield from ((command, figure) for figure in figures.values() if has_bias or figure != BIAS)
+    register = figures_of(network.bus)
+    before, _, key = name.rpartition(".")
+    commands = [command for command in register if before in ("", command)]
+    equation = re.fullmatch(r"\(?(\d+)\)?", name)
+    for is_meant in (
+        lambda figure: figure.key == key,
+        lambda figure: equation is not None and figure.reference == f"({equation[1]})",
+        lambda figure: equation is not None and f"({equation[1]})" in figure.reference.split(),
+        lambda figure: _letters(key) in _names(figure) - {""},
+        lambda figure: key == figure.symbol,
+    ):
+        for command in commands:
+            if figures := tuple(figure for figure in register[command].values() if is_meant(figure)):
+                return Wanted(command, figures)
+    labels = latency_names(network)
+    asked = tuple(label for label in labels if _letters(name) in map(_letters, (label, *label.split())))
+    if asked or (name and name in network.names):
+        return Wanted("latency", (_main_latency(network.bus),), asked or None)
+    raise BusplanError(f"{name or repr(name)}: no such figure{_hint(name, network)} one, explain lists them")
 
 
-def assumptions(profile: Profile) -> tuple[Input, ...]:
-    """Inputs that the figures of a profile rest on, each with its grade, the least well known first.
+def _main_latency(bus: Bus) -> Figure:
+    """The figure of `latency` that all others lead to."""
+    key = bus.figures.deadlines[0] if bus.figures.deadlines else bus.figures.latency_table[-1].key
+    return by_key(bus.figures.latency)[key]
+
+
+def _names(figure: Figure) -> set[str]:
+    """What else a figure is called: as in tables, and beside the other terms."""
+    return {_letters(figure.label), _letters(term_name(figure.key))}
+
+
+def _letters(name: str) -> str:
+    return "".join(letter for letter in name.casefold() if letter.isalnum())
+
+
+def _hint(name: str, network: Network) -> str:
+    names = {_letters(label): label for label in (*network.names, *latency_names(network))}
+    for _, figure in explained_figures(network):
+        names |= {**dict.fromkeys(_names(figure), figure.key), _letters(figure.key): figure.key}
+    asked = _letters(name.rpartition(".")[2])
+    near = [word for word in names if word.startswith(asked)] + get_close_matches(asked, names, cutoff=0.5)
+    close = dict.fromkeys(names[word] for word in near if asked)
+    return f", did you mean {listed([*close][:_MOST_HINTS], 'or')}? Without" if close else "; without"
+
+
+def assumptions(network: Network) -> tuple[Input, ...]:
+    """Inputs that the verdict rests on, each with its grade, the least well known first.
 
     Parameters
     ----------
-    profile
-        The network; inputs of its circle test are included if it asks for one.
+    network
+        The network.
 
     Returns
     -------
     tuple
-        Inputs of the cycle under every timing model, and of the circle, without "given" ones. An execution time without
-        a grade comes first.
+        Inputs of the cycle under every timing model, of its uncertainty and of the limits, without "given" ones. An
+        execution time without a grade comes first: it is a fact, not a choice.
     """
+    profile, bus = network.profile, network.bus
+    limited = network_of(traced_profile(profile))
+    numbers: list[Number] = []
+    for model in model_names(network):
+        known = numbers_of(network, "capacity", model=model)[""]
+        numbers += [known[key] for key in ("required_us", "available_us", "safe_required_us") if key in known]
+    for limit in bus.limits:
+        if not limit.is_safety:
+            numbers += (limit.value(limited), limit.most(limited), limit.uncertainty(limited))
     by_name: dict[str, Input] = {}
-    for model in model_names(profile):
-        figures = capacity_figures(profile, model=model)
-        for key in ("fits", "verdict"):
-            for input_ in inputs(figures[key]) if key in figures else ():
-                by_name.setdefault(input_.name, input_)
-    if profile.asks_for_circle:
-        from busplan.questions.explain.circle import simulated_inputs  # loads the simulation, and numpy with it
-
-        for input_ in simulated_inputs(profile):
-            by_name.setdefault(input_.name, input_)
-    # An execution time is a fact, not a choice: without a grade it is the least well known input.
-    choices = choosing_keys(bus_of(profile))
+    for given in inputs(Traced(None, parts=tuple(numbers))):
+        by_name.setdefault(given.name, given)
     executions = tuple(alike.node_key("execution.") for alike in profile.alike_nodes)
-    known = (
-        given
-        for given in by_name.values()
-        if given.grade != "given"
-        or (
-            given.name.startswith(executions)
-            and not given.name.endswith(choices)
-            and not given.source.startswith("default")
-        )
-    )
-    return tuple(sorted(known, key=lambda input_: -1 if input_.grade == "given" else _GRADES.index(input_.grade)))
 
+    def rank(given: Input) -> int:
+        """Place of its grade; behind all of them for a choice."""
+        if given.grade != "given":
+            return _GRADES.index(given.grade)
+        is_time = given.name.startswith(executions) and not given.name.endswith(choosing_keys(bus))
+        return -1 if is_time and not given.source.startswith("default") else len(_GRADES)
 
-def _traced(
-    profile: Profile,
-    command: CommandName,
-    key: str,
-    *,
-    model: str,
-    kind: str | None,
-    latencies: TracedLatencies | None,
-    progress: Progress | None,
-) -> Traced:
-    if command == "latency":
-        return latency_figures(profile, model=model, kind=kind or "", latencies=latencies)[key]
-    if command == "capacity":
-        if key in VERDICT_KEYS:
-            return verdict_figure(profile, key, model=model)
-        return capacity_figures(profile, model=model)[key]
-    from busplan.questions.explain.circle import circle_figures  # as above
-
-    return circle_figures(profile, with_contributions=key == "contributions", progress=progress)[key]
-
-
-def _steps(profile: Profile, traced: Traced, command: CommandName, figure: Figure) -> Iterator[Step]:
-    for line in lines(traced):
-        known = figure if line is traced else _known(profile, line.key, command)
-        yield Step(
-            key=known.key,
-            symbol=figure.symbol if line is traced else line.symbol,
-            reference=known.reference,
-            formula=formula_text(line, in_numbers=False),
-            numbers=formula_text(line, in_numbers=True),
-            value=line.value,
-            unit=known.unit,
-        )
-
-
-def _known(profile: Profile, key: str, command: CommandName) -> Figure:
-    """Registered figure of a line; a line without one gets a figure of its own."""
-    register = figures_of(bus_of(profile))
-    for figures in (register[command], *register.values()):
-        if key in figures:
-            return figures[key]
-    return Figure(key, key, "", "")
+    return tuple(sorted((given for given in by_name.values() if rank(given) < len(_GRADES)), key=rank))

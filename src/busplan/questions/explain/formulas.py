@@ -1,6 +1,6 @@
 """Steps, inputs and formula of a traced number, in symbols and in numbers."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from inspect import signature
 from typing import Final
 
@@ -166,22 +166,6 @@ def formula_of(equation: Equation) -> str:
     first, *rest = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
     result = equation.function(first, **dict(zip(names[1:], rest, strict=True)))
     return result.symbol or formula_text(result, in_numbers=False)
-
-
-def result_of(value: object, words: str, parts: Iterable[Number]) -> Traced:
-    """A result without an equation, as of a search or a simulation: it has no steps, but all inputs of its parts.
-
-    Parameters
-    ----------
-    value
-        The result.
-    words
-        Its method.
-    parts
-        Numbers that it depends on.
-    """
-    leaves = inputs(Traced(value, parts=tuple(parts)))
-    return Traced(value, formula=words, parts=tuple(Traced(leaf.value, given=leaf) for leaf in leaves))
 
 
 def lines(figure: Traced) -> Iterator[Traced]:

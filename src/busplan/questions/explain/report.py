@@ -1,19 +1,17 @@
 """Answer of `busplan explain`: every step to a figure and its inputs; without one, assumptions and all figures."""
 
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from busplan.buses.bus import Bus
-from busplan.forms import blocks
+from busplan.buses.figure import Figure
 from busplan.forms.blocks import (
     Block,
     Calculation,
+    CalculationStep,
     Cell,
     Chapter,
     Code,
-    JsonDocument,
-    Part,
     Record,
     Report,
     Sentence,
@@ -22,32 +20,25 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
     Words,
-    joined,
 )
 from busplan.forms.numbers import figure_text, period_value
-from busplan.printable import json_text
-from busplan.questions.capacity.report import capacity_document
-from busplan.questions.capacity.sensitivity import sensitivities
-from busplan.questions.capacity.sensitivity_report import sensitivity_document
-from busplan.questions.capacity.verdict import verdicts
-from busplan.questions.explain.bus import OF_DOCUMENT, OF_SENSITIVITY
-from busplan.questions.explain.derivation import Derivation, Explanation, Step, explained_figures
+from busplan.questions.explain.derivation import CommandName, Derivation, Step
 from busplan.questions.explain.formulas import formula_of
-from busplan.questions.fit.figures import capacity
 from busplan.questions.fit.network import bus_of
 from busplan.questions.words.documents import document, fields, with_profile
 from busplan.sections.profile import Profile
 from busplan.sourced import DIGITS, EQUATIONS, Input, short
 
-_MEANING: Final = TableColumn("meaning", kind="words", rank=4, leaves="below", wraps=True)
-INPUT_COLUMNS: Final = (
+_INPUTS: Final = (
     TableColumn("name", kind="words", wraps=True),
     TableColumn("value"),
-    TableColumn("unit", kind="words", rank=1, leaves="below", wraps=True),
-    TableColumn("grade", kind="words", rank=2, leaves="below"),
-    TableColumn("source", kind="words", rank=3, leaves="below", wraps=True),
+    TableColumn("unit", kind="words", rank=2, leaves="below", wraps=True),
+    TableColumn("grade", kind="words", rank=3, leaves="below"),
+    TableColumn("source", kind="words", rank=4, leaves="below", wraps=True),
 )
 """Columns of an input: what it is, and how well it is known."""
+_SYMBOL: Final = TableColumn("symbol", kind="words", rank=1, leaves="below")
+_MEANING: Final = TableColumn("meaning", kind="words", rank=5, leaves="below", wraps=True)
 _FIGURES: Final = (
     *(TableColumn(heading, kind="words") for heading in ("command", "figure")),
     TableColumn("eq", kind="words", rank=2),
@@ -56,46 +47,36 @@ _FIGURES: Final = (
 )
 
 
-def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report:
-    """Report of `explain PROFILE`: the assumptions behind its figures, and all figures that can be explained.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    assumptions
-        The inputs of its figures.
-    """
-    caption = Sentence(("What the figures of ", Code(profile.name), " rest on, the least well known first"))
+def assumptions_report(
+    profile: Profile, assumptions: Sequence[Input], figures: Sequence[tuple[CommandName, Figure]]
+) -> Report:
+    """Report of `explain PROFILE`: what the verdict rests on, and the figures that can be explained."""
+    rests_on = (TableRow((*_input_cells(given), given.meaning)) for given in assumptions)
+    rows = (
+        TableRow((command, Code(figure.key), figure.reference, figure.unit, figure.meaning))
+        for command, figure in figures
+    )
+    caption = Sentence(("What the verdict on ", Code(profile.name), " rests on, the least well known first"))
+    records = [
+        {"command": command, "figure": figure.key, **fields(figure, "symbol", "unit", "reference", "meaning")}
+        for command, figure in figures
+    ]
     return Report(
         Sentence(("The figures of ", Code(profile.name))),
-        lambda: (
-            assumptions_table(assumptions)._replace(caption=caption),
-            _figure_table(profile),
+        (
+            Table((*_INPUTS, _MEANING), tuple(rests_on), caption, stacks=True),
+            Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True),
         ),
-        partial(assumptions_document, profile, assumptions),
-        lambda: figure_rows(profile),
+        document(
+            "explain",
+            profile=profile.name,
+            assumptions=[given._asdict() for given in assumptions],
+            figures=records,
+            equations=equation_rows(),
+            constants=constant_rows(bus_of(profile)),
+        ),
+        records,
     )
-
-
-def assumptions_table(assumptions: Sequence[Input]) -> Table:
-    """Table of inputs, one row each.
-
-    Parameters
-    ----------
-    assumptions
-        The inputs.
-    """
-    rows = (TableRow((*input_cells(given), given.meaning)) for given in assumptions)
-    return Table((*INPUT_COLUMNS, _MEANING), tuple(rows), stacks=True)
-
-
-def figure_rows(profile: Profile) -> list[Record]:
-    """One row for each figure that can be explained."""
-    return [
-        {"command": command, "figure": figure.key, **fields(figure, "symbol", "unit", "reference", "meaning")}
-        for command, figure in explained_figures(profile)
-    ]
 
 
 def equation_rows() -> list[Record]:
@@ -119,97 +100,33 @@ def constant_rows(bus: Bus) -> list[Record]:
     ]
 
 
-def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> JsonDocument:
-    """Document of `busplan explain PROFILE --format json`: the inputs of the figures, and the whole registry."""
-    return document(
-        "explain",
-        profile=profile.name,
-        assumptions=[given._asdict() for given in assumptions],
-        figures=figure_rows(profile),
-        equations=equation_rows(),
-        constants=constant_rows(bus_of(profile)),
-    )
-
-
-def input_cells(given: Input) -> tuple[Cell, ...]:
-    """Cells of one input."""
-    value = ShownValue(given.value, "value", given.unit, digits=DIGITS)
-    return Code(given.name), value, given.unit, given.grade, given.source
-
-
-def _figure_table(profile: Profile) -> Table:
-    rows = (
-        TableRow((command, Code(figure.key), figure.reference, figure.unit, figure.meaning))
-        for command, figure in explained_figures(profile)
-    )
-    return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
-
-
-_NONE: Final = Words("none")
-_NAMING: Final = ("name", "source", "input", "change")
-"""Keys that name a part of a value, the first that it has."""
-_MOST_REPEATED: Final = 100
-"""A longer list of inputs is not shown again: with 200 messages there are 200 of 800 rows."""
-_SYMBOL: Final = TableColumn("symbol", kind="words")
-
-
-def explain_report(explanation: Explanation) -> Report:
+def explain_report(name: str, derivations: Sequence[Derivation]) -> Report:
     """Report of `explain PROFILE FIGURE` with a section for each derivation.
 
     Parameters
     ----------
-    explanation
-        The derivations.
+    name
+        Name of the profile.
+    derivations
+        One or more.
     """
-    filled = _in_words(explanation)
-    name = filled.profile.name
+    figures = dict.fromkeys(derivation.figure.key for derivation in derivations)
     return Report(
-        Sentence(("Where ", Code(filled.derivations[0].figure.key), " of ", Code(name), " comes from")),
-        lambda: tuple(_sections(filled)),
-        partial(_explain_document, filled),
-        lambda: with_profile(
-            name, [record for derivation in filled.derivations for record in _step_records(derivation)]
-        ),
+        Sentence(("Where ", Code(", ".join(figures)), " of ", Code(name), " comes from")),
+        tuple(_sections(name, derivations)),
+        document("explain", profile=name, derivations=[_derivation(derivation) for derivation in derivations]),
+        with_profile(name, [record for derivation in derivations for record in _step_records(derivation)]),
     )
 
 
-def _in_words(explanation: Explanation) -> Explanation:
-    """Fill in the value of figures that are sentences or changes: the report of `capacity` makes them."""
-    return explanation._replace(
-        derivations=tuple(_with_words(derivation, explanation) for derivation in explanation.derivations)
-    )
-
-
-def _with_words(derivation: Derivation, explanation: Explanation) -> Derivation:
-    key = derivation.figure.key
-    if key not in (*OF_DOCUMENT, *OF_SENSITIVITY, "text", "warnings", "cheapest_change"):
-        return derivation
-    result = capacity(explanation.profile, periods_us=None if derivation.period_us is None else [derivation.period_us])
-    if key in OF_SENSITIVITY:
-        answer = sensitivity_document(result, verdicts(result), sensitivities(result))
-    else:
-        answer = capacity_document(result, verdicts(result))
-    value = answer["verdicts"][0][key]
-    *before, last = derivation.steps
-    return derivation._replace(value=value, steps=(*before, last._replace(value=value)))
-
-
-def _explain_document(explanation: Explanation) -> JsonDocument:
-    return document(
-        "explain",
-        profile=explanation.profile.name,
-        derivations=[_derivation(derivation) for derivation in explanation.derivations],
-    )
-
-
-def _derivation(derivation: Derivation) -> JsonDocument:
+def _derivation(derivation: Derivation) -> Record:
     return {
         "command": derivation.command,
         "figure": derivation.figure.key,
         **fields(derivation.figure, "symbol", "unit", "reference", "meaning"),
         **fields(derivation, "timing_model", "transaction", "period_us", "value", "weakest_grade"),
         "steps": [step._asdict() for step in derivation.steps],
-        "inputs": [input_._asdict() for input_ in derivation.inputs],
+        "inputs": [given._asdict() for given in derivation.inputs],
     }
 
 
@@ -223,84 +140,57 @@ def _step_records(derivation: Derivation) -> Iterator[Record]:
             "figure": figure.key,
             **fields(derivation, "timing_model", "transaction", "period_us"),
             "step": number,
-            **fields(step, "reference", "symbol", "formula", "numbers"),
-            "value": json_text(step.value) if _has_names(step.value) else step.value,
-            "unit": step.unit,
+            **fields(step, "reference", "symbol", "formula", "numbers", "value", "unit"),
         }
 
 
-def _sections(explanation: Explanation) -> Iterator[Chapter]:
-    """A section for each derivation; a long list of inputs stands once."""
+def _sections(name: str, derivations: Iterable[Derivation]) -> Iterator[Chapter]:
+    """A section for each derivation; inputs that several have stand once."""
     first: dict[tuple[Input, ...], Derivation] = {}
-    for derivation in explanation.derivations:
+    for derivation in derivations:
         earlier = first.setdefault(derivation.inputs, derivation)
-        is_shown = earlier is derivation or len(derivation.inputs) <= _MOST_REPEATED
-        below = _inputs(derivation) if is_shown else _same_inputs(derivation, earlier)
-        yield _section(derivation, explanation.profile.name, below)
+        below = _inputs(derivation) if earlier is derivation else _same_inputs(earlier)
+        yield _section(derivation, name, below)
 
 
-def _same_inputs(derivation: Derivation, earlier: Derivation) -> Sentence:
-    kind = f"{earlier.transaction}, " if earlier.transaction else ""
-    words = f"It starts from the {len(derivation.inputs)} inputs of {kind}{earlier.timing_model} model"
-    return Sentence((f"{words}; the least well known is {derivation.weakest_grade}.",))
+def _of(derivation: Derivation) -> str:
+    """Transaction and timing model."""
+    return f"{f'{derivation.transaction}, ' if derivation.transaction else ''}{derivation.timing_model} model"
 
 
-def _section(derivation: Derivation, profile: str, below: Block) -> Chapter:
+def _same_inputs(earlier: Derivation) -> Sentence:
+    return Sentence((f"It starts from the same inputs as {earlier.figure.key}, {_of(earlier)}.",))
+
+
+def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
     """The result, its meaning, every step to it, and what stands below them: the inputs."""
     figure = derivation.figure
-    kind = f"{derivation.transaction}, " if derivation.transaction else ""
-    title = Sentence(
-        (
-            *(Code(figure.key), " of ", Code(profile)),
-            *(() if derivation.period_us is None else (" at ", period_value(derivation.period_us))),
-            *(f", {kind}{derivation.timing_model} model: ", *_result_parts(derivation)),
-        )
-    )
+    period = () if derivation.period_us is None else (" at ", period_value(derivation.period_us))
+    result = _result(derivation.value, figure.key, figure.unit)
+    title = Sentence((Code(figure.key), " of ", Code(name), *period, f", {_of(derivation)}: ", result))
     about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}.",))
-    steps = Calculation(tuple(map(_step, derivation.steps)))
-    return Chapter(title, (about, steps, below))
-
-
-def _result_parts(derivation: Derivation) -> tuple[Part, ...]:
-    """The result in a sentence: one figure, or the keys that a change sets."""
-    if isinstance(derivation.value, dict) and "changes" in derivation.value:
-        settings = (
-            Sentence((Code(key), " = ", ShownValue(new, key))) for key, new in derivation.value["changes"].items()
-        )
-        return joined(*settings, by=", ").parts
-    result = _result(derivation.value, derivation.figure.key, derivation.figure.unit)
-    return (result if isinstance(result, ShownValue) else result.text,)
+    return Chapter(title, (about, Calculation(tuple(map(_step, derivation.steps))), below))
 
 
 def _result(value: object, key: str, unit: str) -> ShownValue | Words:
-    if value is None or value in ([], {}):
-        return _NONE
-    if isinstance(value, dict) and "text" in value:
-        return Words(value["text"])
-    if isinstance(value, dict):
-        changes = value.get("changes", value)
-        return Words(", ".join(f"{changed} = {new}" for changed, new in changes.items()))
-    if isinstance(value, list) and _has_names(value):
-        names = (next(item[key] for key in _NAMING if key in item) for item in value)
-        return Words(", ".join(names))
-    return ShownValue(value, key, unit, digits=DIGITS)
+    return Words("none") if value is None else ShownValue(value, key, unit, digits=DIGITS)
 
 
-def _has_names(value: object) -> bool:
-    """Whether a value has named parts."""
-    return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(item, dict) for item in value))
-
-
-def _step(step: Step) -> blocks.CalculationStep:
+def _step(step: Step) -> CalculationStep:
     """A line in symbols and one in numbers; a line that repeats its neighbour is left out."""
     result = _result(step.value, step.key, step.unit)
-    said = figure_text(result) if isinstance(result, ShownValue) else result.text
-    formula = "" if step.formula == step.symbol else step.formula
+    said = result.text if isinstance(result, Words) else figure_text(result)
+    formula = "" if step.formula in (step.symbol, said) else step.formula
     numbers = "" if step.numbers in (formula, short(step.value), said) else step.numbers
-    return blocks.CalculationStep(step.reference, step.symbol, formula, numbers, result)
+    return CalculationStep(step.reference, step.symbol, formula, numbers, result)
 
 
 def _inputs(derivation: Derivation) -> Table:
-    rows = (TableRow((Code(given.symbol), *input_cells(given))) for given in derivation.inputs)
+    rows = (TableRow((Code(given.symbol), *_input_cells(given))) for given in derivation.inputs)
     caption = Sentence((f"Inputs of this figure; the weakest grade is {derivation.weakest_grade}.",))
-    return Table((_SYMBOL, *INPUT_COLUMNS), tuple(rows), caption, stacks=True)
+    return Table((_SYMBOL, *_INPUTS), tuple(rows), caption, stacks=True)
+
+
+def _input_cells(given: Input) -> tuple[Cell, ...]:
+    value = ShownValue(given.value, "value", given.unit, digits=DIGITS)
+    return Code(given.name), value, given.unit, given.grade, given.source

@@ -1,14 +1,14 @@
 """Assumed keys that carry much of the cycle or of its uncertainty: a verdict rests on them unmeasured."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.network import Group, Network
 from busplan.buses.rule import RuleFigures
 from busplan.elementwise import plain
 from busplan.questions.fit.inputs import given
-from busplan.questions.fit.network import bus_of, network_of
-from busplan.sections.base import value_at
+from busplan.questions.fit.network import network_of
+from busplan.sections.base import value_at, with_unchecked
 from busplan.sections.profile import Profile
 from busplan.sourced import Sourced
 
@@ -20,6 +20,8 @@ _MUCH: Final = Sourced(
     meaning="share of the variance, or of the required time, from which on a verdict rests on a key",
 )
 _EXECUTION: Final = "execution"
+_ENDLESS: Final = 1e12
+"""A bit rate at which nothing takes time [kbit/s]."""
 _Share = tuple[tuple[str, ...], float, str]
 """Keys, what they carry [1], and of what."""
 
@@ -42,7 +44,7 @@ class HeavyAssumption(NamedTuple):
         return any(key == covered or key.startswith(f"{covered}.") for covered in self.keys)
 
 
-def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssumption, ...]:
+def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssumption, ...]:
     """The assumptions that carry more than a quarter of the variance or of the required time.
 
     Parameters
@@ -52,6 +54,7 @@ def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssu
     profile
         The network.
     """
+    profile = network.profile
     variance = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     shares: list[_Share] = [
         ((doubt.key,), float(doubt.us) ** 2 / variance, "the variance") for doubt in figures.doubts if variance
@@ -59,7 +62,8 @@ def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssu
     shares += [((term.rests_on,), plain(term.us) / figures.required_us, "the required time") for term in figures.terms]
     # What is no key has no grade, and execution times are no term or doubt of one key.
     shares = [share for share in shares if share[1] > _MUCH and _is_assumed(profile, share[0][0])]
-    shares += _of_execution(figures, profile, variance)
+    shares += _of_execution(figures, network, variance)
+    shares += _of_rates(figures, network)
     said: dict[tuple[str, ...], list[str]] = {}
     for keys, share, whole in shares:
         if share > _MUCH:
@@ -72,9 +76,9 @@ def _is_assumed(profile: Profile, key: str) -> bool:
     return isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed"
 
 
-def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> list[_Share]:
+def _of_execution(figures: RuleFigures, network: Network, variance: float) -> list[_Share]:
     """Shares of the assumed execution times: what of its terms goes without them, and their part of the variance."""
-    network, bus = network_of(profile)._replace(period_us=figures.period_us), bus_of(profile)
+    network, bus = network._replace(period_us=figures.period_us), network.bus
     assumed = [group for group in network.groups if _counts(group, network)]
     if not assumed:
         return []
@@ -88,9 +92,26 @@ def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> li
     return [(keys, whole_us * (whole_us - rest_us) / variance, "the variance"), of_time] if variance else [of_time]
 
 
+def assumed_rates(network: Network) -> tuple[str, ...]:
+    """Keys of the bit rates that a profile calls assumed."""
+    return tuple(key for key in network.bus.rate_keys if _is_assumed(network.profile, key))
+
+
+def _of_rates(figures: RuleFigures, network: Network) -> Iterator[_Share]:
+    """Shares of the assumed bit rates: what of the required time, or without a cycle of the load, goes without them."""
+    bus = network.bus
+    for key in assumed_rates(network):
+        endless = network_of(with_unchecked(network.profile, key, _ENDLESS))
+        if network.groups:
+            cycle = bus.cycle(endless._replace(period_us=figures.period_us), model=figures.timing_model)
+            yield (key,), 1 - plain(cycle.required_us) / figures.required_us, "the required time"
+        elif (load := bus.limit("load")) is not None:
+            yield (key,), 1 - plain(load.value(endless)) / plain(load.value(network)), "the load"
+
+
 def _counts(group: Group, network: Network) -> bool:
     is_assumed = group.node.execution.grade == "assumed"
-    return is_assumed and bus_of(network.profile).has_execution(network._replace(groups=(group,)))
+    return is_assumed and network.bus.has_execution(network._replace(groups=(group,)))
 
 
 def _at_once(group: Group) -> Group:

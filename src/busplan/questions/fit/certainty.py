@@ -11,27 +11,14 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total, within
-from busplan.questions.fit.network import bus_of, network_of
-from busplan.sections.profile import Profile
 
 TIME: Final = "time"
 """Key of the limit of time, which is no limit of the bus: the cycle must fit its slice."""
 
 
-def cycle_of(profile: Profile, *, model: str, nodes: int | None = None) -> BusCycle:
-    """The cycle of a profile under a timing model.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    model
-        Timing model.
-    nodes
-        Nodes on the bus [1]; without it the profile's own number.
-    """
-    network = network_of(profile)
-    return bus_of(profile).cycle(network if nodes is None else network.with_nodes(nodes), model=model)
+def deciding_cycle(network: Network) -> BusCycle:
+    """The cycle of a network under the timing model that decides."""
+    return network.bus.cycle(network, model=network.bus.deciding_model)
 
 
 def available_us(network: Network) -> Number:
@@ -52,7 +39,7 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
 
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
     """The limits of a network's kind of bus, without those of safety and without doubts; time is the last."""
-    bus = bus_of(network.profile)
+    bus = network.bus
     time = time_limit(lambda tried: bus.cycle(tried, model=model).most_required_us)
     return (*(limit.nominal for limit in bus.limits if not limit.is_safety), time)
 
@@ -127,7 +114,7 @@ def certainty(cycle: BusCycle) -> Certainty:
 
 def limit_codes(network: Network) -> dict[str, Number]:
     """The place among `VERDICTS` of each limit of the bus by key, those of safety left out."""
-    return {limit.key: limit.verdict_code(network) for limit in bus_of(network.profile).limits if not limit.is_safety}
+    return {limit.key: limit.verdict_code(network) for limit in network.bus.limits if not limit.is_safety}
 
 
 def time_code(weighed: Certainty, network: Network) -> Number:
@@ -176,6 +163,6 @@ def limits_behind(judged: Judged) -> tuple[str, ...]:
 
 def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
     """Every limit that a network must keep to be shown to fit on a bus that is set safely; time is the last."""
-    bus = bus_of(network.profile)
+    bus = network.bus
     time = time_limit(lambda tried: certainty(bus.cycle(tried, model=bus.deciding_model)).safe_required_us)
     return (*(limit.shown for limit in bus.limits), time)

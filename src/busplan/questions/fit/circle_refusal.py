@@ -1,21 +1,17 @@
-"""Why the circle that a profile asks for cannot be run: the one place that says so, and nothing is simulated.
-
-Every command that gives a verdict asks here, so that all say the same of a profile, at the key that causes it. Of a
-circle that can be run, its loops and its length are told at the end.
-"""
+"""The circle that a profile asks for, without simulating it: why it cannot be run, its loops and its length."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import inf
 from typing import Any, Final, Literal
 
-from busplan.questions.fit.certainty import available_us, cycle_of, fits_in
+from busplan.buses.network import Network
+from busplan.questions.fit.certainty import available_us, deciding_cycle, fits_in
 from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us, skew_us
-from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.base import Section, value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
-from busplan.servo.checks import LARGEST, ParameterError, Refused, no_multiple, parameters
+from busplan.servo.checks import LARGEST, ParameterError, Refused, dividing_step_us, parameters
 from busplan.servo.parameters import FINEST_ENCODER_MM, LONGEST_DELAY_PERIODS, Axis, Delivery, LoopTiming
 from busplan.servo.runnable import (
     LONGEST_SETTLING_US,
@@ -29,37 +25,25 @@ from busplan.servo.runnable import (
 
 AxisName = Literal["x", "y"]
 AXIS_NAMES: Final[tuple[AxisName, ...]] = ("x", "y")
-STEP: Final = "servo.step_us"
 
 
-def refusals(profile: Profile) -> tuple[Refused, ...]:
-    """Why the circle of a profile cannot be run, each cause by its dotted key; empty if it can.
+def refusals(network: Network) -> tuple[Refused, ...]:
+    """Why the circle of a network cannot be run, each cause by its dotted key; empty if it can.
+
+    A cycle that does not fit its bus has no circle: then nothing is asked of drives, delivery and move.
 
     Parameters
     ----------
-    profile
+    network
         The network, whatever it asks for.
-
-    Examples
-    --------
-    >>> from busplan.profile.shipped import load
-    >>> from busplan.profile.toml import override
-    >>> [cause.name for cause in refusals(override(load("paper-1ms").profile, {"servo.step_us": 300.0}))]
-    ['servo.step_us']
     """
-    if not profile.has_cycle:
+    if not network.groups:
         return (Refused("bus.nodes", "none", "messages alone have no axes that could move"),)
-    causes = loop_refusals(profile)
-    of_run = run_refusals(profile, causes)
-    return causes + of_run if of_run and _fits(profile) else causes
+    causes = (*_setpoints_of_several_cycles(network), *_loop_over_the_bus(network))
+    return (*causes, *_of_run(network, is_loop_refused=bool(causes))) if _fits(network) else causes
 
 
-def circle_refusals(profile: Profile) -> tuple[Refused, ...]:
-    """As `refusals`, of a profile that asks for a circle; empty for one that asks for none."""
-    return refusals(profile) if profile.asks_for_circle else ()
-
-
-def require_circle(profile: Profile) -> None:
+def require_circle(network: Network) -> None:
     """Refuse a circle that cannot be run.
 
     Parameters
@@ -72,32 +56,14 @@ def require_circle(profile: Profile) -> None:
     ParameterError
         Its `refusals`.
     """
-    causes = refusals(profile)
+    causes = refusals(network)
     if causes:
         raise ParameterError(*causes)
 
 
-def loop_refusals(profile: Profile) -> tuple[Refused, ...]:
-    """Why the loops of a profile cannot be simulated, whether or not its cycle fits the bus."""
-    return (
-        *step_refusals(profile, profile.cycle.period_us),
-        *_setpoints_of_several_cycles(profile),
-        *_loop_over_the_bus(profile),
-    )
-
-
-def run_refusals(profile: Profile, of_loop: tuple[Refused, ...]) -> tuple[Refused, ...]:
-    """Why the drives, the delivery or the move of a profile cannot be simulated.
-
-    A cycle that does not fit its bus has no circle, so that none of these is asked of it.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    of_loop
-        Its `loop_refusals`: without steps nobody can say how long a move is.
-    """
+def _of_run(network: Network, *, is_loop_refused: bool) -> tuple[Refused, ...]:
+    """Why the drives, the delivery or the move of a profile cannot be simulated."""
+    profile = network.profile
     causes: list[Refused] = []
     axes: list[Axis] = []
     for name in AXIS_NAMES:
@@ -107,86 +73,71 @@ def run_refusals(profile: Profile, of_loop: tuple[Refused, ...]) -> tuple[Refuse
         except ParameterError as error:
             refused = [*error.refused]
         causes += (_at_key(cause, profile, name) for cause in refused)
-    causes += _out_of_order(profile)
-    if not (causes or of_loop):
-        causes += _move(profile, axes)
+    causes += _out_of_order(network)
+    if not (causes or is_loop_refused):
+        causes += _move(network, axes)
     # Both axes may refuse one key.
     return tuple({cause.name: cause for cause in reversed(causes)}.values())[::-1]
 
 
-def _fits(profile: Profile) -> bool:
-    """Whether the cycle of a profile fits its bus."""
-    required_us = cycle_of(profile, model=bus_of(profile).deciding_model).required_us
-    network = network_of(profile)
-    return bool(fits_in(required_us, available_us=available_us(network))) and not bus_of(profile).broken(network)
+def _fits(network: Network) -> bool:
+    """Whether the cycle of a network fits its bus."""
+    required_us = deciding_cycle(network).required_us
+    return bool(fits_in(required_us, available_us=available_us(network))) and not network.bus.broken(network)
 
 
-def step_refusals(profile: Profile, period_us: float) -> Iterator[Refused]:
-    """Refuse the step of a profile at a period that is no multiple of it.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    period_us
-        Communication period [us].
-    """
-    default = "" if "step_us" in profile.servo.model_fields_set else f"; it is the default of {STEP}"
-    for refused in no_multiple(period_us=period_us, step_us=profile.servo.step_us):
-        yield refused._replace(name=STEP, right=f"{refused.right}{default}", beside=("cycle.period_us",))
-
-
-def _setpoints_of_several_cycles(profile: Profile) -> Iterator[Refused]:
+def _setpoints_of_several_cycles(network: Network) -> Iterator[Refused]:
     """Refuse axes whose set-points do not come in every cycle."""
-    key, every = bus_of(profile).setpoints_every(network_of(profile))
+    key, every = network.bus.setpoints_every(network)
     if every > 1:
-        whole = f"a period of {every * profile.cycle.period_us:g} us with 1 has the same set-points"
+        whole = f"a period of {every * network.profile.cycle.period_us:g} us with 1 has the same set-points"
         yield Refused(key, every, f"the circle test has a set-point in every cycle; {whole}")
 
 
-def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:
+def _loop_over_the_bus(network: Network) -> Iterator[Refused]:
     """Refuse a loop on the host with more of the bus in it than its controller is made for."""
-    period_us, delay_us = profile.cycle.period_us, max(loop_delays_us(profile))
+    period_us, delay_us = network.profile.cycle.period_us, max(loop_delays_us(network))
     most_us = LONGEST_DELAY_PERIODS * period_us
     if delay_us > most_us:
         known = f"the circle test knows {LONGEST_DELAY_PERIODS} periods"
         why = f"the bus puts {delay_us:g} us into a loop over it, and {known}"
-        key = bus_of(profile).key_of("pipeline")
+        key, profile = network.bus.key_of("pipeline"), network.profile
         less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
         right = f'{why}, {most_us:g} us, at most; {less}close the loop on the node, servo.loop = "node"'
         yield Refused("servo.loop", '"host"', right)
 
 
-def _out_of_order(profile: Profile) -> Iterator[Refused]:
+def _out_of_order(network: Network) -> Iterator[Refused]:
     """Refuse set-points that would change their order: by what the bus adds, where only that does it."""
-    period_us = profile.cycle.period_us
+    profile, period_us = network.profile, network.profile.cycle.period_us
     own = Delivery(**parameters_in(profile.delivery, Delivery))
     if any(unfit_delivery(own, period_us=period_us)):
         yield from (_at_key(cause, profile) for cause in unfit_delivery(own, period_us=period_us))
-    elif any(unfit_delivery(delivery_of(profile), period_us=period_us)):
+    elif any(unfit_delivery(delivery_of(network), period_us=period_us)):
         known = f"which the circle test knows up to half the period, {period_us / 2:g} us, with jitter and skew"
-        if apart_us := skew_us(profile):
+        if apart_us := skew_us(network):
             right = f"the last axis then takes its set-points {apart_us:g} us after the first, {known}"
-            yield Refused(bus_of(profile).key_of("clock"), "false", f"{right}; set it true if the drives have a clock")
+            yield Refused(network.bus.key_of("clock"), "false", f"{right}; set it true if the drives have a clock")
         else:
-            added_us = jitter_us(profile) - own.jitter_us
+            added_us = jitter_us(network) - own.jitter_us
             right = f"the bus adds {added_us:g} us of jitter either way, {known}; a longer period has room"
             yield Refused("cycle.period_us", period_us, right)
 
 
-def _move(profile: Profile, axes: Sequence[Axis]) -> list[Refused]:
+def _move(network: Network, axes: Sequence[Axis]) -> list[Refused]:
     """Refuse a move that is too short for its feed or too long for memory; a lead-in makes it longer."""
+    profile = network.profile
     is_turn = profile.circle.path != "trapezoid"
     least = [*_unfit(profile, axes, 0.0 if is_turn else None)]
     if least or not is_turn or not any(_unfit(profile, axes, LONGEST_SETTLING_US)):
         return least
-    return [*_unfit(profile, axes, path_settling_us(profile))]
+    return [*_unfit(profile, axes, path_settling_us(network))]
 
 
 def _unfit(profile: Profile, axes: Sequence[Axis], settling_us: float | None) -> Iterator[Refused]:
     """Reasons why the move of a lead-in cannot be made."""
     move, radius_mm = move_of(profile, settling_us), profile.circle.radius_mm
-    timing = LoopTiming(period_us=profile.cycle.period_us, step_us=profile.servo.step_us)
+    timing = LoopTiming(period_us=profile.cycle.period_us, step_us=step_us(profile))
     yield from (_at_key(cause, profile) for cause in unfit_move(move, radius_mm=radius_mm))
     for name, axis in zip(AXIS_NAMES, axes, strict=True):
         causes = unfit_steps(move.setpoints, reach_mm=radius_mm, axis=axis, timing=timing)
@@ -219,10 +170,10 @@ def axis_of(profile: Profile, name: AxisName) -> Axis:
     return Axis(**profile.servo.axis_keys(name))
 
 
-def delivery_of(profile: Profile) -> Delivery:
+def delivery_of(network: Network) -> Delivery:
     """How set-points arrive, with the skew and the jitter that the bus adds."""
-    own = profile.delivery
-    late = {"skew_us": own.skew_us + skew_us(profile), "jitter_us": jitter_us(profile)}
+    own = network.profile.delivery
+    late = {"skew_us": own.skew_us + skew_us(network), "jitter_us": jitter_us(network)}
     return Delivery(**parameters_in(own, Delivery) | {key: max(-LARGEST, min(us, LARGEST)) for key, us in late.items()})
 
 
@@ -255,24 +206,32 @@ _REST_SHARE: Final = 1e-3
 """Rest after settling, as a share of the smallest contour tolerance."""
 
 
+def step_us(profile: Profile) -> float:
+    """Step of the position loops: the longest one up to servo.step_us that divides the period [us].
+
+    Drives run their loops in step with the bus, so a period that servo.step_us does not divide has a shorter step.
+    """
+    return dividing_step_us(profile.cycle.period_us, most_us=profile.servo.step_us)
+
+
 def loop_timing(profile: Profile) -> LoopTiming:
     """Timing of a profile's position loops, in a circle that can be run."""
     servo = profile.servo
     return LoopTiming(
-        period_us=profile.cycle.period_us, step_us=servo.step_us, loop=servo.loop, interpolation=servo.interpolation
+        period_us=profile.cycle.period_us, step_us=step_us(profile), loop=servo.loop, interpolation=servo.interpolation
     )
 
 
-def loop_axes(profile: Profile) -> tuple[Axis, Axis]:
+def loop_axes(network: Network) -> tuple[Axis, Axis]:
     """Both axes of a profile with the delays of their loops, in a circle that can be run."""
     x, y = (
-        replace(axis_of(profile, name), delay_us=delay_us)
-        for name, delay_us in zip(AXIS_NAMES, loop_delays_us(profile), strict=True)
+        replace(axis_of(network.profile, name), delay_us=delay_us)
+        for name, delay_us in zip(AXIS_NAMES, loop_delays_us(network), strict=True)
     )
     return x, y
 
 
-def path_steps(profile: Profile) -> int:
+def path_steps(network: Network) -> int:
     """Count the simulated steps of each axis; nothing is simulated [1].
 
     Raises
@@ -280,24 +239,25 @@ def path_steps(profile: Profile) -> int:
     ParameterError
         The circle cannot be run.
     """
-    require_circle(profile)
-    return path_setpoints(profile) * loop_timing(profile).steps_per_period
+    require_circle(network)
+    return path_setpoints(network) * loop_timing(network.profile).steps_per_period
 
 
-def path_setpoints(profile: Profile) -> int:
+def path_setpoints(network: Network) -> int:
     """Count the set-points of a profile's circle, which can be run [1]."""
-    return move_of(profile, path_settling_us(profile)).setpoints
+    return move_of(network.profile, path_settling_us(network)).setpoints
 
 
-def path_settling_us(profile: Profile) -> float | None:
+def path_settling_us(network: Network) -> float | None:
     """Time of the lead-in at constant speed: None on a trapezoid, infinite if the loops do not settle [us]."""
+    profile = network.profile
     if profile.circle.path == "trapezoid":
         return None
     from busplan.servo.measured_part import REST_MM, settling_time_us  # only what the lead-in decides loads numpy
 
     tolerances_mm = [getattr(profile.tolerance, name) for name in CONTOUR_MEASURES]
     least_mm = min((tolerance_mm for tolerance_mm in tolerances_mm if tolerance_mm), default=None)
-    x, y = loop_axes(profile)
+    x, y = loop_axes(network)
     settling_us = settling_time_us(
         x,
         y,

@@ -1,11 +1,9 @@
 """Capacity of a bus: does the cycle fit its period, with what margin, and how many nodes does it carry?"""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from itertools import chain
+from collections.abc import Mapping
+from dataclasses import dataclass
 from math import inf
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
@@ -14,7 +12,6 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, existing, larger, plain
-from busplan.profile.toml import at_periods, override
 from busplan.questions.fit.certainty import (
     FITS,
     TIME,
@@ -28,88 +25,42 @@ from busplan.questions.fit.certainty import (
     time_code,
     verdict_code,
 )
-from busplan.questions.fit.circle_refusal import circle_refusals
-from busplan.questions.fit.figure_values import FigureValues
-from busplan.questions.fit.network import bus_of, model_names, network_of
+from busplan.questions.fit.network import changed
 from busplan.questions.fit.node_limit import largest_nodes, safe_nodes
-from busplan.sections.profile import Profile
 
 COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
 """Figures that each group has for itself; where all nodes are alike, they are those of the whole."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class GroupCapacity:
-    """How many nodes of one group a bus carries, the other groups as they are.
-
-    The largest and the safe number are each computed when they are first read.
-    """
+    """How many nodes of one group a bus carries, the other groups as they are."""
 
     name: str
     """Empty where all nodes are alike."""
     nodes: int
     axes: int
     """Of all its nodes."""
-    node_axes: int = field(repr=False)
-    timing_model: str = field(repr=False)
-    profile: Profile = field(repr=False)
-
-    @cached_property
-    def _largest(self) -> tuple[int, str]:
-        return largest_nodes(self.profile, model=self.timing_model, group=self.name)
-
-    @cached_property
-    def _safe(self) -> tuple[int, str] | tuple[None, None]:
-        decides = self.timing_model == bus_of(self.profile).deciding_model
-        return safe_nodes(self.profile, group=self.name) if decides else (None, None)
-
-    @property
-    def max_nodes(self) -> int:
-        """Most nodes that fit."""
-        return self._largest[0]
-
-    @property
-    def max_axes(self) -> int:
-        """Their axes."""
-        return self.node_axes * self.max_nodes
-
-    @property
-    def limited_by(self) -> str:
-        """Key of the limit that keeps `max_nodes` from being more."""
-        return self._largest[1]
-
-    @property
-    def safe_nodes(self) -> int | None:
-        """Most nodes that are shown to fit; this and the figures below exist for the timing model that decides."""
-        return self._safe[0]
-
-    @property
-    def safe_axes(self) -> int | None:
-        """Their axes."""
-        return None if self.safe_nodes is None else self.node_axes * self.safe_nodes
-
-    @property
-    def safe_limited_by(self) -> str | None:
-        """Key of the limit that keeps `safe_nodes` from being more."""
-        return self._safe[1]
-
-    def record(self) -> dict[str, Any]:
-        """All its figures by key."""
-        return {key: getattr(self, key) for key in ("name", "nodes", "axes", *COUNTS)}
-
-    def __eq__(self, other: object) -> bool:
-        # Two networks may have one capacity.
-        return isinstance(other, GroupCapacity) and self.record() == other.record()
-
-    def __hash__(self) -> int:
-        return hash((self.name, self.nodes, self.axes))
+    max_nodes: int
+    """Most nodes that fit."""
+    max_axes: int
+    """Their axes."""
+    limited_by: str
+    """Key of the limit that keeps `max_nodes` from being more."""
+    safe_nodes: int | None
+    """Most nodes that are shown to fit; this and the figures below exist for the timing model that decides."""
+    safe_axes: int | None
+    """Their axes."""
+    safe_limited_by: str | None
+    """Key of the limit that keeps `safe_nodes` from being more."""
 
 
-class CapacityFigures(NamedTuple):
-    """Capacity at one period under one timing model; the `figures` of its bus say what each figure means.
+@dataclass(frozen=True)
+class FitFigures:
+    """Does the cycle fit its period, under one timing model? The `figures` of its bus say what each figure means.
 
-    Figures that only its kind of bus has, terms and numbers of nodes are attributes like all others. A network of
-    messages alone has no cycle: then every figure of the cycle, its period among them, is None, whatever its type says.
+    A network of messages alone has no cycle: then every figure of the cycle, its period among them, is None, whatever
+    its type says.
     """
 
     kind: str
@@ -135,8 +86,6 @@ class CapacityFigures(NamedTuple):
     """Keys of the limits that are broken."""
     fits: bool
     """Whether no limit is broken, time among them: required <= available, without bias and uncertainty."""
-    circle_refused_by: tuple[str, ...]
-    """Keys that prevent the profile's circle test from running."""
     bias_us: float | None
     """This and the figures below exist for the timing model that decides."""
     margin_corrected_us: float | None
@@ -149,149 +98,90 @@ class CapacityFigures(NamedTuple):
     verdict: VerdictWord | None
     doubts: tuple[Doubt, ...]
     """Parts of the uncertainty."""
-    counts: tuple[GroupCapacity, ...]
-    """How many nodes fit: of each [[group]], or of all where they are alike."""
     safe: bool
     """Whether every safety limit of the bus is kept, as a gap count that is safe for the hops."""
-    own: FigureValues
-    """Figures that only this kind of bus has."""
+    own: Mapping[str, float | str | None]
+    """Figures that only this kind of bus has, and its terms, by key."""
 
-    @property
-    def groups(self) -> tuple[GroupCapacity, ...]:
-        """One for each [[group]] of the profile."""
-        return self.counts if self._whole is None else ()
+    def values(self) -> dict[str, Any]:
+        """All figures by their keys in the register, whether every bus has them or only this kind."""
+        return {**self.own, **vars(self)}
 
-    @property
-    def _whole(self) -> GroupCapacity | None:
-        """The nodes, where all are alike; groups have figures of their own, and those of the whole are None."""
-        first = self.counts[0] if self.counts else None
-        return None if first is None or first.name else first
 
-    @property
-    def max_nodes(self) -> int | None:
-        """Most nodes that fit; None with groups."""
-        return None if self._whole is None else self._whole.max_nodes
+@dataclass(frozen=True)
+class CapacityFigures(FitFigures):
+    """Capacity at one period under one timing model: whether the cycle fits, and how many nodes would."""
 
-    @property
-    def max_axes(self) -> int | None:
-        """Their axes."""
-        return None if self._whole is None else self._whole.max_axes
-
-    @property
-    def limited_by(self) -> str | None:
-        """Key of the limit that keeps `max_nodes` from being more."""
-        return None if self._whole is None else self._whole.limited_by
-
-    @property
-    def safe_nodes(self) -> int | None:
-        """Most nodes that are shown to fit; None with groups, and under a timing model that does not decide."""
-        return None if self._whole is None else self._whole.safe_nodes
-
-    @property
-    def safe_axes(self) -> int | None:
-        """Their axes."""
-        return None if self._whole is None else self._whole.safe_axes
-
-    @property
-    def safe_limited_by(self) -> str | None:
-        """Key of the limit that keeps `safe_nodes` from being more."""
-        return None if self._whole is None else self._whole.safe_limited_by
-
-    def __getattr__(self, key: str) -> Any:
-        # Figures of the kind and terms are attributes as all others are; only what is no field comes here.
-        if not key.startswith("_"):
-            if not self.terms and any(key == figure.key for figure in kind_named(self.kind).figures.terms):
-                return None
-            if key in self.own:
-                return self.own[key]
-            for term in self.terms:
-                if term.key == key:
-                    return term.us
-        raise AttributeError(f"a bus of kind {self.kind} has no figure {key!r}")
+    counts: tuple[GroupCapacity, ...]
+    """How many nodes fit: of each [[group]], or of all where they are alike."""
+    groups: tuple[GroupCapacity, ...] = ()
+    """One for each [[group]] of the profile."""
+    max_nodes: int | None = None
+    """Most nodes that fit; None with groups, as are all figures below."""
+    max_axes: int | None = None
+    limited_by: str | None = None
+    """Key of the limit that keeps `max_nodes` from being more."""
+    safe_nodes: int | None = None
+    """Most nodes that are shown to fit; None under a timing model that does not decide."""
+    safe_axes: int | None = None
+    safe_limited_by: str | None = None
 
     def by_key(self) -> dict[str, Any]:
         """The figures of the document by key, in its order."""
-        named = {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).figures.capacity}
+        values = self.values()
+        named = {figure.key: values[figure.key] for figure in kind_named(self.kind).figures.capacity}
         return {key: list(value) if isinstance(value, tuple) else value for key, value in named.items()}
 
 
-class Capacity(NamedTuple):
-    """The profile as it was analysed, and for each period a set of figures for each timing model."""
-
-    profile: Profile
-    periods: tuple[tuple[CapacityFigures, ...], ...]
-
-    @property
-    def results(self) -> tuple[CapacityFigures, ...]:
-        """All sets of figures, period by period."""
-        return tuple(chain.from_iterable(self.periods))
+def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
+    """Whether a network fits its own period under one timing model, and how many nodes would."""
+    fit = figures(network, model=model)
+    counts = node_counts(network, model=model)
+    alike = counts[0] if counts and not counts[0].name else None
+    whole = {} if alike is None else {key: getattr(alike, key) for key in COUNTS}
+    return CapacityFigures(**vars(fit), counts=counts, groups=counts if alike is None else (), **whole)
 
 
-def capacity(
-    profile: Profile,
-    *,
-    periods_us: Sequence[float] | None = None,
-    timing_models: Sequence[str] | None = None,
-) -> Capacity:
-    """Tell whether the cycle fits its period, and how many nodes would.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    periods_us
-        Communication periods T_s [us]; without them the profile's own.
-    timing_models
-        Which timing models, in this order; without them all of the kind of bus.
-
-    Returns
-    -------
-    Capacity
-        Figures for each period and model, in this nesting.
-
-    Raises
-    ------
-    BusplanError
-        A period that the profile's schema refuses.
-
-    References
-    ----------
-    Paper, equations (1), (2), (11).
-    """
-    models = model_names(profile) if timing_models is None else timing_models
-    variants = at_periods(profile, periods_us)
-    return Capacity(
-        profile,
-        tuple(tuple(figures(variant, model=model) for model in models) for variant in variants),
-    )
+def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
+    """How many nodes of each group fit a network's period, and are shown to fit; of all where they are alike."""
+    decides = model == network.bus.deciding_model
+    counts = []
+    for alike in network.profile.alike_nodes:
+        most, limit = largest_nodes(network, model=model, group=alike.name)
+        safe, safe_limit = safe_nodes(network, group=alike.name) if decides else (None, None)
+        nodes, axes = int(alike.nodes), alike.node.axes
+        safe_axes = None if safe is None else axes * safe
+        counts.append(
+            GroupCapacity(alike.name, nodes, nodes * axes, most, axes * most, limit, safe, safe_axes, safe_limit)
+        )
+    return tuple(counts)
 
 
-def figures(profile: Profile, *, model: str) -> CapacityFigures:
-    """Compute all figures of a profile at its own period under one timing model.
+def figures(network: Network, *, model: str) -> FitFigures:
+    """Whether a network fits its own period under one timing model.
 
     Parameters
     ----------
-    profile
+    network
         The network.
     model
         Timing model.
     """
-    network = network_of(profile)
-    bus = bus_of(profile)
+    bus, has_cycle = network.bus, bool(network.groups)
     cycle = bus.cycle(network, model=model)
     numbers: dict[str, Any] = {key: existing(number) for key, number in numeric_figures(cycle).items()}
-    own = FigureValues({key: None if number is None else plain(number) for key, number in cycle.figures().items()})
-    overruns = profile.has_cycle and not fits_in(numbers["required_us"], available_us=numbers["available_us"])
+    terms = cycle.terms if has_cycle else ()
+    own = {
+        **{key: None if number is None else existing(number) for key, number in cycle.figures().items()},
+        **dict.fromkeys(figure.key for figure in bus.figures.terms),
+        **{term.key: existing(term.us) for term in terms},
+    }
+    overruns = has_cycle and not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     codes = limit_codes(network)
     broken = tuple(key for key, code in codes.items() if code == BROKEN)
     exceeded = (*broken, *((TIME,) if overruns else ()))
     decides = model == bus.deciding_model
-    terms = cycle.terms if profile.has_cycle else ()
-    counts = (
-        GroupCapacity(alike.name, int(alike.nodes), int(alike.nodes) * alike.node.axes, alike.node.axes, model, profile)
-        for alike in profile.alike_nodes
-    )
-    return CapacityFigures(
+    return FitFigures(
         kind=bus.kind,
         timing_model=model,
         **numbers,
@@ -299,9 +189,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
         binding_term=max(terms, key=lambda term: plain(term.us)).name if terms else _NO_TERM,
         exceeded=exceeded,
         fits=not exceeded,
-        circle_refused_by=tuple(cause.name for cause in circle_refusals(profile)),
         **(_certainty_figures(cycle, codes) if decides else _UNDECIDED),
-        counts=tuple(counts),
         safe=bus.is_safe(network),
         own=own,
     )
@@ -417,7 +305,7 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     is_shown
         Whether limits must be shown to be kept; otherwise the uncertainty of their values plays no part.
     """
-    bus = bus_of(network.profile)
+    bus = network.bus
     period_us = bus.periods.from_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
         if limit.period is not None:
@@ -427,21 +315,21 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     return period_us
 
 
-def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures | None:
+def after_reset(network: Network, deciding: FitFigures) -> FitFigures | None:
     """Figures of a network after a bus reset; None unless it is shown to fit now and not after the reset.
 
     Parameters
     ----------
-    profile
+    network
         The network.
     deciding
         Its figures under the model that decides.
     """
-    changes = bus_of(profile).safety.after_reset
+    changes = network.bus.safety.after_reset
     if deciding.verdict != FITS or not changes:
         return None
-    reset = override(profile, dict(changes))
-    if reset == profile:
+    reset = changed(network, changes)
+    if reset.profile == network.profile:
         return None
     after = figures(reset, model=deciding.timing_model)
     return None if after.verdict == FITS else after

@@ -21,16 +21,6 @@ _SYMBOLS: Final = MappingProxyType(
         "node.axes": "axes_node",
         "node.execution.base_us": "base",
         "node.execution.per_byte_us": "per_byte",
-        "circle.feed_mm_per_min": "F",
-        "circle.radius_mm": "r",
-        "circle.ramp_periods": "ramp",
-        "servo.step_us": "h",
-        "servo.position_gain_per_s": "kp",
-        "servo.integral_gain_per_s2": "ki",
-        "servo.derivative_gain": "kd",
-        "servo.velocity_feedforward": "k_vff",
-        "servo.acceleration_feedforward_s": "k_aff",
-        "servo.drive_lag_us": "tau",
     }
 )
 """Symbol of a key in formulas, unless the equations or a kind of bus define it."""
@@ -51,8 +41,7 @@ def given(profile: Profile, key: str) -> Input:
     -------
     Input
         Its grade is the one beside it, as bus.master_grade of bus.master_us; that of its section, if the section has
-        one, but a default of [servo] is assumed; that of a sourced figure, if the value is that figure; that of
-        its comment in the file; otherwise "given".
+        one; that of a sourced figure, if the value is that figure; that of its comment in the file; otherwise "given".
     """
     *sections, name = key.split(".")
     section: Any = profile
@@ -62,13 +51,6 @@ def given(profile: Profile, key: str) -> Input:
         section = value_at(profile, ".".join(sections[:number]))
         if getattr(section, "grade", None):
             own_grade, graded_by = section.grade, f"; graded by {'.'.join(sections[:number])}.grade"
-            grades = getattr(section, "grades", None)
-            if grades is not None and name not in type(grades).model_fields:
-                own_grade, graded_by = None, ""  # a choice
-            elif grades is not None and getattr(grades, name) is not None:
-                own_grade, graded_by = getattr(grades, name), f"; graded by {'.'.join(sections[:number])}.grades.{name}"
-            elif grades is not None and number == len(sections) and name not in section.model_fields_set:
-                own_grade, graded_by = "assumed", ""  # a default is busplan's, whatever is known of the others
     beside = f"{name.removesuffix('_us')}_grade"
     if getattr(section, beside, None):
         own_grade, graded_by = getattr(section, beside), f"; graded by {'.'.join(sections)}.{beside}"

@@ -3,14 +3,13 @@
 from itertools import accumulate
 
 from busplan.buses.cycle import BusCycle
+from busplan.buses.network import Network
 from busplan.elementwise import Number, plain
-from busplan.questions.fit.certainty import cycle_of
-from busplan.questions.fit.network import bus_of
+from busplan.questions.fit.certainty import deciding_cycle
 from busplan.sections.base import value_at
-from busplan.sections.profile import Profile
 
 
-def loop_delays_us(profile: Profile) -> tuple[float, float]:
+def loop_delays_us(network: Network) -> tuple[float, float]:
     """Bus delay inside the loops of x and y: none on a node [us].
 
     On the host it is one period, for the synchronous packet triggers both the sample and the update with the last
@@ -22,11 +21,11 @@ def loop_delays_us(profile: Profile) -> tuple[float, float]:
     ----------
     Paper, section III-C.
     """
-    if profile.servo.loop == "node":
+    if network.profile.servo.loop == "node":
         return 0.0, 0.0
-    cycle = _deciding_cycle(profile)
-    at_sync = profile.servo.update == "next_sync"
-    whole_us = cycle.loop_periods(at_sync=at_sync) * profile.cycle.period_us
+    cycle = deciding_cycle(network)
+    at_sync = network.profile.servo.update == "next_sync"
+    whole_us = cycle.loop_periods(at_sync=at_sync) * network.profile.cycle.period_us
     if at_sync:
         return whole_us, whole_us
     since_us = whole_us - cycle.sampled_us()
@@ -34,36 +33,32 @@ def loop_delays_us(profile: Profile) -> tuple[float, float]:
     return since_us + first_us, since_us + last_us
 
 
-def skew_us(profile: Profile) -> float:
+def skew_us(network: Network) -> float:
     """How much later the last node with axes takes its set-point than the first, where no clock is common to them [us].
 
     A loop on the host has it in its delays.
     """
-    if profile.servo.loop == "host" or acts_at_once(profile):
+    if network.profile.servo.loop == "host" or acts_at_once(network):
         return 0.0
-    first_us, last_us = _first_and_last_us(_deciding_cycle(profile))
+    first_us, last_us = _first_and_last_us(deciding_cycle(network))
     return last_us - first_us
 
 
-def acts_at_once(profile: Profile) -> bool:
+def acts_at_once(network: Network) -> bool:
     """Whether the nodes take their set-points at one time; otherwise each does when it has its own."""
-    clock = bus_of(profile).key_of("clock")
-    return not clock or bool(value_at(profile, clock))
+    clock = network.bus.key_of("clock")
+    return not clock or bool(value_at(network.profile, clock))
 
 
-def jitter_us(profile: Profile) -> float:
+def jitter_us(network: Network) -> float:
     """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds [us]."""
-    return float(plain(any_jitter_us(profile)))
+    return float(plain(any_jitter_us(network)))
 
 
-def any_jitter_us(profile: Profile) -> Number:
+def any_jitter_us(network: Network) -> Number:
     """As `jitter_us`, of a profile whose numbers may be arrays [us]."""
-    us: Number = profile.delivery.jitter_us + _deciding_cycle(profile).sync_jitter_us()
+    us: Number = network.profile.delivery.jitter_us + deciding_cycle(network).sync_jitter_us()
     return us
-
-
-def _deciding_cycle(profile: Profile) -> BusCycle:
-    return cycle_of(profile, model=bus_of(profile).deciding_model)
 
 
 def _first_and_last_us(cycle: BusCycle) -> tuple[float, float]:

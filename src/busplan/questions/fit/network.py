@@ -1,16 +1,19 @@
 """A profile as a network: its kind of bus, and its nodes with their payloads and execution times."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, is_everywhere, total
+from busplan.profile.toml import override
 from busplan.sections.alike_nodes import AlikeNodes
-from busplan.sections.base import Section
+from busplan.sections.base import Section, with_unchecked
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
+
+PERIOD: Final = "cycle.period_us"
 
 
 def bus_of(profile: Profile) -> Bus:
@@ -34,7 +37,23 @@ def network_of(profile: Profile) -> Network:
     cycle = profile.cycle
     groups = tuple(_group(members) for members in _side_by_side(profile.alike_nodes))
     asked = None if profile.group else ""
-    return Network(profile, groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us, asked)
+    return Network(profile, bus_of(profile), groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us, asked)
+
+
+def at_period(network: Network, period_us: Number) -> Network:
+    """The same network at another communication period that its profile may have [us]."""
+    return network._replace(profile=with_unchecked(network.profile, PERIOD, period_us), period_us=period_us)
+
+
+def changed(network: Network, changes: Mapping[str, object]) -> Network:
+    """The network with other values by dotted key.
+
+    Raises
+    ------
+    BusplanError
+        The profile's schema refuses them.
+    """
+    return network_of(override(network.profile, dict(changes)))
 
 
 def _group(members: Sequence[AlikeNodes]) -> Group:
@@ -108,16 +127,33 @@ def with_execution(group: Group, *, read_us: Number, write_us: Number) -> Group:
     )
 
 
-def model_names(profile: Profile) -> tuple[str, ...]:
-    """Names of the timing models that can express a profile, in the order reports show them."""
-    bus, network = bus_of(profile), network_of(profile)
+def at_periods(network: Network, periods_us: Sequence[float] | None) -> list[Network]:
+    """A network at each of some communication periods [us]; without them, as it is.
+
+    Raises
+    ------
+    BusplanError
+        A period that the profile's schema refuses.
+    """
+    if periods_us is None:
+        return [network]
+    origins = ({PERIOD: f"period {period_us}"} for period_us in periods_us)
+    return [
+        network_of(override(network.profile, {PERIOD: period_us}, origin=origin))
+        for period_us, origin in zip(periods_us, origins, strict=True)
+    ]
+
+
+def model_names(network: Network) -> tuple[str, ...]:
+    """Names of the timing models that can express a network, in the order reports show them."""
+    bus = network.bus
     return tuple(model.name for model in bus.timing_models if not bus.cannot_express(network, model=model.name))
 
 
-def leading_model(profile: Profile) -> str:
+def leading_model(network: Network) -> str:
     """Name of the timing model whose figures lead: the profile's own, or the one that decides where that cannot."""
-    own = profile.bus.timing_model
-    return own if own in model_names(profile) else bus_of(profile).deciding_model
+    own: str = network.profile.bus.timing_model
+    return own if own in model_names(network) else network.bus.deciding_model
 
 
 def without_execution(network: Network) -> Network:

@@ -8,9 +8,7 @@ from busplan.buses.network import Network
 from busplan.buses.parts import Limit
 from busplan.elementwise import Number, choose, larger, plain, rounded_up, smaller, total
 from busplan.questions.fit.certainty import limits_to_be_safe, limits_with_time
-from busplan.questions.fit.network import network_of
 from busplan.sections.base import MAX_COUNT
-from busplan.sections.profile import Profile
 
 
 class MostNodes(NamedTuple):
@@ -20,12 +18,12 @@ class MostNodes(NamedTuple):
     limit: Number
 
 
-def largest_nodes(profile: Profile, *, model: str, group: str = "") -> tuple[int, str]:
-    """Find the largest number of nodes that fits the profile's period, and the limit that sets it.
+def largest_nodes(network: Network, *, model: str, group: str = "") -> tuple[int, str]:
+    """Find the largest number of nodes that fits its period, and the limit that sets it.
 
     Parameters
     ----------
-    profile
+    network
         The network; its own number of nodes plays no part.
     model
         Timing model.
@@ -41,18 +39,18 @@ def largest_nodes(profile: Profile, *, model: str, group: str = "") -> tuple[int
     ----------
     Paper, equations (1)-(11), with (11) solved for N.
     """
-    network = network_of(profile).asking(group)
+    network = network.asking(group)
     return _with_key(network, limits_with_time(network, model=model))
 
 
-def safe_nodes(profile: Profile, *, group: str = "", without: str | None = None) -> tuple[int, str]:
+def safe_nodes(network: Network, *, group: str = "", without: str | None = None) -> tuple[int, str]:
     """Find the largest number of nodes that is shown to fit, with the reserve, on a bus that is set safely for them.
 
     Each number of nodes is tried with its own cycle, bias, uncertainty and limits, and its own "optimal" gap count.
 
     Parameters
     ----------
-    profile
+    network
         The network; its own number of nodes plays no part.
     group
         As for `largest_nodes`.
@@ -64,7 +62,7 @@ def safe_nodes(profile: Profile, *, group: str = "", without: str | None = None)
     tuple
         Number of nodes [1], and the key of the limit.
     """
-    network = network_of(profile).asking(group)
+    network = network.asking(group)
     return _with_key(network, [limit for limit in limits_to_be_safe(network) if limit.key != without])
 
 
@@ -116,8 +114,7 @@ def _most_within(limit: Limit, network: Network, cached_network: Callable[[int],
     if not _any(over):
         return ceiling
     if elements > 1:
-        # A limit that tells without its value is computed for every element.
-        asked = elements if limit.breaks else _size(limit.least_value(network.with_nodes(1)))
+        asked = _size(limit.least_value(network.with_nodes(1)))
         counted = ceiling * (asked * _VALUE_COST + elements)
         if counted <= ceiling.bit_length() * elements * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))

@@ -159,16 +159,6 @@ def _period(machine: Reading) -> Fact:
     return machine.bus.get("period_us", usual)
 
 
-def part_rows(machine: Reading) -> Iterator[ProfileLine]:
-    """What databases alone say: the bit rate and messages."""
-    if BIT_RATE in machine.bus:
-        yield ProfileLine("bus", BIT_RATE, machine.bus[BIT_RATE])
-    messages = list(message_rows(machine))
-    if _DATA_BIT_RATE in machine.bus and switches(messages):
-        yield ProfileLine("bus", _DATA_BIT_RATE, machine.bus[_DATA_BIT_RATE])
-    yield from messages
-
-
 def _usual_bits(machine: Reading) -> int:
     """Length of most identifiers of databases and logs [bits]."""
     extended = sum(number >= EXTENDED for number in machine.messages)

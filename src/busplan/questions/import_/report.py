@@ -58,13 +58,13 @@ def import_report(answer: "ImportAnswer") -> Report:
     records = [_record(row) for row in answer.rows]
     return Report(
         sentence("{}, from files of the machine", Code(answer.profile.name)),
-        lambda: [
+        [
             Sentence((" ".join(_card(answer)[0].split()),)),
             *(Sentence((text,)) for text in (*answer.remarks, *_unknown(answer))),
             _table(records),
         ],
-        lambda: document("import", name=answer.profile.name, values=records, remarks=list(answer.remarks)),
-        lambda: records,
+        document("import", name=answer.profile.name, values=records, remarks=list(answer.remarks)),
+        records,
     )
 
 

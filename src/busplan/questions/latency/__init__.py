@@ -4,8 +4,7 @@ from collections.abc import Iterable
 
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_profile, one_or_several, whole
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network, one_or_several, whole
 from busplan.questions.latency import figures as analysis
 from busplan.questions.latency.figures import LatencyResult
 
@@ -22,7 +21,7 @@ class LatencyAnswer(Answer, LatencyResult):
         return latency_report(self)
 
     def _headline(self) -> str:
-        return f"{self.profile.name}: {bus_of(self.profile).latency_subject(network_of(self.profile))}"
+        return f"{self.profile.name}: {self.network.bus.latency_subject(self.network)}"
 
 
 def latency(
@@ -62,10 +61,10 @@ def latency(
     --------
     >>> import busplan
     >>> answer = busplan.latency("paper-two-node", payload_bytes=[4, 1024], timing_model="paper")
-    >>> [(row.transaction, row.payload_bytes, round(row.phases.latency_us, 2)) for row in answer.transactions]
+    >>> [(row.transaction, row.payload_bytes, round(row.phases["latency_us"], 2)) for row in answer.transactions]
     [('read', 4, 43.17), ('write', 4, 43.17), ('read', 1024, 474.57), ('write', 1024, 474.57)]
     """
-    network = load_profile(profile)
+    network = load_network(profile)
     sizes = None if payload_bytes is None else one_or_several(payload_bytes, name="payload_bytes")
     result = analysis.latency(
         network,

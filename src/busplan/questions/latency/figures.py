@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from busplan.buses.cycle import BusLatency
-from busplan.elementwise import Number, existing
+from busplan.buses.network import Network
+from busplan.elementwise import Number, existing, plain
 from busplan.errors import BusplanError
-from busplan.questions.fit.figure_values import FigureValues
-from busplan.questions.fit.network import bus_of, model_names, network_of
+from busplan.questions.fit.network import model_names, network_of
 from busplan.sections.base import with_unchecked
 from busplan.sections.execution import TableExecution
 from busplan.sections.profile import Profile
@@ -24,27 +23,27 @@ class Transaction(NamedTuple):
     """Of which group of nodes; empty where all are alike."""
     payload_bytes: int | None
     nodes: int
-    phases: FigureValues
+    phases: Mapping[str, float | None]
     """Figures by their key in the register of the bus."""
-
-    def __getattr__(self, key: str) -> Any:
-        # Phases are attributes as the fields are; only what is no field comes here.
-        if not key.startswith("_") and key in self.phases:
-            return self.phases[key]
-        raise AttributeError(f"{self.transaction} has no figure {key!r}")
 
 
 class LatencyResult(NamedTuple):
     """Answer of `latency`."""
 
-    profile: Profile
+    network: Network
     transactions: tuple[Transaction, ...]
     payloads_bytes: tuple[int, ...] = ()
     """Payloads asked for [bytes]; empty for the profile's own."""
 
+    @property
+    def profile(self) -> Profile:
+        """The profile of the network."""
+        profile: Profile = self.network.profile
+        return profile
+
 
 def latency(
-    profile: Profile,
+    network: Network,
     *,
     payloads_bytes: Sequence[int] | None = None,
     timing_models: Sequence[str] | None = None,
@@ -53,7 +52,7 @@ def latency(
 
     Parameters
     ----------
-    profile
+    network
         The network; a transaction is that of its farthest node.
     payloads_bytes
         Payloads of both read and write [bytes]; by default the profile's own.
@@ -74,12 +73,12 @@ def latency(
     ----------
     Paper, equations (3)-(10), (12)-(14).
     """
-    models = model_names(profile) if timing_models is None else timing_models
-    nodes = int(network_of(profile).nodes)
-    _require_execution(profile, payloads_bytes or ())
-    variants = [profile] if payloads_bytes is None else [with_payload(profile, size) for size in payloads_bytes]
+    models = model_names(network) if timing_models is None else timing_models
+    nodes = int(plain(network.nodes))
+    _require_execution(network.profile, payloads_bytes or ())
+    variants = [network] if payloads_bytes is None else [with_payload(network, size) for size in payloads_bytes]
     return LatencyResult(
-        profile,
+        network,
         tuple(
             Transaction(
                 model,
@@ -87,10 +86,10 @@ def latency(
                 bus_latency.group,
                 bus_latency.payload_bytes,
                 nodes,
-                FigureValues(_whole_bytes(bus_latency.phases)),
+                _whole_bytes(bus_latency.phases),
             )
             for variant in variants
-            for alike in zip(*(_latencies(variant, model) for model in models), strict=True)
+            for alike in zip(*(variant.bus.cycle(variant, model=model).latencies() for model in models), strict=True)
             for model, bus_latency in zip(models, alike, strict=True)
         ),
         tuple(payloads_bytes or ()),
@@ -105,17 +104,14 @@ def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float | None]:
     }
 
 
-def with_payload(profile: Profile, size_bytes: int) -> Profile:
-    """Return a copy with the payload of both read and write replaced [bytes], unvalidated."""
+def with_payload(network: Network, size_bytes: int) -> Network:
+    """The network with another payload of both read and write [bytes], unvalidated."""
+    profile = network.profile
     sections = [f"group.{group.name}" for group in profile.group] or ["payload"]
     for section, kind in product(sections, TRANSACTION_KINDS):
         profile = with_unchecked(profile, f"{section}.{kind}_bytes", size_bytes)
         profile = with_unchecked(profile, f"{section}.{kind}_bytes_per_axis", None)
-    return profile
-
-
-def _latencies(profile: Profile, model: str) -> tuple[BusLatency, ...]:
-    return bus_of(profile).cycle(network_of(profile), model=model).latencies()
+    return network_of(profile)
 
 
 def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:

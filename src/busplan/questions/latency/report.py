@@ -1,14 +1,13 @@
 """Answer of `busplan latency`."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from itertools import groupby
 from math import inf
 from operator import itemgetter
 from typing import Final
 
 from busplan.buses.figure import Figure
-from busplan.elementwise import within
+from busplan.elementwise import plain, within
 from busplan.forms.blocks import (
     Block,
     Code,
@@ -21,7 +20,6 @@ from busplan.forms.blocks import (
     TableRow,
     attribute_value,
 )
-from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.latency.figures import LatencyResult, Transaction, with_payload
 from busplan.questions.words.documents import Owner, document, figure_table, with_profile
 from busplan.questions.words.sentences import execution_sentence, not_applicable, warning_sentences
@@ -31,33 +29,33 @@ def latency_report(result: LatencyResult) -> Report:
     """Report of `latency`."""
     return Report(
         Sentence(("Latency of ", Code(result.profile.name))),
-        lambda: tuple(_blocks(result)),
-        partial(latency_document, result),
-        lambda: with_profile(result.profile.name, latency_records(result)),
+        tuple(_blocks(result)),
+        latency_document(result),
+        with_profile(result.profile.name, latency_records(result)),
     )
 
 
 def _blocks(result: LatencyResult) -> Iterator[Block]:
     """Phases of each transaction, the timing models side by side; one table for each payload."""
-    profile, network = result.profile, network_of(result.profile)
+    network = result.network
     yield from _deadline_sentence(result)
     yield from latency_tables(result)
-    yield Sentence((Code(profile.name), f": {bus_of(profile).latency_subject(network)}."))
-    yield from not_applicable(profile)
-    yield from execution_sentence(profile, of_latency=True)
+    yield Sentence((Code(network.profile.name), f": {network.bus.latency_subject(network)}."))
+    yield from not_applicable(network)
+    yield from execution_sentence(network, of_latency=True)
     yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result))
-    yield from warning_sentences(profile, nodes=int(network.nodes), most=0)
+    yield from warning_sentences(network, nodes=int(plain(network.nodes)), most=0)
 
 
 def latency_tables(result: LatencyResult) -> Iterator[Table]:
     """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
-    bus = bus_of(result.profile)
+    bus = result.network.bus
     figures = tuple(
         figure
         for figure in bus.figures.latency_table
         if all(figure.key in transaction.phases for transaction in result.transactions)
     )
-    subject = bus.latency_subject(network_of(result.profile))
+    subject = bus.latency_subject(result.network)
     if bus.figures.has_many_transactions:
         yield from _by_transaction(result, figures, subject)
         return
@@ -74,7 +72,7 @@ def _by_transaction(result: LatencyResult, figures: Sequence[Figure], subject: s
     A time and its deadline come first. Of many transactions those closest to their deadlines are shown. What is 0 for
     all has no column.
     """
-    first = bus_of(result.profile).figures.deadlines or ()
+    first = result.network.bus.figures.deadlines or ()
     figures = [
         figure for figure in figures if any(transaction.phases[figure.key] for transaction in result.transactions)
     ]
@@ -101,7 +99,7 @@ _MOST_ROWS: Final = 30
 
 def _share(result: LatencyResult, transaction: Transaction) -> float:
     """Time of a transaction over its deadline [1]: infinite without a time, 0 without a deadline."""
-    keys = bus_of(result.profile).figures.deadlines
+    keys = result.network.bus.figures.deadlines
     us, deadline_us = (transaction.phases[key] for key in keys) if keys else (None, None)
     if not isinstance(deadline_us, int | float):
         return 0.0
@@ -110,7 +108,7 @@ def _share(result: LatencyResult, transaction: Transaction) -> float:
 
 def _deadline_sentence(result: LatencyResult) -> Iterator[Sentence]:
     """Say whether all transactions keep their deadlines by the model of the verdict, and which is the closest."""
-    keys, model = bus_of(result.profile).figures.deadlines, bus_of(result.profile).deciding_model
+    keys, model = result.network.bus.figures.deadlines, result.network.bus.deciding_model
     due = [
         (share, transaction)
         for transaction in result.transactions
@@ -151,9 +149,8 @@ def _name(transaction: Transaction) -> str:
 
 def _over(result: LatencyResult) -> list[str]:
     """Limits of the bus that the profile breaks with any of the payloads asked for, or with its own."""
-    networks = [network_of(with_payload(result.profile, size)) for size in result.payloads_bytes]
-    networks = networks or [network_of(result.profile)]
-    broken = (limit.words(network) for network in networks for limit in bus_of(result.profile).broken(network))
+    networks = [with_payload(result.network, size) for size in result.payloads_bytes] or [result.network]
+    broken = (limit.words(network) for network in networks for limit in network.bus.broken(network))
     return list(dict.fromkeys(broken))
 
 

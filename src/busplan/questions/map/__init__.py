@@ -5,14 +5,14 @@ from concurrent.futures import Executor
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.progress import Progress
+from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_profile, with_cycle
+from busplan.questions.base.inputs import ProfileLike, load_network, with_cycle
 from busplan.questions.map import trade_off as analysis
 from busplan.questions.map.direction import Direction, checked_direction
 from busplan.questions.map.trade_off import TradeOff
 from busplan.questions.sweep import axis_values
-from busplan.questions.sweep.execution import require_executor
+from busplan.questions.sweep.circles import mapper_of
 from busplan.sections.profile import Profile
 
 Along = Mapping[str, str | Iterable[object]]
@@ -36,7 +36,7 @@ def map_(
     x: Along | None = None,
     y: Along | None = None,
     circle: bool = False,
-    progress: Progress | None = None,
+    progress: Progress = ignored,
     executor: Executor | None = None,
 ) -> MapAnswer:
     """Tell where over two keys a design fits, and what limits it elsewhere: `busplan map`.
@@ -76,17 +76,17 @@ def map_(
     >>> [[cell.state for cell in row] for row in answer.rows]
     [['fits', 'does not fit', 'does not fit'], ['fits', 'fits', 'fits']]
     """
-    require_executor(executor, circle=circle)
-    network = load_profile(profile)
+    mapper = mapper_of(executor, circle=circle)
+    network = load_network(profile)
     if x is None or y is None:
-        with_cycle(network, question="a map of period and axes", instead="give x and y, each a key with values")
+        with_cycle(network.profile, question="a map of period and axes", instead="give x and y, each a key with values")
     return MapAnswer(
         *analysis.trade_off(
             network,
-            x=_direction(network, x, name="x", with_circle=circle),
-            y=_direction(network, y, name="y", with_circle=circle),
+            x=_direction(network.profile, x, name="x", with_circle=circle),
+            y=_direction(network.profile, y, name="y", with_circle=circle),
             with_circle=circle,
-            mapper=map if executor is None else executor.map,
+            mapper=mapper,
             progress=progress,
         )
     )

@@ -1,23 +1,27 @@
 """A direction of a map: a key and its values, given or chosen about what fits."""
 
+from bisect import bisect_right
 from math import ceil
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
+from busplan.buses.network import Network
 from busplan.buses.parts import Value
-from busplan.elementwise import plain
+from busplan.elementwise import FIT_ROUNDING, plain
 from busplan.errors import BusplanError
 from busplan.forms.scale import round_numbers
 from busplan.profile.write import whole
-from busplan.questions.fit.circle_refusal import step_refusals
-from busplan.questions.fit.network import bus_of, network_of, varied_nodes
-from busplan.questions.fit.node_steps import NodeSteps, node_steps, telling_periods
-from busplan.questions.sweep.grid import Values, require_keys
+from busplan.questions.fit.certainty import certainty
+from busplan.questions.fit.figures import shortest_period_us
+from busplan.questions.fit.network import PERIOD, at_period, varied_nodes
+from busplan.questions.fit.node_limit import safe_nodes
+from busplan.questions.sweep.grid import Array, require_keys
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 
 AXES: Final = "axes"
 """Key of the direction along the axes of all nodes. No key of a profile: it sets the number of nodes."""
-PERIOD: Final = "cycle.period_us"
 MOST_VALUES: Final = 64
 """Most values of a direction, as many as gap counts: more do not fit into 80 columns."""
 
@@ -36,14 +40,14 @@ def profile_key(key: str, profile: Profile) -> str:
     return varied_nodes(profile).nodes_key if key == AXES else key
 
 
-def nodes_with(axes: Value, profile: Profile, *, nodes_key: str) -> int:
+def nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
     """Number of nodes with which all nodes have so many axes [1].
 
     Parameters
     ----------
     axes
         Axes of all nodes [1].
-    profile
+    network
         The network, with the other direction's value.
     nodes_key
         Dotted key of the number.
@@ -56,12 +60,13 @@ def nodes_with(axes: Value, profile: Profile, *, nodes_key: str) -> int:
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> nodes_with(12, load("paper-4ms").profile, nodes_key="bus.nodes")
+    >>> from busplan.questions.fit.network import network_of
+    >>> nodes_with(12, network_of(load("paper-4ms").profile), nodes_key="bus.nodes")
     3
     """
-    alike = next(alike for alike in profile.alike_nodes if alike.nodes_key == nodes_key)
+    alike = next(alike for alike in network.profile.alike_nodes if alike.nodes_key == nodes_key)
     node_axes = int(alike.node.axes)
-    axes_beside = int(plain(network_of(profile).axes)) - int(alike.nodes) * node_axes
+    axes_beside = int(plain(network.axes)) - int(alike.nodes) * node_axes
     own = axes - axes_beside if isinstance(axes, int) else 0
     if own < max(node_axes, 1) or not node_axes or own % node_axes:
         beside = f" beside {axes_beside} others" if axes_beside else ""
@@ -69,13 +74,13 @@ def nodes_with(axes: Value, profile: Profile, *, nodes_key: str) -> int:
     return own // node_axes
 
 
-def own_value(key: str, profile: Profile) -> Any:
+def own_value(key: str, network: Network) -> Any:
     """The profile's own value along a direction; None if it has none."""
-    return int(plain(network_of(profile).axes)) if key == AXES else value_at(profile, key)
+    return int(plain(network.axes)) if key == AXES else value_at(network.profile, key)
 
 
 def checked_direction(
-    profile: Profile, key: str, values: Values, *, option: str, circle_option: str | None = None
+    profile: Profile, key: str, values: Array, *, option: str, circle_option: str | None = None
 ) -> Direction:
     """Make a direction after checking its key and how many values it has.
 
@@ -105,8 +110,8 @@ def checked_direction(
         raise BusplanError(
             f"{option} {key}: {values.size:,} values; a map shows up to {MOST_VALUES} of a key. A sweep takes more"
         )
-    numbers = [whole(value) for value in values.part(0, values.size).tolist()]
-    return Direction(key, tuple(numbers if values.has_words else sorted(numbers)))
+    numbers = [whole(value) for value in values.tolist()]
+    return Direction(key, tuple(numbers if values.dtype == object else sorted(numbers)))
 
 
 _FACTORS: Final = ((1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 2, 5), (1,))
@@ -117,46 +122,54 @@ _BEYOND: Final = 2
 """Nodes drawn beyond the most that fit."""
 
 
-def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direction:
+def default_direction(key: str, network: Network) -> Direction:
     """Choose the values of `AXES` or of `PERIOD` about what fits.
 
     Parameters
     ----------
     key
         `AXES` or `PERIOD`.
-    profile
+    network
         The network.
-    with_circle
-        Whether circles are run, though the profile may not ask for one.
     """
-    varied = varied_nodes(profile)
-    steps = node_steps(profile, model=bus_of(profile).deciding_model, group=varied.name)
-    from_us, to_us = telling_periods(profile, [steps])
+    varied = varied_nodes(network.profile)
+    own_us, own_nodes = network.profile.cycle.period_us, int(varied.nodes)
+    # A cycle of no node that fits shows the own period alone.
+    fit_us = _periods_of_nodes(network, varied.name) or [own_us]
+    to_us = max(2 * own_us, 1.25 * fit_us[min(own_nodes, len(fit_us)) - 1], min(4 * own_us, 1.25 * fit_us[-1]))
+    from_us = min(own_us, fit_us[0], to_us / 4) / 1.25
     if key == AXES:
-        nodes, node_axes = _nodes(steps, to_us), int(varied.node.axes)
+        most = bisect_right(fit_us, to_us * (1 + FIT_ROUNDING))
+        counts, node_axes = _counts(own_nodes, most), int(varied.node.axes)
         if not node_axes:  # nodes without axes are counted themselves
-            return Direction(varied.nodes_key, nodes)
-        axes_beside = own_value(AXES, profile) - steps.own_nodes * node_axes
-        return Direction(AXES, tuple(axes_beside + count * node_axes for count in nodes))
-    own_us = own_value(PERIOD, profile)
+            return Direction(varied.nodes_key, counts)
+        axes_beside = own_value(AXES, network) - own_nodes * node_axes
+        return Direction(AXES, tuple(axes_beside + count * node_axes for count in counts))
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
-    known = [known_us for known_us in bus_of(profile).periods.us if least_us <= known_us <= most_us]
+    known = [known_us for known_us in network.bus.periods.us if least_us <= known_us <= most_us]
     periods_us = (
         known[:: ceil(len(known) / _MOST)] if known else round_numbers(least_us, most_us, most=_MOST, decades=_FACTORS)
     )
-    if with_circle or profile.asks_for_circle:
-        # Periods whose circle can be run; all, where the step goes with none.
-        periods_us = [period_us for period_us in periods_us if not any(step_refusals(profile, period_us))] or periods_us
     return Direction(PERIOD, tuple(sorted({*periods_us, own_us})))
 
 
-def _nodes(steps: NodeSteps, to_us: float) -> tuple[int, ...]:
+def _periods_of_nodes(network: Network, group: str) -> list[float]:
+    """Shortest periods at which 1, 2, ... nodes of a group are shown to fit; of no more than fit any period [us]."""
+    bus = network.bus
+    most, _ = safe_nodes(at_period(network, min(MAX_TIME_US, bus.periods.longest_us)), group=group)
+    counts = np.arange(1, most + 1)
+    cycle = bus.cycle(network.asking(group).with_nodes(counts), model=bus.deciding_model)
+    needed_us = np.asarray(certainty(cycle).safe_required_us)
+    periods_us = shortest_period_us(cycle.network, needed_us, is_shown=True)
+    return [float(us) for us in np.broadcast_to(np.asarray(periods_us), counts.shape)]
+
+
+def _counts(own: int, most: int) -> tuple[int, ...]:
     """Numbers of nodes, from one to some beyond the most that fit the longest period drawn.
 
     Steps of one size about this design, to twice its nodes; beyond, steps that grow.
     """
-    own = steps.own_nodes
-    last = min(max(own + 1, steps.max_nodes(to_us) + _BEYOND), MAX_COUNT)
+    last = min(max(own + 1, most + _BEYOND), MAX_COUNT)
     near = last if last <= _MOST else min(2 * own, last)
     most = _MOST if near == last else _MOST // 2
     step = next(size for size in (f * 10**p for p in range(7) for f in (1, 2, 5)) if near <= most * size)

@@ -14,8 +14,8 @@ from busplan.forms.charts import Cell as ChartCell
 from busplan.forms.charts import Drawing, Entry, Grid, Panel, Ruler, choices, letters
 from busplan.forms.numbers import period_value, with_unit
 from busplan.questions.fit.certainty import TIME
-from busplan.questions.fit.network import bus_of, varied_nodes
-from busplan.questions.map.direction import AXES, PERIOD, Direction
+from busplan.questions.fit.network import PERIOD, varied_nodes
+from busplan.questions.map.direction import AXES, Direction
 from busplan.questions.map.trade_off import Cell, NotDrawn, Region, State, TradeOff
 from busplan.sections.profile import Profile
 
@@ -87,16 +87,16 @@ def legend_of(trade_off: TradeOff, looks: Looks) -> Iterator[Entry]:
 def state_words(state: State, trade_off: TradeOff) -> str:
     """Name of a state on a map."""
     if state == "unsafe":
-        return f"unsafe {bus_of(trade_off.profile).safety.setting}"
+        return f"unsafe {trade_off.network.bus.safety.setting}"
     return f"{state}, and the circle passes" if state == "fits" and trade_off.with_circle else state
 
 
-def limit_words(region: Region | Cell, profile: Profile) -> str:
+def limit_words(region: Region | Cell, trade_off: TradeOff) -> str:
     """Limits that keep a region from fitting; empty where it fits."""
     words = " and ".join(region.limited_by)
     if region.limited_by != (TIME,):
         return words
-    return f"{words}, largest term {bus_of(profile).figures.term_label(region.binding_term)}"
+    return f"{words}, largest term {trade_off.network.bus.figures.term_label(region.binding_term)}"
 
 
 def title_of(direction: Direction, profile: Profile) -> str:
@@ -143,7 +143,7 @@ def _is_even(direction: Direction) -> bool:
 
 def cell_words(trade_off: TradeOff, cell: Cell) -> str:
     """Say the setting of a cell, its state and its limit."""
-    limit = limit_words(cell, trade_off.profile)
+    limit = limit_words(cell, trade_off)
     return f"{setting_words(trade_off, cell)}: {state_words(cell.state, trade_off)}{limit and f', {limit}'}"
 
 

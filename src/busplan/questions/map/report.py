@@ -1,7 +1,6 @@
 """Answer of `busplan map`."""
 
 from collections.abc import Iterator
-from functools import partial
 
 from busplan.forms.blocks import (
     Block,
@@ -21,7 +20,6 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.numbers import nouns, sentence_text
-from busplan.questions.fit.network import bus_of
 from busplan.questions.map.drawing import (
     LOOKS,
     limit_words,
@@ -34,22 +32,20 @@ from busplan.questions.map.drawing import (
 from busplan.questions.map.trade_off import Cell, Region, TradeOff
 from busplan.questions.sweep.digest import payload_sentences
 from busplan.questions.words.documents import document, fields, with_profile
-from busplan.questions.words.sentences import refused_circle
 
 
 def map_report(trade_off: TradeOff) -> Report:
     """Report of `map`."""
     return Report(
         Sentence(("Map of ", Code(trade_off.profile.name))),
-        lambda: tuple(_blocks(trade_off)),
-        partial(map_document, trade_off),
-        lambda: with_profile(trade_off.profile.name, map_document(trade_off)["cells"]),
+        tuple(_blocks(trade_off)),
+        map_document(trade_off),
+        with_profile(trade_off.profile.name, map_document(trade_off)["cells"]),
     )
 
 
 def _blocks(trade_off: TradeOff) -> Iterator[Block]:
     """How much fits and whether this design does, the picture, and what limits each region."""
-    yield from refused_circle(trade_off.profile)
     yield headline(trade_off)
     yield from _remarks(trade_off)
     yield map_chart(trade_off)
@@ -69,7 +65,7 @@ def headline(trade_off: TradeOff) -> Sentence:
     own = trade_off.own
     if own is None:
         return joined(counts, Sentence(("This design is not on the map: it has other values.",)))
-    limit = limit_words(own, trade_off.profile)
+    limit = limit_words(own, trade_off)
     text = (
         f"This design ({setting_words(trade_off, own)}): {state_words(own.state, trade_off)}{limit and f', {limit}'}."
     )
@@ -84,7 +80,9 @@ def _remarks(trade_off: TradeOff) -> Iterator[Sentence]:
         number = count_value(len(missing))
         yield sentence(f"{{}} {nouns(len(missing), 'setting')} cannot exist, as {missing[0].reason}.", number)
     if any(cell.state == "circle not judged" for cell in trade_off.cells):
-        yield Sentence(("Not every circle is judged: no contour tolerance is asked for.",), "warns")
+        yield Sentence(
+            ("Not every circle is judged: no contour tolerance is asked for, or no error source matters.",), "warns"
+        )
     yield from payload_sentences(trade_off.profile, (trade_off.x.key, trade_off.y.key))
 
 
@@ -117,7 +115,7 @@ def _region_row(trade_off: TradeOff, region: Region) -> TableRow:
     look = looks_of(trade_off)[region.state, region.limited_by]
     name = Swatch(look.ink, look.mark, state_words(region.state, trade_off))
     cells = count_value(region.cells, "cells")
-    return TableRow((name, limit_words(region, trade_off.profile), cells))
+    return TableRow((name, limit_words(region, trade_off), cells))
 
 
 def map_document(trade_off: TradeOff) -> JsonDocument:
@@ -125,7 +123,7 @@ def map_document(trade_off: TradeOff) -> JsonDocument:
     return document(
         "map",
         profile=trade_off.profile.name,
-        timing_model=bus_of(trade_off.profile).deciding_model,
+        timing_model=trade_off.network.bus.deciding_model,
         x={"key": trade_off.x.key, "values": list(trade_off.x.values)},
         y={"key": trade_off.y.key, "values": list(trade_off.y.values)},
         with_circle=trade_off.with_circle,
@@ -141,12 +139,12 @@ def map_document(trade_off: TradeOff) -> JsonDocument:
 
 def _record(trade_off: TradeOff, cell: Cell) -> Record:
     """A cell as plain data, its values under the keys of the directions, as in a row of a sweep."""
-    safety = bus_of(trade_off.profile).safety.figure
+    safety = trade_off.network.bus.safety.figure
     return {
         trade_off.x.key: cell.x,
         trade_off.y.key: cell.y,
         **fields(cell, "nodes", "axes", "state", "limited_by", "binding_term", "verdict"),
         **fields(cell, "margin_corrected_us", "uncertainty_us"),
         **({} if safety is None else {safety.key: cell.is_safe}),
-        **fields(cell, "circle_refused_by", "circle_passed"),
+        **fields(cell, "circle_passed"),
     }

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from functools import partial
 from pathlib import PurePath
 from typing import Final
 
@@ -76,9 +75,9 @@ def measured_report(answer: MeasuredAnswer, *, applied_to: str | None) -> Report
     """
     return Report(
         Sentence((Code(answer.profile.name), " beside the recording ", Code(answer.source))),
-        lambda: tuple(_blocks(answer)),
-        partial(_document, answer, applied_to=applied_to),
-        lambda: with_profile(answer.profile.name, list(map(_record, answer.figures))),
+        tuple(_blocks(answer)),
+        _document(answer, applied_to=applied_to),
+        with_profile(answer.profile.name, list(map(_record, answer.figures))),
     )
 
 

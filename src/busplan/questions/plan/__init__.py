@@ -1,14 +1,16 @@
 """`busplan.plan`."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
 
+from busplan.buses.network import Network
+from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.profile.changes import KeyChange, KeyChanges
 from busplan.profile.keys import flat
 from busplan.profile.write import whole as as_whole
-from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import (
     ProfileLike,
@@ -20,21 +22,110 @@ from busplan.questions.base.inputs import (
     whole,
     with_cycle,
 )
-from busplan.questions.circle.check import CircleCheck
-from busplan.questions.plan import planning as analysis
-from busplan.questions.plan.constraints import nodes_for_axes
-from busplan.questions.plan.planning import Plan
-from busplan.questions.plan.search import MAX_CIRCLES
-from busplan.questions.plan.smallest_period import needed_settings
+from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
+from busplan.questions.fit.network import PERIOD, changed, model_names, network_of
+from busplan.questions.plan.changes import (
+    Changes,
+    Freedom,
+    Step,
+    freed,
+    freedoms,
+    nodes_for_axes,
+    search,
+    settings_to_be_carried,
+    stands_in_the_way,
+)
+from busplan.questions.plan.needs import Need, most_asking
 from busplan.sections.profile import Profile
 
-__all__ = ["PlanAnswer", "needed_settings", "plan"]
+_AS_IT_IS: Final = "as it is"
 
 
-class PlanAnswer(Answer, Plan):
-    """Answer of `plan`: the steps of the search with their figures, and the recommended one with its `profile`."""
+@dataclass(frozen=True)
+class Option:
+    """A step of the search: what was changed so far, and what it gives."""
 
-    __slots__ = ()
+    title: str
+    changes: dict[str, Value]
+    """Keys that change in the goal, with their new values, the dearest change first."""
+    network: Network
+    """The goal with the changes."""
+    deciding: CapacityFigures
+    """Capacity under the timing model that decides."""
+    others: tuple[FitFigures, ...]
+    """Figures under the other timing models."""
+    held_by: str | None
+    """Key of the constraint that it breaks most; None where all hold."""
+    recommended: bool
+
+    @property
+    def profile(self) -> Profile:
+        """The goal with the changes."""
+        profile: Profile = self.network.profile
+        return profile
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """A further freedom that would be enough, and what to set then."""
+
+    relaxed: str
+    """Name of the freedom."""
+    changes: dict[str, Value]
+    """Changes to make then: keys of the goal with new values."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PlanAnswer(Answer):
+    """Answer of `plan`: the steps of the search with their figures, and the recommended one with its `profile`.
+
+    Parameters
+    ----------
+    profile
+        The original profile.
+    goal
+        The network with the wanted values.
+    wanted
+        Wanted values that differ from the profile, by dotted key.
+    free
+        The freedoms, the cheapest first.
+    options
+        The steps of the search: as it is, and one thing more each time; the last one is recommended if it holds.
+    binding
+        The constraint that stands in the way; None if there is a plan.
+    relaxations
+        Further freedoms that would each make a plan possible; empty if there is a plan.
+    after_reset
+        Figures of the recommended option after a bus reset, where it does not fit then.
+    """
+
+    profile: Profile
+    goal: Network
+    wanted: dict[str, Value]
+    free: tuple[Freedom, ...]
+    options: tuple[Option, ...]
+    binding: Need | None
+    relaxations: tuple[Relaxation, ...]
+    after_reset: FitFigures | None
+
+    @property
+    def recommended(self) -> Option | None:
+        """The recommended option; None if there is no plan for the goal."""
+        return next((option for option in self.options if option.recommended), None)
+
+    @property
+    def period_is_kept(self) -> bool | None:
+        """Whether the recommended option leaves the period of the goal as it is; None without a plan."""
+        return None if self.recommended is None else PERIOD not in self.recommended.changes
+
+    @property
+    def recommended_changes(self) -> dict[str, Value] | None:
+        """Changes from the original profile to the recommended one; None without a plan."""
+        return None if self.recommended is None else self.all_changes(self.recommended)
+
+    def all_changes(self, option: Option) -> dict[str, Value]:
+        """All changes from the original profile to an option."""
+        return {**self.wanted, **option.changes}
 
     @property
     def recommended_words(self) -> str:
@@ -43,13 +134,18 @@ class PlanAnswer(Answer, Plan):
 
         changes = {key: as_whole(value) for key, value in (self.recommended_changes or {}).items()}
         written: dict[str, Any] = dict(flat(changes))
-        return settings(self.profile, written)
+        return settings(self.goal, written)
 
     def report(self) -> Report:
         """The answer in blocks."""
         from busplan.questions.plan.report import plan_report
 
         return plan_report(self)
+
+
+def needed_settings(profile: Profile) -> Changes:
+    """The cheapest setting of the bus with which some slice carries a machine, where none does now; else empty."""
+    return settings_to_be_carried(network_of(profile))
 
 
 def plan(
@@ -62,9 +158,6 @@ def plan(
     reserve: float | None = None,
     wanted: Mapping[str, object] | KeyChanges | None = None,
     free: Iterable[str] | None = None,
-    circle: bool = True,
-    max_circles: int = MAX_CIRCLES,
-    progress: Progress | None = None,
 ) -> PlanAnswer:
     """Tell what to set, with all changes together, for a number of nodes or axes.
 
@@ -86,21 +179,14 @@ def plan(
         Other values to keep by dotted key, in the key's unit: {"payload.read_bytes": 16}. `KeyChanges` have options
         besides, which errors name.
     free
-        Names of what may be changed, of step (of the circle, where it does not divide the period), gap_count,
-        slice_ratio, responses, payload, period and nodes; by default step, gap count, slice ratio to 0.9, period.
-    circle
-        Run the circle test, if the profile has a section for it.
-    max_circles
-        Number of consecutive periods to test with the circle before the strides double [1].
-    progress
-        Called from time to time with the parts of circle tests that are done, and those expected [1].
+        Names of what may be changed, as gap_count, slice_ratio, responses, payload, period and nodes; by default the
+        registers of the bus, the slice ratio to 0.9, and the period.
 
     Returns
     -------
     PlanAnswer
-        The steps of the search, and the recommended one: the least change of the dearest freedom with all cheaper ones
-        free, after which the goal is shown to fit with a safe gap count, within [limits], and passes the circle. Times
-        are in us.
+        The steps of the search, one thing changed at a time in the order of cost, and the recommended one: the goal is
+        shown to fit, on a bus that is set safely, within [limits]. Times are in us.
 
     Raises
     ------
@@ -115,46 +201,91 @@ def plan(
     Examples
     --------
     >>> import busplan
-    >>> answer = busplan.plan("paper-1ms", axes=16, circle=False)
+    >>> answer = busplan.plan("paper-1ms", axes=16)
     >>> answer.recommended_changes
     {'bus.nodes': 4, 'bus.gap_count': 10}
     >>> busplan.capacity(answer.recommended.profile).verdicts[0].models_agree
     True
     """
-    network = load_profile(profile)
+    own = load_profile(profile)
     if nodes is not None or axes is not None:
-        with_cycle(network, question=f"a plan for {'nodes' if axes is None else 'axes'}")
+        with_cycle(own, question=f"a plan for {'nodes' if axes is None else 'axes'}")
     if nodes is not None and axes is not None:
         raise BusplanError(f"nodes {nodes} and axes {axes}: give one of them")
-    own = {
+    given = {
         "bus.nodes": nodes,
         "cycle.period_us": None if period_us is None else finite(period_us, name="period_us"),
         "bus.gap_count": gap_count,
         "limits.reserve": None if reserve is None else finite(reserve, name="reserve"),
     }
-    kept = _changes({key: from_numpy(value) for key, value in own.items() if value is not None})
+    kept = _changes({key: from_numpy(value) for key, value in given.items() if value is not None})
     kept += wanted.each if isinstance(wanted, KeyChanges) else _changes(values_by_key(wanted, name="wanted"))
     if axes is not None:
-        kept = (_nodes(network, whole(axes, name="axes"), kept), *kept)
+        kept = (_nodes(own, whole(axes, name="axes"), kept), *kept)
     changes = KeyChanges(kept)
-    goal = changes.applied(network)
-    tries = whole(max_circles, name="max_circles")
-    result = analysis.plan(
-        network,
-        wanted=changes.values,
-        free=None if free is None else [str(name) for name in items(free, name="free")],
-        circle=CircleCheck(progress=progress, expected=tries) if circle and goal.asks_for_circle else None,
-        max_circles=tries,
+    return _plan(own, changes, None if free is None else [str(name) for name in items(free, name="free")])
+
+
+def _plan(profile: Profile, wanted: KeyChanges, names: Sequence[str] | None) -> PlanAnswer:
+    goal = network_of(wanted.applied(profile))
+    asked: dict[str, Any] = dict(wanted.values)
+    kept = [*dict(flat(asked))]
+    levels = freed(goal, names, kept=kept)
+    steps = search(goal, levels, kept=kept)
+    options = tuple(_option(goal, step, number) for number, step in enumerate(steps))
+    recommended = options[-1] if options[-1].recommended else None
+    return PlanAnswer(
+        profile=profile,
+        goal=goal,
+        wanted={key: value for key, value in asked.items() if _differs(profile, goal.profile, key)},
+        free=levels,
+        options=options,
+        binding=None if recommended else stands_in_the_way(goal, steps[-1]),
+        relaxations=() if recommended else tuple(_relaxations(goal, levels, asked)),
+        after_reset=None if recommended is None else after_reset(recommended.network, recommended.deciding),
     )
-    return PlanAnswer(*result)
+
+
+def _option(goal: Network, step: Step, number: int) -> Option:
+    after = changed(goal, step.changes)
+    model, ratio = after.bus.deciding_model, float(after.profile.cycle.slice_ratio)
+    label = _AS_IT_IS if step.freedom is None else step.freedom.label
+    return Option(
+        title=f"+ {label}" if number > 1 else label,
+        changes=dict(step.changes),
+        network=after,
+        deciding=capacity_figures(after, model=model),
+        others=tuple(figures(after, model=other) for other in model_names(after) if other != model),
+        held_by=most_asking(step.unmet, ratio=ratio).key if step.unmet else None,
+        recommended=not step.unmet,
+    )
+
+
+def _relaxations(goal: Network, levels: Sequence[Freedom], asked: Changes) -> Iterator[Relaxation]:
+    """Further freedoms that would each be enough, those of values that were asked for among them."""
+    names = {level.name for level in levels}
+    for freedom in freedoms(goal):
+        if freedom.name not in names:
+            kept = {key for key, _ in flat(dict(asked))} - set(freedom.keys)
+            more = [level for level in freedoms(goal) if level.name in {*names, freedom.name}]
+            *_, last = search(goal, more, kept=kept)
+            if not last.unmet:
+                yield Relaxation(freedom.name, dict(last.changes))
+
+
+def _differs(profile: Profile, goal: Profile, key: str) -> bool:
+    """Whether two profiles differ in a key, or in one of a section; other changes may be needed for either alone."""
+    own, asked = (dict(flat(side.model_dump())) for side in (profile, goal))
+    keys = [name for name in {**own, **asked} if name == key or name.startswith(f"{key}.")]
+    return any(own.get(key) != asked.get(key) for key in keys)
 
 
 def _changes(values: Mapping[str, object]) -> tuple[KeyChange, ...]:
     return tuple(KeyChange(key, value, key, str(value)) for key, value in values.items())
 
 
-def _nodes(network: Profile, axes: int, kept: Sequence[KeyChange]) -> KeyChange:
+def _nodes(profile: Profile, axes: int, kept: Sequence[KeyChange]) -> KeyChange:
     """The number of nodes that some axes need, with the axes of each node that are kept."""
     of_nodes = KeyChanges(tuple(change for change in kept if change.key in {"node", "node.axes"}))
-    nodes = nodes_for_axes(of_nodes.applied(network), axes)
+    nodes = nodes_for_axes(of_nodes.applied(profile), axes)
     return KeyChange("bus.nodes", nodes, "axes", str(axes), f", nodes {nodes}")

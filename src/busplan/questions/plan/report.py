@@ -1,11 +1,12 @@
 """Answer of `busplan plan`: its sentences, the table of its options, and its document."""
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Final
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES, UNCERTAINTY
+from busplan.buses.network import Network
 from busplan.buses.parts import Value as BusValue
+from busplan.elementwise import plain
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -28,12 +29,10 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import MISSING, listed, nouns, period_value, sentence_text
 from busplan.profile.keys import flat
 from busplan.questions.fit.certainty import FITS, limits_behind
-from busplan.questions.fit.figures import COUNTS, after_reset
-from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.plan.constraints import CIRCLE
-from busplan.questions.plan.freedoms import PERIOD, freedoms
-from busplan.questions.plan.options import Option, Relaxation
-from busplan.questions.plan.planning import Plan
+from busplan.questions.fit.figures import COUNTS
+from busplan.questions.fit.network import PERIOD
+from busplan.questions.plan import Option, PlanAnswer, Relaxation
+from busplan.questions.plan.changes import freedoms
 from busplan.questions.words.documents import document, fields, with_profile
 from busplan.questions.words.sentences import (
     NewValues,
@@ -48,63 +47,53 @@ from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 
-def plan_report(plan: Plan) -> Report:
+def plan_report(plan: PlanAnswer) -> Report:
     """Report of `plan`."""
     return Report(
         Sentence(("Plan of ", Code(plan.profile.name))),
-        lambda: tuple(_blocks(plan)),
-        partial(plan_document, plan),
-        lambda: with_profile(plan.profile.name, plan_records(plan)),
+        tuple(_blocks(plan)),
+        plan_document(plan),
+        with_profile(plan.profile.name, plan_records(plan)),
     )
 
 
-def _blocks(plan: Plan) -> Iterator[Block]:
-    """The recommendation, or what stands in its way; a row for each step of the search, and what could be reached."""
+def _blocks(plan: PlanAnswer) -> Iterator[Block]:
+    """The recommendation, or what stands in its way, and a row for each step of the search."""
     yield _headline(plan)
     yield from (_relaxed(plan, relaxation) for relaxation in plan.relaxations)
     yield from _warnings(plan)
     yield options_table(plan)
     mark = "" if plan.recommended is None else "* recommended. "
-    yield Sentence((f"{mark}'Held by' is what keeps a row from passing, or its value from being better.",))
-    if not all(option.proven for option in plan.options):
-        yield Sentence(("? not proven: the search for a period was cut short (--max-circles).",))
-    for impossible in plan.impossible:
-        proven = "" if impossible.proven else " (not proven: the search was cut short, --max-circles)"
-        reason = ShownValue(impossible.reason, "reason")
-        yield sentence(f"{impossible.title.capitalize()}: none, {{}}{proven}.", reason)
+    yield Sentence((f"{mark}'Held by' is what keeps a row from fitting.",))
 
 
-# --- sentences ------------------------------------------------------------------------------------------------
-
-
-def settings(profile: Profile, changes: NewValues) -> str:
+def settings(network: Network, changes: NewValues) -> str:
     """Write changes as in a profile.
 
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> settings(load("paper-4ms").profile, {"bus.nodes": 20, "bus.speed": "S400"})
+    >>> from busplan.questions.fit.network import network_of
+    >>> settings(network_of(load("paper-4ms").profile), {"bus.nodes": 20, "bus.speed": "S400"})
     'bus.nodes = 20, bus.speed = "S400" (if all nodes can)'
     """
-    return sentence_text(_settings(profile, changes))
+    return sentence_text(_settings(network, changes))
 
 
-def _settings(profile: Profile, changes: NewValues) -> Sentence:
+def _settings(network: Network, changes: NewValues) -> Sentence:
     # The number of nodes is the goal here, so the note on a second bus does not apply.
-    meanings = {key: words for key, words in change_meanings(bus_of(profile)).items() if key != "bus.nodes"}
+    meanings = {key: words for key, words in change_meanings(network.bus).items() if key != "bus.nodes"}
     return settings_sentence(changes, meanings=meanings)
 
 
-def _headline(plan: Plan) -> Sentence:
+def _headline(plan: PlanAnswer) -> Sentence:
     option, subject = plan.recommended, _goal(plan)
     if option is None or plan.binding is not None:
         why = ShownValue("" if plan.binding is None else plan.binding.why, "why")
         none = Words("NO PLAN", "fails")
         return Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
-    judged = plan.goal.tolerance.judges_contour
-    circle = (" and passes the circle" if judged else ", and its circle is not judged") if plan.with_circle else ""
-    margin = (" with a margin of ", *margin_parts(option.deciding)) if plan.goal.has_cycle else ()
-    result = (Words("fits", "passes"), *margin, f"{circle}.")
+    margin = (" with a margin of ", *margin_parts(option.deciding)) if plan.goal.groups else ()
+    result = (Words("fits", "passes"), *margin, ".")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
     first = (
@@ -114,74 +103,59 @@ def _headline(plan: Plan) -> Sentence:
     return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
 
 
-def _freed(plan: Plan, before: str | None = None) -> str:
+def _freed(plan: PlanAnswer, before: str | None = None) -> str:
     """Freedoms, in words; only those cheaper than the freedom of a key."""
-    known = [freedom for freedom in freedoms(plan.goal) if freedom.name in plan.free]
-    cost = next((freedom.cost for freedom in known if before in freedom.keys), None)
-    labels = [freedom.label for freedom in known if cost is None or freedom.cost < cost]
+    cost = next((freedom.cost for freedom in plan.free if before in freedom.keys), None)
+    labels = [freedom.label for freedom in plan.free if cost is None or freedom.cost < cost]
     return listed(labels, "and") if labels else "anything else"
 
 
-def _relaxed(plan: Plan, relaxation: Relaxation) -> Sentence:
+def _relaxed(plan: PlanAnswer, relaxation: Relaxation) -> Sentence:
     """Say what would be enough, and what to set then."""
-    changes = _settings(plan.goal, relaxation.changes).parts if relaxation.changes else ("nothing to change",)
-    if relaxation.value is not None:
-        value = ShownValue(relaxation.value, relaxation.relaxed)
-        return Sentence((f"Enough would be {relaxation.relaxed} = ", value, ": ", *changes, "."))
-    what = "leave out the circle" if relaxation.relaxed == CIRCLE else f"free the {_label(plan, relaxation.relaxed)}"
-    return Sentence((f"Enough would be to {what}: ", *changes, "."))
+    label = next(freedom.label for freedom in freedoms(plan.goal) if freedom.name == relaxation.relaxed)
+    return Sentence((f"Enough would be to free the {label}: ", *_settings(plan.goal, relaxation.changes).parts, "."))
 
 
-def _label(plan: Plan, name: str) -> str:
-    return next(freedom.label for freedom in freedoms(plan.goal) if freedom.name == name)
-
-
-def _goal(plan: Plan) -> tuple[Part, ...]:
+def _goal(plan: PlanAnswer) -> tuple[Part, ...]:
     """The goal of the plan."""
-    goal, network = plan.goal, network_of(plan.goal)
-    if not goal.has_cycle:
-        return (Code(goal.name),)
-    nodes, axes = int(network.nodes), int(network.axes)
+    goal = plan.goal
+    if not goal.groups:
+        return (Code(goal.profile.name),)
+    nodes, axes = int(plain(goal.nodes)), int(plain(goal.axes))
     return (
-        *(Code(goal.name), " with "),
+        *(Code(goal.profile.name), " with "),
         *(figure_value(NODES, nodes), f" {nouns(nodes, 'node')} ("),
         *(figure_value(AXES, axes), f" {nouns(axes, 'axis')}) at "),
-        period_value(goal.cycle.period_us),
+        period_value(goal.profile.cycle.period_us),
     )
 
 
-def _warnings(plan: Plan) -> Iterator[Sentence]:
-    option = plan.recommended
-    profile = plan.goal if option is None else option.profile
-    nodes = int(network_of(profile).nodes)
-    yield from warning_sentences(profile, nodes=nodes, most=nodes)
-    if option is not None:
-        yield from reset_sentence(after_reset(option.profile, option.deciding), option.profile)
+def _warnings(plan: PlanAnswer) -> Iterator[Sentence]:
+    network = plan.goal if plan.recommended is None else plan.recommended.network
+    yield from warning_sentences(network, nodes=int(plain(network.nodes)), most=0)
+    yield from reset_sentence(plan.after_reset, network)
 
 
-# --- plain data -----------------------------------------------------------------------------------------------
-
-
-def _options(plan: Plan) -> list[Record]:
+def _options(plan: PlanAnswer) -> list[Record]:
     return [_record(plan, option) for option in plan.options]
 
 
-def _record(plan: Plan, option: Option) -> Record:
+def _record(plan: PlanAnswer, option: Option) -> Record:
     figures, profile, others = option.deciding, option.profile, option.others
+    values = figures.values()
     return {
         "title": option.title,
         "changes": plan.all_changes(option),
         "recommended": option.recommended,
-        **fields(figures, "timing_model", "verdict", "fits", "circle_refused_by"),
+        **fields(figures, "timing_model", "verdict", "fits"),
         "fits_other_model": all(model.fits for model in others) if others else None,
         "margin_us": figures.margin_us,
         "margin_other_model_us": min((model.margin_us for model in others if profile.has_cycle), default=None),
         **fields(figures, "bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
-        **fields(option, "passes", "held_by", "proven", "circle_passed"),
-        "circle_failures": list(option.circle_failures or ()),
+        "held_by": option.held_by,
         **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
         "slice_ratio": profile.cycle.slice_ratio if profile.has_cycle else None,
-        **fields(figures, *bus_of(profile).figures.planned),
+        **{key: values[key] for key in option.network.bus.figures.planned},
         **{f"{kind}_bytes": _payload_bytes(profile, kind) for kind in TRANSACTION_KINDS},
     }
 
@@ -191,44 +165,41 @@ def _payload_bytes(profile: Profile, kind: TransactionKind) -> int | None:
     return next((int(alike.bytes_of(kind)) for alike in profile.alike_nodes), None)
 
 
-def plan_records(plan: Plan) -> list[Record]:
-    """One row for each option, with its changes and failures as text."""
+def plan_records(plan: PlanAnswer) -> list[Record]:
+    """One row for each option, with its changes as text."""
     return [
         {
             **record,
             "changes": [f"{key}={value}" for key, value in flat(record["changes"])],
-            "circle_failures": "; ".join(record["circle_failures"]),
         }
         for record in _options(plan)
     ]
 
 
-def plan_document(plan: Plan) -> JsonDocument:
+def plan_document(plan: PlanAnswer) -> JsonDocument:
     """Document of `busplan plan --format json`."""
     recommended = None if plan.recommended is None else plan.all_changes(plan.recommended)
-    goal = network_of(plan.goal)
     return document(
         "plan",
         profile=plan.profile.name,
-        goal={"nodes": int(goal.nodes), "axes": int(goal.axes)},
-        free=list(plan.free),
+        goal={"nodes": int(plain(plan.goal.nodes)), "axes": int(plain(plan.goal.axes))},
+        free=[freedom.name for freedom in plan.free],
         period_is_kept=plan.period_is_kept,
         recommended_changes=recommended,
         binding=None if plan.binding is None else {"constraint": plan.binding.key, "why": plan.binding.why},
-        relaxations=[relaxation._asdict() for relaxation in plan.relaxations],
+        relaxations=[vars(relaxation) for relaxation in plan.relaxations],
         options=_options(plan),
-        impossible=[impossible._asdict() for impossible in plan.impossible],
     )
 
 
-def options_table(plan: Plan) -> Table:
+def options_table(plan: PlanAnswer) -> Table:
     """Settings and results of each option; the recommended one has a mark."""
     columns = (
         TableColumn("option", kind="words"),
         TableColumn("", kind="words"),
         TableColumn("set", kind="words", wraps=True),
         TableColumn("largest term", kind="words", rank=2),
-        *(TableColumn(heading, kind="words") for heading in ("held by", "circle")),
+        TableColumn("held by", kind="words"),
         *(TableColumn(heading, "us") for heading in ("margin", "+/-")),
         *(TableColumn(heading, group="safe", rank=1) for heading in ("nodes", "axes")),
     )
@@ -236,19 +207,12 @@ def options_table(plan: Plan) -> Table:
 
 
 def _row(option: Option) -> TableRow:
-    passed = option.circle_passed
-    circle: Cell = MISSING if option.circle_failures is None else "not judged"
-    if passed is not None:
-        circle = Words("passes", "passes") if passed else Words("FAILS", "fails")
-    if option.deciding.circle_refused_by:
-        circle = Words("cannot be run", "fails")
     cells: tuple[Cell, ...] = (
         option.title,
-        "*" * option.recommended + "?" * (not option.proven),
-        _short(option.profile, option.changes),
-        bus_of(option.profile).figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
+        "*" * option.recommended,
+        _short(option.network, option.changes),
+        option.network.bus.figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
         ShownValue(option.held_by, "held_by"),
-        circle,
         *option_margin(option),
         *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES)),
     )
@@ -275,7 +239,6 @@ _SHORT: Final = {
     "bus.nodes": "{} nodes",
     "cycle.period_us": "{}",
     "cycle.slice_ratio": "ratio {}",
-    "servo.step_us": "step {}",
     "payload.read_bytes": "read {} bytes",
     "payload.write_bytes": "write {} bytes",
     "payload.read_bytes_per_axis": "read {} bytes an axis",
@@ -286,14 +249,14 @@ _SHORT: Final = {
 _BOTH: Final = ("payload.read_bytes", "payload.write_bytes")
 
 
-def _short(profile: Profile, changes: NewValues) -> Cell:
+def _short(network: Network, changes: NewValues) -> Cell:
     """The settings of an option, in a few words."""
     if not changes:
         return MISSING
     sizes = {key: value for key, value in changes.items() if key in _BOTH}
     alike = len(sizes) == len(_BOTH) and len(set(sizes.values())) == 1
     shown = {key: value for key, value in changes.items() if not alike or key != _BOTH[-1]}
-    own = {name: key.short for name, key in bus_of(profile).keys.items() if key.short}
+    own = {name: key.short for name, key in network.bus.keys.items() if key.short}
     words = {**_SHORT, **own, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
     return joined(
         *(

@@ -1,21 +1,64 @@
 """`busplan.report`."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import plural
 from busplan.printable import has_controls
-from busplan.profile.changes import NO_CHANGES
-from busplan.progress import Progress
+from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.progress import Progress, part_of
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Origin, ProfileLike, load_profile, one_or_several, origin_of
-from busplan.questions.report.all_answers import AllAnswers, answers_of_each
-from busplan.questions.report.page import ReportedProfile, page_report
+from busplan.questions.base.shell import change_options, shell_word
+from busplan.questions.capacity import capacity
+from busplan.questions.capacity.verdict import Verdict
+from busplan.questions.circle import circle_test
+from busplan.questions.explain import explain
+from busplan.questions.fit.circle_refusal import refusals
+from busplan.questions.fit.network import network_of
+from busplan.questions.latency import latency
+from busplan.questions.map import map_
+from busplan.questions.report.page import page_report
+from busplan.questions.timeline import timeline
 from busplan.questions.words.documents import changed_report
 from busplan.sections.profile import Profile
+
+
+@dataclass(frozen=True)
+class Section:
+    """One answer on a page."""
+
+    key: str
+    title: str
+    command: str
+    """The shell command that gives it again."""
+    report: Report
+
+
+@dataclass(frozen=True)
+class ReportedProfile:
+    """One profile of a page, with its answers."""
+
+    argument: str
+    """The PROFILE argument."""
+    changes: KeyChanges
+    """Changes of its file by options."""
+    verdict: Verdict
+    sections: tuple[Section, ...]
+    """Its answers, that of `capacity` first."""
+
+    @property
+    def network(self) -> Network:
+        """The network."""
+        return self.verdict.network
+
+    def section(self, key: str) -> Section | None:
+        """The answer of a name."""
+        return next((section for section in self.sections if section.key == key), None)
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -25,18 +68,13 @@ class ReportAnswer(Answer):
     Parameters
     ----------
     profiles
-        Each profile with its `argument` in the page's commands, and all its answers.
+        Each profile with its answers.
     title
         Heading of the page; None for the profile's name or the number of profiles.
     """
 
     profiles: tuple[ReportedProfile, ...]
     title: str | None
-
-    @property
-    def answers(self) -> tuple[AllAnswers, ...]:
-        """All answers for each profile."""
-        return tuple(profile.answer for profile in self.profiles)
 
     def report(self) -> Report:
         """The answer in blocks."""
@@ -45,28 +83,28 @@ class ReportAnswer(Answer):
         return changed_report(page, changes) if all(profile.changes == changes for profile in self.profiles) else page
 
     def _headline(self) -> str:
-        return "; ".join(f"{answer.profile.name}: {answer.verdict.deciding.verdict}" for answer in self.answers)
+        return "; ".join(f"{each.network.profile.name}: {each.verdict.deciding.verdict}" for each in self.profiles)
 
 
 def report(
     profiles: ProfileLike | Iterable[ProfileLike],
     *,
     title: str | None = None,
-    circle: bool = True,
+    circle: bool | None = None,
     progress: Progress | None = None,
     origins: Iterable[Origin] | None = None,
 ) -> ReportAnswer:
-    """Put all that busplan says of one or several profiles on one page.
+    """Put the answers for one or several profiles on one page.
 
     Parameters
     ----------
     profiles
-        One or several: a `Profile`, a path or a shipped name each. The page names commands that repeat its figures;
-        in those of a `Profile` stands the shipped one it was made from with its changes, else NAME.toml.
+        One or several: a `Profile`, a path or a shipped name each. The page names commands that repeat its answers; in
+        those of a `Profile` stands the shipped one it was made from with its changes, else NAME.toml.
     title
         Heading of the page; by default the profile's name, or how many profiles.
     circle
-        Run the circle test of profiles that ask for one.
+        Run the circle test; by default of profiles whose servo values are measured.
     progress
         Called from time to time with the steps simulated and the steps known to be needed.
     origins
@@ -87,10 +125,10 @@ def report(
     Examples
     --------
     >>> import busplan
-    >>> page = busplan.report(["paper-4ms", "paper-1ms"], circle=False)
+    >>> page = busplan.report(["paper-4ms", "paper-1ms"])
     >>> page
     <ReportAnswer: paper-4ms: fits; paper-1ms: fits>
-    >>> page.html.splitlines()[0], page.answers[0].verdict.deciding.safe_axes
+    >>> page.html.splitlines()[0], page.profiles[0].verdict.deciding.safe_axes
     ('<!DOCTYPE html>', 52)
     """
     if title is not None and (not isinstance(title, str) or has_controls(title) or not title.strip()):
@@ -106,11 +144,54 @@ def report(
     named = list(origins)
     if len(named) != len(given):
         raise BusplanError(f"origins: {len(named)} for {plural(len(given), 'profile')}; expected one for each")
-    answers_ = answers_of_each(loaded, with_circle=circle, progress=progress)
-    return ReportAnswer(
-        tuple(
-            ReportedProfile(argument, answer, changes)
-            for (argument, changes), answer in zip(named, answers_, strict=True)
-        ),
-        title,
-    )
+    reported = []
+    for number, ((argument, changes), profile) in enumerate(zip(named, loaded, strict=True)):
+        part = None if progress is None else part_of(progress, number=number, of=len(loaded))
+        reported.append(_reported(profile, argument, changes, circle=circle, progress=part))
+    return ReportAnswer(tuple(reported), title)
+
+
+def _reported(
+    profile: Profile, argument: str, changes: KeyChanges, *, circle: bool | None, progress: Progress | None
+) -> ReportedProfile:
+    options = [*change_options(changes, period_us=profile.cycle.period_us)]
+
+    def command(name: str, *more: str, takes_period: bool = True) -> str:
+        # Neither latency nor the list of explain takes --period.
+        known = options if takes_period else [*change_options(_without_period(changes), period_us=0.0)]
+        return " ".join(("busplan", name, shell_word(argument), *more, *known))
+
+    bus = capacity(profile, sensitivity=profile.has_cycle)
+    more = ("--sensitivity",) if profile.has_cycle else ()
+
+    def sections() -> Iterator[Section]:
+        yield Section("capacity", "Every figure of the cycle", command("capacity", *more), bus.report())
+        if profile.has_cycle:
+            yield Section("map", "What fits, and what limits it", command("map"), map_(profile).report())
+        latencies = latency(profile).report()
+        yield Section("latency", "How long data take", command("latency", takes_period=False), latencies)
+        if profile.has_cycle:
+            try:
+                events = timeline(profile).report()
+            except BusplanError:
+                pass  # more nodes than can be laid out
+            else:
+                yield Section("timeline", "The cycle to scale", command("timeline"), events)
+        if _has_circle(profile, circle):
+            test = circle_test(profile, contributions=True, progress=progress).report()
+            yield Section("circle", "The circle", command("circle-test", "--contributions"), test)
+        yield Section("explain", "What it rests on", command("explain", takes_period=False), explain(profile).report())
+
+    return ReportedProfile(argument, changes, bus.verdicts[0], tuple(sections()))
+
+
+def _without_period(changes: KeyChanges) -> KeyChanges:
+    return KeyChanges(tuple(change for change in changes.each if change.option != "--period"))
+
+
+def _has_circle(profile: Profile, circle: bool | None) -> bool:
+    """Whether a circle is on the page: one that can be run, asked for, or with measured servo values."""
+    if not profile.asks_for_circle or circle is False:
+        return False
+    is_measured = profile.servo.grades_given[0] == "measured"
+    return (circle is True or is_measured) and not refusals(network_of(profile))

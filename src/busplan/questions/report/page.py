@@ -1,83 +1,45 @@
-"""Answer of `busplan report`: all answers for one or several profiles on one page."""
+"""The page of `busplan report`: a first screen for somebody who decides, and the answers one after the other."""
 
 from collections.abc import Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from busplan.buses.figure import (
-    AVAILABLE,
     AXES,
     MARGIN_CORRECTED,
     NODES,
     PERIOD,
     SAFE_AXES,
-    TIMING_MODEL,
     UNCERTAINTY,
     UTILISATION,
     VERDICT,
-    Figure,
 )
 from busplan.forms.blocks import (
     Block,
-    Cell,
+    Card,
     Chapter,
+    Chart,
     Code,
-    Facts,
+    Command,
+    Detail,
     JsonDocument,
     Report,
     SectionLink,
     Sentence,
-    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Words,
     attribute_value,
 )
-from busplan.forms.numbers import MISSING, nouns, plural
-from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.forms.numbers import plural
 from busplan.questions.base.shell import shell_word
-from busplan.questions.capacity.card import card
-from busplan.questions.circle.figures import CIRCLE_BY_KEY
-from busplan.questions.circle.report import verdict_words
-from busplan.questions.explain.report import assumptions_table
-from busplan.questions.fit.assumed import heavy_assumptions
-from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.report.all_answers import AllAnswers
-from busplan.questions.report.commands import Sources, sources
-from busplan.questions.report.parts import (
-    circle_question,
-    part,
-    parts,
-)
+from busplan.questions.capacity.lines import card
 from busplan.questions.words.documents import document
 
-_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
+if TYPE_CHECKING:
+    from busplan.questions.report import ReportedProfile, Section
 
 
-class ReportedProfile(NamedTuple):
-    """One profile of a page."""
-
-    argument: str
-    """The PROFILE argument."""
-    answer: AllAnswers
-    changes: KeyChanges = NO_CHANGES
-    """KeyChanges of its file."""
-
-
-class _Subject(NamedTuple):
-    """A profile and the commands behind its figures."""
-
-    key: str
-    origin: str
-    answer: AllAnswers
-    sources: Sources
-
-    @property
-    def name(self) -> str:
-        return self.answer.profile.name
-
-
-def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None) -> Report:
+def page_report(profiles: "Sequence[ReportedProfile]", *, title: str | None = None) -> Report:
     """Make the page: a chapter for each profile, after a comparison if there are several.
 
     Parameters
@@ -87,110 +49,67 @@ def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None
     title
         Title of the page; by default the profile's name, or the number of profiles.
     """
-    subjects = [
-        _Subject(
-            f"p{number}",
-            shell_word(profile.argument),
-            profile.answer,
-            sources(profile.answer, argument=profile.argument, changes=profile.changes),
-        )
-        for number, profile in enumerate(profiles, start=1)
-    ]
-    own = Code(subjects[0].name) if len(subjects) == 1 else plural(len(subjects), "profile")
+    own = Code(profiles[0].network.profile.name) if len(profiles) == 1 else plural(len(profiles), "profile")
     return Report(
         Sentence((own if title is None else title,)),
-        lambda: tuple(_blocks(subjects)),
-        lambda: _document(subjects),
+        tuple(_blocks(profiles)),
+        _document(profiles),
         is_page=True,
         is_whole=True,
     )
 
 
-def _document(subjects: Sequence[_Subject]) -> JsonDocument:
-    """Document of `busplan report --format json`: for each profile, the documents of its commands."""
+def _document(profiles: "Sequence[ReportedProfile]") -> JsonDocument:
+    """Document of `busplan report --format json`: for each profile, the documents of its answers."""
     return document(
         "report",
         profiles=[
-            {"profile": subject.name, "answers": {name: source.document() for name, source in subject.sources.items()}}
-            for subject in subjects
+            {
+                "profile": each.network.profile.name,
+                "answers": {section.key: dict(section.report.document) for section in each.sections},
+            }
+            for each in profiles
         ],
     )
 
 
-def _blocks(subjects: Sequence[_Subject]) -> Iterator[Block]:
-    if len(subjects) == 1:
-        yield from _chapter(subjects[0])
+def _blocks(profiles: "Sequence[ReportedProfile]") -> Iterator[Block]:
+    if len(profiles) == 1:
+        yield from _chapter(profiles[0])
         return
-    yield Chapter(Sentence(("Comparison",)), (_comparison(subjects),), "comparison", "comparison")
-    for subject in subjects:
-        yield Chapter(Sentence((Code(subject.name),)), tuple(_chapter(subject)), key=subject.key)
+    yield Chapter(Sentence(("Comparison",)), (_comparison(profiles),), "comparison", "comparison")
+    for number, profile in enumerate(profiles, start=1):
+        yield Chapter(Sentence((Code(profile.network.profile.name),)), tuple(_chapter(profile)), key=f"p{number}")
 
 
-def _chapter(subject: _Subject) -> Iterator[Block]:
-    """All blocks of one profile."""
-    answer, sources_ = subject.answer, subject.sources
-    if answer.profile.description.strip():
-        yield Sentence((" ".join(answer.profile.description.split()),))
-    yield _facts(subject)
-    circle = (circle_question(answer),) if answer.profile.has_cycle else ()
-    verdicts: tuple[Block, ...] = (card(answer.verdict, answer.profile), *circle)
-    if answer.no_circle:
-        verdicts = verdicts[::-1]  # the cause first
-    lines = (sources_[name].line for name in ("capacity", "circle") if name in sources_)
-    yield part("verdict", "Verdict", (*_assumed(answer), *verdicts, *lines))
-    yield from parts(answer, sources_)
-    assumptions = (assumptions_table(answer.assumptions), sources_["explain"].line)
-    yield part("assumptions", "What it rests on", assumptions)
-    yield _commands(sources_)
+def _chapter(reported: "ReportedProfile") -> Iterator[Block]:
+    """The first screen, and every answer behind a fold."""
+    description = reported.network.profile.description
+    if description.strip():
+        yield Sentence((" ".join(description.split()),))
+    yield card(reported.verdict)
+    trade_off = reported.section("map")
+    if trade_off is not None:
+        yield from (block for block in trade_off.report.blocks if isinstance(block, Chart))
+    yield from map(_folded, reported.sections)
 
 
-_MOST_NAMED: Final = 3
-"""Keys that are named before the verdict; the table at the end has all."""
+_ON_FIRST_SCREEN: Final = {"capacity": Card, "map": Chart}
+"""Blocks of an answer that stand on the first screen already."""
 
 
-def _assumed(answer: AllAnswers) -> Iterator[Sentence]:
-    """Say which keys of the profile are assumed, before any figure that rests on them; those that carry most first."""
-    heavy = heavy_assumptions(answer.verdict.deciding, answer.profile)
-    names = [given.name for given in answer.assumptions if given.grade == "assumed" and "." in given.name]
-    names.sort(key=lambda name: not any(assumption.covers(name) for assumption in heavy))
-    if names:
-        parts = [part for name in names[:_MOST_NAMED] for part in (Code(name), ", ")][:-1]
-        more = len(names) - _MOST_NAMED
-        rest = f" and {more} more" if more > 0 else ""
-        verb = "is" if len(names) == 1 else "are"
-        yield Sentence((*parts, f"{rest} {verb} assumed: nobody has measured what these figures rest on."), "warns")
+def _folded(section: "Section") -> Chapter:
+    shown = _ON_FIRST_SCREEN.get(section.key, ())
+    blocks = [block for block in _whole(section.report.blocks) if not isinstance(block, shown)]
+    return Chapter(Sentence((section.title,)), (*blocks, Command(section.command)), section.key, is_folded=True)
 
 
-def _facts(subject: _Subject) -> Facts:
-    """Settings of the bus, and the PROFILE argument."""
-    bus, figures = bus_of(subject.answer.profile), subject.answer.capacity.results[0]
-    setup = (figure for figure in bus.figures.setup if figure.key in bus.figures.headings)
-
-    def item(name: str, figure: Figure) -> tuple[str, ShownValue]:
-        unit = "us" if figure.unit == "us" else ""
-        return name, ShownValue(getattr(figures, figure.key), figure.key, unit)
-
-    network = network_of(subject.answer.profile)
-    return Facts(
-        (
-            *((nouns(2, noun), ShownValue(number, nouns(2, noun))) for number, noun in bus.counted(network)),
-            *(item(figure_.label, figure_) for figure_ in setup),
-            *((item("period", PERIOD), item("slice", AVAILABLE)) if network.groups else ()),
-            ("deciding model", ShownValue(subject.answer.verdict.deciding.timing_model, TIMING_MODEL.key)),
-            ("profile", Code(subject.origin)),
-        )
-    )
+def _whole(blocks: Sequence[Block]) -> Iterator[Block]:
+    for block in blocks:
+        yield from block.blocks if isinstance(block, Detail) else (block,)
 
 
-def _commands(sources: Sources) -> Chapter:
-    columns = (TableColumn("what", kind="words"), TableColumn("command", kind="words"))
-    rows = tuple(TableRow((source.command.purpose, source.command)) for source in sources.values())
-    line = "The JSON document of one of these commands has each figure above, with all its digits."
-    table = Table(columns, rows, Sentence(("Commands",)), stacks=True)
-    return part("commands", "How to get every figure again", (Sentence((line,)), table))
-
-
-def _comparison(subjects: Sequence[_Subject]) -> Table:
+def _comparison(profiles: "Sequence[ReportedProfile]") -> Table:
     columns = (
         TableColumn("profile", kind="words"),
         TableColumn("verdict", kind="words"),
@@ -201,25 +120,15 @@ def _comparison(subjects: Sequence[_Subject]) -> Table:
         TableColumn("margin", "us"),
         TableColumn("+/-", "us"),
         TableColumn("safe axes"),
-        *(TableColumn(CIRCLE_BY_KEY[key].symbol, group="contour error, um") for key in _MEASURES),
-        TableColumn("circle", kind="words"),
     )
-    rows = tuple(TableRow(_compared(subject)) for subject in subjects)
+    figures = (VERDICT, PERIOD, NODES, AXES, UTILISATION, MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES)
+    rows = tuple(
+        TableRow(
+            (
+                SectionLink(each.network.profile.name, f"p{number}", shell_word(each.argument)),
+                *(attribute_value(figure, each.verdict.deciding) for figure in figures),
+            )
+        )
+        for number, each in enumerate(profiles, start=1)
+    )
     return Table(columns, rows, Sentence(("All profiles, each under the timing model that decides",)))
-
-
-def _compared(subject: _Subject) -> tuple[Cell, ...]:
-    shown = (VERDICT, PERIOD, NODES, AXES, UTILISATION, MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES)
-    bus = (attribute_value(figure, subject.answer.verdict.deciding) for figure in shown)
-    link = SectionLink(subject.name, subject.key, subject.origin)
-    return link, *bus, *_compared_circle(subject)
-
-
-def _compared_circle(subject: _Subject) -> tuple[Cell, ...]:
-    result = subject.answer.circle_figures
-    if result is None:
-        refused = Words("cannot be run", "fails") if subject.answer.no_circle else "not run"
-        return MISSING, MISSING, MISSING, refused
-    figures = tuple(attribute_value(CIRCLE_BY_KEY[key], result) for key in _MEASURES)
-    verdict = verdict_words(result)
-    return *figures, Words(verdict.text.lower(), verdict.state)

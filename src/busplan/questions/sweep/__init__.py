@@ -1,11 +1,6 @@
-"""`busplan.sweep`.
+"""`busplan.sweep`."""
 
-A sweep that is too large for memory is computed block by block: `checked_sweep`, `sweep_blocks`, and a `Digest`, a
-`FigureData` or a writer that takes the blocks.
-"""
-
-import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -13,22 +8,25 @@ from typing import TYPE_CHECKING, Final, NoReturn
 
 import numpy as np
 
+from busplan.buses.figure import TIMING_MODEL, unit_of
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
 from busplan.forms import ROWS_ENDINGS, RowsForm
-from busplan.forms.blocks import Report
+from busplan.forms.blocks import Code, Report, Sentence
 from busplan.forms.charts import Drawing
 from busplan.forms.csv_rows import spelled
+from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_profile
-from busplan.questions.sweep.asked import Sweep, checked_sweep
-from busplan.questions.sweep.blocks import Column, SweepBlock
-from busplan.questions.sweep.circle_run import sweep_blocks
-from busplan.questions.sweep.digest import Digest, default_columns
-from busplan.questions.sweep.execution import Here, Work, require_executor
-from busplan.questions.sweep.grid import Array, Grid
-from busplan.questions.sweep.plot import FigureData, is_drawable
-from busplan.questions.sweep.rows import rows_writer
+from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network
+from busplan.questions.circle.figures import CIRCLE_BY_KEY
+from busplan.questions.sweep.asked import Sweep, checked_sweep, column_figures
+from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, mapper_of
+from busplan.questions.sweep.digest import default_columns, sentences, top_rows
+from busplan.questions.sweep.grid import Array
+from busplan.questions.sweep.plot import FigureData, is_drawable, require_drawable
+from busplan.questions.sweep.rows import sweep_facts, written_rows
+from busplan.questions.sweep.seeds_run import summaries
+from busplan.questions.sweep.table import Columns, figure_table
 from busplan.questions.sweep.values import axis_values
 from busplan.sections.profile import Profile
 
@@ -36,23 +34,10 @@ if TYPE_CHECKING:
     import pandas as pd
     import polars as pl
     import pyarrow as pa
+    import xarray as xr
 
-__all__ = [
-    "Digest",
-    "FigureData",
-    "Here",
-    "SweepAnswer",
-    "Work",
-    "axis_values",
-    "checked_sweep",
-    "default_columns",
-    "rows_writer",
-    "sweep",
-    "sweep_blocks",
-]
+__all__ = ["SweepAnswer", "axis_values", "checked_sweep", "computed", "require_drawable", "sweep"]
 
-MOST_POINTS: Final = 2_000_000
-"""Most points, about half a gigabyte of memory. The command line has no such limit."""
 _SHOWN: Final = 20
 """Rows of the report."""
 
@@ -67,12 +52,12 @@ class SweepAnswer(Answer, Mapping[str, Array]):
     ----------
     sweep
         The sweep as asked for.
-    blocks
-        The figures, block by block.
+    table
+        Its columns.
     """
 
     sweep: Sweep
-    blocks: tuple[SweepBlock, ...]
+    table: Columns
 
     @property
     def profile(self) -> Profile:
@@ -80,35 +65,28 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         return self.sweep.profile
 
     @property
-    def grid(self) -> Grid:
-        """The varied keys and their values."""
-        return self.sweep.grid
-
-    @property
-    def timing_models(self) -> tuple[str, ...]:
-        """The timing models, in the order of the rows of a point."""
-        return self.sweep.timing_models
-
-    @property
     def columns(self) -> tuple[str, ...]:
         """Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests."""
-        return self.sweep.columns
+        return tuple(self.table)
 
     def __getitem__(self, name: str) -> Array:
-        if name not in self.columns:
-            raise KeyError(f"no column {name!r}; there are {', '.join(self.columns)}")
-        return np.concatenate(
-            [block.interleaved([_spelled(column) for column in block.columns(name)]) for block in self.blocks]
-        )
+        if name not in self.table:
+            raise KeyError(f"no column {name!r}; there are {', '.join(self.table)}")
+        column = self.table[name]
+        words = set(column.tolist()) if column.dtype == object else set()
+        if name in self.sweep.numbers or all(isinstance(word, bool) for word in words):
+            return column.copy()
+        texts = {word: str(spelled(word)) for word in words}
+        return np.array([texts[word] for word in column.tolist()])
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.columns)
+        return iter(self.table)
 
     def __len__(self) -> int:
-        return len(self.columns)
+        return len(self.table)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.columns
+        return name in self.table
 
     # A mapping would compare its columns: arrays, which have no single truth.
     __eq__, __hash__ = object.__eq__, object.__hash__
@@ -116,6 +94,55 @@ class SweepAnswer(Answer, Mapping[str, Array]):
     def __array__(self, *_: object, **__: object) -> NoReturn:
         # pandas.DataFrame takes the columns of a dict alone; of this mapping it would make a column of their names.
         raise BusplanError("columns of several types are no array; to_pandas() gives a data frame, dict(answer) a dict")
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Make a data frame of pandas; words are categories.
+
+        Raises
+        ------
+        BusplanError
+            pandas is not installed.
+        """
+        require_extra("pandas", option="to_pandas()", module="pandas")
+        import pandas as pd
+
+        columns = {name: column.tolist() if column.dtype.kind == "U" else column for name, column in self.items()}
+        words = {
+            name: pd.Categorical([word or None for word in texts], [*dict.fromkeys(filter(None, texts))])
+            for name, texts in columns.items()
+            if isinstance(texts, list)
+        }
+        return pd.DataFrame({**columns, **words}).infer_objects()
+
+    def to_xarray(self) -> "xr.Dataset":
+        """Make a dataset of xarray: a dimension for each varied key, by its name, and `timing_model`.
+
+        Each figure has its `units` and its `long_name`.
+
+        Raises
+        ------
+        BusplanError
+            xarray is not installed.
+        """
+        require_extra("xarray", option="to_xarray()", module="xarray")
+        import xarray as xr
+
+        sizes = {
+            **{key: axis.size for key, axis in self.sweep.grid.axes.items()},
+            TIMING_MODEL.key: len(self.sweep.timing_models),
+        }
+        figures = column_figures(self.sweep.network)
+        variables = {
+            name: (
+                tuple(sizes),
+                column.reshape(tuple(sizes.values())),
+                {"units": figures[name].unit, "long_name": figures[name].meaning},
+            )
+            for name, column in self.items()
+            if name not in sizes
+        }
+        coordinates = {key: (key, axis, {"units": unit_of(key)}) for key, axis in self.sweep.grid.axes.items()}
+        return xr.Dataset(variables, {**coordinates, TIMING_MODEL.key: [*self.sweep.timing_models]})
 
     def to_arrow(self) -> "pa.Table":
         """Make a table of Apache Arrow (extra `table`): typed columns with unit and meaning, null where none is.
@@ -126,21 +153,9 @@ class SweepAnswer(Answer, Mapping[str, Array]):
             pyarrow is not installed.
         """
         require_pyarrow("to_arrow()")
-        from busplan.questions.sweep.parquet import arrow_table
+        from busplan.questions.sweep.arrow import arrow_table
 
-        return arrow_table(self.sweep, self.blocks)
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """Make a data frame of pandas from `to_arrow`; words are categories.
-
-        Raises
-        ------
-        BusplanError
-            pandas or pyarrow is not installed.
-        """
-        require_extra("pandas", option="to_pandas()", module="pandas")
-        require_pyarrow("to_pandas()")
-        return self.to_arrow().to_pandas()
+        return arrow_table(self.sweep, self.table, sweep_facts(self.sweep))
 
     def to_polars(self) -> "pl.DataFrame":
         """Make a data frame of polars from `to_arrow`; words are categories.
@@ -158,60 +173,96 @@ class SweepAnswer(Answer, Mapping[str, Array]):
 
     def to_json(self) -> str:
         """Write the document of `busplan sweep --format json`."""
-        return self._rows_in("json").decode()
+        return b"".join(self.rows_in("json")).decode()
 
-    def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
-        rows = {ending: partial(self._rows_in, form) for ending, form in ROWS_ENDINGS.items()}
-        return {**Answer._contents(self), **rows}  # noqa: SLF001 - super() knows no class with slots made anew
+    def rows_in(self, form: RowsForm, columns: Sequence[str] | None = None) -> Iterator[bytes]:
+        """Write every row, piece by piece.
 
-    def drawing(self) -> Drawing:
-        """The picture of `busplan sweep --plot`.
+        Parameters
+        ----------
+        form
+            The form; "parquet" needs the extra `table`.
+        columns
+            Names of columns, behind the varied keys and the timing model; by default all.
 
         Raises
         ------
         BusplanError
-            More than two keys vary, or there are too many points.
+            No such column.
         """
-        return self._figure().drawing(self.profile.name)
+        names = self._behind_keys(columns or self.columns)
+        return written_rows(form, self.sweep, {name: self.table[name] for name in names})
+
+    def _behind_keys(self, columns: Iterable[str]) -> tuple[str, ...]:
+        self.sweep.require_columns(columns, name="columns")
+        return tuple(dict.fromkeys((*self.sweep.grid.axes, TIMING_MODEL.key, *columns)))
+
+    def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
+        rows = {ending: partial(self._bytes_in, form) for ending, form in ROWS_ENDINGS.items()}
+        return {**Answer._contents(self), **rows}  # noqa: SLF001 - super() knows no class with slots made anew
+
+    def _bytes_in(self, form: RowsForm) -> bytes:
+        return b"".join(self.rows_in(form))
+
+    def drawing(self, *, figure: str | None = None) -> Drawing:
+        """Draw a figure over one or two varied keys: the picture of `busplan sweep --plot`.
+
+        Parameters
+        ----------
+        figure
+            Name of a column in numbers; by default the safe axes and, where these do not vary, the corrected margin.
+
+        Raises
+        ------
+        BusplanError
+            No column in numbers, more than two keys vary, or there are too many points.
+        """
+        self.sweep.require_number(figure, name="figure")
+        title = ", ".join(filter(None, (self.profile.name, self.sweep.changes.words)))
+        return FigureData(self.sweep, self.table, figure=figure).drawing(title)
 
     def _repr_html_(self) -> str:
         from busplan.forms.html import fragment
 
         report = self._shown()
-        charts = [self._figure().chart()] if is_drawable(self.grid) else []
-        return fragment(report._replace(blocks=lambda: (*report.blocks(), *charts)))
+        charts = [FigureData(self.sweep, self.table).chart()] if is_drawable(self.sweep.grid) else []
+        return fragment(report._replace(blocks=(*report.blocks, *charts)))
 
-    def _figure(self) -> FigureData:
-        figure = FigureData(self.sweep)
-        for block in self.blocks:
-            figure.add(block)
-        return figure
+    def sentences(self) -> tuple[Sentence, ...]:
+        """How many points there are, how many fit, and what is wrong at others."""
+        return tuple(sentences(self.sweep, self.table))
 
-    def _rows_in(self, form: RowsForm) -> bytes:
-        """Every row in a form."""
-        written: list[bytes] = []
-        writer = rows_writer(form, self.sweep, written.append)
-        for block in self.blocks:
-            writer.add(block)
-        writer.finish(complete=True)
-        return b"".join(written)
+    def report(
+        self,
+        *,
+        columns: Sequence[str] | None = None,
+        top: int = _SHOWN,
+        sort_by: str | None = None,
+        ascending: bool = False,
+    ) -> Report:
+        """The answer in blocks, with some rows.
 
-    def report(self) -> Report:
-        """The answer in blocks."""
-        shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.sweep)))
-        digest = Digest(self.sweep._replace(columns=tuple(shown)), top=_SHOWN)
-        for block in self.blocks:
-            digest.add(block)
-        return digest.report(document=lambda: json.loads(self.to_json()))
+        Parameters
+        ----------
+        columns
+            Names of columns, behind the varied keys and the timing model, and before `sort_by`; by default the main
+            ones.
+        top
+            Most rows.
+        sort_by
+            Column in numbers to sort by; by default rows are in the order of the grid.
+        ascending
+            Smallest first.
 
-
-def _spelled(column: Column) -> Array:
-    if column.words is None:
-        return column.values
-    if any(isinstance(word, bool) for word in column.words):
-        return np.array(column.words, dtype=object)[column.values]
-    words: Array = np.array([str(spelled(word)) for word in column.words])
-    return words[column.values]
+        Raises
+        ------
+        BusplanError
+            No such column, or none in numbers.
+        """
+        self.sweep.require_number(sort_by, name="sort_by")
+        shown = self._behind_keys((*(columns or default_columns(self.sweep)), *([sort_by] if sort_by else [])))
+        rows = top_rows(self.sweep, self.table, columns=shown, top=top, sort_by=sort_by, ascending=ascending)
+        return Report(Sentence(("Sweep of ", Code(self.profile.name))), (*self.sentences(), *rows), {})
 
 
 def sweep(
@@ -219,10 +270,12 @@ def sweep(
     *,
     vary: Mapping[str, str | Iterable[object]],
     timing_model: Models | None = None,
+    group: str | None = None,
     circle: bool = False,
     summary: bool = False,
     force: bool = False,
     executor: Executor | None = None,
+    progress: Progress = ignored,
 ) -> SweepAnswer:
     """Compute capacity over a grid: any keys of the profile, every combination.
 
@@ -236,6 +289,9 @@ def sweep(
     timing_model
         Name of a timing model, or several in this order; by default all of the kind of bus. IEEE 1394 has "paper" for
         the paper's equations as published, and "standard" for the standard's clock and packets.
+    group
+        Of a profile with groups, the name of the one whose nodes vary for the most and the safe nodes and axes; the
+        others are as they are. By default that with the most axes.
     circle
         Also run the circle test of every point, and add its columns (errors in mm, margins).
     summary
@@ -247,6 +303,8 @@ def sweep(
         With `circle`: where the tests run, in chunks of about a second; by default in this thread. Any
         `concurrent.futures.Executor` gives the same answer, and is not shut down. Worker processes must have this
         version of busplan.
+    progress
+        Called now and then with the points, or the circle tests, that are done, and all of them [1].
 
     Returns
     -------
@@ -257,7 +315,7 @@ def sweep(
     Raises
     ------
     BusplanError
-        Not a profile, an invalid key or value, a point whose circle test cannot be run, or too many points.
+        Not a profile, an invalid key or value, a point whose circle test cannot be run, or more than a million points.
     Exception
         Any error that `executor` raises.
 
@@ -274,19 +332,56 @@ def sweep(
     >>> answer["limited_by"].tolist()
     ['time', 'time', 'time']
     """
-    require_executor(executor, circle=circle)
-    network = load_profile(profile)
+    network = load_network(profile)
     models = None if timing_model is None else checked_models(timing_model, network)
     if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):
         raise BusplanError(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
         )
-    if summary and not circle:
-        raise BusplanError("summary=True: goes with circle=True")
-    asked = checked_sweep(network, vary, timing_models=models, circle=circle, summary=summary, force=force)
-    if asked.grid.points > MOST_POINTS:
-        raise BusplanError(
-            f"vary: {asked.grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, "
-            "or write them with busplan sweep -o FILE.csv"
+    asked = checked_sweep(network, vary, timing_models=models, group=group, circle=circle, summary=summary, force=force)
+    return computed(asked, executor=executor, progress=progress)
+
+
+def computed(asked: Sweep, *, executor: Executor | None = None, progress: Progress = ignored) -> SweepAnswer:
+    """Compute a sweep.
+
+    Parameters
+    ----------
+    asked
+        The sweep.
+    executor, progress
+        As for `sweep`.
+
+    Raises
+    ------
+    BusplanError
+        A point whose circle test cannot be run.
+    Exception
+        Any error that `executor` raises.
+    """
+    mapper = mapper_of(executor, circle=asked.circle)
+    models = len(asked.timing_models)
+    table = figure_table(
+        asked.network,
+        asked.grid,
+        timing_models=asked.timing_models,
+        group=asked.group,
+        progress=ignored if asked.circle else progress,
+    )
+    if asked.circle:
+        results = circle_results(asked.profile, asked.grid, asked.tests, mapper=mapper, progress=progress)
+        of_points = (
+            {name: _typed(name, own) for name, own in zip(CIRCLE_COLUMNS, results, strict=True)}
+            if asked.seeds is None
+            else summaries(results.reshape(len(CIRCLE_COLUMNS), asked.grid.points, -1))
         )
-    return SweepAnswer(asked, tuple(sweep_blocks(asked, Work(executor or Here()))))
+        # One test a point, the same beside every timing model.
+        table |= {name: np.repeat(own, models) for name, own in of_points.items()}
+    return SweepAnswer(asked, table)
+
+
+def _typed(name: str, values: Array) -> Array:
+    """A figure of circles as numbers, or as truth values, None where one is missing."""
+    if CIRCLE_BY_KEY[name].sort != "truth":
+        return values
+    return np.array([None if np.isnan(value) else bool(value) for value in values.tolist()])

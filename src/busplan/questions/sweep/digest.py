@@ -1,20 +1,15 @@
 """Digest of a sweep for people: how many points fit, and the top rows."""
 
-from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping
-from math import isnan
+from collections.abc import Collection, Iterator, Mapping
 from types import MappingProxyType
-from typing import Final, NoReturn
+from typing import Final
 
 import numpy as np
 
-from busplan.buses.figure import CIRCLE_REFUSED_BY, EXCEEDED, TIMING_MODEL, VERDICT, Figure
-from busplan.errors import BusplanError
+from busplan.buses.figure import EXCEEDED, TIMING_MODEL, VERDICT, Figure
 from busplan.forms.blocks import (
     Code,
-    JsonDocument,
     Record,
-    Report,
     Sentence,
     ShownValue,
     Table,
@@ -26,12 +21,10 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.numbers import nouns
-from busplan.questions.fit.certainty import FITS, VERDICTS
-from busplan.questions.fit.figures import COUNTS
-from busplan.questions.fit.network import bus_of
+from busplan.questions.fit.certainty import FITS
 from busplan.questions.sweep.asked import Sweep, column_figures
-from busplan.questions.sweep.blocks import SweepBlock
-from busplan.questions.sweep.grid import Array
+from busplan.questions.sweep.rows import plain_rows
+from busplan.questions.sweep.table import Columns
 from busplan.sections.profile import Profile
 
 _RANKS: Final[Mapping[str, int]] = MappingProxyType(
@@ -58,204 +51,140 @@ SUMMARY_COLUMNS: Final = (
 
 
 def default_columns(sweep: Sweep) -> tuple[str, ...]:
-    """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole.
+    """Default figures of a table, with the safe nodes of each group.
 
     A network without a cycle has what its kind adds to a table, and the limits that are broken.
     """
     if not sweep.profile.has_cycle:
-        return (*(figure.key for figure in bus_of(sweep.profile).figures.table), EXCEEDED.key, VERDICT.key)
+        return (*(figure.key for figure in sweep.network.bus.figures.table), EXCEEDED.key, VERDICT.key)
     of_circle = (key for key in (*CIRCLE_COLUMNS, *SUMMARY_COLUMNS) if key in sweep.columns)
-    if not sweep.profile.group:
-        return (*_RANKS, *of_circle)
-    whole = (key for key in _RANKS if key not in COUNTS)
-    return (*whole, *(f"group.{group.name}.safe_nodes" for group in sweep.profile.group), *of_circle)
+    return (*_RANKS, *(f"group.{group.name}.safe_nodes" for group in sweep.profile.group), *of_circle)
 
 
-def _not_kept() -> NoReturn:
-    raise BusplanError("a sweep's document has every row: it is written as the rows come, and not from a few of them")
-
-
-class Digest:
-    """Counts of a sweep in sentences, and its first or best rows, from blocks that pass by and are not kept.
+def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
+    """How many points there are, and how many fit.
 
     Parameters
     ----------
     sweep
-        The sweep; its columns are those of the rows.
+        The sweep.
+    table
+        All its columns.
+    """
+    points, bus = sweep.grid.points, sweep.network.bus
+    head = sentence(f"{{}}: {{}} {nouns(points, 'point')}; ", Code(sweep.profile.name), _points(points, "points"))
+    fitting = (
+        sentence(f"{{}} shown to fit ({model} model)", _points(np.sum(own[VERDICT.key] == FITS)))
+        if model == bus.deciding_model
+        else sentence(f"{{}} fit by the closed form of the {model} model", _points(np.sum(own["fits"])))
+        for model, own in _by_model(sweep, table)
+    )
+    yield joined(head, joined(*fitting, by=", "), Sentence((".",)), by="")
+    # Settings of the bus and the circle are the same under every model.
+    _, first = next(_by_model(sweep, table))
+    if sweep.circle:
+        yield from _circles(sweep, table) if sweep.seeds is None else _over_seeds(first, sweep.seeds.size)
+    yield from payload_sentences(sweep.profile, sweep.grid.axes)
+    if sweep.group:
+        yield sentence("Axes are counted with more nodes of {}, the other groups as they are.", Code(sweep.group))
+    safety = bus.safety.figure
+    unsafe = 0 if safety is None else np.sum(~first[safety.key].astype(bool))
+    if unsafe and safety is not None:
+        yield sentence(
+            f"At {{}} points the {bus.safety.setting} is unsafe ({safety.key}).", _points(unsafe), state="warns"
+        )
+
+
+def _by_model(sweep: Sweep, table: Columns) -> Iterator[tuple[str, Columns]]:
+    """Each timing model with its rows, one for each point."""
+    models = sweep.timing_models
+    return (
+        (model, {name: column[number :: len(models)] for name, column in table.items()})
+        for number, model in enumerate(models)
+    )
+
+
+def _points(number: float, key: str = "") -> ShownValue:
+    return count_value(int(number), key, grouped=True)
+
+
+def _circles(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
+    """Circle tests without a summary over seeds."""
+    passed = {model: own["passed"].tolist() for model, own in _by_model(sweep, table)}
+    unjudged = next(iter(passed.values())).count(None)
+    yield from _unjudged(unjudged)
+    if unjudged < sweep.grid.points:
+        counts = (sentence(f"{{}} by the {model} model", _points(own.count(True))) for model, own in passed.items())
+        head = Sentence(("The circle holds every tolerance at ",))
+        yield joined(head, joined(*counts, by=" and "), Sentence((".",)), by="")
+
+
+def _over_seeds(figures: Columns, seeds: int) -> Iterator[Sentence]:
+    """Points whose circle fails with no, some and every seed."""
+    failed = figures["failed_share"]
+    judged, never, always = (int(np.sum(own)) for own in (failed >= 0, failed == 0, failed == 1))
+    if judged:
+        counts = map(_points, (seeds, never, judged - never - always, always))
+        words = (
+            f"The circle holds every tolerance with each of {{}} seeds at {{}} of {judged:,} {nouns(judged, 'point')}, "
+        )
+        yield sentence(f"{words}fails with some at {{}} and with all at {{}}.", *counts)
+    yield from _unjudged(failed.size - judged)
+    unmoved = int(np.sum(figures["max_contour_error_std_mm"] == 0))
+    if unmoved:
+        words = f"At {{}} {nouns(unmoved, 'point')} all seeds gave the same circle: a seed draws for {{}} and {{}}."
+        drawn = Code("delivery.jitter_us"), Code("delivery.loss_probability")
+        yield sentence(words, _points(unmoved), *drawn, state="warns")
+
+
+def _unjudged(points: int) -> Iterator[Sentence]:
+    if points:
+        words = "The circle is not judged at {}: no contour tolerance is asked for, or no error source matters."
+        yield sentence(words, _points(points), state="warns")
+
+
+def top_rows(
+    sweep: Sweep, table: Columns, *, columns: tuple[str, ...], top: int, sort_by: str | None, ascending: bool
+) -> tuple[Sentence, Table]:
+    """The first or best rows, after how many there are; headings are the names that --columns and --sort take.
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    table
+        All its columns.
+    columns
+        Names of those shown; the timing model is one.
     top
-        How many rows.
+        Most rows.
     sort_by
         Column in numbers to sort by; None for the order of the grid.
     ascending
         Smallest first.
     """
-
-    def __init__(self, sweep: Sweep, *, top: int, sort_by: str | None = None, ascending: bool = False) -> None:
-        self.points = 0
-        """Points so far."""
-        self._sweep, self._bus = sweep, bus_of(sweep.profile)
-        self._top, self._sort_by = top, sort_by
-        self._sign = 1.0 if ascending else -1.0
-        self._kept: list[tuple[float, Record]] = []
-        """The top rows, each after its rank, the smallest first."""
-        self._fits = [0] * len(sweep.timing_models)
-        self._passed = [0] * len(sweep.timing_models)
-        self._counts: Counter[str] = Counter()
-        self._refused_by: dict[str, None] = {}
-
-    def add(self, block: SweepBlock) -> None:
-        """Take one more block; blocks come in the order of the grid."""
-        self._keep_top(block)
-        points = block.chunk.points
-        self.points += points
-        for number, (model, figures) in enumerate(zip(self._sweep.timing_models, block.models, strict=True)):
-            decides = model == self._bus.deciding_model
-            flags = np.equal(figures["verdict"].values, VERDICTS.index(FITS)) if decides else figures["fits"].values
-            self._fits[number] += _share(flags, points)
-            if "passed" in figures:
-                self._passed[number] += _share(figures["passed"].are_true, points)
-        # Settings of the bus and the circle are the same under every model.
-        figures = block.models[0]
-        refused = figures[CIRCLE_REFUSED_BY.key]
-        for code, keys in enumerate(refused.words or ()):
-            if isinstance(keys, list) and keys:
-                self._counts["refused"] += _share(np.equal(refused.values, code), points)
-                self._refused_by |= dict.fromkeys(keys)
-        if self._bus.safety.figure is not None:
-            self._counts["unsafe"] += points - _share(figures[self._bus.safety.figure.key].values, points)
-        if "passed" in figures:
-            self._counts["unjudged"] += _share(figures["passed"].are_missing, points)
-        if "failed_share" in figures:
-            failed = figures["failed_share"].values
-            self._counts["never"] += int(np.sum(failed == 0))
-            self._counts["always"] += int(np.sum(failed == 1))
-            self._counts["unjudged"] += int(np.sum(np.isnan(failed)))
-            self._counts["unmoved"] += int(np.sum(figures["max_contour_error_std_mm"].values == 0))
-
-    def _keep_top(self, block: SweepBlock) -> None:
-        columns = self._sweep.columns
-        if self._sort_by is None:
-            rows = block.chunk.points * len(block.models)
-            chosen = range(min(rows, self._top - len(self._kept)))
-            self._kept += [(0.0, block.row(index, columns)) for index in chosen]
-            return
-        ranks = self._sign * block.rows(self._sort_by).astype(float)
-        worst = self._kept[-1][0] if len(self._kept) >= self._top else np.inf
-        # NaN never ranks; among equals, the first in the grid stays.
-        better = np.flatnonzero(ranks < worst)
-        best = better[np.argsort(ranks[better], kind="stable")[: self._top]]
-        self._kept += [(float(ranks[index]), block.row(int(index), columns)) for index in best]
-        self._kept = sorted(self._kept, key=lambda ranked: ranked[0])[: self._top]
-
-    @property
-    def rows(self) -> list[Record]:
-        """The top rows so far."""
-        return [record for _, record in self._kept]
-
-    def sentences(self) -> Iterator[Sentence]:
-        """How many points there are, and how many fit."""
-        sweep = self._sweep
-        expected = sweep.grid.points
-        whole = count_value(expected, "points", grouped=True)
-        points = whole if self.points == expected else count_value(self.points, grouped=True)
-        cut = Sentence(()) if self.points == expected else sentence(" of {} (interrupted)", whole)
-        head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", Code(sweep.profile.name), points)
-        yield joined(head, cut, Sentence(("; ",)), self._fitting(), Sentence((".",)), by="")
-        refused = self._counts["refused"]
-        if refused:
-            words = f"The circle cannot be run at {{}} {nouns(refused, 'point')}: {', '.join(self._refused_by)}."
-            yield sentence(words, count_value(refused, grouped=True), state="fails")
-        yield from self._over_seeds() if sweep.seeds is not None else self._circles()
-        yield from payload_sentences(sweep.profile, sweep.grid.axes)
-        safety = self._bus.safety.figure
-        if self._counts["unsafe"] and safety is not None:
-            words = f"At {{}} points the {self._bus.safety.setting} is unsafe ({safety.key})."
-            yield sentence(words, count_value(self._counts["unsafe"], grouped=True), state="warns")
-
-    def _fitting(self) -> Sentence:
-        parts = (
-            sentence(
-                f"{{}} shown to fit ({model} model)"
-                if model == self._bus.deciding_model
-                else f"{{}} fit by the closed form of the {model} model",
-                count_value(count, grouped=True),
-            )
-            for count, model in zip(self._fits, self._sweep.timing_models, strict=True)
-        )
-        return joined(*parts, by=", ")
-
-    def _circles(self) -> Iterator[Sentence]:
-        """Circle tests without a summary over seeds."""
-        yield from self._unjudged()
-        if self._sweep.circle and self._counts["unjudged"] < self.points:
-            passed = (
-                sentence(f"{{}} by the {model} model", count_value(count, grouped=True))
-                for count, model in zip(self._passed, self._sweep.timing_models, strict=True)
-            )
-            head = Sentence(("The circle holds every tolerance at ",))
-            yield joined(head, joined(*passed, by=" and "), Sentence((".",)), by="")
-
-    def _over_seeds(self) -> Iterator[Sentence]:
-        """Points whose circle fails with no, some and every seed."""
-        never, always, unmoved = (self._counts[key] for key in ("never", "always", "unmoved"))
-        judged = self.points - self._counts["unjudged"]
-        if judged and self._sweep.seeds is not None:
-            seeds = count_value(self._sweep.seeds.size, grouped=True)
-            counts = (count_value(count, grouped=True) for count in (never, judged - never - always, always))
-            points = f"{judged:,} {nouns(judged, 'point')}"
-            words = f"The circle holds every tolerance with each of {{}} seeds at {{}} of {points}, "
-            yield sentence(f"{words}fails with some at {{}} and with all at {{}}.", seeds, *counts)
-        yield from self._unjudged()
-        if unmoved:
-            points = nouns(unmoved, "point")
-            words = f"At {{}} {points} all seeds gave the same circle: a seed draws for {{}} and {{}}."
-            drawn = Code("delivery.jitter_us"), Code("delivery.loss_probability")
-            yield sentence(words, count_value(unmoved, grouped=True), *drawn, state="warns")
-
-    def _unjudged(self) -> Iterator[Sentence]:
-        if self._counts["unjudged"]:
-            words = "The circle is not judged at {}: no contour tolerance is asked for."
-            yield sentence(words, count_value(self._counts["unjudged"], grouped=True), state="warns")
-
-    def report(self, document: Callable[[], JsonDocument] = _not_kept) -> Report:
-        """The answer in blocks.
-
-        Parameters
-        ----------
-        document
-            Function that returns the document with all rows; without it the answer has none.
-        """
-        return Report(
-            Sentence(("Sweep of ", Code(self._sweep.profile.name))),
-            lambda: (*self.sentences(), self._shown(), self._table()),
-            document,
-            lambda: document()["rows"],
-        )
-
-    def _shown(self) -> Sentence:
-        """How many rows are shown, and their order."""
-        rows = self.points * len(self._sweep.timing_models)
-        order = f", {'smallest' if self._sign > 0 else 'largest'} {self._sort_by} first" if self._sort_by else ""
-        total, words = count_value(rows, grouped=True), f"{nouns(rows, 'row')}{order}."
-        if len(self._kept) < rows:
-            return sentence(f"{{}} of {{}} {words}", count_value(len(self._kept)), total)
-        return sentence(f"{{}} {words}", total)
-
-    def _table(self) -> Table:
-        """The top rows; headings are the names that --columns and --sort take."""
-        columns, figures = self._sweep.columns, column_figures(self._sweep.profile)
-        # Columns that were asked for by name stay.
-        ranks = _RANKS if all(name in columns for name in _RANKS if name not in COUNTS) else {}
-        return Table(
-            tuple(_column(name, figures.get(name), rank=ranks.get(name, 0)) for name in columns),
-            tuple(TableRow(tuple(_cells(record, figures))) for record in self.rows),
+    total, order = table[TIMING_MODEL.key].size, ""
+    places = np.arange(total)
+    if sort_by is not None:
+        ranks = table[sort_by].astype(float)
+        # NaN comes last and is left out; among equals, the first in the grid comes first.
+        places = np.argsort(ranks if ascending else -ranks, kind="stable")[: np.sum(~np.isnan(ranks))]
+        order = f", {'smallest' if ascending else 'largest'} {sort_by} first"
+    records = plain_rows(sweep, {name: table[name] for name in columns}, places[:top])
+    figures = column_figures(sweep.network)
+    # Columns that were asked for by name stay.
+    ranks_of = _RANKS if set(_RANKS) <= set(columns) else {}
+    shown, words = _points(len(records)), f"{nouns(total, 'row')}{order}."
+    return (
+        sentence(f"{{}} of {{}} {words}", shown, _points(total))
+        if len(records) < total
+        else sentence(f"{{}} {words}", shown),
+        Table(
+            tuple(_column(name, figures.get(name), rank=ranks_of.get(name, 0)) for name in columns),
+            tuple(TableRow(tuple(_cells(record, figures))) for record in records),
             heads=columns.index(TIMING_MODEL.key) + 1,
-        )
-
-
-def _share(flags: Array, points: int) -> int:
-    """Number of points of a block for which a flag is True, from its values before broadcasting."""
-    return int(flags.sum()) * (points // int(flags.size))
+        ),
+    )
 
 
 def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[Sentence]:
@@ -285,8 +214,7 @@ def _column(name: str, figure: Figure | None, *, rank: int) -> TableColumn:
 
 
 def _cells(record: Record, figures: Mapping[str, Figure]) -> Iterator[ShownValue]:
-    for name, own in record.items():
-        value = None if isinstance(own, float) and isnan(own) else own
+    for name, value in record.items():
         figure = figures.get(name)
         if figure is None:
             yield ShownValue(value, name)

@@ -1,21 +1,24 @@
-"""A full grid of profile values in row-major order, in chunks: no axis is in memory as a whole."""
+"""A full grid of profile values in row-major order."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from itertools import islice, product
 from math import prod
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from busplan.buses.network import Network
 from busplan.buses.parts import Value
 from busplan.errors import BusplanError
+from busplan.forms.numbers import listed
 from busplan.profile.keys import named_tables
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override
 from busplan.profile.write import whole
 from busplan.questions.base.inputs import known_model
-from busplan.questions.fit.network import model_names
+from busplan.questions.fit.network import changed, model_names
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 Array = NDArray[Any]
@@ -23,102 +26,53 @@ Array = NDArray[Any]
 
 _CHECKED_EACH: Final = 100
 """Up to this many values of a key are all checked; of more, the extremes: every valid range is an interval."""
-_POINTS_AT_ONCE: Final = 4096
-MAX_POINTS: Final = 10**12
-"""A larger grid would take weeks, so it is probably a typing error."""
+MOST_POINTS: Final = 1_000_000
+"""Most points of a sweep: the work on them takes up to two gigabytes of memory."""
 
 
-class Listed(NamedTuple):
-    """Single values: numbers, and words that the profile allows."""
+def axis_of(values: Sequence[Value]) -> Array:
+    """Values of a key as an array: whole numbers, floats, or objects if there are words among them.
 
-    values: tuple[Value, ...]
-
-    @property
-    def size(self) -> int:
-        """How many values."""
-        return len(self.values)
-
-    def part(self, start: int, stop: int) -> Array:
-        """Values from index `start` to before `stop`."""
-        # All parts of the axis have one type.
-        common = (
-            object if self.has_words else float if any(isinstance(value, float) for value in self.values) else np.int64
-        )
-        return np.array(self.values[start:stop], dtype=common)
-
-    @property
-    def has_words(self) -> bool:
-        """Whether a value is a word."""
-        return any(isinstance(value, str | bool) for value in self.values)
-
-
-class Steps(NamedTuple):
-    """Evenly spaced values (first + i step) / scale; exact decimals, because all three are whole numbers."""
-
-    first: int
-    step: int
-    scale: int
-    size: int
-    has_words: bool = False
-
-    def part(self, start: int, stop: int) -> Array:
-        """Values from index `start` to before `stop`."""
-        whole = self.first + self.step * np.arange(start, stop, dtype=np.int64)
-        return whole if self.scale == 1 else whole / self.scale
-
-
-class Even(NamedTuple):
-    """A number of evenly spaced values, both ends included."""
-
-    first: float
-    last: float
-    size: int
-    has_words: bool = False
-
-    def part(self, start: int, stop: int) -> Array:
-        """Values from index `start` to before `stop`."""
-        share = np.arange(start, stop) / (self.size - 1)
-        return self.first * (1 - share) + self.last * share
-
-
-Values = Listed | Steps | Even
+    Parameters
+    ----------
+    values
+        Numbers, and words that the key takes.
+    """
+    if any(isinstance(value, str | bool) for value in values):
+        return np.array(values, dtype=object)
+    # NumPy keeps whole numbers beyond 64 bits as objects.
+    return np.array(values, dtype=float if any(isinstance(value, float) for value in values) else None)
 
 
 class Chunk(NamedTuple):
     """A contiguous part of a grid."""
 
-    start: int
-    """Index of its first point."""
     shape: tuple[int, ...]
     """Points along each axis of the grid."""
     values: dict[str, Array]
     """Values of each key, shaped to broadcast along its own axis."""
+
+
+class Grid(NamedTuple):
+    """Every combination of the values of some keys; the last key changes fastest."""
+
+    axes: dict[str, Array]
+    """Values by key, each of shape (values,), as from `axis_of`."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Values of each key."""
+        return tuple(axis.size for axis in self.axes.values())
 
     @property
     def points(self) -> int:
         """How many points."""
         return prod(self.shape)
 
-    def point(self, index: int) -> dict[str, object]:
-        """Values of one of its points by key."""
-        where = np.unravel_index(index, self.shape)
-        return {
-            key: np.broadcast_to(values, self.shape)[where].item()
-            if values.dtype != object
-            else np.broadcast_to(values, self.shape)[where]
-            for key, values in self.values.items()
-        }
-
-
-class Grid(NamedTuple):
-    """Every combination of the values of some keys; the last key changes fastest."""
-
-    axes: dict[str, Values]
-
-    @property
-    def points(self) -> int:
-        """How many points."""
-        return prod(axis.size for axis in self.axes.values())
+    def each_point(self) -> Iterator[dict[str, object]]:
+        """Values of the keys of each point."""
+        points = product(*(axis.tolist() for axis in self.axes.values()))
+        return (dict(zip(self.axes, point, strict=True)) for point in points)
 
     def chunks(self, most: int) -> Iterator[Chunk]:
         """Split the grid.
@@ -133,50 +87,20 @@ class Grid(NamedTuple):
         Chunk
             In row-major order.
         """
-        sizes = [axis.size for axis in self.axes.values()]
-        if not sizes:
-            yield self._chunk(0, [])
-            return
-        # Find the axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
-        cut, behind = len(sizes) - 1, 1
-        while cut and behind * sizes[cut] <= most:
-            behind *= sizes[cut]
-            cut -= 1
-        width = max(1, most // behind)
-        start = 0
-        for before in range(prod(sizes[:cut])):
-            fixed = [int(index) for index in np.unravel_index(before, sizes[:cut])] if cut else []
-            for begin in range(0, sizes[cut], width):
-                end = min(begin + width, sizes[cut])
-                parts = [(index, index + 1) for index in fixed] + [(begin, end)]
-                parts += [(0, size) for size in sizes[cut + 1 :]]
-                chunk = self._chunk(start, parts)
-                yield chunk
-                start += chunk.points
-
-    def each_point(self) -> Iterator[dict[str, object]]:
-        """Values of the keys of each point."""
-        # Some at a time: an axis that is a list is looked through for each chunk.
-        return (chunk.point(index) for chunk in self.chunks(_POINTS_AT_ONCE) for index in range(chunk.points))
-
-    def _chunk(self, start: int, parts: list[tuple[int, int]]) -> Chunk:
-        shape = tuple(stop - first for first, stop in parts)
-        values = {}
-        for number, (key, axis) in enumerate(self.axes.items()):
-            own = [1] * len(shape)
-            own[number] = shape[number]
-            values[key] = axis.part(*parts[number]).reshape(own)
-        return Chunk(start, shape, values)
+        # The axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
+        cut = next(number for number in range(len(self.shape) + 1) if prod(self.shape[number + 1 :]) <= most)
+        width = max(1, most // prod(self.shape[cut + 1 :]))
+        parts = [
+            *([slice(index, index + 1) for index in range(size)] for size in self.shape[:cut]),
+            *([slice(begin, begin + width) for begin in range(0, size, width)] for size in self.shape[cut : cut + 1]),
+            *([slice(size)] for size in self.shape[cut + 1 :]),
+        ]
+        for part in product(*parts):
+            values = [axis[own] for axis, own in zip(self.axes.values(), part, strict=True)]
+            yield Chunk(tuple(own.size for own in values), dict(zip(self.axes, np.ix_(*values), strict=True)))
 
 
-def checked_grid(
-    profile: Profile,
-    axes: Mapping[str, Values],
-    *,
-    with_circle: bool,
-    option: str = "--vary",
-    circle_option: str = "--circle",
-) -> Grid:
+def checked_grid(profile: Profile, axes: Mapping[str, Array], *, with_circle: bool) -> Grid:
     """Make a grid after validating its values.
 
     Parameters
@@ -187,15 +111,14 @@ def checked_grid(
         Values by dotted key.
     with_circle
         If False, keys that only the circle test reads are refused.
-    option, circle_option
-        Names in messages of the values, and of the option that requests circle tests.
 
     Raises
     ------
     BusplanError
-        A key that is unknown, not a number, or without effect here; a value that the profile's schema refuses.
+        A key that is unknown, not a number, or without effect here; a value that the profile's schema refuses; too
+        many points.
     """
-    require_keys(profile, axes, option=option, circle_option=None if with_circle else circle_option)
+    require_keys(profile, axes, option="vary", circle_option=None if with_circle else "circle=True")
     samples = {key: _samples(axis) for key, axis in axes.items()}
     first: dict[str, object] = {key: values[0] for key, values in samples.items()}
     override(profile, first)
@@ -206,10 +129,8 @@ def checked_grid(
     for end in (_least, _greatest):
         override(profile, {key: end(values) for key, values in samples.items()})
     grid = Grid(dict(axes))
-    if grid.points > MAX_POINTS:
-        raise BusplanError(
-            f"{option}: {grid.points:,} points are more than the {MAX_POINTS:,} a sweep takes; vary less"
-        )
+    if grid.points > MOST_POINTS:
+        raise BusplanError(f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} a sweep takes; vary less")
     return grid
 
 
@@ -232,37 +153,41 @@ def require_keys(profile: Profile, keys: Iterable[str], *, option: str, circle_o
     BusplanError
         A key that is unknown, not a number, or without effect here.
     """
+    read = cycle_keys(profile)
     for key in keys:
+        of_groups = [f"group.{group.name}.{key.partition('.')[2]}" for group in profile.group]
+        if key not in read and set(of_groups) <= {*read} and of_groups:
+            raise BusplanError(
+                f"{option} {key}: each group of {profile.name} has its own; give {listed(of_groups, 'or')}"
+            )
         _require_known(profile, key, name=f"{option} {key}")
         _require_read(profile, key, name=f"{option} {key}", circle_option=circle_option)
 
 
-def grid_models(profile: Profile, grid: Grid, asked: Sequence[str] | None, *, name: str) -> tuple[str, ...]:
+def grid_models(network: Network, grid: Grid, asked: Sequence[str] | None) -> tuple[str, ...]:
     """Timing models of a sweep: those that can express every value of the grid.
 
     Parameters
     ----------
-    profile
+    network
         The network.
     grid
         Values of its keys.
     asked
         Names of timing models; by default all that can.
-    name
-        Name of the timing models in messages.
 
     Raises
     ------
     BusplanError
         A model that was asked for cannot express a value.
     """
-    variants = [override(profile, {key: value}) for key, axis in grid.axes.items() for value in _samples(axis)]
+    variants = [changed(network, {key: value}) for key, axis in grid.axes.items() for value in _samples(axis)]
     if asked is not None:
         for model in asked:
             for variant in variants:
-                known_model(variant, model, name=name)
+                known_model(variant, model, name="timing_model")
         return tuple(asked)
-    return tuple(model for model in model_names(profile) if all(model in model_names(variant) for variant in variants))
+    return tuple(model for model in model_names(network) if all(model in model_names(variant) for variant in variants))
 
 
 def _require_known(profile: Profile, key: str, *, name: str) -> None:
@@ -297,20 +222,16 @@ def _require_read(profile: Profile, key: str, *, name: str, circle_option: str |
         raise BusplanError(f"{name}: no figure of capacity depends on it; add {circle_option} to run circle tests")
 
 
-def _samples(axis: Values) -> list[Value]:
+def _samples(axis: Array) -> list[Value]:
     """Values to check: all, or of many the extremes, the words and one fraction. Whole floats become ints."""
-    if isinstance(axis, Listed):
-        if axis.size <= _CHECKED_EACH:
-            return list(dict.fromkeys(axis.values))
-        numbers = [value for value in axis.values if not isinstance(value, str | bool)]
+    values: list[Value] = axis.tolist()
+    if len(values) > _CHECKED_EACH:
+        numbers = [value for value in values if not isinstance(value, str | bool)]
         # A fraction among whole numbers may lie between the extremes.
-        fractions = [value for value in numbers if isinstance(value, float)][:1]
-        words = set(axis.values) - set(numbers)
-        return [*dict.fromkeys((axis.values[0], min(numbers), max(numbers), *fractions, *words))]
-    # In equal steps from a whole number, the second value is a fraction if any is.
-    chosen = range(axis.size) if axis.size <= _CHECKED_EACH else (0, 1, axis.size - 1)
-    values = (axis.part(index, index + 1).item() for index in chosen)
-    return list(map(whole, values))
+        fractions = (value for value in numbers if value % 1)
+        words = (value for value in values if isinstance(value, str | bool))
+        values = [values[0], min(numbers), max(numbers), *islice(fractions, 1), *words]
+    return [*dict.fromkeys(map(whole, values))]
 
 
 def _least(values: list[Value]) -> Value:

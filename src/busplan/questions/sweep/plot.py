@@ -8,26 +8,21 @@ from busplan.buses.figure import VERDICT
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Chart, Sentence
 from busplan.forms.charts import Drawing
-from busplan.questions.fit.certainty import FITS, VERDICTS
-from busplan.questions.fit.network import bus_of
+from busplan.questions.fit.certainty import FITS
 from busplan.questions.sweep.asked import Sweep
-from busplan.questions.sweep.blocks import SweepBlock
 from busplan.questions.sweep.grid import Grid
 from busplan.questions.sweep.panels import sweep_drawing
 from busplan.questions.sweep.plotted import Plotted, SweptModel, is_constant, key_label, plot_scale, plotted_figure
+from busplan.questions.sweep.table import Columns
 from busplan.sections.base import value_at
-from busplan.sections.profile import Profile
 
 MAX_DRAWN: Final = 250_000
 """Most points of a figure: more would not be visible."""
 _MAX_KEYS: Final = 2
 
 
-def _default_figures(profile: Profile) -> tuple[str, ...]:
-    """Columns of which the first that varies is drawn, if none is asked for."""
-    margins = ("margin_corrected_us", "margin_us")
-    # Of groups, the most axes are no single number.
-    return margins if profile.group else ("safe_axes", *margins)
+_DEFAULT_FIGURES: Final = ("safe_axes", "margin_corrected_us", "margin_us")
+"""Columns of which the first that varies is drawn, if none is asked for."""
 
 
 def is_drawable(grid: Grid) -> bool:
@@ -45,15 +40,13 @@ def _not_drawable(grid: Grid) -> str:
     return f"{grid.points:,} points; a figure shows at most {MAX_DRAWN:,}" if grid.points > MAX_DRAWN else ""
 
 
-class FigureData:
-    """One figure over the whole grid under each timing model, collected block by block.
+def require_drawable(grid: Grid, *, option: str = "the picture of a sweep") -> None:
+    """Refuse a figure over a grid that cannot be drawn.
 
     Parameters
     ----------
-    sweep
-        The sweep; its profile is this design, which the picture marks.
-    figure
-        Name of the column; by default the safe axes or, of groups and where these do not vary, the corrected margin.
+    grid
+        The varied keys.
     option
         Name of the option that asks for the picture, for messages.
 
@@ -62,29 +55,37 @@ class FigureData:
     BusplanError
         More than two keys vary, or there are too many points.
     """
+    if reason := _not_drawable(grid):
+        raise BusplanError(f"{option}: {reason}")
 
-    def __init__(self, sweep: Sweep, *, figure: str | None = None, option: str = "the picture of a sweep") -> None:
-        if reason := _not_drawable(sweep.grid):
-            raise BusplanError(f"{option}: {reason}")
-        self._profile, self._grid, self._models = sweep.profile, sweep.grid, sweep.timing_models
-        points = self._grid.points, len(self._models)
-        names = (figure,) if figure else _default_figures(sweep.profile)
-        self._values = {name: np.full(points, np.nan) for name in names}
-        self._unsafe, self._fits = np.zeros(points, dtype=bool), np.zeros(points[0], dtype=bool)
 
-    def add(self, block: SweepBlock) -> None:
-        """Add a block."""
-        points = slice(block.chunk.start, block.chunk.start + block.chunk.points)
-        for name, values in self._values.items():
-            values[points] = block.rows(name).reshape(-1, len(self._models))
-        bus = bus_of(self._profile)
-        if bus.deciding_model in self._models:
-            verdicts = block.columns(VERDICT.key)[self._models.index(bus.deciding_model)]
-            fits = np.equal(verdicts.values, VERDICTS.index(FITS))
-            self._fits[points] = np.broadcast_to(fits, block.chunk.shape).ravel()
-        for number, safe in enumerate(block.columns(bus.safety.figure.key) if bus.safety.figure else ()):
-            unsafe = ~safe.are_true.astype(bool) & ~safe.are_missing.astype(bool)
-            self._unsafe[points, number] = np.broadcast_to(unsafe, block.chunk.shape).ravel()
+class FigureData:
+    """One figure over the whole grid under each timing model.
+
+    Parameters
+    ----------
+    sweep
+        The sweep; its profile is this design, which the picture marks.
+    table
+        All its columns.
+    figure
+        Name of the column; by default the safe axes and, where these do not vary, the corrected margin.
+
+    Raises
+    ------
+    BusplanError
+        As `require_drawable`.
+    """
+
+    def __init__(self, sweep: Sweep, table: Columns, *, figure: str | None = None) -> None:
+        require_drawable(sweep.grid)
+        self._network, self._grid, self._models = sweep.network, sweep.grid, sweep.timing_models
+        by_model = {name: column.reshape(-1, len(self._models)) for name, column in table.items()}
+        self._values = {name: by_model[name].astype(float) for name in ((figure,) if figure else _DEFAULT_FIGURES)}
+        bus = sweep.network.bus
+        safe = by_model[bus.safety.figure.key].astype(bool) if bus.safety.figure else True
+        self._unsafe = ~np.broadcast_to(safe, by_model[VERDICT.key].shape)
+        self._fits = (by_model[VERDICT.key] == FITS).any(axis=1)
 
     def drawing(self, title: str) -> Drawing:
         """Draw the collected values.
@@ -99,15 +100,15 @@ class FigureData:
 
     def chart(self) -> Chart:
         """The picture as a block of a page."""
-        drawing = self.drawing(self._profile.name)
+        drawing = self.drawing(self._network.profile.name)
         return Chart(drawing, Sentence(drawing.words))
 
     def plotted(self) -> Plotted:
         """The picture's content, in words and in the unit of the figure."""
         keys = self._varied()
         name = self._drawn()
-        figure, factor = plotted_figure(self._profile, name)
-        shape, bus = tuple(self._grid.axes[key].size for key in keys), bus_of(self._profile)
+        figure, factor = plotted_figure(self._network, name)
+        shape, bus = tuple(self._grid.axes[key].size for key in keys), self._network.bus
         panels = tuple(
             SweptModel(
                 model,
@@ -121,7 +122,7 @@ class FigureData:
             if not np.isnan(values).all()  # a figure that the model does not have
         )
         as_cells = len(keys) == _MAX_KEYS
-        scales = tuple(plot_scale(self._profile, key, self._grid.axes[key], as_cells=as_cells) for key in keys)
+        scales = tuple(plot_scale(self._network.profile, key, self._grid.axes[key], as_cells=as_cells) for key in keys)
         if not self._is_own():
             scales = tuple(scale._replace(own=None) for scale in scales)
         return Plotted(figure, scales, panels, bus.deciding_model, bus.safety.setting)
@@ -140,11 +141,11 @@ class FigureData:
     def _single(self) -> dict[str, object]:
         """Keys with one value."""
         varied = self._varied()
-        return {key: axis.part(0, 1).tolist()[0] for key, axis in self._grid.axes.items() if key not in varied}
+        return {key: axis[:1].tolist()[0] for key, axis in self._grid.axes.items() if key not in varied}
 
     def _is_own(self) -> bool:
         """Whether the keys with one value have that of this design."""
-        return all(value_at(self._profile, key) == value for key, value in self._single().items())
+        return all(value_at(self._network.profile, key) == value for key, value in self._single().items())
 
     def _fixed(self) -> str:
-        return "".join(f"; {key_label(self._profile, key)}: {value}" for key, value in self._single().items())
+        return "".join(f"; {key_label(self._network.profile, key)}: {value}" for key, value in self._single().items())

@@ -5,11 +5,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from busplan.buses.figure import NODES, PERIOD, Figure, unit_of
+from busplan.buses.network import Network
 from busplan.forms.blocks import ShownValue, figure_value
 from busplan.forms.numbers import SILENT_UNITS, factor_of, with_unit
 from busplan.questions.fit.network import bus_of
 from busplan.questions.sweep.asked import column_figures
-from busplan.questions.sweep.grid import Array, Values
+from busplan.questions.sweep.grid import Array
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
@@ -38,7 +39,7 @@ class PlotScale(NamedTuple):
         return bool(self.labels)
 
 
-def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> PlotScale:
+def plot_scale(profile: Profile, key: str, axis: Array, *, as_cells: bool) -> PlotScale:
     """Make the scale of a key.
 
     Words and numbers among words are choices, as are numbers that do not ascend. Others stand on a number line.
@@ -54,7 +55,7 @@ def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> P
     as_cells
         If True, numbers that are not evenly spaced are choices, too: cells of a map are equally wide.
     """
-    values, own = axis.part(0, axis.size), value_at(profile, key)
+    values, own = axis, value_at(profile, key)
     are_choices = values.dtype == object or not _on_a_line(values, evenly=as_cells)
     whole = values.dtype != object and bool(np.equal(np.mod(values, 1), 0).all())
     label = key_label(profile, key)
@@ -95,19 +96,19 @@ def key_label(profile: Profile, key: str) -> str:
     return ", ".join(filter(None, (name.replace(".", " ").replace("_", " "), unit)))
 
 
-def plotted_figure(profile: Profile, name: str) -> tuple[Figure, float]:
+def plotted_figure(network: Network, name: str) -> tuple[Figure, float]:
     """The registered figure of a column, and the factor to the unit that it is drawn in.
 
     Parameters
     ----------
-    profile
+    network
         The network.
     name
         Name of the column: a figure, or one of a group.
     """
-    figure = column_figures(profile).get(name)
+    figure = column_figures(network).get(name)
     if figure is None:
-        return Figure(name, name, "", "", key_label(profile, name)), 1.0
+        return Figure(name, name, "", "", key_label(network.profile, name)), 1.0
     return figure, factor_of(figure_value(figure, 0.0))
 
 

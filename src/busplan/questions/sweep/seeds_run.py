@@ -1,8 +1,6 @@
 """Circle tests over many seeds: how the figures of each point are spread, and how often the circle fails."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import islice
-from math import nan, sqrt
+from collections.abc import Mapping
 from statistics import NormalDist
 from types import MappingProxyType
 from typing import Final
@@ -12,9 +10,9 @@ import numpy as np
 from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
-from busplan.questions.sweep.blocks import Column, SweepBlock
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS
-from busplan.questions.sweep.grid import Array, Grid, Values
+from busplan.questions.sweep.grid import Array, Grid
+from busplan.questions.sweep.table import Columns
 
 SEED: Final = "delivery.seed"
 """The key that a summary is over."""
@@ -73,15 +71,13 @@ SUMMARY_FIGURES: Final = (
 SUMMARY_COLUMNS: Final = tuple(figure.key for figure in SUMMARY_FIGURES)
 
 
-def without_seed(grid: Grid, *, option: str) -> tuple[Grid, Values]:
+def without_seed(grid: Grid) -> tuple[Grid, Array]:
     """Split a grid into that of the other keys, and the seeds.
 
     Parameters
     ----------
     grid
         All varied keys.
-    option
-        Names of the option that asks for a summary and of the option that gives the values, for messages.
 
     Raises
     ------
@@ -89,47 +85,37 @@ def without_seed(grid: Grid, *, option: str) -> tuple[Grid, Values]:
         No seed varies.
     """
     if SEED not in grid.axes:
-        raise BusplanError(f"{option}: is over seeds, and none vary; add {SEED} and its values, as {SEED}=1:1000")
+        raise BusplanError(f"summary=True: is over seeds, and none vary; add {SEED} and its values, as {SEED}=1:1000")
     return Grid({key: axis for key, axis in grid.axes.items() if key != SEED}), grid.axes[SEED]
 
 
-def with_seeds(block: SweepBlock, results: Iterator[Array], seeds: int) -> SweepBlock:
-    """Add the columns of a summary to a block: a circle test for each point and seed, the same beside every model.
-
-    Parameters
-    ----------
-    block
-        Its capacity.
-    results
-        Those of its points, each with every seed, and of those after them, each of shape (CIRCLE_COLUMNS,).
-    seeds
-        Tests of each point.
-    """
-    rows = [summary(np.array([*islice(results, seeds)])) for _ in range(block.chunk.points)]
-    columns = {name: _column([row[name] for row in rows], shape=block.chunk.shape) for name in SUMMARY_COLUMNS}
-    return block._replace(models=tuple({**figures, **columns} for figures in block.models))
-
-
-def _column(values: Sequence[float], *, shape: tuple[int, ...]) -> Column:
-    return Column(np.array(values).reshape(shape))
-
-
-def summary(results: Array) -> dict[str, float]:
-    """Summarise the circle tests of one point: `SUMMARY_COLUMNS`; NaN for what a circle lacks.
+def summaries(results: Array) -> Columns:
+    """Summarise circle tests over seeds: `SUMMARY_COLUMNS`; NaN for what a circle lacks.
 
     Parameters
     ----------
     results
-        Shape (seeds, CIRCLE_COLUMNS), as from `run_chunk`.
+        Shape (CIRCLE_COLUMNS, points, seeds), as from `circle_results`.
+
+    Returns
+    -------
+    dict
+        Each of shape (points,).
     """
-    by_key = dict(zip(CIRCLE_COLUMNS, results.T, strict=True))
-    failed = float(np.sum(1 - by_key["passed"]))
-    spreads = (_spread(key, by_key[key]) for key in _SPREAD)
-    numbers = (len(results), *_shares(failed, len(results)), *(number for own in spreads for number in own))
-    return dict(zip(SUMMARY_COLUMNS, numbers, strict=True))
+    by_key = dict(zip(CIRCLE_COLUMNS, results, strict=True))
+    points, seeds = by_key["passed"].shape
+    # Where no error source matters, a seed says nothing of the tolerance.
+    is_judged = ~np.isnan(by_key["passed"])
+    failed = np.where(is_judged.any(axis=1), np.sum(is_judged & (by_key["passed"] == 0), axis=1), np.nan)
+    columns = (
+        np.full(points, seeds),
+        *_shares(failed, seeds),
+        *(part for key in _SPREAD for part in _spread(key, by_key[key])),
+    )
+    return dict(zip(SUMMARY_COLUMNS, columns, strict=True))
 
 
-def _shares(failed: float, tests: int) -> tuple[float, ...]:
+def _shares(failed: Array, tests: int) -> tuple[Array, ...]:
     """Share of tests that failed, and its 95 % interval.
 
     References
@@ -138,19 +124,20 @@ def _shares(failed: float, tests: int) -> tuple[float, ...]:
     """
     z = NormalDist().inv_cdf((1 + _SHARE) / 2)
     middle = (failed + z**2 / 2) / (tests + z**2)
-    half = z / (tests + z**2) * sqrt(failed * (tests - failed) / tests + z**2 / 4)
+    half = z / (tests + z**2) * np.sqrt(failed * (tests - failed) / tests + z**2 / 4)
     # Exactly 0 and 1 at the ends, whatever rounding gives.
-    low = 0.0 if failed == 0 else middle - half
-    high = 1.0 if failed == tests else middle + half
+    low = np.where(failed == 0, 0.0, middle - half)
+    high = np.where(failed == tests, 1.0, middle + half)
     return failed / tests, low, high
 
 
-def _spread(key: str, values: Array) -> tuple[float, ...]:
+def _spread(key: str, values: Array) -> tuple[Array, ...]:
     """Mean, standard deviation, 95 % quantile and worst, in the order of `_PARTS`."""
     # From the first on, so that equal values have exactly their mean, and no deviation.
-    off = values - values[0]
-    std = float(np.std(off, ddof=1)) if values.size > 1 else nan
+    first = values[:, :1]
+    off = values - first
+    std = np.std(off, axis=1, ddof=1) if values.shape[1] > 1 else np.full(len(values), np.nan)
     is_more_better = CIRCLE_BY_KEY[key].better == "more"
-    quantile = np.quantile(values, 1 - _SHARE if is_more_better else _SHARE)
-    worst = values.min() if is_more_better else values.max()
-    return float(values[0] + off.mean()), std, float(quantile), float(worst)
+    quantile = np.quantile(values, 1 - _SHARE if is_more_better else _SHARE, axis=1)
+    worst = values.min(axis=1) if is_more_better else values.max(axis=1)
+    return first[:, 0] + off.mean(axis=1), std, quantile, worst

@@ -6,10 +6,12 @@ from decimal import Decimal, localcontext
 from math import isfinite
 from typing import Final, TypeGuard
 
+import numpy as np
+
 from busplan.errors import BusplanError
 from busplan.profile.kinds import words_of
 from busplan.questions.base.inputs import items
-from busplan.questions.sweep.grid import Even, Listed, Steps, Values
+from busplan.questions.sweep.grid import MOST_POINTS, Array, axis_of
 from busplan.sections.profile import Profile
 
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,2})?")
@@ -24,8 +26,8 @@ _MAX_DECIMALS: Final = 22
 _MOST_LISTED: Final = 10_000
 
 
-def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Values:
-    """Values of a key: text as on the command line, a range, or several values.
+def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Array:
+    """Values of a key as an array: from text as on the command line, a range, or several values.
 
     Parameters
     ----------
@@ -46,16 +48,13 @@ def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, na
     words = words_of(profile, key)
     if isinstance(given, str):
         return parse_values(given, name=f"{name} {key}={given}", words=words)
-    name = f"{name} {key}"
-    return (
-        stepped(given, name=name)
-        if isinstance(given, range)
-        else listed(items(given, name=name), name=name, words=words)
-    )
+    if isinstance(given, range) and given[MOST_POINTS:]:
+        raise BusplanError(f"{name} {key}: more values than the {MOST_POINTS:,} points a sweep takes; vary less")
+    return listed(items(given, name=f"{name} {key}"), name=f"{name} {key}", words=words)
 
 
-def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Values:
-    """Parse the values of a --vary option.
+def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Array:
+    """Parse the text of some values.
 
     Parameters
     ----------
@@ -73,8 +72,8 @@ def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Values
 
     Examples
     --------
-    >>> parse_values("250:1000:*2", name="--vary")
-    Listed(values=(250, 500, 1000))
+    >>> parse_values("250:1000:*2", name="vary")
+    array([ 250,  500, 1000])
     """
     if ":" in text:
         return _range(name, text)
@@ -84,7 +83,7 @@ def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Values
     )
 
 
-def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) -> Listed:
+def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) -> Array:
     """Make an axis from single values.
 
     Parameters
@@ -112,22 +111,7 @@ def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) 
         unique[int(value) if isinstance(value, float) and _is_whole(value) else value] = None
     if not unique:
         raise BusplanError(f"{name}: no values; give at least one")
-    return Listed(tuple(unique))
-
-
-def stepped(values: range, *, name: str) -> Steps:
-    """Make an axis from a range of whole numbers.
-
-    Raises
-    ------
-    BusplanError
-        No values, or numbers that are too large.
-    """
-    if not values:
-        raise BusplanError(f"{name}: no values; give at least one")
-    if max(abs(values[0]), abs(values[-1])) >= _EXACT:
-        raise BusplanError(f"{name}: numbers of {_EXACT:,} and more are too large")
-    return Steps(values.start, values.step, 1, len(values))
+    return axis_of([*unique])
 
 
 _TRUTHS: Final = {"true": True, "false": False}
@@ -145,7 +129,7 @@ def _is_whole(number: float) -> bool:
     return number.is_integer() and abs(number) < _EXACT
 
 
-def _range(name: str, text: str) -> Values:
+def _range(name: str, text: str) -> Array:
     parts = [part.strip() for part in text.split(":")]
     if len(parts) not in {2, 3}:
         raise BusplanError(f"{name}: {_FORMS}")
@@ -162,17 +146,25 @@ def _range(name: str, text: str) -> Values:
         return _steps(name, first, step, int((last - first) // step) + 1)
 
 
-def _steps(name: str, first: Decimal, step: Decimal, size: int) -> Values:
+def _steps(name: str, first: Decimal, step: Decimal, size: int) -> Array:
     if size == 1:
-        return Listed((_plain(first),))
+        return axis_of([_plain(first)])
     decimals = max(0, *(-int(number.normalize().as_tuple().exponent) for number in (first, step)))
     start, stride = (int(number.scaleb(decimals)) for number in (first, step))
     if decimals > _MAX_DECIMALS or max(abs(start), abs(start + stride * size)) >= _EXACT:
         raise BusplanError(f"{name}: more digits than a number here can hold; use A:B:#COUNT")
-    return Steps(start, stride, 10**decimals, size)
+    whole = start + stride * _numbered(name, size)
+    return whole / float(10**decimals) if decimals else whole
 
 
-def _geometric(name: str, first: Decimal, last: Decimal, factor: Decimal) -> Values:
+def _numbered(name: str, size: int) -> Array:
+    """Whole numbers from 0, one for each value."""
+    if size > MOST_POINTS:
+        raise BusplanError(f"{name}: {size:,} values are more than the {MOST_POINTS:,} points a sweep takes; vary less")
+    return np.arange(size)
+
+
+def _geometric(name: str, first: Decimal, last: Decimal, factor: Decimal) -> Array:
     if factor <= 0 or factor == 1 or first <= 0 or last <= 0 or (last - first) * (factor - 1) < 0:
         raise BusplanError(f"{name}: multiplying by {factor} never leads from {first} to {last}")
     values: list[int | float] = []
@@ -182,10 +174,10 @@ def _geometric(name: str, first: Decimal, last: Decimal, factor: Decimal) -> Val
             if len(values) > _MOST_LISTED:
                 raise BusplanError(f"{name}: more than {_MOST_LISTED:,} values; take a larger factor")
             first *= factor
-    return Listed(tuple(values))
+    return axis_of(values)
 
 
-def _even(name: str, first: Decimal, last: Decimal, count: str) -> Values:
+def _even(name: str, first: Decimal, last: Decimal, count: str) -> Array:
     if not re.fullmatch(r"[0-9]{1,12}", count) or int(count) < 2:  # noqa: PLR2004
         raise BusplanError(f"{name}: expected a count of 2 or more after the #")
     if first == last:
@@ -193,7 +185,8 @@ def _even(name: str, first: Decimal, last: Decimal, count: str) -> Values:
     step = (last - first) / (int(count) - 1)
     if all(number == number.to_integral_value() for number in (first, step)):
         return _steps(name, first, step, int(count))
-    return Even(float(first), float(last), int(count))
+    share = _numbered(name, int(count)) / (int(count) - 1)
+    return float(first) * (1 - share) + float(last) * share
 
 
 def _number(name: str, part: str, words: Collection[str] = ()) -> Decimal:

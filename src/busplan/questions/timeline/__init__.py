@@ -3,13 +3,14 @@
 import re
 from typing import Final
 
+from busplan.buses.network import Network
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole, with_cycle
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.network import network_of
 from busplan.questions.timeline.events import Schedule, Total, schedule, totals, zoom
-from busplan.sections.profile import Profile
 
 _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
@@ -77,7 +78,7 @@ def timeline(
     >>> [(event.kind, round(event.duration_us, 3)) for event in answer.events][1:4]
     [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.733)]
     """
-    network = with_cycle(load_profile(profile), question="timeline")
+    network = network_of(with_cycle(load_profile(profile), question="timeline"))
     asked = None if transaction is None else _transaction(transaction, network)
     model = None if timing_model is None else checked_models([timing_model], network)[0]
     window = zoom(
@@ -89,7 +90,7 @@ def timeline(
     return TimelineAnswer(*window)
 
 
-def _transaction(asked: object, profile: Profile) -> tuple[str, int]:
+def _transaction(asked: object, network: Network) -> tuple[str, int]:
     """Kind and node of a transaction of the profile's bus."""
     match asked:
         case str():
@@ -100,7 +101,7 @@ def _transaction(asked: object, profile: Profile) -> tuple[str, int]:
             text = f"{kind}:{node}"
         case _:
             raise BusplanError(f'transaction {asked!r}: expected one of one node, as ("read", 1)')
-    kinds, nodes = [kind.key for kind in bus_of(profile).stretch_kinds], int(network_of(profile).nodes)
+    kinds, nodes = [kind.key for kind in network.bus.stretch_kinds], int(plain(network.nodes))
     if kind in kinds and 1 <= node <= nodes:
         return kind, node
     expected = f"{' or '.join(kinds)} and a node from 1 to {nodes}" if kinds else "none: this bus has no transactions"

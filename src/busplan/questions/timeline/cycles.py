@@ -7,7 +7,6 @@ from typing import Final, NamedTuple
 from busplan.buses.network import Group
 from busplan.buses.rates import common_multiple, numbers_by_due
 from busplan.elementwise import plain
-from busplan.questions.fit.certainty import cycle_of
 from busplan.questions.timeline.events import Schedule
 
 MOST_LISTED: Final = 64
@@ -38,7 +37,7 @@ class CommonMultiple:
 
     def __init__(self, schedule: Schedule) -> None:
         self._schedule = schedule
-        self._cycle = cycle_of(schedule.profile, model=schedule.figures.timing_model)
+        self._cycle = schedule.network.bus.cycle(schedule.network, model=schedule.figures.timing_model)
         self._rates = self._cycle.rates
 
     @cached_property

@@ -11,7 +11,7 @@ from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span
 from busplan.forms.numbers import figure_text, nouns, sentence_text, with_unit
 from busplan.questions.fit.certainty import fits_in
 from busplan.questions.fit.figures import margin_us
-from busplan.questions.fit.network import bus_of, model_names, network_of
+from busplan.questions.fit.network import bus_of, model_names
 from busplan.questions.timeline.cycles import CommonMultiple
 from busplan.questions.timeline.events import TOTAL, Event, Schedule, drawn_cycle
 from busplan.sections.profile import Profile
@@ -45,8 +45,8 @@ def model_needs(schedule: Schedule) -> tuple[ModelNeeds, ...]:
         The cycle, under one of them.
     """
     available_us, needs = schedule.figures.available_us, []
-    for model in model_names(schedule.profile):
-        required_us = drawn_cycle(schedule.profile, model=model, number=schedule.number).required_us
+    for model in model_names(schedule.network):
+        required_us = drawn_cycle(schedule.network, model=model, number=schedule.number).required_us
         left_us = plain(margin_us(required_us, available_us=available_us))
         needs.append(ModelNeeds(model, plain(required_us), left_us))
     return tuple(needs)
@@ -87,8 +87,8 @@ def charged(schedule: Schedule) -> Sentence:
     nodes, common, cycle = schedule.figures.nodes, CommonMultiple(schedule), "the cycle"
     if schedule.number is not None and common.cycles > 1:
         cycle = f"cycle {common.number} of {common.cycles}"
-    setup = ", ".join((nouns(nodes, "node"), *bus_of(schedule.profile).setup_words(network_of(schedule.profile))))
-    way = bus_of(schedule.profile).way_charged(network_of(schedule.profile))
+    setup = ", ".join((nouns(nodes, "node"), *schedule.network.bus.setup_words(schedule.network)))
+    way = schedule.network.bus.way_charged(schedule.network)
     return sentence(
         f"{{}} {setup}; {{}} to {{}} of {cycle}, {way}",
         count_value(nodes, "nodes"),

@@ -11,12 +11,13 @@ from typing import Final, NamedTuple
 
 from busplan.buses.cycle import BusCycle, BusEvent
 from busplan.buses.figure import Figure
+from busplan.buses.network import Network
 from busplan.buses.parts import IDLE
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.questions.fit.certainty import cycle_of, fits_in
-from busplan.questions.fit.figures import CapacityFigures, figures, margin_us
-from busplan.questions.fit.network import bus_of, leading_model, network_of
+from busplan.questions.fit.certainty import fits_in
+from busplan.questions.fit.figures import FitFigures, figures, margin_us
+from busplan.questions.fit.network import leading_model
 from busplan.sections.profile import Profile
 
 MOST_NODES: Final = 1000
@@ -55,8 +56,8 @@ class Event(NamedTuple):
 class Schedule(NamedTuple):
     """A cycle, or the part of it inside a window."""
 
-    profile: Profile
-    figures: CapacityFigures
+    network: Network
+    figures: FitFigures
     """Closed form of the cycle that the verdict is for: time needed, time available, and whether it fits."""
     cycle_events: tuple[Event, ...]
     """Events of the whole cycle, and the idle rest of its slice."""
@@ -68,6 +69,12 @@ class Schedule(NamedTuple):
     """Closed form of the time that the cycle needs [us]."""
     number: int | None = None
     """Which cycle of the common multiple of the rates was asked for, from 1; None for that of the verdict."""
+
+    @property
+    def profile(self) -> Profile:
+        """The profile of the network."""
+        profile: Profile = self.network.profile
+        return profile
 
     @property
     def end_us(self) -> float:
@@ -110,20 +117,20 @@ class Total(NamedTuple):
     """Share of the window, 0..1."""
 
 
-def drawn_cycle(profile: Profile, *, model: str, number: int | None) -> BusCycle:
+def drawn_cycle(network: Network, *, model: str, number: int | None) -> BusCycle:
     """The cycle that a timeline shows under a timing model; parameters as `schedule` has them."""
-    cycle = cycle_of(profile, model=model)
+    cycle = network.bus.cycle(network, model=model)
     return cycle if number is None else cycle.at(number)
 
 
-def schedule(profile: Profile, *, model: str | None = None, number: int | None = None) -> Schedule:
+def schedule(network: Network, *, model: str | None = None, number: int | None = None) -> Schedule:
     """Lay out one communication cycle, node by node.
 
     The events of the bus, then the idle rest of the slice. There are no events of zero duration.
 
     Parameters
     ----------
-    profile
+    network
         The network.
     model
         Timing model; without it the one whose figures lead.
@@ -142,21 +149,21 @@ def schedule(profile: Profile, *, model: str | None = None, number: int | None =
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> cycle = schedule(load("paper-two-node").profile)
+    >>> from busplan.questions.fit.network import network_of
+    >>> cycle = schedule(network_of(load("paper-two-node").profile))
     >>> [event.kind for event in cycle.events][2:5]
     ['request_data', 'acknowledge', 'execution']
     >>> abs(cycle.used_us - cycle.figures.required_us) < 1e-9
     True
     """
-    network, bus = network_of(profile), bus_of(profile)
-    nodes = int(network.nodes)
+    nodes = int(plain(network.nodes))
     if nodes > MOST_NODES:
-        limit = bus.limit("nodes")
+        limit = network.bus.limit("nodes")
         carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
         where = "bus.nodes" if network.is_uniform else "nodes of all groups"
         raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
-    model = leading_model(profile) if model is None else model
-    closed, cycle = figures(profile, model=model), drawn_cycle(profile, model=model, number=number)
+    model = leading_model(network) if model is None else model
+    closed, cycle = figures(network, model=model), drawn_cycle(network, model=model, number=number)
     events = list(islice(_laid_out(cycle.events()), MOST_EVENTS + 1))
     if len(events) > MOST_EVENTS:
         raise BusplanError(f"a timeline shows up to {MOST_EVENTS:,} events, and this cycle has more")
@@ -165,7 +172,7 @@ def schedule(profile: Profile, *, model: str | None = None, number: int | None =
     if not fits_in(closed.available_us, available_us=end_us):
         events.append(Event(IDLE.key, None, None, None, end_us, closed.available_us, "", IDLE.label))
     return Schedule(
-        profile,
+        network,
         closed,
         tuple(events),
         from_us=0.0,

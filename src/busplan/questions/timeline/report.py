@@ -1,7 +1,6 @@
 """Answer of `busplan timeline`."""
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Final
 
 from busplan.buses.figure import MARGIN, VERDICT
@@ -28,7 +27,6 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import period_value, sentence_text
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.fit.network import bus_of
 from busplan.questions.timeline.cycles import CommonMultiple
 from busplan.questions.timeline.drawing import (
     charged,
@@ -41,7 +39,7 @@ from busplan.questions.timeline.drawing import (
 )
 from busplan.questions.timeline.events import EVENTS, SHARE, TOTAL, Schedule, Total, totals
 from busplan.questions.words.documents import document
-from busplan.questions.words.sentences import refused_circle, safety_record, story, warnings
+from busplan.questions.words.sentences import safety_record, story, warnings
 
 _TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
 
@@ -50,15 +48,14 @@ def timeline_report(schedule: Schedule) -> Report:
     """Report of `timeline`."""
     return Report(
         Sentence(("Timeline of ", Code(schedule.profile.name))),
-        lambda: tuple(_blocks(schedule)),
-        partial(timeline_document, schedule),
-        partial(timeline_records, schedule),
+        tuple(_blocks(schedule)),
+        timeline_document(schedule),
+        timeline_records(schedule),
     )
 
 
 def _blocks(schedule: Schedule) -> Iterator[Block]:
     """Whether the cycle fits, the cycle to scale, and the total of each kind of event."""
-    yield from refused_circle(schedule.profile)
     yield headline(schedule)
     yield from (Sentence((words,), "warns") for words in _warnings(schedule))
     yield margins_sentence(schedule)
@@ -72,7 +69,7 @@ def headline(schedule: Schedule) -> Sentence:
     figures = schedule.figures
     parts: tuple[Part, ...] = (
         *(Code(schedule.profile.name), " at ", period_value(figures.period_us), ": "),
-        *story(figures, schedule.profile),
+        *story(figures, schedule.network),
         f" by the {figures.timing_model} model",
         *((" in the fullest cycle",) if schedule.number is not None and CommonMultiple(schedule).cycles > 1 else ()),
     )
@@ -145,19 +142,20 @@ def _total_row(schedule: Schedule, total: Total) -> TableRow:
 
 
 def _warnings(schedule: Schedule) -> list[str]:
-    return warnings(schedule.profile, nodes=schedule.figures.nodes, most=0)
+    return warnings(schedule.network, nodes=schedule.figures.nodes, most=0)
 
 
 def _facts(schedule: Schedule) -> JsonDocument:
     """The document without events: the cycle that is drawn, the verdict, the cycles that differ, and the window."""
     figures, common = schedule.figures, CommonMultiple(schedule)
+    values = figures.values()
     return document(
         "timeline",
         profile=schedule.profile.name,
         timing_model=figures.timing_model,
         period_us=figures.period_us,
         nodes=figures.nodes,
-        **{key: getattr(figures, key) for key in bus_of(schedule.profile).figures.headings},
+        **{key: values[key] for key in schedule.network.bus.figures.headings},
         cycle=common.number,
         common_multiple=common.cycles,
         distinct_cycles=None if common.distinct is None else [alike._asdict() for alike in common.distinct],
@@ -167,9 +165,8 @@ def _facts(schedule: Schedule) -> JsonDocument:
         exceeded=list(figures.exceeded),
         not_shown=None if figures.not_shown is None else list(figures.not_shown),
         fits=figures.fits,
-        circle_refused_by=list(figures.circle_refused_by),
         verdict=figures.verdict,
-        **safety_record(figures, schedule.profile),
+        **safety_record(figures, schedule.network),
         warnings=_warnings(schedule),
         from_us=schedule.from_us,
         to_us=schedule.to_us,

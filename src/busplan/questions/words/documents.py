@@ -56,8 +56,8 @@ def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDoc
 def changed_report(report: Report, changes: KeyChanges) -> Report:
     """Name the --set options in an answer: in a sentence at its top, and in its JSON document."""
     return report._replace(
-        blocks=lambda: (*changes_sentences(changes), *report.blocks()),
-        document=lambda: changed_document(report.document(), changes),
+        blocks=(*changes_sentences(changes), *report.blocks),
+        document=changed_document(report.document, changes),
     )
 
 

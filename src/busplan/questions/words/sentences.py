@@ -4,15 +4,13 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, UNCERTAINTY, UTILISATION
+from busplan.buses.network import Network
 from busplan.buses.parts import Value as BusValue
 from busplan.buses.published import parts_tested
-from busplan.forms.blocks import Code, Part, Record, Sentence, ShownValue, attribute_value, joined, sentence
-from busplan.forms.numbers import period_value
+from busplan.forms.blocks import Part, Record, Sentence, ShownValue, attribute_value, joined, sentence
 from busplan.profile.write import value_text
 from busplan.questions.fit.certainty import TIME, limits_behind
-from busplan.questions.fit.circle_refusal import circle_refusals
-from busplan.questions.fit.figures import CapacityFigures
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.figures import FitFigures
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -61,18 +59,7 @@ def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
     return ('"', shown, '"') if quotes and isinstance(value, str) else (shown,)
 
 
-def refused_circle(profile: Profile) -> Iterator[Sentence]:
-    """Say why the circle that a profile asks for cannot be run; nothing where it can.
-
-    It stands first in every answer with a verdict: a circle that cannot be run is said before the verdict.
-    """
-    causes = circle_refusals(profile)
-    if causes:
-        subject = ("The circle of ", Code(profile.name), " cannot be run at ", period_value(profile.cycle.period_us))
-        yield Sentence((*subject, ": ", ", and ".join(cause.message for cause in causes), "."), "fails")
-
-
-def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
+def warnings(network: Network, *, nodes: int, most: int) -> list[str]:
     """Warnings, whatever the verdict.
 
     Parameters
@@ -84,15 +71,15 @@ def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
     most
         Largest number of nodes in the report [1]; 0 if it has none.
     """
-    return bus_of(profile).warnings(network_of(profile), nodes=[number for number in (nodes, most) if number])
+    return network.bus.warnings(network, nodes=[number for number in (nodes, most) if number])
 
 
-def warning_sentences(profile: Profile, *, nodes: int, most: int) -> Iterator[Sentence]:
+def warning_sentences(network: Network, *, nodes: int, most: int) -> Iterator[Sentence]:
     """Warnings as sentences; see `warnings`."""
-    return (Sentence((words,), "warns") for words in warnings(profile, nodes=nodes, most=most))
+    return (Sentence((words,), "warns") for words in warnings(network, nodes=nodes, most=most))
 
 
-def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterator[Sentence]:
+def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterator[Sentence]:
     """Say how the execution time behind the figures is known; nothing without a grade, or where none is in them.
 
     Parameters
@@ -102,8 +89,8 @@ def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterato
     of_latency
         Whether the figures are latencies, and not those of the cycle.
     """
-    grades, bus, network = execution_grades(profile), bus_of(profile), network_of(profile)
-    if grades is not None and bus.has_execution(network, of_latency=of_latency):
+    grades = execution_grades(network.profile)
+    if grades is not None and network.bus.has_execution(network, of_latency=of_latency):
         text = f"The execution time behind these figures is {grades}."
         yield sentence(text, state="warns" if "assumed" in grades else "neutral")
 
@@ -118,11 +105,10 @@ def execution_grades(profile: Profile) -> str | None:
     return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items()) or None
 
 
-def broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
+def broken_limits(figures: FitFigures, network: Network) -> list[str]:
     """Say by how much each limit of the bus is broken, or why it is not shown to be kept."""
-    broken = map(bus_of(profile).limit, limits_behind(figures))
-    network = network_of(profile)
-    if profile.has_cycle:
+    broken = map(network.bus.limit, limits_behind(figures))
+    if network.groups:
         network = network._replace(period_us=figures.period_us)
     return [limit.words(network) for limit in broken if limit is not None]
 
@@ -141,24 +127,24 @@ def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
         yield Sentence((f"Model of {kind}: {'; '.join(phrases)}; not tested: {', '.join(tested.untested)}.",))
 
 
-def not_applicable(profile: Profile) -> Iterator[Sentence]:
+def not_applicable(network: Network) -> Iterator[Sentence]:
     """Say which timing models cannot express a profile, and why."""
-    bus = bus_of(profile)
+    bus = network.bus
     for model in bus.timing_models:
-        keys = bus.cannot_express(network_of(profile), model=model.name)
+        keys = bus.cannot_express(network, model=model.name)
         if keys:
             yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
 
 
-def reset_sentence(after: CapacityFigures | None, profile: Profile) -> Iterator[Sentence]:
+def reset_sentence(after: FitFigures | None, network: Network) -> Iterator[Sentence]:
     """Say that a cycle stops fitting at a bus reset; nothing if it does not."""
     if after is not None:
-        keys = ", ".join(f"{key} = {value}" for key, value in bus_of(profile).safety.after_reset.items())
+        keys = ", ".join(f"{key} = {value}" for key, value in network.bus.safety.after_reset.items())
         text = f"After a bus reset, with {keys} until it is set again, the verdict is: {after.verdict}."
         yield sentence(text, state="warns")
 
 
-def story(figures: CapacityFigures, profile: Profile) -> tuple[Part, ...]:
+def story(figures: FitFigures, network: Network) -> tuple[Part, ...]:
     """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict.
 
     Parameters
@@ -173,13 +159,13 @@ def story(figures: CapacityFigures, profile: Profile) -> tuple[Part, ...]:
         used = attribute_value(UTILISATION, figures)._replace(decimals=1)
         return sentence("{} to spare, {} of {} used", attribute_value(MARGIN, figures), used, available).parts
     short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
-    reasons = [Sentence((words,)) for words in broken_limits(figures, profile)]
+    reasons = [Sentence((words,)) for words in broken_limits(figures, network)]
     if TIME in figures.exceeded:
         reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
     return joined(*reasons, by=", and ").parts
 
 
-def margin_parts(figures: CapacityFigures) -> tuple[Part, ...]:
+def margin_parts(figures: FitFigures) -> tuple[Part, ...]:
     """A corrected margin with its uncertainty, as far as that is known.
 
     Parameters
@@ -191,7 +177,7 @@ def margin_parts(figures: CapacityFigures) -> tuple[Part, ...]:
     return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
 
 
-def safety_record(figures: CapacityFigures, profile: Profile) -> Record:
+def safety_record(figures: FitFigures, network: Network) -> Record:
     """Whether the settings of the bus are safe, by the key of its kind; empty if the kind has none."""
-    safety = bus_of(profile).safety.figure
+    safety = network.bus.safety.figure
     return {} if safety is None else {safety.key: figures.safe}

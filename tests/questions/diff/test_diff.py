@@ -9,30 +9,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.errors import BusplanError
+import busplan
 from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
-from busplan.questions.circle.figures import CircleFigures
-from busplan.questions.circle.roundness import circle_test
-from busplan.questions.diff.difference import ComparedFigure, Difference, difference
+from busplan.questions.diff import ComparedFigure, DiffAnswer, diff
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 
 # Written down here a second time, on purpose: a direction that turns round lets regressions through.
 MORE = {
-    "shown_to_fit", "gap_count_safe", "margin_corrected_us", "safe_nodes", "safe_axes", "fits", "margin_us",
-    "max_nodes", "max_axes", "passed", "verdict", "stable", "phase_margin_deg", "gain_margin_db",
+    "gap_count_safe", "margin_corrected_us", "safe_nodes", "safe_axes", "fits", "margin_us",
+    "max_nodes", "max_axes", "verdict",
 }  # fmt: skip
 LESS = {
     "safe_min_period_us", "utilisation", "required_us", "min_period_us", "read_latency_us", "read_latency_with_gaps_us",
     "write_latency_us", "write_latency_with_gaps_us", "read_transaction_us", "write_transaction_us",
-    "mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm",
 }  # fmt: skip
 NEITHER = {
     "timing_model", "period_us", "nodes", "axes", "hops", "gap_count", "safe_gap_count", "available_us",
-    "time_slice_us", "limited_by", "binding_term", "servo_grade", "bias_us", "uncertainty_us",
+    "time_slice_us", "limited_by", "binding_term", "bias_us", "uncertainty_us",
     "safe_limited_by", "cycle_starts_us", "sync_us", "cycle_arbitration_us", "cycle_data_us", "cycle_acknowledge_us",
     "cycle_hold_us", "cycle_execution_us", "cycle_worst_extra_us", "cycle_idle_us", "cycle_host_us", "retries_us",
     "nonperiodic_us",
@@ -40,35 +37,13 @@ NEITHER = {
 TURNED = {"better": "worse", "worse": "better", "same": "same", "neutral": "neutral"}
 
 
-def figure(found: Difference, part: str, key: str) -> ComparedFigure:
+def figure(found: DiffAnswer, part: str, key: str) -> ComparedFigure:
     (one,) = (one for one in found.figures if (one.part, one.figure.key) == (part, key))
     return one
 
 
-def circle_of(**values: Any) -> CircleFigures:
-    """Figures of a circle as far as they are compared."""
-    plain = {
-        "radius_mm": 100.0, "stable": True, "phase_margin_deg": 50.0, "gain_margin_db": 20.0,
-        "mean_contour_error_mm": 0.001, "max_contour_error_mm": 0.002, "circular_deviation_mm": 0.003, "passed": True,
-        "servo_grade": "assumed", "failures": (),
-    }  # fmt: skip
-    return CircleFigures(**{**dict.fromkeys(CircleFigures._fields), **plain, **values})
-
-
-def circles(make: Make, a: CircleFigures | None, b: CircleFigures | None) -> Difference:
-    """Compare two profiles with given circles; None is one that cannot be run."""
-
-    def circle(profile: Profile) -> CircleFigures:
-        found = a if profile.name == "a" else b
-        if found is None:
-            raise BusplanError("too short")
-        return found
-
-    return difference(make(name="a", circle={}), make(name="b"), circle=circle)
-
-
 def test_each_figure_has_its_direction(make: Make) -> None:
-    found = circles(make, circle_of(), circle_of()).figures
+    found = diff(make(name="a"), make(name="b")).figures
     expected = {
         **dict.fromkeys(MORE, "more"),
         **dict.fromkeys(LESS, "less"),
@@ -108,20 +83,20 @@ def test_what_stands_in_the_file_is_what_toml_reads_there(name: str) -> None:
 
 
 def test_a_value_that_is_the_default_is_no_difference(make: Make) -> None:
-    found = difference(make(bus__gap_count=63), make(bus__gap_count=63, bus__max_hops=None, limits={}))
+    found = diff(make(bus__gap_count=63), make(bus__gap_count=63, bus__max_hops=None, limits={}))
     assert found.keys == ()
     assert {one.judgement for one in found.figures} == {"same"}
 
 
 def test_a_default_is_told_from_what_stands_in_the_file(make: Make) -> None:
-    (one,) = difference(make(), make(cycle__nonperiodic_us=5.0)).keys
+    (one,) = diff(make(), make(cycle__nonperiodic_us=5.0)).keys
     assert one.key == "cycle.nonperiodic_us"
     assert (one.a, one.b) == ((0.0, "default"), (5.0, "file"))
 
 
 def test_keys_of_one_profile_alone(make: Make) -> None:
     table = {"kind": "table", "payload_bytes": [4, 16], "time_us": [30.0, 40.0]}
-    found = {one.key: one for one in difference(make(), make(node__execution=table)).keys}
+    found = {one.key: one for one in diff(make(), make(node__execution=table)).keys}
     assert set(found) == {
         "node.execution.kind",
         *(f"node.execution.{key}" for key in ("base_us", "per_byte_us", "payload_bytes", "time_us")),
@@ -137,7 +112,7 @@ def test_keys_of_one_profile_alone(make: Make) -> None:
 @given(data=st.data())
 def test_the_other_way_round_everything_turns(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     a, b = data.draw(any_profile), data.draw(any_profile)
-    there, back = difference(a, b), difference(b, a)
+    there, back = diff(a, b), diff(b, a)
     assert {one.key for one in there.keys} == {one.key for one in back.keys}
     for one, other in zip(there.figures, back.figures, strict=True):
         assert (one.a, one.b) == (other.b, other.a)
@@ -151,7 +126,7 @@ def test_the_other_way_round_everything_turns(data: st.DataObject, any_profile: 
 @given(data=st.data())
 def test_against_itself_everything_is_the_same(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     one = data.draw(any_profile)
-    found = difference(one, one)
+    found = diff(one, one)
     assert (found.keys, {figure.judgement for figure in found.figures}) == ((), {"same"})
 
 
@@ -161,145 +136,62 @@ def test_what_rounding_can_make_is_the_same(make: Make, share: float) -> None:
     a = make(cycle__nonperiodic_us=1e8, cycle__period_us=1e9)
     b = override(a, {"cycle.nonperiodic_us": 1e8 * (1 + share)})
     expected = "same" if share < 1e-9 else "worse"
-    assert figure(difference(a, b), "paper", "required_us").judgement == expected
+    assert figure(diff(a, b), "paper", "required_us").judgement == expected
 
 
 def test_the_last_digit_of_a_margin_is_rounding(make: Make) -> None:
     # A margin is what two larger times leave: next to none of it, their rounding is all of it.
     a = make(cycle__period_us=1000.0)
-    required = figure(difference(a, a), "paper", "required_us").a
+    required = figure(diff(a, a), "paper", "required_us").a
     full = override(a, {"cycle.slice_ratio": required / 1000})
     less = override(full, {"cycle.slice_ratio": nextafter(nextafter(full.cycle.slice_ratio, 0), 0)})
     more = override(full, {"cycle.slice_ratio": full.cycle.slice_ratio * (1 + 1e-12)})
     for a, b in ((full, less), (full, more), (more, full)):
-        margin = figure(difference(a, b), "paper", "margin_us")
+        margin = figure(diff(a, b), "paper", "margin_us")
         assert (margin.judgement, margin.relative_difference) == ("same", None)
-    assert figure(difference(more, full), "paper", "margin_us").a > 0
+    assert figure(diff(more, full), "paper", "margin_us").a > 0
 
 
 def test_a_difference_is_signed_and_a_share_is_of_the_size_of_a(make: Make) -> None:
     a, b = make(cycle__period_us=300.0), make(cycle__period_us=3000.0)
-    margin = figure(difference(a, b, timing_models=["standard"]), "standard", "margin_us")
+    margin = figure(diff(a, b, timing_model=["standard"]), "standard", "margin_us")
     assert margin.a < 0 < margin.b
     assert margin.difference == pytest.approx(1350.0)
     assert margin.relative_difference == pytest.approx(1350.0 / -margin.a)
     assert margin.judgement == "better"
-    period = figure(difference(b, a), "plan", "period_us")
+    period = figure(diff(b, a), "plan", "period_us")
     assert (period.difference, period.relative_difference, period.judgement) == (-2700.0, -0.9, "neutral")
 
 
-def test_gap_counts_and_decibels_have_no_share(make: Make) -> None:
-    found = difference(make(), make(bus__gap_count=7))
-    assert figure(found, "plan", "gap_count").relative_difference is None
-    gain = figure(circles(make, circle_of(), circle_of(gain_margin_db=10.0)), "circle", "gain_margin_db")
-    assert (gain.difference, gain.relative_difference, gain.judgement) == (-10.0, None, "worse")
+def test_gap_counts_have_no_share(make: Make) -> None:
+    assert figure(diff(make(), make(bus__gap_count=7)), "plan", "gap_count").relative_difference is None
 
 
 def test_only_the_models_asked_for_and_always_the_verdict(make: Make) -> None:
     # 500 us: the paper's timing carries four nodes, 399.4 us; three are shown to fit, 424.4 us, and four need 565.4.
     a = make(cycle__period_us=1000.0, bus__nodes=3, bus__timing_model="paper")
     b = override(a, {"bus.nodes": 4})
-    found = difference(a, b, timing_models=["paper"])
+    found = diff(a, b, timing_model=["paper"])
     assert {one.part for one in found.figures} == {"plan", "paper"}
-    shown = figure(found, "plan", "shown_to_fit")
-    assert (shown.a, shown.b, shown.judgement) == (True, False, "worse")
     verdict = figure(found, "plan", "verdict")
     assert (verdict.a, verdict.b, verdict.judgement) == ("fits", "not shown to fit", "worse")
     assert figure(found, "paper", "fits").judgement == "same"
-    assert [one.figure.key for one in found.regressions(tolerance=1e9)] == ["verdict", "shown_to_fit"]
+    assert [one.figure.key for one in found.regressions(tolerance_percent=1e11)] == ["verdict"]
 
 
 def test_a_model_that_cannot_express_both_is_not_compared(make: Make) -> None:
     a, b = make(), make(node__write_response="unified")
     for one, other in ((a, b), (b, a)):
-        assert {each.part for each in difference(one, other).figures} == {"plan", "standard"}
+        assert {each.part for each in diff(one, other).figures} == {"plan", "standard"}
 
 
 def test_a_gap_count_that_makes_all_better_is_no_regression_by_its_bias(make: Make) -> None:
-    found = difference(make(), make(bus__gap_count="optimal"))
+    found = diff(make(), make(bus__gap_count="optimal"))
     bias = figure(found, "plan", "bias_us")
     # Eight halves, each 2 (63 - 7) / 98.304 us further from the measured gap count.
     assert bias.difference == pytest.approx(8 * 2 * 56 / 98.304)
     assert bias.judgement == "neutral"
-    assert found.regressions() == []
-
-
-# --- the circle -------------------------------------------------------------------------------------------
-
-
-def test_a_circle_is_run_when_either_asks_for_one(make: Make) -> None:
-    ran: list[str] = []
-
-    def circle(profile: Profile) -> CircleFigures:
-        ran.append(profile.name)
-        return circle_of()
-
-    a, b, asks = make(name="a"), make(name="b"), make(name="asks", servo={})
-    assert difference(a, b, circle=circle).circles is None
-    assert difference(a, asks).circles is None
-    assert ran == []
-    assert difference(a, asks, circle=circle).circles is not None
-    assert difference(asks, b, circle=circle).circles is not None
-    assert ran == ["a", "asks", "asks", "b"]
-    assert difference(asks, make(name="asks"), circle=circle).circles is not None
-    assert ran[4:] == ["asks"], "the same profile needs no second run"
-
-
-@pytest.mark.parametrize(
-    ("key", "a", "b", "judgement"),
-    [
-        ("phase_margin_deg", {"phase_margin_deg": 40.0}, {"phase_margin_deg": 50.0}, "better"),
-        ("phase_margin_deg", {}, {"phase_margin_deg": None}, "better"),
-        ("phase_margin_deg", {}, {"phase_margin_deg": None, "stable": False}, "worse"),
-        ("phase_margin_deg", {"phase_margin_deg": None}, {"phase_margin_deg": None, "stable": False}, "worse"),
-        ("phase_margin_deg", {"phase_margin_deg": None}, {"phase_margin_deg": None}, "same"),
-        ("gain_margin_db", {"gain_margin_db": None}, {}, "worse"),
-        ("gain_margin_db", {}, {"gain_margin_db": None, "stable": None}, "neutral"),
-        ("max_contour_error_mm", {}, {"max_contour_error_mm": 0.0021}, "worse"),
-        ("max_contour_error_mm", {}, {"max_contour_error_mm": 0.0019}, "better"),
-        ("max_contour_error_mm", {}, {"max_contour_error_mm": 0.002 + 1e-8}, "same"),
-        ("max_contour_error_mm", {}, {"max_contour_error_mm": None}, "neutral"),
-        ("circular_deviation_mm", {"circular_deviation_mm": None}, {}, "neutral"),
-        ("stable", {}, {"stable": False}, "worse"),
-        ("stable", {}, {"stable": None}, "neutral"),
-        ("servo_grade", {}, {"servo_grade": "measured"}, "neutral"),
-    ],
-)
-def test_which_way_a_circle_goes(make: Make, key: str, a: dict[str, Any], b: dict[str, Any], judgement: str) -> None:
-    assert figure(circles(make, circle_of(**a), circle_of(**b)), "circle", key).judgement == judgement
-
-
-@pytest.mark.parametrize(
-    ("a", "b", "judgement"),
-    [
-        (True, False, "worse"),
-        (True, None, "worse"),
-        (None, True, "better"),
-        (False, True, "better"),
-        (False, None, "neutral"),
-        (False, False, "same"),
-        (None, None, "same"),
-    ],
-)
-def test_a_circle_that_cannot_be_run_is_not_passed(make: Make, a: bool | None, b: bool | None, judgement: str) -> None:
-    sides = (None if one is None else circle_of(passed=one) for one in (a, b))
-    found = circles(make, *sides)
-    passed = figure(found, "circle", "passed")
-    assert (passed.a, passed.b, passed.judgement) == (a, b, judgement)
-    assert passed.is_regression(tolerance=1e9) == (judgement == "worse")
-    assert found.circles is not None
-    assert [side.problems for side in found.circles] == [("too short",) if one is None else () for one in (a, b)]
-
-
-def test_a_circle_that_the_bus_does_not_carry_is_not_simulated() -> None:
-    a = load("paper-1ms").profile
-    b = override(a, {"cycle.period_us": 200.0})
-    found = difference(a, b, circle=lambda profile: circle_test(profile, explain=False).results[0])
-    assert found.circles is not None
-    assert [side.simulated for side in found.circles] == [True, False]
-    assert found.circles[1].problems == ("the cycle does not fit the bus: 263.320 us needed of 100.000 us",)
-    assert figure(found, "circle", "passed").judgement == "worse"
-    assert figure(found, "circle", "mean_contour_error_mm").judgement == "neutral"
+    assert found.regressions() == ()
 
 
 # --- the gate ---------------------------------------------------------------------------------------------
@@ -309,7 +201,7 @@ def test_a_tolerance_allows_a_share_of_the_figure_of_a(make: Make) -> None:
     # 550 us: 10 us more change no number of nodes, of either model or shown.
     a = make(cycle__period_us=1100.0, cycle__nonperiodic_us=0.0)
     b = override(a, {"cycle.nonperiodic_us": 10.0})
-    found = difference(a, b)
+    found = diff(a, b)
     assert {one.figure.key for one in found.regressions()} == {
         "margin_corrected_us",
         "safe_min_period_us",
@@ -323,13 +215,36 @@ def test_a_tolerance_allows_a_share_of_the_figure_of_a(make: Make) -> None:
     assert share is not None
     assert not required.is_regression(tolerance=share)
     assert required.is_regression(tolerance=share * (1 - 1e-6))
-    assert found.regressions(tolerance=1.0) == []
-    assert difference(b, a).regressions() == []
+    assert found.regressions(tolerance_percent=100) == ()
+    assert diff(b, a).regressions() == ()
 
 
 def test_what_is_no_number_is_never_tolerated(make: Make) -> None:
     a, b = make(cycle__period_us=1000.0), make(cycle__period_us=200.0)
-    worse = {(one.part, one.figure.key) for one in difference(a, b).regressions(tolerance=1e9)}
-    assert worse == {("plan", "verdict"), ("plan", "shown_to_fit"), ("paper", "fits"), ("standard", "fits")}
-    unstable = circles(make, circle_of(), circle_of(stable=False, phase_margin_deg=None))
-    assert {one.figure.key for one in unstable.regressions(tolerance=1e9)} == {"stable", "phase_margin_deg"}
+    worse = {(one.part, one.figure.key) for one in diff(a, b).regressions(tolerance_percent=1e11)}
+    assert worse == {("plan", "verdict"), ("paper", "fits"), ("standard", "fits")}
+
+
+@pytest.mark.parametrize("percent", [-1, float("nan"), float("inf"), "5"])
+def test_a_tolerance_that_is_none_is_refused(make: Make, percent: Any) -> None:
+    with pytest.raises(busplan.BusplanError, match="tolerance_percent"):
+        diff(make(), make()).regressions(tolerance_percent=percent)
+
+
+def test_regressions_are_named_with_the_timing_that_has_them() -> None:
+    paper = load("paper-1ms").profile
+    found = diff(paper, override(paper, {"cycle.nonperiodic_us": 250}))
+    assert found.regression_words(tolerance_percent=80) == (
+        "regression: B is worse by more than 80 % in 8 figures: verdict, corrected margin, "
+        "period with enough time, margin, utilisation, required time, smallest period, no limit broken (standard)"
+    )
+    assert found.regression_words(tolerance_percent=0).startswith("regression: B is worse in ")
+    assert diff(paper, paper).regression_words() == ""
+
+
+def test_two_kinds_of_bus_are_compared_by_the_models_that_decide() -> None:
+    found = diff("paper-1ms", "can-servo-8")
+    assert {one.part for one in found.figures} == {"plan", "deciding"}
+    assert figure(found, "deciding", "sync_us").judgement == "neutral"
+    with pytest.raises(busplan.BusplanError, match="have no timing model in common; leave it out"):
+        diff("paper-1ms", "can-servo-8", timing_model="standard")

@@ -1,0 +1,212 @@
+"""The verdict in words, line by line: the card of every form."""
+
+from collections.abc import Iterator
+from math import ceil, floor, isfinite, log10
+from typing import Final
+
+from busplan.buses.published import parts_tested
+from busplan.elementwise import FIT_ROUNDING, plain
+from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
+from busplan.forms.numbers import listed, period, plural, sentence_text
+from busplan.questions.capacity.verdict import Verdict
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
+from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.words.sentences import change_meanings, settings_sentence
+
+_FIGURES: Final = 3
+"""Digits of a time whose uncertainty is unknown."""
+_MOST_DECIMALS: Final = 6
+"""Decimals of a time in us: what is below a picosecond is float rounding."""
+_Line = tuple[str, Sentence]
+
+
+def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
+    """Say the verdict, how full the period is, what is free, what would fit, and what the verdict rests on.
+
+    Parameters
+    ----------
+    verdict
+        The verdict on one period.
+    is_brief
+        Whether lines that are the same for every period are left out.
+    """
+    network, bus = verdict.network, verdict.network.bus
+    counts = [plural(number, noun) for number, noun in bus.counted(network)]
+    if network.groups:
+        counts.append(period(verdict.period_us))
+    subject = Sentence((Code(network.profile.name), f"  {bus.title}, {', '.join(counts)}"))
+    lines = [
+        *_reasons(verdict),
+        *(_times(verdict) if network.groups else ()),
+        *((label, Sentence((words,))) for label, words in verdict.bus_lines),
+        *_room(verdict),
+    ]
+    if not is_brief:
+        lines += _rests_on(verdict)
+    return Card(subject, _word(verdict), _gauge(verdict), tuple(lines))
+
+
+def card_text(card: Card) -> str:
+    """The verdict in one line: what the card says, label by label."""
+    said = "; ".join(f"{label}: {sentence_text(words)}" for label, words in card.lines)
+    return f"{sentence_text(card.subject)}: {card.verdict.text}. {said}."
+
+
+def _word(verdict: Verdict) -> Words:
+    word = verdict.deciding.verdict
+    but = "" if verdict.all_well or word != FITS else ", BUT"
+    state: State = "passes" if verdict.all_well else "fails" if word == DOES_NOT_FIT or but else "warns"
+    return Words(f"{(word or '').upper()}{but}", state)
+
+
+def _gauge(verdict: Verdict) -> Gauge | None:
+    figures, network = verdict.deciding, verdict.network
+    state: State = "passes" if figures.verdict == FITS else "fails"
+    if network.groups:
+        available_us, whole_us = figures.available_us, max(figures.period_us, _used_us(figures))
+        return Gauge(
+            used=_used_us(figures) / whole_us,
+            doubt=(figures.uncertainty_us or 0.0) / whole_us,
+            free_until=available_us * (1 - network.profile.limits.reserve) / whole_us,
+            most=available_us / whole_us,
+            state=state,
+        )
+    limit = network.bus.limit("load")
+    if limit is None:
+        return None
+    load, most = plain(limit.value(network)), plain(limit.most(network))
+    whole = max(1.0, load)
+    return Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
+
+
+def _used_us(figures: CapacityFigures) -> float:
+    """Time the cycle takes, with the bias of the model [us]."""
+    return figures.available_us - (figures.margin_corrected_us or 0.0)
+
+
+def _reasons(verdict: Verdict) -> Iterator[_Line]:
+    """Reasons beside time why the machine does not run as the profile has it."""
+    for words in verdict.broken_limits:
+        yield "limit", Sentence((words,), "fails" if verdict.deciding.verdict == DOES_NOT_FIT else "warns")
+    if not verdict.deciding.safe:
+        yield "unsafe", Sentence((verdict.network.bus.safety.setting,), "fails")
+    if verdict.deciding.verdict == FITS:
+        yield from (("[limits]", Sentence((words,), "fails")) for _, words in verdict.missed_limits)
+
+
+def _times(verdict: Verdict) -> Iterator[_Line]:
+    figures, network = verdict.deciding, verdict.network
+    doubt_us, margin_us = figures.uncertainty_us, (figures.margin_corrected_us or 0.0)
+    of_us = _us(figures.available_us, None)
+    share = f"{_used_us(figures) / figures.available_us:.0%}".replace("%", " %")
+    of = of_us if network.slice_ratio == 1 else f"the {of_us} that the bus may use"
+    bias = f", {_us(figures.bias_us, None)} of it bias of the model" if figures.bias_us else ""
+    yield "used", Sentence((f"{_us(_used_us(figures), doubt_us)} us of {of}, {share}{bias}",))
+    doubt = "" if doubt_us is None else f", +/- {_us(doubt_us, doubt_us)}"
+    kept_us = figures.available_us * network.profile.limits.reserve
+    kept = f"; {_us(kept_us, doubt_us)} must stay free" if kept_us else ""
+    yield ("short by" if margin_us < 0 else "free"), Sentence((f"{_us(abs(margin_us), doubt_us)} us{doubt}{kept}",))
+    yield "fastest period", _fastest(verdict)
+
+
+def _fastest(verdict: Verdict) -> Sentence:
+    fastest, doubt_us = verdict.fastest, verdict.deciding.uncertainty_us
+    if fastest is None or fastest.us is None:
+        return Sentence((f"none: {fastest.need.why if fastest else ''}",), "fails")
+    limited = "" if fastest.need.key == TIME else f", limited by {fastest.need.key}"
+    is_listed = bool(verdict.network.bus.periods.us)
+    return Sentence((f"{period(fastest.us if is_listed else _up(fastest.us, doubt_us))}{limited}",))
+
+
+def _room(verdict: Verdict) -> Iterator[_Line]:
+    """Room for more nodes; without it the change that makes room, or that mends what is wrong."""
+    figures = verdict.deciding
+    if verdict.all_well and verdict.has_room:
+        spare = {count.name: (count.safe_nodes or 0) - count.nodes for count in figures.counts}
+        rooms = (f"{number} more {f'of {name}' if name else 'nodes'}" for name, number in spare.items() if number > 0)
+        yield "room for", Sentence((listed([*rooms], "or"),))
+        return
+    if verdict.all_well and verdict.network.groups:
+        yield "room for", Sentence(("no more nodes",))
+    change, label = verdict.change, "one more" if verdict.all_well else "cure"
+    if change is None:
+        if verdict.no_change:
+            yield label, Sentence((f"none: {verdict.no_change}",))
+        return
+    meanings = change_meanings(verdict.network.bus)
+    settings = settings_sentence(change.changes, meanings=meanings, quotes=False)
+    left_us = change.figures.margin_corrected_us
+    left = "" if left_us is None else f", which leaves {_us(left_us, change.figures.uncertainty_us)} us"
+    yield label, joined(settings, Sentence((left,)), by="")
+
+
+def _rests_on(verdict: Verdict) -> Iterator[_Line]:
+    """The largest part, and what the verdict assumes, leaves out, or rests on without a test."""
+    figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
+    if figures.terms:
+        largest = max(figures.terms, key=lambda term: plain(term.us))
+        us = _us(plain(largest.us), figures.uncertainty_us)
+        yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
+    parts = uncertainty_parts(figures)
+    if parts and parts[0]["share"]:
+        share = f"{parts[0]['share']:.0%}".replace("%", " %")
+        yield "largest doubt", Sentence((f"{parts[0]['label']}, {share} of the variance",))
+    for assumption in verdict.assumptions:
+        them = "it" if len(assumption.keys) == 1 else "them"
+        yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
+    if verdict.left_out:
+        yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in verdict.left_out)),))
+    if verdict.premises:
+        yield "rests on", Sentence(("; ".join(verdict.premises),))
+    yield "checked against", Sentence((_tested(verdict),))
+    for other in verdict.contradicting:
+        needed = f"{_us(other.required_us, figures.uncertainty_us)} us needed of {_us(other.available_us, None)}"
+        yield f"{other.timing_model} model", Sentence((f"says otherwise, {needed}, but does not decide",), "warns")
+    for model in bus.timing_models:
+        if missing := bus.cannot_express(network, model=model.name):
+            yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
+    if verdict.after_reset is not None:
+        keys = ", ".join(f"{key} = {value}" for key, value in bus.safety.after_reset.items())
+        yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
+    yield from (("beware", Sentence((warning,), "warns")) for warning in verdict.warnings)
+
+
+def _tested(verdict: Verdict) -> str:
+    tested = parts_tested(verdict.network.bus.evidence_data)
+    known = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
+    never = f"never measured: {', '.join(tested.untested)}" if tested.untested and verdict.network.groups else ""
+    return "; ".join(filter(None, (known, never))) or "no published figures"
+
+
+def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
+    """Parts of the uncertainty, the largest first."""
+    whole = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
+    return [
+        {
+            "input": doubt.key,
+            "label": doubt.label,
+            "standard_uncertainty_us": float(doubt.us),
+            "share": float(doubt.us) ** 2 / whole if whole else 0.0,
+        }
+        for doubt in sorted(figures.doubts, key=lambda doubt: -float(doubt.us))
+    ]
+
+
+def _us(us: float, doubt_us: float | None) -> str:
+    """A time in digits that its doubt allows."""
+    return f"{us:.{_decimals(us, doubt_us)}f}"
+
+
+def _up(us: float, doubt_us: float | None) -> float:
+    """A time rounded up to the digits that its doubt allows."""
+    scale: float = 10.0 ** _decimals(us, doubt_us)
+    return ceil(us * scale * (1 - FIT_ROUNDING)) / scale
+
+
+def _decimals(us: float, doubt_us: float | None) -> int:
+    """Decimals down to the first digit of the doubt, or of three digits without one."""
+    if doubt_us and isfinite(doubt_us):
+        decimals = -floor(log10(doubt_us))
+    else:
+        decimals = _FIGURES - 1 - floor(log10(abs(us))) if us else 0
+    return min(max(0, decimals), _MOST_DECIMALS)

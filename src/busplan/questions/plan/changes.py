@@ -1,0 +1,343 @@
+"""What a plan may change, in the order of its cost; one thing at a time, until every constraint holds."""
+
+from bisect import bisect_left
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from decimal import ROUND_CEILING, Context, Decimal
+from functools import partial
+from itertools import product
+from math import ceil, inf
+from typing import Final, NamedTuple, TypeAlias
+
+from busplan.buses.network import Network
+from busplan.buses.parts import Cost, Value
+from busplan.elementwise import FIT_ROUNDING, plain
+from busplan.errors import BusplanError
+from busplan.questions.fit.network import PERIOD, at_period, changed
+from busplan.questions.plan.needs import Need, most_asking, rooms, smallest_period, to_be_shown, unmet
+from busplan.sections.alike_nodes import AlikeNodes
+from busplan.sections.base import MAX_TIME_US
+from busplan.sections.profile import Profile
+from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
+
+Changes: TypeAlias = Mapping[str, Value]
+"""New values of a profile by dotted key."""
+NODES: Final = "bus.nodes"
+"""Key of the number of nodes, where all are alike."""
+RATIO: Final = "cycle.slice_ratio"
+MOST_RATIO: Final = 0.9
+"""Largest slice ratio that is advised: the host computes in the rest of the period. Chosen."""
+_RATIO_STEPS: Final = 100
+_PERIOD_DIGITS: Final = 3
+"""Significant digits of a period that is advised."""
+_DEFAULT_COSTS: Final = (Cost.REGISTER, Cost.HOST_TIME, Cost.PERIOD)
+_PAYLOADS: Final = tuple(f"{kind}_bytes{part}" for kind in TRANSACTION_KINDS for part in ("", "_per_axis"))
+
+
+class Freedom(NamedTuple):
+    """One thing that a plan may change."""
+
+    name: str
+    label: str
+    cost: Cost
+    keys: tuple[str, ...]
+    values: Callable[[Network, Collection[str]], Iterator[Changes]]
+    """Values of a network, beside keys that must stay: the least change first; where none is enough, what helps most
+    is among them."""
+
+
+class Step(NamedTuple):
+    """A step of a plan: what was freed, and the changes that came nearest."""
+
+    freedom: Freedom | None
+    """None of the network as it is."""
+    changes: Changes
+    """All changes so far by dotted key, those of the last freedom first."""
+    unmet: tuple[Need, ...]
+    """Constraints that do not hold with them."""
+
+
+def freedoms(network: Network) -> tuple[Freedom, ...]:
+    """Everything that may be changed in a network, the cheapest first."""
+    own = [
+        Freedom(setting.name, setting.label, setting.cost, setting.keys, partial(_of_bus, setting.name))
+        for setting in network.bus.settings(network)
+    ]
+    if network.groups:
+        sections = [f"group.{group.name}" for group in network.profile.group] or ["payload"]
+        payloads = tuple(f"{section}.{key}" for section in sections for key in _PAYLOADS)
+        own += (
+            Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,), _ratios),
+            Freedom("payload", "payload", Cost.PAYLOAD, payloads, _payloads),
+            Freedom("period", "period", Cost.PERIOD, (PERIOD,), _periods),
+        )
+        if network.is_uniform:
+            # Where nodes differ, nobody but the user knows which can go.
+            own.append(Freedom("nodes", "nodes", Cost.NODES, (NODES,), _fewer_nodes))
+    return tuple(sorted(own, key=lambda freedom: freedom.cost))
+
+
+def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collection[str] = ()) -> tuple[Freedom, ...]:
+    """Freedoms of a plan, the cheapest first.
+
+    Parameters
+    ----------
+    network
+        The network.
+    names
+        Names of freedoms; None for those of the bus's registers, the slice ratio and the period; of a network without a
+        cycle all.
+    kept
+        Keys that were given a value, which stays.
+
+    Raises
+    ------
+    BusplanError
+        The network has no freedom of that name, or its value was given.
+    """
+    known = freedoms(network)
+    still = [freedom for freedom in known if not set(freedom.keys) <= set(kept)]
+    if names is None:
+        return tuple(freedom for freedom in still if freedom.cost in _DEFAULT_COSTS or not network.groups)
+    kind = f"{network.profile.bus.kind} with groups" if network.profile.group else network.profile.bus.kind
+    problems = [
+        f"free {name}: there is nothing of that name to free on a bus of kind {kind}; there are "
+        f"{', '.join(freedom.name for freedom in known)}"
+        for name in names
+        if name not in {freedom.name for freedom in known}
+    ]
+    problems += [
+        f"free {freedom.name}: {' and '.join(key for key in freedom.keys if key in kept)} was given a value, which is "
+        "kept; give one of them"
+        for freedom in known
+        if freedom.name in names and freedom not in still
+    ]
+    if problems:
+        raise BusplanError(*problems)
+    return tuple(freedom for freedom in still if freedom.name in names)
+
+
+def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str] = ()) -> list[Step]:
+    """Change one thing at a time, the cheapest first, until every constraint of a plan holds.
+
+    Of each thing the least change that is enough is taken; where none is, the one that comes nearest, and the next
+    thing is changed beside it. In the end, what is not needed beside the last change is left as it was.
+
+    Parameters
+    ----------
+    network
+        The network.
+    levels
+        Freedoms, the cheapest first.
+    kept
+        Keys that must stay.
+
+    Returns
+    -------
+    list
+        The steps from the network as it is; the last one holds, or nothing of the levels is enough.
+    """
+    steps = [Step(None, {}, tuple(unmet(network)))]
+    changes: list[Changes] = []
+    for freedom in levels:
+        if not steps[-1].unmet:
+            break
+        now = _with(network, changes)
+        nearest, needs = None, list(steps[-1].unmet)
+        for change in freedom.values(now, kept):
+            if set(change) & set(kept) or (after := _with_one(now, change)) is None:
+                continue
+            still = unmet(after)
+            if not still or _lack(still, after) < _lack(needs, now if nearest is None else _with_one(now, nearest)):
+                nearest, needs = change, still
+            if not still:
+                break
+        changes += [nearest] if nearest else []
+        steps.append(Step(freedom, _together(changes), tuple(needs)))
+    if not steps[-1].unmet and len(changes) > 1:
+        steps[-1] = steps[-1]._replace(changes=_together(_needed(network, changes)))
+    return steps
+
+
+def _needed(network: Network, changes: list[Changes]) -> list[Changes]:
+    """The changes without those that are not needed beside the last, the dearest first."""
+    left = list(changes)
+    for change in changes[-2::-1]:
+        fewer = [other for other in left if other is not change]
+        if not unmet(_with(network, fewer)):
+            left = fewer
+    return left
+
+
+def _together(changes: Sequence[Changes]) -> Changes:
+    return {key: value for change in reversed(changes) for key, value in change.items()}
+
+
+def _with(network: Network, changes: Sequence[Changes]) -> Network:
+    return changed(network, _together(changes)) if changes else network
+
+
+def _with_one(network: Network, change: Changes) -> Network | None:
+    """The network after a change; None where its schema refuses it."""
+    if list(change) == [PERIOD]:
+        return at_period(network, float(change[PERIOD]))
+    try:
+        return changed(network, change)
+    except BusplanError:
+        return None
+
+
+def _lack(needs: Sequence[Need], network: Network | None) -> tuple[int, float]:
+    """How far a network is from all constraints: those that no period mends, and the period for the rest [us]."""
+    if not needs or network is None:
+        return 0, 0.0
+    periods_us = [need.period_us(float(plain(network.slice_ratio))) for need in needs]
+    return periods_us.count(inf), max((us for us in periods_us if us < inf), default=0.0)
+
+
+def _of_bus(name: str, network: Network, _kept: Collection[str]) -> Iterator[Changes]:
+    """Values of a setting of the bus, safe for all nodes that [limits] asks for."""
+    largest = max((network, *(room.network for room in rooms(network))), key=lambda each: float(plain(each.nodes)))
+    return (values for setting in network.bus.settings(largest) if setting.name == name for values in setting.values)
+
+
+def _ratios(network: Network, _kept: Collection[str]) -> Iterator[Changes]:
+    """The smallest slice ratio that gives the time that is needed, and no more than is advised."""
+    own, period_us = float(plain(network.slice_ratio)), float(plain(network.period_us))
+    slice_us = max((need.slice_us for need in unmet(network) if need.slice_us < inf), default=0.0)
+    ratio = min(ceil(_RATIO_STEPS * slice_us / period_us * (1 - FIT_ROUNDING)) / _RATIO_STEPS, MOST_RATIO)
+    if ratio > own:
+        yield {RATIO: ratio}
+
+
+def _payloads(network: Network, kept: Collection[str]) -> Iterator[Changes]:
+    """The largest payload with which all constraints hold, or the smallest one: the larger of read and write is cut."""
+    profile, payloads = network.profile, network.bus.payloads(network)
+    cuts = [_cut(alike, kind) for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS)]
+    step = max(payloads.step_bytes, min((size for key, size in cuts if key not in kept), default=1))
+    most = min(int(network.largest_payload_bytes) - 1, payloads.most_bytes)
+    sizes = [size for size in range(step, most + 1, step) if _within(profile, size, kept)]
+    # No more bytes are needed where fewer are not enough, but where a table of execution times falls.
+    fits = bisect_left(sizes, x=True, key=lambda size: not _holds(network, _within(profile, size, kept)))
+    yield from (
+        (change for size in (sizes[max(fits - 1, 0)], sizes[0]) if (change := _within(profile, size, kept)))
+        if sizes
+        else ()
+    )
+
+
+def _holds(network: Network, change: Changes | None) -> bool:
+    after = _with_one(network, change) if change else None
+    return after is not None and not unmet(after)
+
+
+def _within(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
+    """The change to payloads of so many bytes or less; empty where they are, None where no payload would be left."""
+    changes: dict[str, Value] = {}
+    for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS):
+        over, (key, bytes_cut) = int(alike.bytes_of(kind)) - most_bytes, _cut(alike, kind)
+        if over > 0 and key not in kept:
+            changes[key] = getattr(alike.payload, key.rpartition(".")[2]) - ceil(over / bytes_cut)
+    return changes if all(int(value) > 0 for value in changes.values()) else None
+
+
+def _cut(alike: AlikeNodes, kind: TransactionKind) -> tuple[str, int]:
+    """The key that a payload is cut by, and what a byte of it takes away [bytes]; without axes it is the fixed part."""
+    key, axes = alike.payload_key(kind), int(alike.node.axes)
+    return (key, axes) if axes and key.endswith("_per_axis") else (key.removesuffix("_per_axis"), 1)
+
+
+def _periods(network: Network, _kept: Collection[str]) -> Iterator[Changes]:
+    """The period nearest to the own one at which all constraints hold: rounded up, or the next that the bus allows."""
+    least = smallest_period(network)
+    if least.us is None:
+        return
+    periods, own_us = network.bus.periods, float(plain(network.period_us))
+    if periods.us:
+        allowed = (us for us in periods.us if us >= least.us)
+        yield from ({PERIOD: us} for us in sorted(allowed, key=lambda us: abs(us - own_us)))
+    else:
+        yield {PERIOD: min(rounded_up(max(least.us, own_us)), MAX_TIME_US)}
+
+
+def rounded_up(us: float) -> float:
+    """A time rounded up to three significant digits, float rounding aside [us].
+
+    Examples
+    --------
+    >>> rounded_up(1087.2), rounded_up(123.4), rounded_up(1100.0)
+    (1090.0, 124.0, 1100.0)
+    """
+    context = Context(prec=_PERIOD_DIGITS, rounding=ROUND_CEILING)
+    return float(context.create_decimal(Decimal(us * (1 - FIT_ROUNDING))))
+
+
+def _fewer_nodes(network: Network, _kept: Collection[str]) -> Iterator[Changes]:
+    """The most nodes, fewer than now, with which all constraints hold; no constraint is eased by nodes."""
+    counts = range(int(plain(network.nodes)) - 1, 0, -1)
+    place = bisect_left(counts, x=True, key=lambda nodes: _holds(network, {NODES: nodes}))
+    if counts:
+        yield {NODES: counts[min(place, len(counts) - 1)]}
+
+
+class Cure(NamedTuple):
+    """The change after which a network holds every constraint of a plan."""
+
+    changes: Changes | None
+    """New value by dotted key, the dearest change first; empty if nothing is to change, None if no change is enough."""
+    why: str = ""
+    """Reason that no change is enough."""
+
+
+def cure(network: Network, *, kept: Collection[str] = ()) -> Cure:
+    """Find the change that mends a network, with the default freedoms of a plan."""
+    steps = search(network, freed(network, kept=kept), kept=kept)
+    last = steps[-1]
+    return Cure(None, stands_in_the_way(network, last).why) if last.unmet else Cure(last.changes)
+
+
+def stands_in_the_way(network: Network, step: Step) -> Need:
+    """The constraint that a step does not hold, with its words."""
+    after = changed(network, step.changes)
+    ratio = float(plain(after.slice_ratio))
+    need = most_asking(step.unmet, ratio=ratio)
+    return need._replace(why=need.words(ratio=ratio, most_us=float(plain(after.period_us))))
+
+
+def changeable(network: Network) -> tuple[str, ...]:
+    """Default freedoms of a plan, in words, the cheapest first."""
+    return tuple(freedom.label for freedom in freed(network))
+
+
+def nodes_for_axes(profile: Profile, axes: int) -> int:
+    """Nodes that a number of axes takes, with the profile's axes of each node [1].
+
+    Raises
+    ------
+    BusplanError
+        Nodes differ, so that axes do not say how many of which.
+    """
+    if profile.group:
+        own = {alike: int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes}
+        needed = {alike: axes - sum(own.values()) + own[alike] for alike in own if alike.node.axes}
+        each = ", or ".join(
+            f"set {alike.nodes_key}={ceil(of_group / int(alike.node.axes))}"
+            for alike, of_group in needed.items()
+            if of_group > 0
+        )
+        instead = f"say instead: {each}" if each else "set the nodes of a group instead"
+        raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
+    (alike,) = profile.alike_nodes
+    return ceil(axes / int(alike.node.axes))
+
+
+def settings_to_be_carried(network: Network) -> Changes:
+    """The cheapest setting of the bus with which some slice carries the network, where none does now; else empty."""
+
+    def is_carried(trial: Network | None) -> bool:
+        return trial is not None and all(need.period_us(1.0) < inf for need in to_be_shown(trial))
+
+    if is_carried(network):
+        return {}
+    settings = sorted(network.bus.settings(network), key=lambda setting: setting.cost)
+    changes = (dict(values) for setting in settings for values in setting.values)
+    return next((change for change in changes if is_carried(_with_one(network, change))), {})

@@ -1,0 +1,285 @@
+"""Capacity over a grid: the figures of `capacity` for many profiles at once, by the same functions.
+
+Those functions accept arrays, so a profile whose keys hold arrays gives arrays. The values of each key lie along an
+axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are added here.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache, partial, reduce
+from math import inf, prod
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from busplan.buses.cycle import BusCycle
+from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, Sort
+from busplan.buses.network import Network
+from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Limit
+from busplan.elementwise import Number
+from busplan.progress import Progress, ignored
+from busplan.questions.fit.certainty import (
+    TIME,
+    VERDICTS,
+    certainty,
+    fits_in,
+    limit_codes,
+    limits_to_be_safe,
+    limits_with_time,
+    time_code,
+    verdict_code,
+)
+from busplan.questions.fit.figures import COUNTS, certainty_numbers, numeric_figures
+from busplan.questions.fit.network import network_of
+from busplan.questions.fit.node_limit import most_nodes
+from busplan.questions.sweep.grid import Array, Grid
+from busplan.sections.base import with_all_unchecked
+from busplan.sections.profile import Profile
+
+CHUNK_POINTS: Final = 1 << 14
+"""Points computed at once: their arrays fit into the processor's cache."""
+
+_TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
+
+Columns: TypeAlias = dict[str, Array]
+"""Columns by name, a row for each point and timing model, each of shape (rows,).
+
+Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
+"""
+
+
+def figure_names(network: Network) -> tuple[str, ...]:
+    """Columns of a sweep after the varied keys; `timing_model` is the first, counts of groups are the last."""
+    groups = (f"group.{group.name}.{key}" for group in network.profile.group for key in COUNTS)
+    return (*(figure.key for figure in network.bus.figures.capacity), *groups)
+
+
+def figure_table(
+    network: Network,
+    grid: Grid,
+    *,
+    timing_models: Sequence[str],
+    group: str = "",
+    with_counts: bool = True,
+    progress: Progress = ignored,
+) -> Columns:
+    """Compute all figures of `capacity` over a grid.
+
+    Parameters
+    ----------
+    network
+        The network.
+    grid
+        Values of its keys, from `checked_grid`.
+    timing_models
+        Timing models, in this order.
+    group
+        Group of the profile whose nodes vary for the most nodes and axes of the whole, the others as they are; empty
+        where all nodes are alike.
+    with_counts
+        Whether there are columns of the most nodes and axes, which take the cycle at other numbers of nodes.
+    progress
+        Called with the points that are done, and all of them.
+
+    References
+    ----------
+    Paper, equations (1)-(11).
+    """
+    profile = network.profile
+    parts: list[Columns] = []
+    done = 0
+    for chunk in grid.chunks(CHUNK_POINTS):
+        figures_of = partial(_figures, profile, chunk.values, group=group)
+        columns = [{**chunk.values, **figures_of(model, with_counts=with_counts)} for model in timing_models]
+        names = (name for name in (*grid.axes, *figure_names(network)) if name in columns[0])
+        parts.append({name: _interleaved([own[name] for own in columns], chunk.shape) for name in names})
+        done += prod(chunk.shape)
+        progress(done, grid.points)
+    # A part lets go of a column when it is in the table.
+    return {name: np.concatenate([part.pop(name) for part in parts]) for name in [*parts[0]]}
+
+
+def _interleaved(by_model: Sequence[Array], shape: tuple[int, ...]) -> Array:
+    """Arrays that broadcast to a shape, one for each timing model: point by point, and for each model by model."""
+    return np.stack([np.broadcast_to(own, shape).ravel() for own in by_model], axis=1).ravel()
+
+
+def _figures(
+    profile: Profile, values: Mapping[str, Array], model: str, *, group: str, with_counts: bool
+) -> dict[str, Array]:
+    """All figures of a chunk under one timing model; they broadcast to its shape."""
+    for number, (key, own) in enumerate(values.items()):
+        if own.dtype == object and own.size > 1:
+            # Words among numbers: compute each value by itself and join the results along the axis.
+            parts = [
+                _figures(
+                    profile,
+                    {**values, key: np.take(own, [index], axis=number)},
+                    model,
+                    group=group,
+                    with_counts=with_counts,
+                )
+                for index in range(own.size)
+            ]
+            return {name: _joined([part[name] for part in parts], axis=number) for name in parts[0]}
+    figures = _columns(_at(profile, values), model, group=group, with_counts=with_counts)
+    return {name: _with_axes(column, len(values)) for name, column in figures.items()}
+
+
+def _with_axes(column: Array, axes: int) -> Array:
+    return column.reshape((1,) * axes) if column.size == 1 else column
+
+
+def _joined(parts: list[Array], *, axis: int) -> Array:
+    shape = np.broadcast_shapes(*(part.shape for part in parts))
+    return np.concatenate([np.broadcast_to(part, shape) for part in parts], axis=axis)
+
+
+def _at(profile: Profile, values: Mapping[str, Array]) -> Profile:
+    """Return a copy whose keys hold arrays, unvalidated."""
+    return with_all_unchecked(
+        profile, {key: own.item() if own.size == 1 else own.astype(float) for key, own in values.items()}
+    )
+
+
+def _columns(where: Profile, model: str, *, group: str, with_counts: bool) -> dict[str, Array]:
+    network = network_of(where)
+    bus = network.bus
+    cycle = bus.cycle(network, model=model)
+    figures = numeric_figures(cycle)
+    terms = {term.key: term.us if network.groups else inf for term in cycle.terms}
+    limits = limits_with_time(network, model=model)
+    late = np.logical_not(np.asarray(fits_in(figures["required_us"], available_us=figures["available_us"])))
+    codes = limit_codes(network)
+    broken = {**_where(codes, BROKEN), TIME: late}
+    numbers = {**figures, **cycle.figures(), **terms, FITS.key: np.logical_not(reduce(np.logical_or, broken.values()))}
+    words = {
+        TIMING_MODEL.key: _word(model),
+        "binding_term": _chosen([term.name for term in cycle.terms], _largest([*terms.values()]))
+        if network.groups
+        else _word(None),
+        "exceeded": _sets(broken),
+        **(_certainty(cycle, codes) if model == bus.deciding_model else _UNDECIDED),
+        **(_counts(network, limits, model=model, group=group) if with_counts else {}),
+    }
+    sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
+    return {
+        key: words[key] if key in words else _number(numbers[key], sorts[key])
+        for key in figure_names(network)
+        if with_counts or key.rpartition(".")[2] not in COUNTS
+    }
+
+
+def _chosen(words: Iterable[object], codes: Array) -> Array:
+    """Words by their place."""
+    chosen: Array = _words(tuple(words))[np.atleast_1d(codes)]
+    return chosen
+
+
+def _word(word: object) -> Array:
+    return _chosen([word], np.zeros(1, int))
+
+
+@cache
+def _words(words: tuple[object, ...]) -> Array:
+    return np.fromiter(words, dtype=object, count=len(words))
+
+
+_NO_NUMBER: Final = np.full((), np.nan)
+_UNDECIDED: Final = {
+    figure.key: _word(None) if figure.sort in ("word", "words") else _NO_NUMBER
+    for figure in CERTAINTY
+    if figure.key not in COUNTS
+}
+"""Figures that a timing model does not have."""
+
+
+def _number(number: Number | None, sort: Sort) -> Array:
+    """Array of the type that the sort of a figure has; NaN for what does not exist."""
+    if number is None:
+        return _NO_NUMBER
+    array: Array = np.asarray(number, dtype=_TYPES[sort])
+    return np.where(np.isinf(array), np.nan, array) if sort == "number" else array
+
+
+def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str) -> dict[str, Array]:
+    """How many nodes fit: of each group, and of the whole where one group varies and the others are as they are."""
+    if not network.groups:
+        return {**dict.fromkeys(COUNTS, _NO_NUMBER), "limited_by": _word(None), "safe_limited_by": _word(None)}
+    counts = {name: _counts_of(network.asking(name), limits, model=model) for name in network.names}
+    whole = counts[group]
+    if network.is_uniform:
+        return whole
+    varied = network.asking(group).asked_nodes
+    beside = {"nodes": network.nodes - varied.nodes, "axes": network.axes - varied.nodes * varied.node.axes}
+    # Where not even one of its nodes fits, there is no number of the whole.
+    more = {
+        f"{most}_{what}": np.where(
+            whole[f"{most}_nodes"] > 0, whole[f"{most}_{what}"] + number, whole[f"{most}_{what}"]
+        )
+        for most in ("max", "safe")
+        for what, number in beside.items()
+    }
+    of_groups = {f"group.{name}.{key}": column for name in counts for key, column in counts[name].items()}
+    return {**whole, **{key: column.astype(whole[key].dtype) for key, column in more.items()}, **of_groups}
+
+
+def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict[str, Array]:
+    most, axes = most_nodes(network, limits), network.asked_nodes.node.axes
+    counted = {
+        "max_nodes": _number(most.nodes, "count"),
+        "max_axes": _number(axes * most.nodes, "count"),
+        "limited_by": _chosen([limit.key for limit in limits], np.asarray(most.limit, int)),
+    }
+    if model != network.bus.deciding_model:
+        return {**counted, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _word(None)}
+    to_be_safe = limits_to_be_safe(network)
+    # No more nodes are shown to fit than fit.
+    safe = most_nodes(network, to_be_safe, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
+    return {
+        **counted,
+        "safe_nodes": _number(safe.nodes, "count"),
+        "safe_axes": _number(axes * safe.nodes, "count"),
+        "safe_limited_by": _chosen([limit.key for limit in to_be_safe], np.asarray(safe.limit, int)),
+    }
+
+
+def _certainty(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Array]:
+    """Figures of how sure the verdict is, of a cycle under the timing model that decides."""
+    sure = certainty(cycle)
+    codes = {**limits, TIME: time_code(sure, cycle.network)}
+    sorts = {figure.key: figure.sort for figure in CERTAINTY}
+    return {
+        **{key: _number(number, sorts[key]) for key, number in certainty_numbers(sure, cycle).items()},
+        "not_shown": _sets(_where(codes, NOT_SHOWN_KEPT)),
+        "verdict": _chosen(VERDICTS, np.asarray(verdict_code(codes), int)),
+    }
+
+
+def _where(codes: Mapping[str, Number], code: int) -> dict[str, Array]:
+    """Where each limit has a verdict."""
+    return {key: np.equal(np.asarray(own), code) for key, own in codes.items()}
+
+
+def _sets(flags: Mapping[str, Array]) -> Array:
+    """The keys that are flagged, as a tuple at each point."""
+    codes: Array = np.asarray(sum(flag.astype(int) << bit for bit, flag in enumerate(flags.values())))
+    words: Array = _combinations(tuple(flags))[np.atleast_1d(codes)]
+    return words
+
+
+@cache
+def _combinations(keys: tuple[str, ...]) -> Array:
+    """Every set of keys, by the number whose bits are its members."""
+    return _words(
+        tuple(tuple(key for bit, key in enumerate(keys) if code >> bit & 1) for code in range(1 << len(keys)))
+    )
+
+
+def _largest(terms: list[Number]) -> Array:
+    """Index of the largest term; the first one among equals."""
+    best, *rest = map(np.asarray, terms)
+    place = np.zeros((), int)
+    for index, term in enumerate(rest, start=1):
+        place = np.where(np.greater(term, best), index, place)
+        best = np.maximum(term, best)
+    return place

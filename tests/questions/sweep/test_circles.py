@@ -1,0 +1,183 @@
+"""Circle tests of a sweep, here and on any executor; worker processes that are lost."""
+
+import os
+import random
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from multiprocessing import active_children
+from typing import Any
+
+import pytest
+
+import busplan
+from busplan.cli.workers import workers
+from busplan.errors import WorkerLostError
+from busplan.questions.sweep.circles import CIRCLE_COLUMNS, chunk_tests
+
+Make = Callable[..., busplan.Profile]
+
+SMALL = {"circle.radius_mm": [10], "servo.position_gain_per_s": range(100, 104), "delivery.seed": range(1, 4)}
+
+
+class Shuffled(Executor):
+    """Runs all that was handed over, in any order, when a result is asked for."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self._calls: list[tuple[Future[Any], Callable[[], Any]]] = []
+        self.order: list[int] = []
+
+    def submit(self, fn: Callable[..., Any], /, *args: object, **_kwargs: object) -> "Future[Any]":
+        number, future = len(self._calls) + len(self.order), _Asked(self._run)
+
+        def call() -> None:
+            self.order.append(number)
+            try:
+                future.set_result(fn(*args))
+            except Exception as error:  # noqa: BLE001 - as every executor
+                future.set_exception(error)
+
+        self._calls.append((future, call))
+        return future
+
+    def _run(self) -> None:
+        calls, self._calls = self._calls, []
+        for _, call in self._random.sample(calls, len(calls)):
+            call()
+
+
+class _Asked(Future[Any]):
+    def __init__(self, ask: Callable[[], None]) -> None:
+        super().__init__()
+        self._ask = ask
+
+    def result(self, timeout: float | None = None) -> Any:
+        self._ask()
+        return super().result(timeout)
+
+
+def test_a_sweep_is_the_same_on_every_executor() -> None:
+    def document(executor: Executor | None, *, summary: bool = False) -> str:
+        return busplan.sweep("paper-1ms", vary=SMALL, circle=True, executor=executor, summary=summary).to_json()
+
+    alone, summary, shuffled = document(None), document(None, summary=True), Shuffled(7)
+    assert alone.count('"passed"') == 12 * 2
+    assert all(name in alone for name in CIRCLE_COLUMNS)
+    with ThreadPoolExecutor(3) as threads, workers(1) as own:
+        for executor in (shuffled, threads, own):
+            assert document(executor) == alone
+            assert document(executor, summary=True) == summary
+            # It is the caller's, and goes on.
+            assert executor.submit(abs, -1).result(timeout=300) == 1
+    assert shuffled.order != sorted(shuffled.order)
+
+
+def test_progress_counts_the_tests() -> None:
+    done: list[tuple[int, int]] = []
+    busplan.sweep("paper-1ms", vary=SMALL, circle=True, progress=lambda *counts: done.append(counts))
+    assert done == [(number, 12) for number in range(1, 13)]
+    done.clear()
+    busplan.sweep("paper-1ms", vary={"bus.nodes": range(1, 9)}, progress=lambda *counts: done.append(counts))
+    assert done == [(8, 8)]
+
+
+def test_the_first_point_that_cannot_be_run_is_named_before_any_is() -> None:
+    executor = Shuffled(1)
+    with pytest.raises(busplan.BusplanError) as caught:
+        busplan.sweep(
+            "paper-4ms", vary={"cycle.period_us": range(1000, 2001)}, circle=True, force=True, executor=executor
+        )
+    assert str(caught.value).startswith("at cycle.period_us = 1001: servo.step_us")
+    assert not executor.order
+
+
+def test_a_circle_that_the_profile_does_not_ask_for_is_refused_too() -> None:
+    still = busplan.load_profile("paper-two-node")
+    assert not still.asks_for_circle
+    with pytest.raises(busplan.BusplanError, match=r"^at cycle\.period_us = 1001: servo\.step_us"):
+        busplan.sweep(still, vary={"cycle.period_us": [1000, 1001]}, circle=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"executor": ThreadPoolExecutor(1)}, "executor: goes with circle=True"),
+        ({"circle": True, "executor": 3}, "executor 3: expected a concurrent.futures.Executor"),
+        ({"summary": True}, "summary=True: goes with circle=True"),
+    ],
+)
+def test_refusals(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(busplan.BusplanError, match=words):
+        busplan.sweep("paper-1ms", vary={"bus.nodes": [1]}, **options)
+
+
+def test_a_chunk_is_about_a_second_of_work_and_a_few_tests_are_shared_out() -> None:
+    for each_s in [1e-3, 0.06, 0.4, 20.0]:
+        for number in [1, 10, 1000, 10**7]:
+            size = chunk_tests(number, time_s=number * each_s)
+            assert size == 1 or number / size >= 64
+            if number == 10**7 and each_s < 3:
+                assert 0.3 <= size * each_s <= 3
+
+
+@pytest.fixture
+def big(make: Make) -> busplan.Profile:
+    circle = {"radius_mm": 10_000.0, "feed_mm_per_min": 3000.0, "ramp_periods": 20}
+    return make(circle=circle, cycle__period_us=2000.0, servo={"step_us": 50.0})
+
+
+def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
+    big: busplan.Profile, caplog: pytest.LogCaptureFixture
+) -> None:
+    class Stopped(Executor):
+        def map(self, *_: Any, **__: Any) -> Iterator[Any]:
+            raise KeyboardInterrupt
+
+    def told(vary: dict[str, Any], **options: Any) -> list[str]:
+        caplog.clear()
+        with pytest.raises(KeyboardInterrupt):
+            busplan.sweep(big, vary=vary, circle=True, executor=Stopped(), **options)
+        return caplog.messages
+
+    # 50,267,120 steps at 2 ms, which take about 5 s; where the cycle does not fit, nothing is simulated.
+    assert told({"cycle.period_us": [2000, 100]}) == []
+    (said,) = told({"delivery.seed": [1, 2, 3]})
+    assert said.startswith("circle test: 150,801,360 steps, about ")
+    # The memory of one: they run one behind the other.
+    assert " and 0.58 GB" in said
+    # Of more points than are looked at, the number is that of all.
+    (said,) = told({"delivery.seed": range(1, 1001)}, force=True)
+    assert said.startswith("circle test: 50,267,120,000 steps, about ")
+
+
+# --- worker processes --------------------------------------------------------------------------
+
+
+def inverse(number: int) -> float:
+    return 1 / number
+
+
+def test_a_worker_that_is_lost_is_said_and_none_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = active_children()
+    stumbles: list[object] = []
+    monkeypatch.setattr("threading.excepthook", stumbles.append)
+    with workers(2) as crew:
+        assert list(crew.map(abs, range(-50, 0))) == list(range(50, 0, -1))
+        assert len(active_children()) == len(before) + 2
+    assert active_children() == before
+    with pytest.raises(ZeroDivisionError), workers(1) as crew:
+        list(crew.map(inverse, [1, 0]))
+    with pytest.raises(WorkerLostError, match="a worker was killed"), workers(1) as crew:
+        list(crew.map(os._exit, range(100)))
+    assert active_children() == before
+    with workers(1) as crew:
+        calls = [crew.submit(time.sleep, 0.1) for _ in range(9)]
+        calls[0].result()
+        for call in calls:
+            call.cancel()
+        for process in set(active_children()) - set(before):
+            process.kill()
+        assert calls[1].exception(timeout=300)
+    assert active_children() == before
+    assert not stumbles

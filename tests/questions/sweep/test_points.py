@@ -1,0 +1,82 @@
+"""A sweep is capacity, point by point: what switches a part on or off does so at each point for itself."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import busplan
+from busplan.buses import kind_named, kind_names
+from busplan.profile.kinds import cycle_keys
+from busplan.profile.toml import override
+from busplan.sections.base import value_at
+from busplan.sections.profile import Profile
+
+GROUPS: Mapping[str, Any] = {
+    "schema_version": 1,
+    "name": "test",
+    "bus": {"kind": "ethercat", "mailbox_polls": 1, "distributed_clocks": True},
+    "cycle": {"period_us": 9500.0},
+    "group": [
+        {
+            "name": name,
+            "nodes": nodes,
+            "axes": 1,
+            "read_bytes": size,
+            "write_bytes": 0,
+            "every": every,
+            "execution": {"kind": "linear", "base_us": 5.0, "per_byte_us": 0.1},
+        }
+        for name, nodes, size, every in (("first", 2, 8, 1), ("second", 3, 1480, 1), ("third", 5, 46, 8))
+    ],
+}
+
+
+def with_values(profile: Profile, key: str, values: list[float]) -> list[float]:
+    """Those of some values that a profile may have, each once."""
+    taken = []
+    for value in dict.fromkeys(values):
+        try:
+            override(profile, {key: value})
+        except busplan.BusplanError:
+            continue
+        taken.append(value)
+    return taken
+
+
+def require_points(profile: Profile, vary: Mapping[str, list[float]]) -> None:
+    for row in busplan.sweep(profile, vary=vary).to_dict()["rows"]:
+        point = override(profile, {key: row[key] for key in vary})
+        (found,) = busplan.capacity(point, timing_model=row["timing_model"]).results
+        for key, value in found.by_key().items():
+            assert row[key] == (pytest.approx(value, rel=1e-9, abs=1e-9) if isinstance(value, float) else value), key
+
+
+@pytest.mark.parametrize("kind", kind_names())
+@given(data=st.data())
+def test_every_figure_of_a_row_is_that_of_its_point(
+    kind: str, data: st.DataObject, profiles_by_kind: Mapping[str, st.SearchStrategy[Profile]]
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    values = {key: value_at(profile, key) for key in cycle_keys(profile)}
+    keys = [(key, value) for key, value in values.items() if type(value) in (int, float)]
+    key, value = data.draw(st.sampled_from(keys))
+    some = with_values(profile, key, [0, 1, 3, value])
+    if len(some) > 1:
+        require_points(profile, {key: some})
+
+
+@pytest.mark.parametrize("polls", [[0, 1], [2, 0]])
+@pytest.mark.parametrize("model", [None, "TwinCAT"])
+def test_the_last_frame_comes_again_where_no_mailbox_is_asked(polls: list[float], model: str | None) -> None:
+    data = {**GROUPS, "bus": {**GROUPS["bus"], **({"master": model} if model else {})}}
+    profile = kind_named("ethercat").profile_model().model_validate(data)
+    require_points(profile, {"bus.mailbox_polls": polls})
+
+
+@pytest.mark.parametrize("sizes", [[0, 8], [0, 1480, 3]])
+def test_the_first_device_with_data_shares_the_first_frame(sizes: list[float]) -> None:
+    profile = kind_named("ethercat").profile_model().model_validate(GROUPS)
+    require_points(profile, {"group.first.read_bytes": sizes, "group.third.every": [1, 8]})

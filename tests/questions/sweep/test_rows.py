@@ -1,0 +1,167 @@
+"""Rows of a sweep as files: the characters that `capacity` writes for each point, and typed columns of Parquet."""
+
+import csv
+import io
+import json
+import tomllib
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import busplan
+from busplan.buses.figure import unit_of
+from busplan.questions.sweep.asked import column_figures
+from busplan.questions.sweep.circles import CIRCLE_COLUMNS
+
+GRIDS: dict[str, tuple[str, dict[str, Any]]] = {
+    "decimals": ("paper-4ms", {"cycle.period_us": "100:135.5:1.7"}),
+    "words among numbers": ("paper-1ms", {"cycle.period_us": (250, 333.3, 4000), "bus.gap_count": (7, "optimal", 63)}),
+    "truths": ("paper-4ms", {"bus.cycle_master": (True, False), "bus.nodes": (1, 16, 17)}),
+    "CAN": ("can-servo-8", {"cycle.period_us": (1000, 2000, 5000.5)}),
+}
+
+
+def saved(answer: Any, path: Path) -> bytes:
+    answer.save(path)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_csv_and_json_are_what_capacity_writes_for_each_point(name: str, tmp_path: Path) -> None:
+    shipped, vary = GRIDS[name]
+    answer = busplan.sweep(shipped, vary=vary)
+    text = saved(answer, tmp_path / "rows.csv").decode()
+    rows, document = list(csv.reader(io.StringIO(text))), json.loads(saved(answer, tmp_path / "rows.json"))
+    wanted_rows, wanted = [list(answer.columns)], []
+    for changes in answer.sweep.grid.each_point():
+        own_profile = busplan.load_profile(shipped, changes=changes)
+        one = busplan.capacity(own_profile, timing_model=answer.sweep.timing_models)
+        own = list(csv.reader(io.StringIO(saved(one, tmp_path / "one.csv").decode())))
+        assert own[0][1:] == list(answer.columns[len(changes) :])
+        start = [str(value).lower() if isinstance(value, bool) else str(value) for value in changes.values()]
+        wanted_rows += [start + row[1:] for row in own[1:]]
+        wanted += [{**changes, **{key: row[key] for key in own[0][1:]}} for row in one.to_dict()["results"]]
+    assert rows == wanted_rows
+    # Not only equal: 4.0 stays 4.0.
+    assert list(map(repr, document.pop("rows"))) == list(map(repr, wanted))
+    assert (document["schema"], document["command"], document["profile"]) == (1, "sweep", shipped)
+    assert (document["points"], document["varied"]) == (
+        len(wanted) // len(document["timing_models"]),
+        {key: len(axis) for key, axis in answer.sweep.grid.axes.items()},
+    )
+
+
+def test_what_does_not_exist_is_null_and_empty(tmp_path: Path) -> None:
+    own = busplan.load_profile("paper-two-node", changes={"circle.radius_mm": 5.0, "circle.ramp_periods": 5})
+    # At 100 us the cycle does not fit, which fails; at 2 ms nothing is asked of the circle.
+    answer = busplan.sweep(own, vary={"cycle.period_us": [100, 2000]}, timing_model="standard", circle=True)
+    first, second = csv.DictReader(io.StringIO(saved(answer, tmp_path / "rows.csv").decode()))
+    assert (first["max_contour_error_mm"], first["passed"], second["passed"]) == ("", "false", "")
+    rows = answer.to_dict()["rows"]
+    assert [(row["phase_margin_deg"] is None, row["passed"]) for row in rows] == [(True, False), (False, None)]
+    assert list(answer["passed"]) == [False, None]
+
+
+def test_a_thousand_pieces_are_one_table(tmp_path: Path) -> None:
+    answer = busplan.sweep("paper-4ms", vary={"cycle.nonperiodic_us": range(20_000)}, timing_model="paper")
+    rows = list(csv.DictReader(io.StringIO(saved(answer, tmp_path / "rows.csv").decode())))
+    assert [int(row["cycle.nonperiodic_us"]) for row in rows] == list(range(20_000))
+    assert [float(row["margin_us"]) for row in rows] == answer["margin_us"].tolist()
+    assert [row["margin_us"] for row in answer.to_dict()["rows"]] == answer["margin_us"].tolist()
+
+
+# --- Parquet ----------------------------------------------------------------------------------------------
+
+VARY: dict[str, Any] = {
+    "bus.gap_count": (7, "optimal", 63),
+    "bus.nodes": (1, 9, 17),
+    "cycle.period_us": (250, 333.3, 4000),
+}
+
+
+@pytest.fixture(scope="module")
+def parquet(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    pytest.importorskip("pyarrow")
+    return saved(busplan.sweep("paper-4ms", vary=VARY), tmp_path_factory.mktemp("rows") / "rows.parquet")
+
+
+def expected() -> dict[str, list[object]]:
+    """The columns of the document in JSON; lists as words, and empty ones as nothing, as in CSV."""
+    rows = busplan.sweep("paper-4ms", vary=VARY).to_dict()["rows"]
+    found = {name: [row[name] for row in rows] for name in rows[0]}
+    for name in ("exceeded", "not_shown", "circle_refused_by"):
+        found[name] = [" ".join(one or ()) or None for one in found[name]]
+    found["bus.gap_count"] = [str(one) for one in found["bus.gap_count"]]
+    return found
+
+
+def test_pandas_reads_the_figures_of_the_document(parquet: bytes) -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.read_parquet(BytesIO(parquet))
+    wanted = expected()
+    assert list(frame) == list(wanted)
+    for name, values in wanted.items():
+        got = [None if pandas.isna(one) else one for one in frame[name].tolist()]
+        assert got == values, name
+    kinds = {name: str(frame[name].dtype) for name in frame}
+    assert {kinds[name] for name in ("timing_model", "limited_by", "verdict", "bus.gap_count")} == {"category"}
+    assert (kinds["margin_us"], kinds["max_nodes"], kinds["fits"]) == ("float64", "int64", "bool")
+    assert (kinds["bus.nodes"], kinds["cycle.period_us"]) == ("int64", "float64")
+
+
+def test_polars_reads_the_figures_of_the_document(parquet: bytes) -> None:
+    polars = pytest.importorskip("polars")
+    frame = polars.read_parquet(BytesIO(parquet))
+    assert frame.to_dict(as_series=False) == expected()
+    # A count that only one timing model has is whole all the same.
+    assert frame.schema["safe_nodes"] == polars.Int64
+    assert frame.schema["verdict"] == polars.Categorical
+
+
+def test_both_read_the_floats_of_csv(tmp_path: Path) -> None:
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": np.linspace(100, 4000, 300)}, timing_model="standard")
+    text = saved(answer, tmp_path / "rows.csv")
+    frames = (
+        pandas.read_csv(BytesIO(text), engine="python"),
+        polars.read_csv(BytesIO(text), infer_schema_length=None),
+    )
+    for name in ("cycle.period_us", "margin_us", "utilisation", "nodes_eq11", "uncertainty_us"):
+        for frame in frames:
+            np.testing.assert_array_equal(frame[name].to_numpy(), answer[name], strict=True)
+
+
+def test_the_schema_says_what_the_rows_are_of(parquet: bytes) -> None:
+    schema = pytest.importorskip("pyarrow.parquet").read_schema(BytesIO(parquet))
+    assert tomllib.loads(schema.metadata[b"busplan.profile"].decode())["name"] == "paper-4ms"
+    facts = json.loads(schema.metadata[b"busplan.sweep"])
+    document = busplan.sweep("paper-4ms", vary=VARY).to_dict()
+    assert facts == {key: value for key, value in document.items() if key != "rows"}
+    assert schema.metadata[b"busplan.version"].decode() == busplan.__version__
+    figures = column_figures(busplan.load_profile("paper-4ms"))
+    for field in schema:
+        assert field.metadata[b"unit"].decode() == unit_of(field.name)
+        if field.name in figures:
+            assert field.metadata[b"meaning"].decode() == figures[field.name].meaning
+    assert schema.field("margin_us").metadata[b"unit"] == b"us"
+
+
+def test_truths_that_vary_are_truths() -> None:
+    pytest.importorskip("pyarrow")
+    table = busplan.sweep("paper-4ms", vary={"bus.cycle_master": (False, True)}).to_arrow()
+    assert table["bus.cycle_master"].to_pylist() == [False, True]
+
+
+def test_counts_of_groups_and_figures_of_circles_are_typed() -> None:
+    pa = pytest.importorskip("pyarrow")
+    found = busplan.sweep("gantry-24", vary={"cycle.period_us": (500, 1000)}).to_arrow()
+    counts = [name for name in found.column_names if name.endswith("safe_nodes")]
+    assert len(counts) == 4
+    assert {found.schema.field(name).type for name in counts} == {pa.int64()}
+    answer = busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, circle=True)
+    row, wanted = answer.to_arrow().to_pylist()[0], answer.to_dict()["rows"][0]
+    assert {name: row[name] for name in CIRCLE_COLUMNS} == {name: wanted[name] for name in CIRCLE_COLUMNS}
+    assert row["passed"] is None

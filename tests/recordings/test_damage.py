@@ -1,0 +1,204 @@
+"""Recordings with damage: what no frame can be is none, becomes no figure, and is said where it begins."""
+
+import os
+import resource
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+from struct import pack
+from typing import TYPE_CHECKING, Any
+
+import can
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import busplan
+from busplan.errors import BusplanError
+from busplan.recordings.can import CanFrames, read_can
+from busplan.recordings.ethercat import read_ethercat
+from tests.oracles.can_recording import arbitrated, candump, servo_8
+from tests.oracles.ethercat_recording import Machine, pcap, pcapng, simulated
+
+if TYPE_CHECKING:
+    from subprocess import CompletedProcess
+
+Run = Callable[..., "CompletedProcess[str]"]
+LOGGED = arbitrated(servo_8(100))
+MANY = 1_000_000
+"""Far less than the bytes of a bomb, far more than those of any container [kB]."""
+
+
+def read(path: Path) -> CanFrames:
+    return read_can(path, progress=lambda _done, _total: None)
+
+
+LINES = {
+    "a stamp of nan s": "(nan) can0 181#00",
+    "a stamp of inf s": "(inf) can0 181#00",
+    "a stamp of 1e+300 s": "(1e300) can0 181#00",
+    "a stamp of -1 s": "(-1) can0 181#00",
+    "a stamp of 1e+10 s": "(10000000000.000000) can0 181#00",
+    "a stamp 23,148.1 days after the one before": "(3700000000.000000) can0 181#00",
+    "data of 300 bytes": f"(1700000001.000000) can0 181#{300 * '00'}",
+}
+
+
+@pytest.mark.parametrize("words", LINES)
+def test_what_no_frame_can_be_ends_the_log_and_is_said(words: str, tmp_path: Path) -> None:
+    whole, damaged = tmp_path / "whole.log", tmp_path / "damaged.log"
+    whole.write_text(candump(LOGGED))
+    damaged.write_text(f"{candump(LOGGED)}{LINES[words]}\n{candump(LOGGED[:9], start_s=1_700_000_002)}")
+    expected, found = (busplan.measured("can-servo-8", path) for path in (whole, damaged))
+    assert found.figures == expected.figures
+    said = f"The log is cut or damaged after frame {len(LOGGED):,}, read up to there: {words}."
+    assert said in found.remarks
+    assert [remark for remark in found.remarks if remark != said] == list(expected.remarks)
+    damaged.write_text(f"{LINES[words]}\n{candump(LOGGED)}")
+    if "days" not in words:  # of a first frame nobody knows when it came
+        with pytest.raises(BusplanError, match="has no CAN frame") as caught:
+            busplan.measured("can-servo-8", damaged)
+        assert words in str(caught.value)
+
+
+def test_an_absurd_stamp_makes_no_load_smaller(run: Run, tmp_path: Path) -> None:
+    run("init", "plan", "--from", "can-servo-8", cwd=tmp_path)
+    path = tmp_path / "plan.toml"
+    path.write_text(path.read_text().replace("period_us = 4000", "period_us = 8000"))
+    for line in ("", *LINES.values()):
+        (tmp_path / "bus.log").write_text(f"{candump(LOGGED)}{line}\n")
+        done = run("check", "plan.toml", "--no-circle", "--recording", "bus.log", cwd=tmp_path)
+        assert (done.returncode, "BP401 error: name: load: " in done.stdout) == (1, True)
+
+
+def test_an_identifier_of_29_bits_without_its_mark_is_damage(tmp_path: Path) -> None:
+    path = tmp_path / "bus.asc"
+    head = "date Thu Jan 1 10:00:00.000 am 2024\nbase hex  timestamps absolute\nBegin Triggerblock\n"
+    words = ("123", "7FF", "18FEF100")
+    frames = "".join(f"   {number}.0 1  {word} Rx   d 2 00 11\n" for number, word in enumerate(words))
+    path.write_text(head + frames + frames.replace("18FEF100", "18FEF100x"))
+    found = read(path)
+    assert found.identifiers.tolist() == [0x123, 0x7FF]
+    assert found.broken == "an identifier of 0x18fef100, which has no room in 11 bits"
+    path.write_text(head + frames.replace("18FEF100", "18FEF100x"))
+    assert read(path).identifiers.tolist() == [0x123, 0x7FF, 0x18FEF100]
+
+
+@cache
+def log(ending: str, folder: str) -> bytes:
+    path = Path(folder, f"whole.{ending}")
+    with can.Logger(str(path)) as writer:
+        for frame in LOGGED[:60]:
+            writer(
+                can.Message(
+                    timestamp=1_700_000_000 + frame.us / 1e6,
+                    arbitration_id=frame.identifier,
+                    is_extended_id=False,
+                    data=frame.data,
+                    channel=0,
+                )
+            )
+    return path.read_bytes()
+
+
+PIECES = st.one_of(
+    st.binary(max_size=4), st.sampled_from([b"nan", b"9" * 12, b"-", b"x", b"FFFFFFFFF", b"inf", b" ", b"\n", b"1e99"])
+)
+
+
+@given(
+    ending=st.sampled_from(["log", "asc", "trc", "blf"]),
+    damages=st.lists(st.tuples(st.floats(0, 1), st.integers(0, 12), PIECES), min_size=1, max_size=3),
+)
+def test_frames_are_taken_whole_or_not_at_all(
+    tmp_path_factory: pytest.TempPathFactory, ending: str, damages: list[tuple[float, int, bytes]]
+) -> None:
+    folder = tmp_path_factory.mktemp("damaged")
+    content = log(ending, str(tmp_path_factory.getbasetemp()))
+    for share, cut, piece in damages:
+        at = int(share * len(content))
+        content = content[:at] + piece + content[at + cut :]
+    path = folder / f"bus.{ending}"
+    path.write_bytes(content)
+    try:
+        found = read(path)
+    except BusplanError:
+        return
+    arrays: list[Any] = [field for field in found if isinstance(field, np.ndarray)]
+    assert {len(array) for array in arrays} == {len(found.times_us)}
+    assert np.isfinite(found.times_us).all()
+    assert np.diff(found.times_us, prepend=0).max() <= 86_400e6
+    assert datetime.fromtimestamp(found.start_s, tz=UTC)
+    assert (found.identifiers < np.where(found.extended, 1 << 29, 1 << 11)).all()
+    assert found.sizes.max() <= 64
+
+
+@pytest.mark.parametrize("form", ["pcap", "pcapng"])
+def test_a_packet_of_another_century_ends_a_capture(form: str, tmp_path: Path) -> None:
+    write: Callable[..., bytes] = pcap if form == "pcap" else pcapng
+    packets = simulated(Machine(), 200)
+    late = [(us + (2e15 if place == 150 else 0), packet) for place, (us, packet) in enumerate(packets)]
+    path = tmp_path / "capture"
+    path.write_bytes(write(packets[:150]))
+    expected = read_ethercat(path, progress=lambda _done, _total: None)
+    path.write_bytes(write(late))
+    found = read_ethercat(path, progress=lambda _done, _total: None)
+    assert np.array_equal(found.times_ns, expected.times_ns)
+    assert found.notes.packets == 150
+    # It is the first one behind those.
+    assert found.notes.broken_at is not None
+    assert 0 <= found.notes.broken_at - len(write(packets[:150])) <= 32
+
+
+PEAK = """
+import resource, sys
+from busplan.recordings.can import read_can
+from pathlib import Path
+try:
+    print(read_can(Path("bus.blf"), progress=lambda *_: None).broken)
+except Exception as error:
+    print(error)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def object_of(kind: int, content: bytes) -> bytes:
+    size = 16 + len(content)
+    return pack("<4sHHII", b"LOBJ", 16, 1, size, kind) + content + bytes(size % 4)
+
+
+def test_a_container_is_inflated_no_further_than_one_can_be(tmp_path: Path) -> None:
+    whole = log("blf", str(tmp_path))
+    deflating = zlib.compressobj()
+    bomb = b"".join((*(deflating.compress(bytes(MANY)) for _ in range(1500)), deflating.flush()))
+    assert len(bomb) < 2 * MANY
+    path = tmp_path / "bus.blf"
+    # An object that goes on from one container to the next is held as it grows.
+    longest = object_of(1, b"")[:8] + pack("<II", 0xFFFFFF00, 1)
+    small = zlib.compress(longest + bytes(6 * MANY))
+    for content in ([bomb], [small] * 200):
+        containers = (object_of(10, pack("<H6xII", 2, 0, 0) + data) for data in content)
+        path.write_bytes(whole + b"".join(containers))
+        done = subprocess.run(
+            [sys.executable, "-c", PEAK], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=300
+        )
+        *_, said, peak_kb = done.stdout.splitlines()
+        assert said == "a container of over 16,000,000 bytes"
+        assert int(peak_kb) < resource.getrusage(resource.RUSAGE_SELF).ru_maxrss + MANY // 2
+    path.write_bytes(whole + object_of(10, pack("<H6xII", 3, 0, 0) + b"?"))
+    assert read(path).broken == "a container that is compressed by method 3"
+
+
+@pytest.mark.parametrize("command", [("measured", "can-servo-8"), ("measured", "ethercat-servo-8"), ("import",)])
+def test_a_pipe_that_nobody_writes_is_refused(run: Run, tmp_path: Path, command: tuple[str, ...]) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    done = run(*command, "pipe", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "pipe: is a named pipe; give a regular file\n")
+    if command[0] == "measured":
+        done = run("check", command[1], "--no-circle", "--recording", "pipe", cwd=tmp_path)
+        assert (done.returncode, "pipe: is a named pipe; give a regular file" in done.stderr) == (2, True)
