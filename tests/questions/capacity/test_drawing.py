@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 import busplan
 from busplan.forms.charts import Lanes
 from busplan.profile.shipped import load
-from busplan.questions.capacity.sensitivity import Effect, Sensitivity, sensitivity
+from busplan.questions.capacity.sensitivity import Effect, Sensitivity, sensitivity_of
 from busplan.questions.capacity.sensitivity_report import sensitivity_drawing
+from busplan.questions.fit.network import network_of
 
-BASE = sensitivity(load("paper-1ms").profile)
+BASE = sensitivity_of(network_of(load("paper-1ms").profile))
 CHANGES_US = st.lists(st.floats(-1e6, 1e6).map(lambda us: round(us, 3)), min_size=1, max_size=9)
 
 

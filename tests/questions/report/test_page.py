@@ -3,7 +3,7 @@
 import os
 import re
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from html.parser import HTMLParser
 from importlib.resources import files
@@ -12,6 +12,8 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
+from busplan.questions.report.all_answers import AllAnswers, all_answers
+from busplan.questions.report.commands import sources
 from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
@@ -20,19 +22,13 @@ from busplan.buses import kind_named, kind_names
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, ShownValue, Table
-from busplan.forms.charts import Curves, Lanes
 from busplan.forms.numbers import cell_text, sentence_text
 from busplan.forms.picture import INKS
 from busplan.forms.svg import signed_bar
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.base.shell import shell_word
-from busplan.questions.fit.figures import CapacityFigures, capacity
-from busplan.questions.fit.node_steps import NodeSteps, node_steps, telling_periods
-from busplan.questions.report.all_answers import AllAnswers, all_answers
-from busplan.questions.report.commands import sources
 from busplan.questions.report.page import ReportedProfile, page_report
-from busplan.questions.words.drawings import LEFT, axes_drawing, terms_drawing
 from busplan.sections.profile import Profile
 
 PLACES = {"paper": "first", "standard": "second"}
@@ -288,65 +284,6 @@ def test_a_circle_that_was_left_out_is_said() -> None:
 # --- charts -----------------------------------------------------------------------------------------------
 
 
-def axes_plot(profile: Profile) -> tuple[list[NodeSteps], Curves]:
-    steps = [node_steps(profile, model=model) for model in ("paper", "standard")]
-    (panel,) = axes_drawing(profile, steps).panels
-    assert isinstance(panel.plot, Curves)
-    return steps, panel.plot
-
-
-@pytest.mark.parametrize("profile", [BASE, changed(bus__max_hops=3), changed(cycle__period_us=100.0)])
-def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) -> None:
-    steps, plot = axes_plot(profile)
-    from_us, to_us = telling_periods(profile, steps)
-    assert (plot.across.low, plot.across.high, plot.across.is_log) == (from_us, to_us, True)
-    for one, curve in zip(steps, plot.curves, strict=True):
-        assert curve.entry.words == one.timing_model
-        wanted = [at for at in one.from_us if from_us < at <= to_us]
-        assert list(dict.fromkeys(x for x, _ in curve.points)) == [from_us, *wanted, to_us]
-        for at in wanted:
-            before, after = (y or 0 for x, y in curve.points if x == at)
-            assert after - before == one.axes_per_node
-            assert after == one.max_axes(at)
-
-
-def test_the_profiles_own_period_and_axes_are_lines() -> None:
-    _, plot = axes_plot(BASE)
-    own_axes = BASE.alike_nodes[0].nodes * BASE.alike_nodes[0].node.axes
-    across, up = plot.guides
-    assert (across.x, up.y) == (BASE.cycle.period_us, own_axes)
-    assert across.entry.words == f"this profile: 4 ms, {own_axes} axes"
-
-
-def terms_lanes(results: Sequence[CapacityFigures]) -> list[Lanes]:
-    plots = [panel.plot for panel in terms_drawing(results).panels]
-    return [plot for plot in plots if isinstance(plot, Lanes)]
-
-
-def test_bars_are_the_terms_one_after_the_other_and_fill_the_slice() -> None:
-    results = simulated().capacity.results
-    whole, alone = terms_lanes(results)
-    for plot in (whole, alone):
-        for result, lane in zip(results, plot.lanes, strict=True):
-            left = (LEFT,) if plot is whole else ()
-            wanted = [term for term in (*TERMS, *left) if getattr(result, term.key) > 0]
-            assert [span.entry.words for span in lane.spans] == [term.label for term in wanted]
-            sizes = [span.end - span.start for span in lane.spans]
-            assert sizes == pytest.approx([getattr(result, term.key) for term in wanted])
-            assert all(span.end == after.start for span, after in pairwise(lane.spans))
-    assert whole.across.high == results[0].available_us
-    assert whole.lanes[0].spans[-1].words == "left of the slice, 1792.883 us"
-    # A cycle that is small in its slice is drawn again as wide as the page.
-    assert alone.across.high == max(result.required_us for result in results)
-
-
-def test_bars_of_an_overrun_show_where_the_slice_ends() -> None:
-    results = capacity(changed(cycle__period_us=300.0)).results
-    (plot,) = terms_lanes(results)
-    assert [guide.x for guide in plot.guides] == [150.0]
-    assert plot.across.high == results[1].required_us
-
-
 def test_signed_bars_share_one_zero() -> None:
     def bar(value: float) -> tuple[float, float, str]:
         (rect,) = ET.fromstring(signed_bar(value, least=-1.0, most=3.0, title="x")).iter(f"{SVG}rect")
@@ -390,7 +327,7 @@ def test_letters_can_be_read_on_their_bars() -> None:
     letters = dict.fromkeys(INKS, ("#10151c", "#10151c"))
     letters |= dict.fromkeys(("sync", "request", "acknowledge", "reserve", "out"), ("#ffffff", "#10151c"))
     letters |= {"idle": (SCHEMES[0]["ink"], SCHEMES[1]["ink"]), "long-gap": ("#10151c", SCHEMES[1]["ink"])}
-    for term in (*(term for kind in kind_names() for term in kind_named(kind).figures.terms), LEFT):
+    for term in (term for kind in kind_names() for term in kind_named(kind).figures.terms):
         for letter, colour in zip(letters[term.ink], INKS[term.ink], strict=True):
             assert contrast(letter, colour) >= 4.5, term
     for ink, colours in INKS.items():

@@ -12,6 +12,7 @@ from busplan.forms.charts import Curves, Drawing, Grid, legend
 from busplan.forms.picture import INKS
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Array, axis_of
 from busplan.questions.sweep.panels import sweep_drawing
 from busplan.questions.sweep.plot import FigureData
@@ -225,11 +226,11 @@ def test_keys_are_said_in_words_with_their_unit(key: str, label: str) -> None:
 
 
 def test_figures_are_drawn_in_the_unit_of_their_label() -> None:
-    assert plotted_figure(PAPER, "margin_us")[1] == 1
+    assert plotted_figure(network_of(PAPER), "margin_us")[1] == 1
     one = plotted("utilisation", bus__nodes=(1, 2))
     assert one.label == "utilisation, %"
     assert one.panels[0].values.tolist() == pytest.approx([100 * 102.955 / 2000, 10.356], abs=0.001)
-    figure, factor = plotted_figure(PAPER, "max_contour_error_mm")
+    figure, factor = plotted_figure(network_of(PAPER), "max_contour_error_mm")
     assert (figure.column, factor) == ("um", 1000)
 
 
