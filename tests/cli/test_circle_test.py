@@ -222,8 +222,8 @@ def test_without_a_circle_the_answer_is_told_and_the_old_plot_stays(circle_test:
     ("name", "words"),
     [
         ("report.md", "### Circle test of `quick`\n"),
-        ("report.html", '<svg xmlns="http://www.w3.org/2000/svg" class="chart circle"'),
-        ("report.txt", "deg  0   "),
+        ("report.html", '<svg xmlns="http://www.w3.org/2000/svg" class="chart"'),
+        ("report.txt", "Figures of the circle test"),
         ("report.csv", "profile,period_us,feed_mm_per_min,"),
         ("report.json", '"command": "circle-test"'),
     ],

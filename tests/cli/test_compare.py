@@ -25,7 +25,7 @@ Refused = Callable[..., str]
         ("c.html", b"<!DOCTYPE html>"),
         ("c.csv", b"profile,kind,title,is_own,"),
         ("c.json", b'{\n  "schema": 1,\n  "command": "compare",'),
-        ("c.svg", b'<svg xmlns="http://www.w3.org/2000/svg" class="chart kinds"'),
+        ("c.svg", b'<svg xmlns="http://www.w3.org/2000/svg" class="chart"'),
         ("c.png", b"\x89PNG"),
     ],
 )

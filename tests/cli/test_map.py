@@ -25,7 +25,7 @@ FEW = ("--x", "bus.nodes=1:3", "--y", "cycle.period_us=500,4000")
         ("map.html", b"<!DOCTYPE html>"),
         ("map.csv", b"profile,bus.nodes,cycle.period_us,nodes,"),
         ("map.json", b'{\n  "schema": 1,\n  "command": "map",'),
-        ("map.svg", b'<svg xmlns="http://www.w3.org/2000/svg" class="chart map"'),
+        ("map.svg", b'<svg xmlns="http://www.w3.org/2000/svg" class="chart"'),
         ("map.png", b"\x89PNG"),
     ],
 )

@@ -21,7 +21,6 @@ from busplan.forms.blocks import (
     Chart,
     Code,
     Command,
-    Drawing,
     Facts,
     Question,
     Report,
@@ -35,12 +34,13 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
     Words,
+    first_drawing,
     sentence,
 )
+from busplan.forms.charts import Cell, Drawing, Entry, Grid, Panel, choices
 from busplan.forms.csv_rows import csv_cell, to_csv
-from busplan.forms.lines import Line, Mark
+from busplan.forms.lines import Mark
 from busplan.forms.numbers import decimals_of, period, with_unit
-from busplan.forms.picture import first_picture
 from busplan.forms.terminal import block_lines
 from busplan.printable import to_json
 
@@ -49,16 +49,8 @@ FAILED = ShownValue(False, "fits", state="fails")
 HOSTILE = "<b>*x*</b> | `y` [z](javascript:alert(1)) \x1b[2J"
 
 
-class Picture(Drawing):
-    stylesheet = ".busplan-picture{fill:red}"
-
-    def svg(self) -> str:
-        return '<svg class="busplan-picture"></svg>'
-
-    is_text_in_markdown = True
-
-    def characters(self, width: int) -> list[Line]:
-        return [Line("#" * width, "drawn")]
+GRID = Grid(choices("x", "1"), choices("y", "1"), ((Cell("fits", "#"),),), (Entry("fits", "fits", "#"),))
+PICTURE = Drawing("A map", (Panel(GRID),), has_characters=True)
 
 
 def answer(*blocks: Block) -> Report:
@@ -87,7 +79,7 @@ def one_of_each(text: str = "text") -> Sequence[Block]:
         sentence(f"{text.replace('{', '')}: {{}} to spare.", MARGIN, state="passes"),
         Facts((("margin", MARGIN), ("profile", Code(text)))),
         table,
-        Chart(Picture(), Sentence((text,)), Sentence(("It is read so: ", Code(text)))),
+        Chart(PICTURE, Sentence((text,)), Sentence(("It is read so: ", Code(text)))),
         Snippet(("[bus]", 'speed = "S400"')),
         Calculation(
             (CalculationStep("(1)", "T", "a + b", "1 + 2", MARGIN), CalculationStep("x", "W", "", "", Words("time")))
@@ -157,7 +149,7 @@ def test_a_sentence_in_a_cell_keeps_its_units_and_its_state() -> None:
 
 
 def test_how_a_drawing_is_read_stands_where_it_is_drawn_so() -> None:
-    chart = Chart(Picture(), Sentence(("A picture",)), Sentence(("rings of 5 um.",)))
+    chart = Chart(PICTURE, Sentence(("A picture",)), Sentence(("rings of 5 um.",)))
     assert "<figcaption>A picture. rings of 5 um.</figcaption>" in render(answer(chart), "html")
     assert "rings" not in render(answer(chart), "table")
     assert "rings" not in render(answer(chart), "markdown")
@@ -224,21 +216,20 @@ def test_html_keeps_the_exact_value_and_its_state() -> None:
     assert [one["class"] for one in found if one["value"] == "false"] == ["fails"]
 
 
-def test_html_has_the_style_of_its_drawings_once() -> None:
-    html = render(answer(Chart(Picture(), Sentence(("one",))), Chart(Picture(), Sentence(("two",)))), "html")
-    assert html.count(Picture.stylesheet) == 1
-    assert html.count('<svg class="busplan-picture">') == 2
+def test_html_has_its_drawings_and_their_style_once() -> None:
+    html = render(answer(Chart(PICTURE, Sentence(("one",))), Chart(PICTURE, Sentence(("two",)))), "html")
+    assert html.count(".chart .fits{") == 2  # on a light and on a dark background
+    assert html.count("<title>A map</title>") == 2
 
 
-def test_a_picture_of_its_own_has_the_style_of_its_drawing() -> None:
-    svg = first_picture([Chart(Picture(), Sentence(("one",)))]) or ""
-    assert Picture.stylesheet in svg.partition("<style>")[2].partition("</style>")[0]
-    assert first_picture([Sentence(("one",))]) is None
+def test_the_picture_of_an_answer_is_its_first() -> None:
+    assert first_drawing([Sentence(("one",)), Chart(PICTURE, Sentence(("one",)))]) == PICTURE
+    assert first_drawing([Sentence(("one",))]) is None
 
 
 def test_markdown_has_a_drawing_in_characters() -> None:
     text = render(answer(*one_of_each()), "markdown")
-    assert "```text\n####" in text
+    assert "```text\n  1 | # |\n" in text
     assert text.startswith("### An answer for `p`\n")
     assert render(answer()._replace(is_page=True), "markdown") == "# An answer for `p`\n"
     assert render(answer(Sentence(("Alone.",)))._replace(is_page=True), "table") == "An answer for p\nAlone.\n"
@@ -325,16 +316,9 @@ def test_a_figure_is_not_written_in_a_unit_that_it_does_not_convert_to() -> None
         with_unit(ShownValue(1.0, "margin_us", "mm"))
 
 
-class Blank(Drawing):
-    """A drawing that Markdown cannot show."""
-
-    def svg(self) -> str:
-        return '<svg xmlns="http://www.w3.org/2000/svg"></svg>\n'
-
-
 @pytest.mark.parametrize("caption", ["Reads take <most>, 3 us", "Reads take <most>, 3 us."])
 def test_markdown_says_a_chart_that_it_cannot_draw(caption: str) -> None:
-    chart = Chart(Blank(), Sentence((caption,)), Sentence(("The dot is the start.",)))
+    chart = Chart(PICTURE._replace(has_characters=False), Sentence((caption,)), Sentence(("The dot is the start.",)))
     report = Report(Sentence(("x",)), lambda: (chart,), dict)
     assert render(report, "markdown") == "### x\n\nReads take \\<most\\>, 3 us.\n"
 

@@ -50,7 +50,7 @@ def test_letters_are_of_the_font_that_travels_with_the_package(text: str) -> Non
 
 
 def test_a_picture_is_the_same_on_every_computer(monkeypatch: pytest.MonkeyPatch) -> None:
-    svg = busplan.timeline("paper-4ms")._repr_svg_()
+    svg = busplan.timeline("paper-4ms").svg()
     here = png(svg)
     monkeypatch.setattr(resvg_py, "svg_to_bytes", partial(resvg_py.svg_to_bytes, skip_system_fonts=True))
     assert png(svg) == here == png(svg)
@@ -67,7 +67,7 @@ def test_bold_letters_are_bold() -> None:
 
 def test_each_cell_of_a_map_has_its_colour_in_its_place_and_its_mark_on_it() -> None:
     answer = busplan.map_("paper-4ms", x={"axes": "4:72:4"}, y={"cycle.period_us": [500, 1000, 2000, 4000, 8000]})
-    svg = answer._repr_svg_()
+    svg = answer.svg()
     image, root = pixels(svg), fromstring(svg)
     (body,) = root.findall(f"{SVG}svg")
     (area,) = body.findall(f"{SVG}svg")
@@ -82,7 +82,7 @@ def test_each_cell_of_a_map_has_its_colour_in_its_place_and_its_mark_on_it() -> 
     for cell in cells:
         x, across = left + px(cell.get("x"), width), px(cell.get("width"), width)
         y = float(cell.get("y") or 0)
-        colour = INKS[(cell.get("class") or "").split()[1]].light  # type: ignore[index]
+        colour = INKS[(cell.get("class") or "").split()[1]].light
         corner = image[round(2 * (y + 3)), round(2 * (x + 3))]
         assert "#" + "".join(f"{one:02x}" for one in corner) == colour
         middle = image[round(2 * y) + 8 : round(2 * y) + 34, round(2 * (x + across / 2)) - 10 :][:, :20]

@@ -19,7 +19,7 @@ def test_a_notebook_shows_tables_and_charts_and_no_name_is_markup() -> None:
     assert "<b>" not in shown
     assert "&lt;b&gt;&amp;x</bdi>  IEEE 1394, " in shown
     assert shown.count("<table") == 2
-    assert shown.count("<svg ") == 2  # the bar of the card, and what moves the margin
+    assert shown.count('role="img"') == 2  # the bar of the card, and what moves the margin
     assert f'<data value="{found.results[1].margin_us!r}"' in shown
 
 
@@ -61,7 +61,10 @@ def test_a_sweep_shows_its_table_and_its_picture_where_it_can_be_drawn() -> None
     drawn, not_drawn = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]}), busplan.sweep("paper-4ms", vary=vary)
     for answer, charts in ((drawn, 1), (not_drawn, 0)):
         shown = answer._repr_html_()
-        assert (shown.count("<table"), shown.count('class="chart sweep"')) == (1, charts)
+        assert (shown.count("<table"), shown.count('<svg xmlns="http://www.w3.org/2000/svg" class="chart"')) == (
+            1,
+            charts,
+        )
     assert not_drawn._repr_svg_() is None
 
 

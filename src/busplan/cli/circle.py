@@ -115,9 +115,9 @@ def _draw(test: "CircleTestAnswer", file: NewFile, changes: KeyChanges, form: Pi
     if not any(test.runs):
         file.abandon()
         return
-    from busplan.forms.raster import picture
+    from busplan.forms.svg import content
 
-    file.write(document_bytes(picture(test.svg(note=changes.words), form)))
+    file.write(document_bytes(content(test.drawing(), form, note=changes.words)))
 
 
 def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:

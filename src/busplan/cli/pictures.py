@@ -18,6 +18,7 @@ from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Report
+    from busplan.forms.charts import Drawing
 
 
 DrawnForm = Literal[Form, Picture]
@@ -72,7 +73,7 @@ class Drawn(Protocol):
     def report(self) -> "Report":
         """The answer in blocks."""
 
-    def svg(self, *, note: str = "") -> str:
+    def drawing(self) -> "Drawing":
         """The picture."""
 
 
@@ -103,10 +104,10 @@ def show_drawn(
     """
     match form:
         case "svg" | "png":
-            from busplan.forms.raster import picture
+            from busplan.forms.svg import content
 
             require_apart({"--output": output}, inputs=inputs)
-            write_document(picture(find().svg(note=_changes_words(changes)), form), output)
+            write_document(content(find().drawing(), form, note=_changes_words(changes)), output)
         case _:
             with answer(form, output, inputs=inputs, changes=changes, is_whole=is_whole) as give:
                 give(find().report())

@@ -191,9 +191,9 @@ def sweep_command(
             answer = computed(asked, executor=crew, progress=progress)
         _write(answer, form, rows, file)
         if picture_file is not None and picture_form is not None:
-            from busplan.forms.raster import picture
+            from busplan.forms.svg import content
 
-            picture_file.write(document_bytes(picture(answer.svg(figure=figure), picture_form)))
+            picture_file.write(document_bytes(content(answer.drawing(figure=figure), picture_form)))
     for path in (output, plot):
         if path is not None:
             say(f"wrote {path}")

@@ -4,13 +4,12 @@ A block holds content, not appearance: a figure keeps its exact value, and a sta
 writes every block in its own way.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from string import Formatter
-from typing import Any, ClassVar, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan.buses.figure import Figure, Ink
-from busplan.forms.lines import Line
+from busplan.forms.charts import Drawing
 
 State = Literal["passes", "fails", "warns", "neutral"]
 """Verdict that a piece of text carries; it sets the colour."""
@@ -157,58 +156,13 @@ class Facts(NamedTuple):
     items: tuple[tuple[str, ShownValue | Code], ...]
 
 
-class Drawing(ABC):
-    """A picture that can be drawn in several ways; a way that it does not support gives None."""
-
-    stylesheet: str = ""
-    """CSS of its SVG, included once in a page."""
-    shape: ClassVar[Literal["wide", "round"]] = "wide"
-    is_text_in_markdown: ClassVar[bool] = False
-    """If True, Markdown shows it in characters."""
-
-    @abstractmethod
-    def svg(self) -> str | None:
-        """Draw it as SVG that fills the width of its container."""
-
-    def characters(self, width: int) -> list[Line] | None:  # noqa: ARG002 - optional
-        """Draw it in characters, `width` columns wide."""
-        return None
-
-
-class OwnPicture(Drawing):
-    """A picture that stands in a page and in characters.
-
-    Parameters
-    ----------
-    svg
-        Function that draws it without what the page has: style sheet, title and legend.
-    lines
-        Function that draws it in characters, `width` columns wide.
-    stylesheet
-        Its own rules, after those of all charts.
-    """
-
-    is_text_in_markdown = True
-
-    def __init__(self, svg: Callable[[], str], lines: Callable[..., list[Line]], *, stylesheet: str) -> None:
-        self._svg, self._lines, self.stylesheet = svg, lines, stylesheet
-
-    def svg(self) -> str:
-        """Draw it for a page."""
-        return self._svg()
-
-    def characters(self, width: int) -> list[Line]:
-        """Draw it in characters."""
-        return self._lines(width=width)
-
-
 class Chart(NamedTuple):
     """A drawing with a caption."""
 
     drawing: Drawing
     caption: Sentence
     legend: Sentence | None = None
-    """How to read the SVG; follows the caption. A drawing in characters contains its own legend."""
+    """How to read the SVG; follows the caption."""
 
 
 class Snippet(NamedTuple):
@@ -336,6 +290,17 @@ class Report(NamedTuple):
     """Says how the reader sees the details that tables leave out."""
     is_card_enough: bool = False
     """If True, a terminal too low for all of it shows no more than its cards."""
+
+
+def first_drawing(blocks: Sequence[Block]) -> Drawing | None:
+    """The first drawing of an answer; None if it has none."""
+    for block in blocks:
+        drawing = block.drawing if isinstance(block, Chart) else None
+        if isinstance(block, Chapter):
+            drawing = first_drawing(block.blocks)
+        if drawing is not None:
+            return drawing
+    return None
 
 
 def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:

@@ -13,10 +13,11 @@ from markupsafe import Markup
 from busplan import __version__
 from busplan.buses.figure import unit_of
 from busplan.forms import blocks as made_of
-from busplan.forms.bars import signed_bar
-from busplan.forms.blocks import Bar, Block, Chapter, Chart, Command, Report, Sentence, Table
+from busplan.forms.blocks import Bar, Block, Chapter, Command, Report, Sentence, Table
+from busplan.forms.charts import Drawing
 from busplan.forms.numbers import cell_text, figure_text, sentence_text, shown_blocks, unit_text
 from busplan.forms.picture import DARK, fills
+from busplan.forms.svg import inline, signed_bar
 from busplan.printable import json_text, printable_lines
 
 _TYPES: Final = ("ShownValue", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
@@ -46,7 +47,7 @@ def page(report: Report) -> str:
         title=report.title,
         blocks=blocks,
         program=f"busplan {__version__}",
-        colours=Markup(_colours(blocks)),  # noqa: S704 - our own constants
+        colours=Markup(_colours()),  # noqa: S704 - our own constants
     )
 
 
@@ -62,7 +63,7 @@ def fragment(report: Report) -> str:
     page = files("busplan.forms") / "templates"
     chart, style = ((page / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
     # The rules are nested in the fragment's own rule, where & stands for its outer element: that is its root.
-    own = f"{chart}{_colours(blocks)}{style}".replace(":root", "&")
+    own = f"{chart}{_colours()}{style}".replace(":root", "&")
     own = _DARK_RULES.sub(lambda rules: f"{_NOT_ON_LIGHT} {{\n{rules[0]}\n}}\n", own)
     return _template("fragment.html.j2").render(blocks=blocks, style=Markup(own))  # noqa: S704 - as above
 
@@ -96,31 +97,21 @@ def _environment() -> Environment:
         "groups": _groups,
         "words": cell_text,
         "bar": _bar,
-        # SVG from `forms.svg` is escaped already.
-        "svg": Markup,
+        "drawn": _drawn,
         "holds_sections": lambda section: any(isinstance(block, Chapter) for block in section.blocks),
     }
     return environment
 
 
-def _colours(blocks: Sequence[Block]) -> str:
-    """Rules of the drawings among the blocks, and of inks on a light and on a dark background."""
+def _colours() -> str:
+    """Rules of inks, on a light and on a dark background."""
     light, dark = fills(".chart")
-    styles = dict.fromkeys(chart.drawing.stylesheet for chart in _charts(blocks))
-    return f"{''.join(styles)}{light}{DARK}{{\n{dark}}}\n"
+    return f"{light}{DARK}{{\n{dark}}}\n"
 
 
 def _shown(piece: object) -> object:
     """Text without control characters: a terminal may show the file."""
     return printable_lines(piece) if isinstance(piece, str) and not isinstance(piece, Markup) else piece
-
-
-def _charts(blocks: Sequence[Block]) -> Iterator[Chart]:
-    for block in blocks:
-        if isinstance(block, Chart):
-            yield block
-        elif isinstance(block, Chapter):
-            yield from _charts(block.blocks)
 
 
 def _runs(blocks: Sequence[Block]) -> Iterator[tuple[str, list[Block]]]:
@@ -144,6 +135,10 @@ def _groups(table: Table) -> list[tuple[str, int]]:
     """Group headings with the number of columns that each spans; empty if no column has a group."""
     groups = [(name, len(list(run))) for name, run in groupby(column.group for column in table.columns)]
     return groups if any(name for name, _ in groups) else []
+
+
+def _drawn(drawing: Drawing) -> Markup:
+    return Markup(inline(drawing))  # noqa: S704 - our own SVG, which is escaped
 
 
 def _bar(bar: Bar) -> Markup:

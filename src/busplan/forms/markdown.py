@@ -26,6 +26,7 @@ from busplan.forms.blocks import (
     Table,
     Words,
 )
+from busplan.forms.characters import drawing_lines
 from busplan.forms.lines import plain_text
 from busplan.forms.numbers import cell_text, part_text, shown_blocks, with_unit
 from busplan.printable import printable
@@ -164,9 +165,9 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
 
 def _chart(chart: Chart) -> Iterator[str]:
     """A drawing in characters, or else what it shows in words."""
-    lines = chart.drawing.characters(_TEXT_WIDTH) if chart.drawing.is_text_in_markdown else None
-    if lines:
-        yield from (*_caption(chart.caption), "```text", *plain_text(lines).splitlines(), "```")
+    if chart.drawing.has_characters:
+        drawn = plain_text(drawing_lines(chart.drawing, _TEXT_WIDTH)).splitlines()
+        yield from (*_caption(chart.caption), "```text", *drawn, "```")
     else:
         yield f"{_sentence(chart.caption).removesuffix('.')}."
 

@@ -1,13 +1,10 @@
-"""The picture of an answer as an SVG of its own, and the colours of all drawings."""
+"""Colours of all drawings, and the style sheet of one that is a file of its own."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Final, NamedTuple
-
-from busplan.buses.figure import Ink
-from busplan.forms.blocks import Block, Chapter, Chart
 
 DARK: Final = "@media screen and (prefers-color-scheme:dark)"
 """Media query for the colours on a dark background; printed pages are light."""
@@ -22,8 +19,22 @@ class InkColours(NamedTuple):
     """On a dark background."""
 
 
-INKS: Final[Mapping[Ink, InkColours]] = MappingProxyType(
+def _shades(name: str, pale: tuple[int, int, int], deep: tuple[int, int, int]) -> dict[str, InkColours]:
+    """Colours from pale to deep, evenly; black letters are read on all of them."""
+    shades = {}
+    for level in range(LEVELS):
+        share = level / (LEVELS - 1)
+        parts = (round(start + share * (end - start)) for start, end in zip(pale, deep, strict=True))
+        shades[f"{name}-{level}"] = InkColours(*[f"#{''.join(f'{part:02x}' for part in parts)}"] * 2)
+    return shades
+
+
+LEVELS: Final = 10
+"""Colours of numbers above zero, and of those below."""
+INKS: Final[Mapping[str, InkColours]] = MappingProxyType(
     {
+        "first": InkColours("#1d4f91", "#8cb8f5"),
+        "second": InkColours("#a34a00", "#f5b041"),
         "sync": InkColours("#7c3aed", "#a78bfa"),
         "contention": InkColours("#e08a00", "#f5b041"),
         "request": InkColours("#1d6fd8", "#5aa9ff"),
@@ -45,15 +56,18 @@ INKS: Final[Mapping[Ink, InkColours]] = MappingProxyType(
         "uneven": InkColours("#74aef7", "#6ea8f5"),
         "unjudged": InkColours("#bfe3c4", "#a5d0ab"),
         "refused": InkColours("#b59ae0", "#a78fd4"),
+        **_shades("above", (233, 241, 252), (52, 128, 216)),
+        **_shades("below", (251, 228, 224), (214, 84, 72)),
     }
 )
 """Colours by ink; the name of an ink is its CSS class."""
 
 
 def fills(scope: str) -> tuple[str, str]:
-    """CSS rules that fill each ink inside a selector: for a light background and for a dark one."""
+    """CSS rules that colour each ink inside a selector: for a light background and for a dark one."""
     light, dark = (
-        "".join(f"{scope} .{ink}{{fill:{colours[side]}}}\n" for ink, colours in INKS.items()) for side in (0, 1)
+        "".join(f"{scope} .{ink}{{color:{colours[side]};fill:{colours[side]}}}\n" for ink, colours in INKS.items())
+        for side in (0, 1)
     )
     return light, dark
 
@@ -69,32 +83,8 @@ _THEMED: Final = re.compile(r"[^{}]*\{[^{}]*var\([^{}]*\}")
 """A rule with a variable."""
 
 
-def first_picture(blocks: Sequence[Block]) -> str | None:
-    """Write the first chart of an answer as SVG with its style sheet, for light and dark backgrounds.
-
-    Parameters
-    ----------
-    blocks
-        Blocks of the answer.
-
-    Returns
-    -------
-    str or None
-        None if no chart can be drawn.
-    """
-    for block in blocks:
-        picture = None
-        if isinstance(block, Chapter):
-            picture = first_picture(block.blocks)
-        elif isinstance(block, Chart) and (svg := block.drawing.svg()) is not None:
-            picture = styled(svg, css=block.drawing.stylesheet)
-        if picture is not None:
-            return picture
-    return None
-
-
-def styled(svg: str, *, css: str = "") -> str:
-    """Add the style sheet of the page's charts to a drawing of the class `chart`.
+def styled(svg: str) -> str:
+    """Add the style sheet of the page's charts to a drawing.
 
     Each colour stands in it twice, for light and for dark backgrounds: not every viewer of SVG knows variables.
 
@@ -102,17 +92,14 @@ def styled(svg: str, *, css: str = "") -> str:
     ----------
     svg
         The drawing.
-    css
-        Rules of its own.
     """
     chart = (files("busplan.forms") / "templates" / "chart.css").read_text(encoding="utf-8")
     light, dark = (dict(_VARIABLE.findall(block)) for block in _ROOT.findall(chart))
-    rules = f"{_DARK_ROOT.sub('', chart)}{_PAPER}{css}"
+    rules = f"{_DARK_ROOT.sub('', chart)}{_PAPER}"
     on_light, on_dark = fills(".chart")
     sheet = f"{_filled(rules, light)}{on_light}{DARK}{{{_filled(''.join(_THEMED.findall(rules)), dark)}{on_dark}}}"
     head, body = svg.split(">", 1)
-    paper = "" if "viewBox" in head else _SHEET_OF_PAPER
-    return f"{head}>\n<style>{sheet}</style>{paper}{body}"
+    return f"{head}>\n<style>{sheet}</style>{_SHEET_OF_PAPER}{body}"
 
 
 def _filled(rules: str, colours: Mapping[str, str]) -> str:

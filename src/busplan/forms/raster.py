@@ -2,10 +2,7 @@
 
 import re
 from importlib.resources import as_file, files
-from typing import TYPE_CHECKING, Final
-
-if TYPE_CHECKING:
-    from busplan.forms import Picture
+from typing import Final
 
 WIDTH: Final = 640
 """Width that a PNG gives to a drawing as wide as its container, in px."""
@@ -38,8 +35,3 @@ def png(svg: str) -> bytes:
             font_files=[str(fonts / "regular.ttf"), str(fonts / "bold.ttf")],
             style_sheet=_FONT,
         )
-
-
-def picture(svg: str, form: "Picture") -> str | bytes:
-    """Give a drawing as the content of a file."""
-    return svg if form == "svg" else png(svg)

@@ -105,35 +105,37 @@ def ticks(low: float, high: float, *, most: int) -> tuple[Tick, ...]:
     return tuple(Tick(number * step.size, f"{number * step.size:.{decimals}f}") for number in range(first, last + 1))
 
 
-def placed_labels(texts: Sequence[str], *, own: int | None, pitch: float, letter: float) -> dict[int, float]:
-    """Place labels in the middle of their columns, this design's first, as far as none touches another.
+def placed(
+    labels: Sequence[tuple[float, float]], *, room: float, gap: float = 0.0, own: int | None = None
+) -> dict[int, float]:
+    """Place labels in the middle of their places, this design's first, as far as none touches another.
 
     Parameters
     ----------
-    texts
-        A label for each column.
+    labels
+        Place and size of each label.
+    room
+        End of the scale, which no label leaves.
+    gap
+        Least distance of two labels.
     own
-        Column of this design.
-    pitch
-        Width of a column, in the unit of the result.
-    letter
-        Width of a letter.
+        Label of this design.
 
     Returns
     -------
     dict
-        Where each label begins, by column.
+        Where each label that has room begins, by its number.
 
     Examples
     --------
-    >>> placed_labels(["8", "12", "100", "16"], own=3, pitch=3, letter=1)
+    >>> placed([(1.5, 1), (4.5, 2), (7.5, 3), (10.5, 2)], room=12, gap=1, own=3)
     {0: 1.0, 1: 3.5, 3: 9.5}
     """
-    placed: dict[int, float] = {}
-    for column in sorted(range(len(texts)), key=lambda index: index != own):
-        start = max(0.0, (column + 0.5) * pitch - letter * len(texts[column]) / 2)
-        end = start + letter * (len(texts[column]) + 1)
-        others = ((begin, begin + letter * (len(texts[index]) + 1)) for index, begin in placed.items())
-        if all(start >= behind or end <= begin for begin, behind in others):
-            placed[column] = start
-    return dict(sorted(placed.items()))
+    starts: dict[int, float] = {}
+    for number in sorted(range(len(labels)), key=lambda other: other != own):
+        place, size = labels[number]
+        start = min(max(0.0, place - size / 2), room - size)
+        others = ((begin, begin + labels[other][1]) for other, begin in starts.items())
+        if all(start >= end + gap or start + size + gap <= begin for begin, end in others):
+            starts[number] = start
+    return dict(sorted(starts.items()))

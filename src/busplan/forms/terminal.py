@@ -22,6 +22,7 @@ from busplan.forms.blocks import (
     Table,
 )
 from busplan.forms.cards import card_lines
+from busplan.forms.characters import drawing_lines
 from busplan.forms.lines import BLANK, Line, plain_text, styled_text, wrapped
 from busplan.forms.numbers import part_text, sentence_line, with_unit
 from busplan.forms.text_tables import table_lines
@@ -103,9 +104,10 @@ def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) ->
             lines = table_lines(block, width=width, is_whole=is_whole, whole_by=whole_by)
             return [*_caption(block.caption, width), *lines]
         case Chart():
-            drawn = block.drawing.characters(width or WIDTH)
-            pieces = (piece for line in drawn or () for piece in _drawn_lines(line, width))
-            return [*_caption(block.caption, width), *pieces] if drawn else []
+            if not block.drawing.has_characters:
+                return []
+            drawn = drawing_lines(block.drawing, width or WIDTH)
+            return [*_caption(block.caption, width), *(piece for line in drawn for piece in _drawn_lines(line, width))]
         case Command():
             return [Line(f"$ {block.line}", "drawn")]
         case Snippet():

@@ -3,6 +3,8 @@
 from typing import Never
 
 import pytest
+from busplan.questions.plan.planning import plan
+from busplan.questions.report.all_answers import all_answers
 
 from busplan.gate.gate import check_document
 from busplan.profile.document import Document
@@ -13,8 +15,6 @@ from busplan.questions.capacity.sensitivity import sensitivities
 from busplan.questions.capacity.verdict import verdicts
 from busplan.questions.compare.kinds import compare
 from busplan.questions.fit.figures import capacity
-from busplan.questions.plan.planning import plan
-from busplan.questions.report.all_answers import all_answers
 from busplan.sections.profile import Profile
 
 NEVER_ROUND = {"servo.step_us": 1.0, "tolerance": {"max_contour_error_mm": 0.0}, "circle.feed_mm_per_min": 4000.0}

@@ -1,10 +1,9 @@
 """The page of `busplan report`: its charts are the results, its colours can be read, its names are text."""
 
-import math
 import os
 import re
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from html.parser import HTMLParser
 from importlib.resources import files
@@ -13,6 +12,8 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
+from busplan.questions.report.all_answers import AllAnswers, all_answers
+from busplan.questions.report.commands import sources
 from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
@@ -20,19 +21,14 @@ from markdown_it import MarkdownIt
 from busplan.buses import kind_named, kind_names
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.forms import render
-from busplan.forms.bars import signed_bar
 from busplan.forms.blocks import Chapter, Report, ShownValue, Table
 from busplan.forms.numbers import cell_text, sentence_text
 from busplan.forms.picture import INKS
+from busplan.forms.svg import signed_bar
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.base.shell import shell_word
-from busplan.questions.fit.figures import capacity
-from busplan.questions.fit.node_steps import node_steps, telling_periods
-from busplan.questions.report.all_answers import AllAnswers, all_answers
-from busplan.questions.report.commands import sources
 from busplan.questions.report.page import ReportedProfile, page_report
-from busplan.questions.words.drawings import LEFT, AxesDrawing, TermsDrawing
 from busplan.sections.profile import Profile
 
 PLACES = {"paper": "first", "standard": "second"}
@@ -288,97 +284,6 @@ def test_a_circle_that_was_left_out_is_said() -> None:
 # --- charts -----------------------------------------------------------------------------------------------
 
 
-def stairs(path: str) -> Iterator[tuple[float, float]]:
-    """Corners of a path of M, H and V."""
-    x = y = 0.0
-    for command, numbers in re.findall(r"([MHV])([^MHV]*)", path):
-        values = [float(one) for one in numbers.split()]
-        x = values[0] if command in "MH" else x
-        y = values[-1] if command in "MV" else y
-        yield x, y
-
-
-@pytest.mark.parametrize("profile", [BASE, changed(bus__max_hops=3), changed(cycle__period_us=100.0)])
-def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) -> None:
-    steps = [node_steps(profile, model=model) for model in ("paper", "standard")]
-    root = ET.fromstring(AxesDrawing(profile, steps).svg())
-    from_us, to_us = telling_periods(profile, steps)
-    for one in steps:
-        (path,) = (
-            found for found in root.iter(f"{SVG}path") if found.get("class") == f"curve {PLACES[one.timing_model]}"
-        )
-        corners = list(stairs(path.get("d", "")))
-        wanted = [
-            1000 * math.log(at / from_us) / math.log(to_us / from_us) for at in one.from_us if from_us < at <= to_us
-        ]
-        assert sorted({x for x, _ in corners} - {0.0, 1000.0}) == pytest.approx(
-            sorted({round(x, 1) for x in wanted}), abs=0.06
-        )
-        heights = list(dict.fromkeys(y for _, y in corners))
-        assert len(heights) == len(wanted) + 1
-        assert all(
-            lower - upper == pytest.approx(heights[0] - heights[1], abs=0.11) for lower, upper in pairwise(heights)
-        )
-    marks = [(svg.get("x"), rect.get("class")) for svg in root.iter(f"{SVG}svg") for rect in svg.findall(f"{SVG}rect")]
-    own = f"{100 * math.log(profile.cycle.period_us / from_us) / math.log(to_us / from_us):.5g}%"
-    assert {(own, "mark first"), (own, "mark second")} <= set(marks)
-
-
-def test_the_profiles_own_point_and_the_lines_of_axes_share_one_scale() -> None:
-    steps = [node_steps(BASE, model=model) for model in ("paper", "standard")]
-    root = ET.fromstring(AxesDrawing(BASE, steps).svg())
-    lines = [line for line in root.iter(f"{SVG}line") if line.get("class") == "rule" and line.get("x2") == "100%"]
-    figures = [text for text in root.iter(f"{SVG}text") if text.get("x") == "0" and text.get("class") == "small halo"]
-    heights = {
-        int((text.text or "").split()[0]): float(line.get("y1") or "")
-        for line, text in zip(lines, figures, strict=True)
-    }
-    most = max(heights)
-    per_axis = (heights[0] - heights[most]) / most
-    for axes, height in heights.items():
-        assert height == pytest.approx(heights[0] - axes * per_axis, abs=1)
-    (point,) = root.iter(f"{SVG}circle")
-    own_axes = BASE.alike_nodes[0].nodes * BASE.alike_nodes[0].node.axes
-    assert float(point.get("cy") or "") == pytest.approx(heights[0] - own_axes * per_axis, abs=1)
-    marks = {rect.get("class"): svg for svg in root.iter(f"{SVG}svg") for rect in svg.findall(f"{SVG}rect")
-             if (svg.get("x") or "").endswith("%")}  # fmt: skip
-    for one in steps:
-        wanted = heights[0] - one.max_axes(BASE.cycle.period_us) * per_axis
-        assert float(marks[f"mark {PLACES[one.timing_model]}"].get("y") or "") == pytest.approx(wanted, abs=1)
-
-
-def test_a_cycle_that_is_small_in_its_slice_is_drawn_again_as_wide_as_the_page() -> None:
-    results = without_circle(BASE).capacity.results
-    root = ET.fromstring(TermsDrawing(results).svg())
-    widths = [float((rect.get("width") or "").rstrip("%")) for rect in root.iter(f"{SVG}rect")]
-    bars = len([1 for one in results for term in TERMS if getattr(one, term.key) > 0])
-    alone = widths[-bars:]
-    longest = max(one.required_us for one in results)
-    shares = [one.required_us / longest * 100 for one in results]
-    first = len([1 for term in TERMS if getattr(results[0], term.key) > 0])
-    assert [sum(alone[:first]), sum(alone[first:])] == pytest.approx(shares, abs=0.01)
-
-
-def test_bars_are_the_terms_and_fill_the_slice() -> None:
-    results = simulated().capacity.results
-    root = ET.fromstring(TermsDrawing(results).svg())
-    widths = [(rect.findtext(f"{SVG}title") or "", float((rect.get("width") or "").rstrip("%")))
-              for rect in root.iter(f"{SVG}rect")]  # fmt: skip
-    first = [term.key for term in TERMS if getattr(results[0], term.key) > 0]
-    shown = widths[: len(first) + 1]
-    wanted = [getattr(results[0], key) / results[0].available_us * 100 for key in (*first, "margin_us")]
-    assert [width for _, width in shown] == pytest.approx(wanted, rel=1e-3)
-    assert sum(width for _, width in shown) == pytest.approx(100.0, abs=0.01)
-    assert shown[-1][0] == "left of the slice, 1792.883 us"
-
-
-def test_bars_of_an_overrun_show_where_the_slice_ends() -> None:
-    results = capacity(changed(cycle__period_us=300.0)).results
-    root = ET.fromstring(TermsDrawing(results).svg())
-    (edge,) = (line for line in root.iter(f"{SVG}line") if line.get("class") == "edge")
-    assert float((edge.get("x1") or "").rstrip("%")) == pytest.approx(150 / results[1].required_us * 100, rel=1e-3)
-
-
 def test_signed_bars_share_one_zero() -> None:
     def bar(value: float) -> tuple[float, float, str]:
         (rect,) = ET.fromstring(signed_bar(value, least=-1.0, most=3.0, title="x")).iter(f"{SVG}rect")
@@ -412,17 +317,24 @@ def contrast(one: str, other: str) -> float:
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=["light", "dark"])
 def test_words_and_curves_can_be_read_in_both_schemes(scheme: dict[str, str]) -> None:
-    for name in ("ink", "muted", "link", "good", "bad", "plain", "model-first", "model-second"):
+    for name in ("ink", "muted", "link", "good", "bad", "warn", "plain"):
         assert contrast(scheme[name], scheme["paper"]) >= 4.5, name
+    for name in ("first", "second"):
+        assert contrast(INKS[name][SCHEMES.index(scheme)], scheme["paper"]) >= 4.5, name
 
 
 def test_letters_can_be_read_on_their_bars() -> None:
     letters = dict.fromkeys(INKS, ("#10151c", "#10151c"))
     letters |= dict.fromkeys(("sync", "request", "acknowledge", "reserve", "out"), ("#ffffff", "#10151c"))
     letters |= {"idle": (SCHEMES[0]["ink"], SCHEMES[1]["ink"]), "long-gap": ("#10151c", SCHEMES[1]["ink"])}
-    for term in (*(term for kind in kind_names() for term in kind_named(kind).figures.terms), LEFT):
+    for term in (term for kind in kind_names() for term in kind_named(kind).figures.terms):
         for letter, colour in zip(letters[term.ink], INKS[term.ink], strict=True):
             assert contrast(letter, colour) >= 4.5, term
+    for ink, colours in INKS.items():
+        if ink.startswith(("above", "below")):
+            assert contrast("#10151c", colours.light) >= 4, ink
+    levels = [colours for ink, colours in INKS.items() if ink.startswith(("above", "below"))]
+    assert len(set(levels)) == len(levels)
 
 
 @cache

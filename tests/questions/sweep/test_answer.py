@@ -199,7 +199,7 @@ def test_a_column_that_is_not_there_is_a_key_error() -> None:
 def test_columns_that_are_not_there_or_no_numbers_are_refused() -> None:
     answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]})
     calls: list[tuple[Any, str]] = [
-        (lambda: answer.svg(figure="verdict"), "figure verdict: expected a column in numbers: bus.nodes, "),
+        (lambda: answer.drawing(figure="verdict"), "figure verdict: expected a column in numbers: bus.nodes, "),
         (lambda: answer.report(sort_by="axis"), "sort_by axis: expected a column in numbers: bus.nodes, "),
         (lambda: answer.report(columns=["axis"]), "columns axis: no such column; there are bus.nodes, timing_model"),
         (lambda: answer.rows_in("csv", ["axis"]), "columns axis: no such column; there are bus.nodes, timing_model"),

@@ -1,23 +1,23 @@
-"""The picture of a sweep: choices are categories, zero is in the middle of its colours, units and words are there."""
+"""The picture of a sweep: choices are categories, colours part at zero, units and words are there."""
 
-from collections.abc import Callable, Sequence
-from re import findall
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
-from xml.etree.ElementTree import Element, fromstring
 
 import numpy as np
 import pytest
 
 import busplan
+from busplan.forms.charts import Curves, Drawing, Grid, legend
+from busplan.forms.picture import INKS
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Array, axis_of
-from busplan.questions.sweep.panels import sweep_svg
+from busplan.questions.sweep.panels import sweep_drawing
 from busplan.questions.sweep.plot import FigureData
 from busplan.questions.sweep.plotted import Plotted, caption, key_label, plot_scale, plotted_figure
 
-SVG = "{http://www.w3.org/2000/svg}"
-Plots = Callable[[Element], list[Any]]
 PAPER = load("paper-4ms").profile
 MODELS = ("paper", "standard")
 
@@ -26,122 +26,75 @@ def values(given: Sequence[Any] | range) -> Array:
     return axis_of(list(given))
 
 
-def added(figure: str | None, profile: Any = PAPER, **vary: Any) -> FigureData:
+def plotted(figure: str | None, profile: Any = PAPER, **vary: Any) -> Plotted:
     own = {key.replace("__", "."): one for key, one in vary.items()}
     answer = busplan.sweep(profile, vary=own, timing_model=MODELS)
-    return FigureData(answer.sweep, answer.table, figure=figure)
+    return FigureData(answer.sweep, answer.table, figure=figure).plotted()
 
 
-def plotted(figure: str | None, profile: Any = PAPER, **vary: Any) -> Plotted:
-    return added(figure, profile, **vary).plotted()
+def drawn(one: Plotted) -> Drawing:
+    return sweep_drawing(one, title="x")
 
 
-def drawn(one: Plotted) -> Element:
-    return fromstring(sweep_svg(one, title="x"))
+def curves(one: Plotted) -> Curves:
+    (panel,) = drawn(one).panels
+    assert isinstance(panel.plot, Curves)
+    return panel.plot
 
 
-def texts(root: Element) -> list[str]:
-    return [text.text or "" for text in root.iter(f"{SVG}text")]
+def grids(one: Plotted) -> list[Grid]:
+    return [panel.plot for panel in drawn(one).panels if isinstance(panel.plot, Grid)]
 
 
-def marks(plot: Any, tag: str, css: str) -> list[tuple[float, float]]:
-    """Values at the places of marks of a class."""
-    top, height = float(plot.path.get("y")), float(plot.path.get("height"))
-    return [
-        (
-            round(plot.x(float(one.get("x", "").rstrip("%")) / 100), 6),
-            round(plot.y((float(one.get("y", "")) - top) / height), 6),
-        )
-        for one in plot.area.findall(f"{SVG}svg")
-        if one.find(f"{SVG}{tag}[@class='{css}']") is not None
-    ]
+def words(one: Plotted) -> list[str]:
+    return [entry.words for entry in legend(drawn(one).panels)]
 
 
-Cell = tuple[float, float, float, float, tuple[int, ...]]
-
-
-def cells(plot: Any) -> list[Cell]:
-    """Rectangles of a map as shares, and their colours."""
-    width, height = map(float, plot.path.get("viewBox").split()[2:])
-    number = r"(-?[\d.]+)"
-    found = []
-    for path in plot.path.iter(f"{SVG}path"):
-        colour = tuple(int(path.get("fill", "#000000")[at : at + 2], 16) for at in (1, 3, 5))
-        for run in findall(rf"M{number} {number}H{number}V{number}H", path.get("d", "")):
-            left, top, right, bottom = map(float, run)
-            found.append((left / width, right / width, top / height, bottom / height, colour))
-    return found
-
-
-def colours_of(plot: Any, rows: int, columns: int) -> list[list[tuple[int, ...] | None]]:
-    """Colour of each cell, the lowest row first; None where nothing is drawn."""
-    found = cells(plot)
-
-    def at(row: int, column: int) -> tuple[int, ...] | None:
-        x, y = (column + 0.5) / columns, 1 - (row + 0.5) / rows
-        hits = [colour for left, right, top, bottom, colour in found if left < x < right and top < y < bottom]
-        assert len(hits) <= 1
-        return hits[0] if hits else None
-
-    return [[at(row, column) for column in range(columns)] for row in range(rows)]
-
-
-@pytest.mark.parametrize("vary", [{"bus__nodes": (1, 2)}, {"bus__gap_count": (7, 63), "cycle__period_us": (250, 4000)}])
-def test_the_same_sweep_draws_the_same_picture(vary: dict[str, Any]) -> None:
-    data = added("margin_us", **vary)
-    assert data.svg("x") == data.svg("x")
-
-
-@pytest.mark.parametrize("given", [(5, 7, 63), (63, "optimal"), ("optimal",), range(5, 64)])
-def test_gap_counts_are_categories(given: Any) -> None:
+@pytest.mark.parametrize("given", [(63, "optimal"), ("optimal",), (63, 7)])
+def test_words_and_numbers_among_them_are_categories(given: Any) -> None:
     scale = plot_scale(PAPER, "bus.gap_count", values(given), as_cells=False)
     assert scale.places.tolist() == list(range(len(given)))
     assert scale.labels == tuple(map(str, given))
     assert scale.own == (scale.labels.index("63") if "63" in scale.labels else None)
 
 
-def test_no_line_joins_choices_and_a_line_joins_numbers(plots: Plots) -> None:
-    root = drawn(plotted("margin_us", bus__gap_count=(5, 63, "optimal")))
-    (plot,) = plots(root)
-    assert plot.paths == {}
-    assert plot.across == pytest.approx({"5": 1 / 6, "63": 3 / 6, "optimal": 5 / 6}, abs=1e-4)
-    (plot,) = plots(drawn(plotted("margin_us", bus__nodes=range(1, 7))))
-    assert set(plot.paths) == {"curve first", "curve second"}
+def test_no_line_joins_choices_and_a_line_joins_numbers() -> None:
+    plot = curves(plotted("margin_us", bus__gap_count=(5, 63, "optimal")))
+    assert not any(curve.has_line for curve in plot.curves)
+    assert all(curve.has_dots for curve in plot.curves)
+    assert [tick.label for tick in plot.across.ticks] == ["5", "63", "optimal"]
+    assert all(curve.has_line for curve in curves(plotted("margin_us", bus__nodes=range(1, 7))).curves)
 
 
-def test_points_stand_at_their_values(plots: Plots) -> None:
+def test_points_stand_at_their_values_and_this_design_at_its_own() -> None:
     one = plotted("margin_us", cycle__period_us=(250, 500, 1000, 4000))
-    root = drawn(one)
-    (plot,) = plots(root)
-    for css, panel in zip(("first", "second"), one.panels, strict=True):
-        wanted = list(zip((250, 500, 1000, 4000), panel.values, strict=True))
-        for drawn_at, (x, y) in zip(plot.values(f"curve {css}"), wanted, strict=True):
-            assert drawn_at == pytest.approx((x, y), abs=8)
-        for drawn_at, (x, y) in zip(marks(plot, "rect", f"mark {css}"), wanted, strict=True):
-            assert drawn_at == pytest.approx((x, y), abs=8)
+    plot = curves(one)
+    assert [curve.entry.words for curve in plot.curves] == ["paper model", "standard model"]
+    assert len({curve.entry.mark for curve in plot.curves}) == 2
+    for curve, panel in zip(plot.curves, one.panels, strict=True):
+        assert curve.points == tuple(zip((250, 500, 1000, 4000), panel.values, strict=True))
+    assert {guide.entry.words: (guide.x, guide.y) for guide in plot.guides} == {
+        "margin of 0": (None, 0.0),
+        "this design": (4000.0, None),
+    }
 
 
 def test_a_curve_has_a_gap_where_a_value_is_missing() -> None:
     one = plotted("margin_us", bus__nodes=range(1, 7))
-    (panel, *_) = one.panels
-    panel.values[2] = float("nan")
-    root = drawn(one._replace(panels=(panel,)))
-    (d,) = (path.get("d", "") for path in root.iter(f"{SVG}path") if path.get("class") == "curve first")
-    assert [piece.count("L") for piece in d.split("M")[1:]] == [1, 2]
+    one.panels[0].values[2] = float("nan")
+    missing = [number for number, (_, y) in enumerate(curves(one).curves[0].points) if y is None]
+    assert missing == [2]
 
 
 @pytest.mark.parametrize("nodes", [(2,), range(1, 4), range(1, 7), range(1, 40)])
-def test_whole_numbers_have_whole_ticks(nodes: Any, plots: Plots) -> None:
-    (plot,) = plots(drawn(plotted("max_nodes", bus__nodes=nodes)))
-    for label in (*plot.up, *plot.across):
-        assert label.lstrip("-").isdigit()
+def test_whole_numbers_have_whole_ticks(nodes: Any) -> None:
+    plot = curves(plotted("max_nodes", bus__nodes=nodes))
+    assert all(tick.label.lstrip("-").isdigit() for tick in (*plot.up.ticks, *plot.across.ticks))
 
 
-def test_many_points_are_a_curve_without_marks(plots: Plots) -> None:
-    one = plotted("margin_us", cycle__nonperiodic_us=range(250))
-    (plot,) = plots(drawn(one))
-    assert len(plot.values("curve first")) == 250
-    assert marks(plot, "rect", "mark first") == []
+def test_many_points_are_a_curve_without_marks() -> None:
+    (curve, _) = curves(plotted("margin_us", cycle__nonperiodic_us=range(250))).curves
+    assert (len(curve.points), curve.has_dots) == (250, False)
 
 
 def test_uneven_numbers_are_equal_cells_and_a_true_scale_of_a_curve() -> None:
@@ -153,73 +106,60 @@ def test_uneven_numbers_are_equal_cells_and_a_true_scale_of_a_curve() -> None:
     assert plot_scale(PAPER, "cycle.period_us", values([250, 500]), as_cells=False).own is None
 
 
-def test_colours_of_a_margin_are_red_below_zero_and_blue_from_it_on(plots: Plots) -> None:
+def test_colours_of_a_margin_are_red_below_zero_and_blue_from_it_on() -> None:
     one = plotted("margin_us", bus__gap_count=(7, 63), cycle__period_us=range(250, 1001, 50))
-    for plot, panel in zip(plots(drawn(one)), one.panels, strict=True):
-        found = colours_of(plot, *panel.values.shape)
-        for value, colour in zip(panel.values.ravel(), [each for row in found for each in row], strict=True):
-            assert colour is not None
-            red, _, blue = colour
-            assert (blue > red) == (value >= 0)
-        # Farther from zero is darker, on either side.
-        ranked = sorted(zip(panel.values.ravel(), [each for row in found for each in row], strict=True))
-        for side in ([c for v, c in ranked if v < 0][::-1], [c for v, c in ranked if v >= 0]):
-            greens = [colour[1] for colour in side if colour]
-            assert greens == sorted(greens, reverse=True)
+    for grid, panel in zip(grids(one), one.panels, strict=True):
+        looks = sorted(
+            (value, cell.ink)
+            for values, row in zip(panel.values, grid.rows, strict=True)
+            for value, cell in zip(values, row, strict=True)
+            if cell
+        )
+        assert all(ink.startswith("above" if value >= 0 else "below") for value, ink in looks)
+        # Farther from zero is stronger, on either side.
+        for side in ([ink for value, ink in looks if value < 0][::-1], [ink for value, ink in looks if value >= 0]):
+            assert side == sorted(side)
     # Without a margin below zero, none looks like one.
-    (plot, _) = plots(drawn(plotted("margin_us", bus__nodes=(1, 2), cycle__period_us=(2000, 4000))))
-    assert all(colour[2] > colour[0] for *_, colour in cells(plot))
+    (grid, _) = grids(plotted("margin_us", bus__nodes=(1, 2), cycle__period_us=(2000, 4000)))
+    assert all(cell.ink.startswith("above") for row in grid.rows for cell in row if cell)
 
 
-def test_a_missing_value_is_blank(plots: Plots) -> None:
+@pytest.mark.parametrize("figure", ["margin_us", "max_axes", "utilisation"])
+def test_each_colour_is_explained_by_the_values_that_it_stands_for(figure: str) -> None:
+    one = plotted(figure, bus__nodes=range(1, 9), cycle__period_us=range(250, 8001, 250))
+    (grid, *_) = grids(one)
+    ranges = {
+        entry.ink: tuple(map(float, entry.words.removesuffix(" us").removesuffix("%").split(" to ")))
+        for entry in grid.legend
+        if entry.ink in INKS
+    }
+    assert len(ranges) > 3
+    ends = sorted(ranges.values())
+    for (_, end), (start, _) in pairwise(ends):
+        assert start - end in ((1.0,) if one.figure.sort == "count" else (0.0,))
+    for row, cells in zip(one.panels[0].values, grid.rows, strict=True):
+        for value, cell in zip(row, cells, strict=True):
+            low, high = ranges[cell.ink]  # type: ignore[union-attr]
+            assert low - abs(low) * 1e-3 <= value <= high + abs(high) * 1e-3
+
+
+def test_a_missing_value_is_blank() -> None:
     one = plotted("margin_us", bus__gap_count=(7, 63), cycle__period_us=(250, 500, 1000))
-    (panel, *_) = one.panels
-    panel.values[1, 1] = float("nan")
-    root = drawn(one._replace(panels=(panel,)))
-    (plot,) = plots(root)
-    found = colours_of(plot, 2, 3)
-    assert [[colour is None for colour in row] for row in found] == [[False] * 3, [False, True, False]]
-    assert texts(root)[-1] == "blank: no value"
+    one.panels[0].values[1, 1] = float("nan")
+    (grid, _) = grids(one)
+    assert [[cell is None for cell in row] for row in grid.rows] == [[False] * 3, [False, True, False]]
+    assert "blank: no value" in words(one)
 
 
-def test_the_largest_map_is_few_paths() -> None:
-    one = plotted("margin_us", bus__nodes=(1, 2), cycle__period_us=(250, 500))
-    up, across = (scale._replace(places=np.arange(500.0), own=None) for scale in one.scales)
-    values = np.add.outer(np.arange(500.0), np.arange(500.0)) - 400
-    panel = one.panels[0]._replace(values=values, unsafe=values > 500)
-    svg = sweep_svg(one._replace(scales=(up, across), panels=(panel,)), title="x")
-    assert len(svg) < 1_000_000
-    assert len([each for each in fromstring(svg).iter(f"{SVG}path") if each.get("fill")]) <= 60
-
-
-def test_the_line_parts_the_cells_of_zero_or_more_from_the_others(plots: Plots) -> None:
-    one = plotted("margin_us", bus__gap_count=(7, 63, "optimal"), cycle__period_us=range(250, 2001, 250))
-    for plot, panel in zip(plots(drawn(one)), one.panels, strict=True):
-        fits = panel.values >= 0
-        expected = set()
-        for row in range(3):
-            for column in range(8):
-                if column < 7 and fits[row, column] != fits[row, column + 1]:
-                    expected.add(((column + 1, row), (column + 1, row + 1)))
-                if row < 2 and fits[row, column] != fits[row + 1, column]:
-                    expected.add(((column, row + 1), (column + 1, row + 1)))
-        (points,) = plot.paths["border"]
-        corners = [(round(8 * x), round(3 * (1 - y))) for x, y in points]
-        assert set(zip(corners[::2], corners[1::2], strict=True)) == expected
-        assert expected
-
-
-def test_the_line_and_the_grey_are_of_the_verdict(plots: Plots) -> None:
+def test_the_line_and_the_grey_are_of_the_verdict() -> None:
     # At 540 us the margin is above zero, and less than its uncertainty.
     one = plotted("margin_corrected_us", bus__nodes=(2, 3), cycle__period_us=(500, 540, 4000))
-    (panel,) = one.panels
+    (panel,), (grid,) = one.panels, grids(one)
     assert (panel.values[0] >= 0).tolist() == [False, True, True]
-    (plot,) = plots(drawn(one))
-    (points,) = plot.paths["border"]
-    assert {round(3 * x) for x, _ in points} == {2}
-    assert texts(drawn(one))[-2:] == ["edge of the settings that are shown to fit", "this design"]
-    (plot,) = plots(drawn(plotted("safe_axes", cycle__period_us=(500, 540, 4000))))
-    assert max(x for x, _ in plot.values("unproven")) == pytest.approx((540 + 4000) / 2, abs=8)
+    assert [cell.is_inside for cell in grid.rows[0] if cell] == [False, False, True]
+    assert words(one)[-2:] == ["edge of what is shown to fit", "this design"]
+    (shade,) = curves(plotted("safe_axes", cycle__period_us=(500, 540, 4000))).shades
+    assert (shade.entry.words, shade.low, shade.high) == ("not shown to fit", 500, (540 + 4000) / 2)
 
 
 def test_a_figure_that_does_not_vary_gives_way_to_the_margin() -> None:
@@ -228,36 +168,37 @@ def test_a_figure_that_does_not_vary_gives_way_to_the_margin() -> None:
     assert plotted(None, cycle__period_us=(500, 4000)).figure.key == "safe_axes"
 
 
-def test_a_map_of_one_value_is_a_sentence(plots: Plots) -> None:
+def test_a_map_of_one_value_is_a_sentence() -> None:
     one = plotted("max_nodes", bus__nodes=(1, 2), cycle__period_us=(500, 501))
-    root = drawn(one)
-    assert plots(root) == []
-    written = " ".join(texts(root))
-    assert "paper model: 2 at every setting" in written
-    assert "Most nodes by the standard model: 1 at every setting." in written
+    assert grids(one) == []
+    assert [panel.title for panel in drawn(one).panels] == ["paper model: 2 at every setting"]
+    assert drawn(one).words[0].startswith("Most nodes by the standard model: 1 at every setting.")
 
 
-def test_unsafe_points_and_this_design_are_marked(plots: Plots) -> None:
-    root = drawn(plotted("margin_us", bus__gap_count=(5, 7, 63), cycle__period_us=(250, 4000)))
-    for plot in plots(root):
-        plot.up = {str(place): at for place, at in enumerate(plot.up.values())}
-        assert marks(plot, "path", "above") == [
-            pytest.approx(place, rel=1e-3, abs=1e-3) for place in ((250, 0), (4000, 0))
-        ]
-        assert marks(plot, "circle", "above") == [pytest.approx((4000, 2), rel=1e-3)]
-    assert texts(root)[-3:] == ["margin of 0 (paper model)", "unsafe gap count", "this design"]
-    (plot,) = plots(drawn(plotted("margin_us", bus__gap_count=(5, 63))))
-    plot.across = {"0": 0.25, "1": 0.75}
-    assert {x for x, _ in marks(plot, "path", "cross")} == {0}
+def test_unsafe_settings_and_this_design_are_marked() -> None:
+    one = plotted("margin_us", bus__gap_count=(5, 7, 63), cycle__period_us=(250, 4000))
+    for grid in grids(one):
+        assert [[cell.mark for cell in row if cell] for row in grid.rows] == [["!", "!"], ["", ""], ["", ""]]
+        assert grid.own == (4000, 2)
+    assert {"unsafe gap count", "this design"} < set(words(one))
+    (shade,) = curves(plotted("margin_us", bus__gap_count=(5, 9, 63))).shades
+    assert (shade.entry.words, shade.low, shade.high) == ("unsafe gap count", 5, 7)
 
 
-def test_the_bar_of_colours_has_the_colours_of_its_values() -> None:
-    root = drawn(plotted("margin_us", bus__gap_count=(7, 63), cycle__period_us=range(250, 1001, 250)))
-    bar = [one.get("fill", "") for one in root.iter(f"{SVG}rect") if one.get("class") == "cells"]
-    assert len(bar) == 60
-    reds = [int(fill[1:3], 16) > int(fill[5:], 16) for fill in bar]
-    assert reds == sorted(reds, reverse=True)
-    assert len(set(reds)) == 2
+def test_the_largest_map_is_a_small_picture() -> None:
+    one = plotted("margin_us", bus__nodes=(1, 2), cycle__period_us=(250, 500))
+    up, across = (scale._replace(places=np.arange(500.0), own=None) for scale in one.scales)
+    values = np.add.outer(np.arange(500.0), np.arange(500.0)) - 400
+    panel = one.panels[0]._replace(values=values, unsafe=values > 500, fits=values > 0)
+    (grid,) = grids(one._replace(scales=(up, across), panels=(panel,)))
+    assert len({id(cell) for row in grid.rows for cell in row}) < 100
+
+
+def test_a_sweep_over_three_keys_has_no_picture() -> None:
+    answer = busplan.sweep(
+        "paper-1ms", vary={key: [1, 2] for key in ("bus.nodes", "node.axes", "cycle.nonperiodic_us")}
+    )
+    assert answer._repr_svg_() is None
 
 
 def test_another_design_is_not_marked_as_this_one() -> None:
@@ -285,11 +226,11 @@ def test_keys_are_said_in_words_with_their_unit(key: str, label: str) -> None:
 
 
 def test_figures_are_drawn_in_the_unit_of_their_label() -> None:
-    assert plotted_figure(PAPER, "margin_us")[1] == 1
+    assert plotted_figure(network_of(PAPER), "margin_us")[1] == 1
     one = plotted("utilisation", bus__nodes=(1, 2))
     assert one.label == "utilisation, %"
     assert one.panels[0].values.tolist() == pytest.approx([100 * 102.955 / 2000, 10.356], abs=0.001)
-    figure, factor = plotted_figure(PAPER, "max_contour_error_mm")
+    figure, factor = plotted_figure(network_of(PAPER), "max_contour_error_mm")
     assert (figure.column, factor) == ("um", 1000)
 
 
@@ -302,6 +243,14 @@ def test_figures_are_drawn_in_the_unit_of_their_label() -> None:
             (
                 "Margin by the standard model: -138.3 us to 1737 us; this design has 1737 us. "
                 "Shown to fit: 1 of 3 settings, outside the grey."
+            ),
+        ),
+        (
+            "utilisation",
+            {"bus__nodes": (1, 2)},
+            (
+                "Utilisation by the standard model: 7.125% to 13.17%; this design has 13.17%. "
+                "Every setting is shown to fit."
             ),
         ),
         (
@@ -330,4 +279,5 @@ def test_a_figure_that_no_model_has_is_said() -> None:
     one = plotted("margin_us", quiet, bus__nodes=(1, 2))
     empty = one._replace(panels=())
     assert caption(empty) == "No timing model gives margin here."
-    assert "No timing model gives margin here." in texts(drawn(empty))
+    assert drawn(empty).words == ("No timing model gives margin here.",)
+    assert drawn(empty).panels == ()

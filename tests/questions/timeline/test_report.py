@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable, Iterator
-from xml.etree import ElementTree as ET
 
 import pytest
 from hypothesis import given
@@ -12,15 +11,13 @@ from busplan.buses import kind_named
 from busplan.buses.parts import IDLE
 from busplan.forms import html, markdown, terminal
 from busplan.forms.blocks import Report, ShownValue
+from busplan.forms.charts import Lane, Lanes, legend
 from busplan.forms.numbers import sentence_text
-from busplan.forms.raster import png
 from busplan.forms.scale import ticks
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.fit.figures import capacity
-from busplan.questions.timeline import svg
 from busplan.questions.timeline.events import Schedule, schedule, totals, zoom
-from busplan.questions.timeline.lanes import node_lanes, stretches
 from busplan.questions.timeline.report import (
     headline,
     timeline_chart,
@@ -32,7 +29,6 @@ from busplan.questions.timeline.report import (
 
 ValuesIn = Callable[[object], Iterator[ShownValue]]
 
-SVG = "{http://www.w3.org/2000/svg}"
 HOSTILE = '<b>$x_1$ & %%{init: {"theme":"dark"}}%%; ]]> "q" # end: </svg>機械'
 
 
@@ -44,12 +40,16 @@ def drawn(one: Schedule, width: int | None = None) -> list[str]:
     return terminal.text(timeline_report(one), width=width).splitlines()
 
 
-def title(one: Schedule) -> str:
-    return sentence_text(headline(one))
+def lanes(one: Schedule, number: int = 1) -> Lanes:
+    """Lanes of the period (0) or of the window (1)."""
+    plot = timeline_chart(one).drawing.panels[number].plot
+    assert isinstance(plot, Lanes)
+    return plot
 
 
-def timeline_svg(one: Schedule) -> str:
-    return svg.timeline_svg(one, title=title(one))
+def lane(one: Schedule, label: str, number: int = 0) -> Lane:
+    (found,) = (lane for lane in lanes(one, number).lanes if lane.label == label)
+    return found
 
 
 def row(lines: list[str], label: str) -> str:
@@ -94,8 +94,8 @@ def test_a_drawing_is_to_scale() -> None:
     one = plan(bus__nodes=8)
     lines = drawn(one, 132)
     strip = row(lines, "cycle")
-    for mark, kinds in {"R": "read", "W": "write", "~": "idle"}.items():
-        part_us = sum(part.event.duration_us for part in stretches(one.events) if part.kind == kinds)
+    for mark, kinds in {"R": "read", "W": "write", "~": None}.items():
+        part_us = sum(part.duration_us for part in one.events if part.transaction == kinds and part.kind != "sync")
         assert strip.count(mark) == pytest.approx(part_us / 4000 * len(strip), abs=1.01)
     assert strip.count("-") == pytest.approx(len(strip) / 2, abs=1.01)
     for number in range(1, 9):
@@ -124,12 +124,14 @@ def test_an_overrun_is_said_and_seen() -> None:
     for name, beyond_us in {"over": 57.117, "paper": 57.117, "standard": 113.320}.items():
         assert row(lines, name).count("!") / len(over) == pytest.approx(beyond_us / 300, abs=0.03)
     assert "idle" not in "\n".join(lines)
-    assert "beyond the slice, 57.117 us: 150.000 to 207.117 us" in timeline_svg(one)
+    (beyond,) = lane(one, "over").spans
+    assert beyond.words == "beyond the slice, 57.117 us: 150.000 to 207.117 us"
+    assert [line.partition("|")[0].strip() for line in lines].count("over") == 2
+    assert {guide.x for guide in (*lanes(one, 0).guides, *lanes(one, 1).guides)} == {150.0}
     document = timeline_document(one)
     assert (document["fits"], document["exceeded"]) == (False, ["time"])
     assert document["margin_us"] < 0
-    whole = "\n".join(drawn(plan()))
-    assert "beyond" not in whole + timeline_svg(plan())
+    assert "beyond" not in "\n".join(drawn(plan()))
 
 
 @pytest.mark.parametrize("period_us", [4000.0, 550.0, 500.0, 300.0, 250.0, 100.0])
@@ -139,27 +141,23 @@ def test_the_period_is_whole_with_its_slice_and_both_margins(period_us: float) -
     assert [each["margin_us"] for each in timeline_document(one)["margins"]] == [
         each.margin_us for each in found.values()
     ]
-    lines, drawn_svg = drawn(one)[1 if one.figures.circle_refused_by else 0 :], timeline_svg(one)
+    lines = drawn(one)[1 if one.figures.circle_refused_by else 0 :]
     end_us = max(period_us, *(each.required_us for each in found.values()))
     assert lines[4].startswith(f"The period of {period_us:.3f} us")
-    rects = {
-        rect.findtext(f"{SVG}title") or "": (rect.get("x") or "", rect.get("width") or "")
-        for rect in ET.fromstring(drawn_svg).iter(f"{SVG}rect")
-    }
+    assert (lanes(one, 0).across.low, lanes(one, 0).across.high) == (0, end_us)
     for model, each in found.items():
         margin = f"margin {each.margin_us:.3f} us" if each.margin_us >= 0 else f"{-each.margin_us:.3f} us short"
-        words = f"{model}: {each.required_us:.3f} us needed, {margin}"
-        assert words in drawn_svg
+        assert lane(one, model).note == f"{each.required_us:.3f} us needed, {margin}"
         assert f"{each.margin_us:.3f} us by the {model} model" in lines[1]
         bars = row(lines, model)
-        share = min(each.required_us, each.available_us) / end_us
-        assert bars.count("#") / len(bars) == pytest.approx(share, abs=0.03)
+        used_us = min(each.required_us, each.available_us)
+        assert bars.count("#") / len(bars) == pytest.approx(used_us / end_us, abs=0.03)
         assert bars.count(".") / len(bars) == pytest.approx(max(0, each.margin_us) / end_us, abs=0.03)
-        (width,) = (width for title, (_, width) in rects.items() if title.startswith(f"needed by the {model} model"))
-        assert float(width.rstrip("%")) == pytest.approx(100 * share, rel=1e-3)
-    behind = [x for title, (x, _) in rects.items() if title.startswith("rest of the period,")]
-    assert len(behind) == (period_us > one.end_us)
-    assert [float(x.rstrip("%")) for x in behind] == pytest.approx([100 * one.end_us / end_us] * len(behind), rel=1e-3)
+        needed = lane(one, model).spans[0]
+        assert (needed.entry.words, needed.start) == ("needed", 0)
+        assert needed.end == pytest.approx(used_us)
+    behind = [span for span in lane(one, "cycle").spans if span.entry.words == "rest of the period"]
+    assert [(span.start, span.end) for span in behind] == [(one.end_us, period_us)] * (period_us > one.end_us)
 
 
 def test_an_unsafe_gap_count_is_warned_of() -> None:
@@ -171,7 +169,7 @@ def test_an_unsafe_gap_count_is_warned_of() -> None:
 def test_a_single_transaction_is_drawn_event_by_event() -> None:
     lines = drawn(zoom(plan(), transaction=("write", 2)))
     assert any(line.startswith("The write of node 2, 155.438 to 207.117 us") for line in lines)
-    assert re.search(r"^node execution +36\.733 \| +=+ +\|$", "\n".join(lines), re.MULTILINE)
+    assert re.search(r"^node execution +36\.733 us \| +=+ +\|$", "\n".join(lines), re.MULTILINE)
     assert row(lines, "window").strip() == "^^"
     short = drawn(zoom(plan(), from_us=10.0, to_us=10.001))
     assert row(short, "window").strip() == "^"
@@ -179,41 +177,16 @@ def test_a_single_transaction_is_drawn_event_by_event() -> None:
 
 @pytest.mark.parametrize(
     "one",
-    [plan(), plan(cycle__period_us=300.0), zoom(plan(), from_us=100.0, to_us=180.0), plan(bus__nodes=62)],
+    [plan(), plan(cycle__period_us=300.0), zoom(plan(), from_us=100.0, to_us=180.0), plan(bus__nodes=16)],
     ids=["whole", "overrun", "window", "many"],
 )
-def test_svg_bars_are_the_events(one: Schedule) -> None:
-    root = ET.fromstring(timeline_svg(one))
-    assert root.tag == f"{SVG}svg"
-    assert root.get("width") == "100%"
-    style = root.findtext(f"{SVG}style")
-    assert style is not None
-    assert "prefers-color-scheme:dark" in style
-    tips = [rect.findtext(f"{SVG}title") or "" for rect in root.iter(f"{SVG}rect")]
-    executions = [tip for tip in tips if "node execution" in tip]
-    assert len(executions) == sum(event.kind == "execution" for event in one.events)
-    widths = [
-        float((rect.get("width") or "").rstrip("%"))
-        for rect in root.iter(f"{SVG}rect")
-        if "node execution" in (rect.findtext(f"{SVG}title") or "")
-    ]
-    whole_us = (one.used_us if one.is_whole else one.to_us) - one.from_us
-    wanted = [event.duration_us / whole_us * 100 for event in one.events if event.kind == "execution"]
-    assert widths == pytest.approx(wanted, rel=1e-2)
-
-
-def test_hostile_names_are_text_in_every_form() -> None:
-    one = plan(name=HOSTILE)
-    root = ET.fromstring(timeline_svg(one))
-    assert (root.findtext(f"{SVG}title") or "").startswith(HOSTILE)
-    assert {element.tag.removeprefix(SVG) for element in root.iter()} <= {
-        *("svg", "title", "desc", "style", "rect", "line", "text")
-    }
-    assert png(timeline_svg(one)).startswith(b"\x89PNG")
-
-
-def test_png_is_the_same_for_the_same_schedule() -> None:
-    assert png(timeline_svg(zoom(plan(), to_us=60.0))) == png(timeline_svg(zoom(plan(), to_us=60.0)))
+def test_bars_are_the_events_in_the_lanes_of_their_nodes(one: Schedule) -> None:
+    bars = [span for each in lanes(one).lanes for span in each.spans if "execution" in span.words]
+    executions = [event for event in one.events if event.kind == "execution"]
+    assert sorted((bar.start, bar.end) for bar in bars) == [(event.start_us, event.end_us) for event in executions]
+    assert (lanes(one).across.low, lanes(one).across.high) == (one.from_us, one.used_us if one.is_whole else one.to_us)
+    explained = {entry.words for entry in legend(timeline_chart(one).drawing.panels)}
+    assert {kind_named("ieee1394").event_kind(event.kind).label for event in one.events} - {"idle"} <= explained
 
 
 def test_documents_hold_the_schedules_own_numbers() -> None:
@@ -257,17 +230,17 @@ def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
     assert "```text\nThe period of 4000.000 us" in text
     assert "| arbitration | " in text
     page = html.page(report)
-    assert page.count('<svg xmlns="http://www.w3.org/2000/svg" class="chart timeline"') == 1
-    assert page.count(".chart.timeline .track{") == 1
+    assert page.count('<svg xmlns="http://www.w3.org/2000/svg" class="chart"') == 1
     assert '<data value="8">8</data>' in page
     assert HOSTILE not in page
 
 
 def test_a_page_of_many_events_says_that_a_bar_is_a_transaction() -> None:
     many = plan(bus__nodes=62, bus__max_hops=3)
-    legend = timeline_chart(many).legend
-    assert legend is not None
-    assert sentence_text(legend) == "A bar is a whole transaction."
+    words = timeline_chart(many).legend
+    assert words is not None
+    assert sentence_text(words) == "A bar is a whole transaction."
+    assert [span.words.split(",")[0] for span in lane(many, "node 9", 1).spans] == ["read of node 9", "write of node 9"]
     assert timeline_chart(plan()).legend is None
 
 
@@ -277,8 +250,9 @@ def spans(one: Schedule) -> list[tuple[str, float, float]]:
 
 def test_bus_lane_comes_first_and_nodes_in_their_turn() -> None:
     one = plan(bus__nodes=12)
-    assert [lane.label for lane in node_lanes(one)] == ["bus", *(f"node {number}" for number in range(1, 13))]
-    assert [lane.label for lane in node_lanes(zoom(one, transaction=("write", 11)))] == ["node 11"]
+    assert [each.label for each in lanes(one).lanes] == ["bus", *(f"node {number}" for number in range(1, 13))]
+    each = zoom(one, transaction=("write", 11))
+    assert [span.words.split(":")[0] for lane in lanes(each).lanes for span in lane.spans] == ["write of node 11"] * 9
 
 
 @given(start=st.floats(0.0, 1e6), width=st.floats(1e-3, 1e6), most=st.integers(1, 12))

@@ -13,7 +13,8 @@ from busplan.errors import BusplanError
 from busplan.extras import require_pyarrow, require_resvg
 from busplan.files import document_bytes, write_file
 from busplan.forms import ENDINGS, Form, ending_expected, render
-from busplan.forms.blocks import Report
+from busplan.forms.blocks import Report, first_drawing
+from busplan.forms.charts import Drawing
 from busplan.forms.terminal import block_lines
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
@@ -67,22 +68,45 @@ class Answer(ABC):
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         """Makers of a file's content, by ending."""
         texts = {ending: partial(self._text, form) for ending, form in ENDINGS.items()}
-        return {**texts, ".svg": self._svg, ".png": self._png}
+        return {**texts, ".svg": self.svg, ".png": self._png}
 
-    def _svg(self) -> str:
-        """The picture, which not every answer has."""
-        picture = self._repr_svg_()
-        if picture is None:
+    def drawing(self) -> Drawing:
+        """The picture as data.
+
+        Raises
+        ------
+        BusplanError
+            The answer has no picture.
+        """
+        drawing = first_drawing(self.report().blocks)
+        if drawing is None:
             raise BusplanError(
                 "there is nothing to draw: this answer has no picture; those of timeline, map_, compare, circle_test, "
                 "sweep, and capacity with sensitivity=True have one"
             )
-        return picture
+        return drawing
+
+    def svg(self, *, note: str = "") -> str:
+        """The picture as an SVG file.
+
+        Parameters
+        ----------
+        note
+            Words after its title.
+
+        Raises
+        ------
+        BusplanError
+            The answer has no picture.
+        """
+        from busplan.forms.svg import content
+
+        return str(content(self.drawing(), "svg", note=note))
 
     def _png(self) -> bytes:
-        from busplan.forms.raster import png
+        from busplan.forms.svg import content
 
-        return png(self._svg())
+        return document_bytes(content(self.drawing(), "png"))
 
     def _text(self, form: Form) -> str:
         """The answer in a form."""
@@ -112,6 +136,7 @@ class Answer(ABC):
         return fragment(self._shown())
 
     def _repr_svg_(self) -> str | None:
-        from busplan.forms.picture import first_picture
-
-        return first_picture(self.report().blocks)
+        try:
+            return self.svg()
+        except BusplanError:
+            return None

@@ -2,17 +2,14 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
-from xml.etree.ElementTree import SubElement
 
 from busplan.buses.cycle import Term
 from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
 from busplan.buses.network import Network
-from busplan.forms.bars import ROW, SignedBar, draw_bars, draw_zero
 from busplan.forms.blocks import (
     Block,
     Cell,
     Chart,
-    Drawing,
     JsonDocument,
     Record,
     Report,
@@ -26,9 +23,8 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.lines import Line
+from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
 from busplan.forms.numbers import decimals_of, listed, nouns, period_value, sentence_text
-from busplan.forms.svg import Scale, drawing, markup
 from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.report import capacity_report
 from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Sensitivity, Standing
@@ -36,87 +32,38 @@ from busplan.questions.fit.certainty import FITS, limits_behind
 from busplan.questions.words.documents import fields, with_profile
 
 _DECIMALS: Final = 3
-_NARROWEST: Final = 10
-"""Least columns of the bars in characters."""
-_TAKES, _ADDS, _ZERO = "-", "+", "|"
 
 
-class SensitivityDrawing(Drawing):
-    """A bar for each change that can be made, on one scale.
+def sensitivity_drawing(sensitivity: Sensitivity) -> Drawing | None:
+    """Draw a bar for each change that can be made, on one scale; None if nothing moves the margin.
 
     Parameters
     ----------
     sensitivity
         Effects of small changes.
     """
-
-    def __init__(self, sensitivity: Sensitivity) -> None:
-        self._bars = [
-            _bar(effect.change, effect.margin_change_us)
-            for effect in sensitivity.effects
-            if effect.margin_change_us is not None
-        ]
-        self._margin_us = sensitivity.now.margin_corrected_us
-        self._least_us = min((bar.start_us for bar in self._bars), default=0.0)
-        self._most_us = max((bar.end_us for bar in self._bars), default=0.0)
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether nothing moves the margin: then there is no bar to see."""
-        return self._least_us == self._most_us
-
-    @property
-    def shows_the_end(self) -> bool:
-        """Whether the scale reaches to where nothing is left of the margin."""
-        return self._least_us <= -self._margin_us < 0
-
-    def svg(self) -> str | None:
-        """Draw a bar below the name of each change."""
-        if self.is_empty:
-            return None
-        root = drawing("What each small change does to the corrected margin", css="chart sensitivity")
-        scale = Scale(self._least_us, self._most_us)
-        bottom = len(self._bars) * ROW
-        draw_zero(root, scale, top=0, bottom=bottom)
-        if self.shows_the_end:
-            draw_zero(root, scale, top=0, bottom=bottom, at=-self._margin_us, css="edge")
-        draw_bars(root, self._bars, scale, y=0)
-        root.set("height", str(scale.marks(SubElement(root, "g"), top=bottom, bottom=bottom)))
-        return markup(root)
-
-    def characters(self, width: int) -> list[Line] | None:
-        """Draw a row for each change: its name, its bar and its figure."""
-        return None if self.is_empty else [Line(row, "drawn") for row in self._rows(width)]
-
-    def _rows(self, width: int) -> Iterator[str]:
-        names = max(len(bar.label) for bar in self._bars)
-        figures = max(len(bar.words) for bar in self._bars)
-        columns = max(_NARROWEST, width - names - figures - 5)
-        left, right = _shared(columns, least=self._least_us, most=self._most_us)
-        for bar in self._bars:
-            size = _columns(
-                bar.value, self._least_us if bar.value < 0 else self._most_us, left if bar.value < 0 else right
-            )
-            takes, adds = (_TAKES * size, "") if bar.value < 0 else ("", _ADDS * size)
-            drawn = f"{takes.rjust(left)}{_ZERO}{adds.ljust(right)}"
-            yield f"{bar.label.ljust(names)}  {drawn}  {bar.words.rjust(figures)}"
+    moved = [(effect.change, effect.margin_change_us) for effect in sensitivity.effects]
+    changes = [(change, us) for change, us in moved if us is not None]
+    least, most = (choose((us for _, us in changes), default=0.0) for choose in (min, max))
+    least, most, left_us = min(least, 0.0), max(most, 0.0), sensitivity.now.margin_corrected_us
+    if least == most:
+        return None
+    lanes = tuple(
+        Lane(change, tuple(_bar(us)), f"{decimals_of(us, _DECIMALS, signed=True)} us", is_thin=True)
+        for change, us in changes
+    )
+    guides = [Guide(Entry("zero"), x=0.0)]
+    if least <= -left_us < 0:
+        guides.append(Guide(Entry("edge", "nothing is left of the margin", shape="line"), x=-left_us))
+    title = "What each small change does to the corrected margin"
+    return Drawing(title, (Panel(Lanes(numbers("us", least, most), lanes, tuple(guides))),))
 
 
-def _bar(change: str, us: float) -> SignedBar:
-    return SignedBar(change, us, decimals_of(us, _DECIMALS, signed=True), "us", "takes" if us < 0 else "hides")
-
-
-def _shared(columns: int, *, least: float, most: float) -> tuple[int, int]:
-    """Share columns between the left and the right of zero; a side with a bar has one at least."""
-    left = round(columns * -least / (most - least))
-    left = max(left, 1) if least < 0 else 0
-    left = min(left, columns - 1) if most > 0 else columns
-    return left, columns - left
-
-
-def _columns(us: float, of_us: float, columns: int) -> int:
-    """Columns of a bar: none only for no change at all."""
-    return max(1, round(columns * us / of_us)) if us else 0
+def _bar(us: float) -> Iterator[Span]:
+    if us < 0:
+        yield Span(Entry("takes", "takes from the margin"), us, 0.0)
+    elif us > 0:
+        yield Span(Entry("hides", "adds to it"), 0.0, us)
 
 
 def next_bottleneck_sentence(bottlenecks: NextBottleneck, network: Network) -> Sentence:
@@ -222,13 +169,11 @@ def sensitivity_blocks(sensitivity: Sensitivity) -> Iterator[Block]:
         The effects of all changes.
     """
     yield sensitivity_table(sensitivity)
-    drawn = SensitivityDrawing(sensitivity)
-    if not drawn.is_empty:
+    drawn = sensitivity_drawing(sensitivity)
+    if drawn is not None:
         change = _capital(sensitivity.effects[0].change)
         sides = "a bar to the left takes from it, one to the right adds to it"
-        caption = Sentence((f"{change} moves the margin most; {sides}, in us",))
-        legend = Sentence(("The red line is where nothing is left of the margin.",)) if drawn.shows_the_end else None
-        yield Chart(drawn, caption, legend)
+        yield Chart(drawn, Sentence((f"{change} moves the margin most; {sides}, in us",)))
     yield _headline(sensitivity)
     yield from (
         Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in sensitivity.effects if effect.note

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
+from busplan.forms.charts import Drawing
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Periods, ProfileLike, load_network, one_or_several, whole
@@ -50,27 +51,19 @@ class CircleTestAnswer(Answer, CircleTest):
 
         return csv_blocks(trace_records(self, every=whole(every, name="every")), columns=TRACE_COLUMNS)
 
-    def svg(self, *, note: str = "") -> str:
-        """The magnified circle, its error over time and the ranked error sources, as an SVG file.
-
-        Parameters
-        ----------
-        note
-            Title, beside the profile's name.
+    def drawing(self) -> Drawing:
+        """The magnified circle, its error over time and the ranked error sources.
 
         Raises
         ------
         BusplanError
             No period fits the bus, so nothing was simulated.
         """
-        from busplan.questions.circle.plot import circle_svg
+        from busplan.questions.circle.plot import test_drawing
 
         if not any(self.runs):
             raise BusplanError("there is nothing to draw: no period fits the bus")
-        return circle_svg(self, note=note)
-
-    def _repr_svg_(self) -> str | None:
-        return self.svg() if any(self.runs) else None
+        return test_drawing(self)
 
 
 def circle_test(

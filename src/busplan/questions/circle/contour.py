@@ -1,6 +1,6 @@
 """Contour data of a simulation, for drawings and files: the error around the circle, and every step."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -20,45 +20,26 @@ class ContourProfile(NamedTuple):
     low_mm: tuple[float | None, ...]
     high_mm: tuple[float | None, ...]
 
-    def condensed(self, *, sectors: int) -> "ContourProfile":
-        """Merge neighbouring sectors.
 
-        Parameters
-        ----------
-        sectors
-            New number of sectors, a divisor of the present number [1].
-        """
-        width = len(self.low_mm) // sectors
-
-        def each(ends: tuple[float | None, ...], choose: Callable[[list[float]], float]) -> Iterator[float | None]:
-            for start in range(0, len(ends), width):
-                there = [end for end in ends[start : start + width] if end is not None]
-                yield choose(there) if there else None
-
-        return ContourProfile(tuple(each(self.low_mm, min)), tuple(each(self.high_mm, max)))
-
-
-def contour_profile(run: CircleRun, *, sectors: int = CONTOUR_SECTORS) -> ContourProfile:
+def contour_profile(run: CircleRun) -> ContourProfile:
     """Condense the measured part of a circle test.
 
     Parameters
     ----------
     run
         The simulation.
-    sectors
-        Number of equal sectors [1].
 
     Returns
     -------
     ContourProfile
         Sector 0 begins on the positive x axis; sectors follow counter-clockwise.
     """
-    low, high = np.full(sectors, np.inf), np.full(sectors, -np.inf)
+    low, high = np.full(CONTOUR_SECTORS, np.inf), np.full(CONTOUR_SECTORS, -np.inf)
     for block in blocks(run.measured):
         x_mm, y_mm = run.x_mm[block], run.y_mm[block]
         error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
         turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
-        sector = np.minimum((turn * sectors).astype(np.int64), sectors - 1)
+        sector = np.minimum((turn * CONTOUR_SECTORS).astype(np.int64), CONTOUR_SECTORS - 1)
         # Neighbouring points are mostly in the same sector: only the extremes of each stay are looked at one by one.
         entered = np.flatnonzero(np.diff(sector, prepend=-1))
         np.minimum.at(low, sector[entered], np.minimum.reduceat(error_mm, entered))

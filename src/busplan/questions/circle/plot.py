@@ -1,25 +1,35 @@
-"""The circle test as one SVG: the magnified circle, the error over time, and the ranked error sources."""
+"""The circle test as one picture: the magnified circle, the error over time, and the ranked error sources."""
 
 from collections.abc import Sequence
 from math import ceil
 from typing import Final, NamedTuple
-from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.forms.bars import ROW, SignedBar, draw_bars, draw_zero
+from busplan.forms.charts import (
+    Curve,
+    Curves,
+    Drawing,
+    Entry,
+    Guide,
+    Lane,
+    Lanes,
+    Panel,
+    Ruler,
+    Shade,
+    Span,
+    numbers,
+)
+from busplan.forms.lines import Tone
 from busplan.forms.numbers import decimals_of, period
-from busplan.forms.picture import styled
-from busplan.forms.plot_area import MARGIN_PERCENT, PlotArea, draw_plot_area, numbers
-from busplan.forms.svg import LINE, Scale, drawing, inside, markup, paragraph, text_at
 from busplan.questions.circle.contour import contour_profile
 from busplan.questions.circle.drawing import (
-    HEIGHT,
-    CircleDrawing,
+    TOLERANCE,
     ErrorRange,
     LengthUnit,
     Magnified,
+    dial,
     error_range,
     length_unit,
     magnified,
@@ -35,7 +45,7 @@ _MAX_POINTS: Final = 2000
 """Most points of one curve: more would not be visible."""
 
 
-class Curve(NamedTuple):
+class Stretch(NamedTuple):
     """A part of the move. Of many points, the smallest and the largest error of each stretch are kept."""
 
     time_s: Floats
@@ -48,10 +58,10 @@ class CircleRow(NamedTuple):
 
     result: CircleFigures
     run: CircleRun
-    curves: tuple[Curve, ...]
+    curves: tuple[Stretch, ...]
 
     @property
-    def judged(self) -> tuple[Curve, ...]:
+    def judged(self) -> tuple[Stretch, ...]:
         """Curves that mean and largest error are taken from: the whole move on a trapezoid."""
         return tuple(curve for curve in self.curves if curve.measured or self.result.path == "trapezoid")
 
@@ -106,7 +116,7 @@ def _ends(errors: Sequence[Floats]) -> tuple[float, float]:
     return min(float(error_um.min()) for error_um in errors), max(float(error_um.max()) for error_um in errors)
 
 
-def _curves(run: CircleRun) -> tuple[Curve, ...]:
+def _curves(run: CircleRun) -> tuple[Stretch, ...]:
     """The measured part, and what lies before and after it; neighbours share a point."""
     error_um = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm) * 1e3
     start, stop = run.measured.start, min(run.measured.stop, run.steps)
@@ -115,7 +125,7 @@ def _curves(run: CircleRun) -> tuple[Curve, ...]:
     for first, end, measured in parts:
         kept = first + extremes(error_um[first:end], most=_MAX_POINTS)
         time_s = (kept + 1).astype(np.float64) * (run.timing.step_us / 1e6)
-        curves.append(Curve(time_s, error_um[kept], measured))
+        curves.append(Stretch(time_s, error_um[kept], measured))
     return tuple(curves)
 
 
@@ -150,78 +160,45 @@ def extremes(values: Floats, *, most: int) -> NDArray[np.int64]:
     return np.unique(np.concatenate((first + stretches.argmin(axis=1), first + stretches.argmax(axis=1), rest, ends)))
 
 
-_ERRORS: Final = 220
-"""Height of the error over time, in px."""
-_GAP: Final = 16
 _ROOM: Final = 0.08
 """Empty room above and below the errors, as a share of their range."""
-_LETTER: Final = 9
-"""Width of a bold letter, about, in px."""
-_STYLE: Final = """\
-.chart .measured { stroke: var(--model-first); stroke-width: 1.4; }
-.chart .apart { stroke: var(--model-first); stroke-width: 1; stroke-opacity: .45; }
-.chart .during { fill: var(--model-first); fill-opacity: .08; }
-.chart .frame { fill: none; stroke: var(--plain); stroke-width: 1.4; stroke-dasharray: 4 3; }
-.chart .frame.passes { stroke: var(--good); stroke-dasharray: none; }
-.chart .frame.fails { fill: var(--bad); stroke: var(--bad); stroke-dasharray: none; }
-.chart .verdict { font-weight: 700; fill: var(--plain); }
-.chart .verdict.passes { fill: var(--good); }
-.chart .verdict.fails { fill: var(--paper); }
-"""
-_VERDICTS: Final = {True: "passes", False: "fails", None: ""}
-"""Class of the frame of each verdict: an outline, a filled box, a dashed outline."""
+_TONES: Final[dict[bool | None, Tone]] = {True: "passes", False: "fails", None: "neutral"}
 _DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
 
 
-def circle_svg(test: CircleTest, *, note: str = "") -> str:
+def test_drawing(test: CircleTest) -> Drawing:
     """Draw each simulated period on the same scales, one below the other.
-
-    It fills the width of its container, from 320 px on.
 
     Parameters
     ----------
     test
         The circle test, with at least one simulated period.
-    note
-        Title, beside the profile's name.
     """
     rows = circle_rows(test)
     scales = common_scales(rows, test.profile.tolerance)
-    root = drawing(f"Circle test of {test.profile.name}", css="chart circle-test")
-    body = inside(root, x_percent=MARGIN_PERCENT, width_percent=100 - 2 * MARGIN_PERCENT, y=0)
-    y = _title(body, test, note)
-    for row in rows:
-        y = _circle(body, row, scales, y=_head(body, row, scales, y=y + 2 * _GAP))
-        y = _errors(body, row, scales, y=y + _GAP)
-        y = _ranking(body, row, rows, scales, y=y)
-    root.set("height", str(_legend(body, rows, y=y + _GAP) + _GAP))
-    return styled(markup(root), css=_STYLE)
-
-
-def _title(body: Element, test: CircleTest, note: str) -> int:
-    """Name, note, grade of the servo values, and the periods that are not drawn."""
     servo = "ideal drive" if test.results[0].ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(result.period_us) for result, run in zip(test.results, test.runs, strict=True) if run is None]
-    without = f"not drawn, for the bus does not carry it: {', '.join(missing)}" if missing else ""
-    y = paragraph(body, test.profile.name, y=8, css="head")
-    for line in filter(None, (note, f"circle test, {servo}", without)):
-        y = paragraph(body, line, y=y, css="small")
-    return y
+    words = [f"circle test, {servo}"]
+    if missing:
+        words.append(f"not drawn, for the bus does not carry it: {', '.join(missing)}")
+    panels = (
+        panel for row in rows for panel in (_circle(row, scales), _errors(row, scales), _ranking(row, rows, scales))
+    )
+    description = f"Circle test of {test.profile.name}"
+    return Drawing(test.profile.name, tuple(panel for panel in panels if panel), tuple(words), description)
 
 
-def _head(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
-    """Write the setup, the verdict in a frame of its own, and what the circle shows."""
-    result = row.result
+def _circle(row: CircleRow, scales: Scales) -> Panel:
+    """The setup, the verdict, and the circle on the scale of all periods."""
+    result, scale = row.result, scales.circle
     setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
-    y = paragraph(body, setup, y=y, css="head") + 4
-    word, css = result.verdict_word, _VERDICTS[result.passed]
-    frame = {"x": "1", "y": str(y), "width": str(_LETTER * len(word) + 16), "height": str(LINE)}
-    SubElement(body, "rect", {**frame, "class": f"frame {css}".rstrip()})
-    text_at(body, word, x=str(9 + _LETTER * len(word) / 2), y=y + 15, css=f"verdict {css}".rstrip(), anchor="middle")
-    y += LINE + 6
     deviation = measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
     whole = "no G on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}"
-    return paragraph(body, f"{_shown(row, scales)}; {whole}; {_DIRECTIONS[row.run.path.direction]}", y=y, css="small")
+    words = f"{_shown(row, scales)}; {whole}; {_DIRECTIONS[row.run.path.direction]}"
+    plot = None
+    if scale is not None and not row.run.diverged:
+        plot = dial(contour_profile(row.run), scale, row.run.path.direction)
+    return Panel(plot, f"{result.verdict_word}: {setup}", words, _TONES[result.passed])
 
 
 def _shown(row: CircleRow, scales: Scales) -> str:
@@ -241,97 +218,54 @@ def measure_text(value_mm: float | None, limit_mm: float | None, scales: Scales)
     return value if limit_mm is None else f"{value} (limit {unit.text(limit_mm * 1e3)})"
 
 
-def _circle(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
-    """Draw the circle of the page, on the scale of all periods."""
-    if row.run.diverged or scales.circle is None:
-        return y
-    y += _GAP
-    box = SubElement(body, "svg", {"class": "chart circle", "y": str(y), "width": "100%", "height": str(HEIGHT)})
-    shape = CircleDrawing(contour_profile(row.run), tolerance_mm=None, direction=row.run.path.direction)
-    shape.draw(box, scales.circle)
-    return y + HEIGHT
-
-
-def _errors(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
-    """Draw the contour error over time, with its mean and maximum above, and return the y below it."""
-    errors, unit, tolerance = scales.errors, scales.unit, scales.tolerance
+def _errors(row: CircleRow, scales: Scales) -> Panel:
+    """The contour error over time, with its mean and maximum above: the measured part strong and shaded."""
+    errors, per_um, tolerance = scales.errors, scales.unit.per_um, scales.tolerance
     result, limit_mm = row.result, tolerance.max_contour_error_mm
     mean = measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
     largest = measure_text(result.max_contour_error_mm, limit_mm, scales)
-    y = paragraph(body, f"mean {mean}, max {largest}", y=y, css="head")
-    room_um = _ROOM * (errors.top_um - errors.bottom_um) or 1.0
-    label = ", ".join(filter(None, (f"contour error [{unit.name}]", errors.zero_outside)))
-    up = numbers(label, (errors.bottom_um - room_um) * unit.per_um, (errors.top_um + room_um) * unit.per_um)
-    plot = draw_plot_area(body, numbers("time [s]", 0.0, row.curves[-1].time_s[-1]), up, y=y, height=_ERRORS)
-    for curve in row.curves:
-        _curve(plot, curve, per_um=unit.per_um)
-    if not errors.zero_outside:
-        plot.line(y=0.0, css="zero")
-    for limit in () if limit_mm is None else (-limit_mm * 1e3 * unit.per_um, limit_mm * 1e3 * unit.per_um):
-        if up.low <= limit <= up.high:
-            plot.line(y=limit, css="tolerance")
-    return plot.bottom
+    label = ", ".join(filter(None, (f"contour error [{scales.unit.name}]", errors.zero_outside)))
+    up = numbers(label, errors.bottom_um * per_um, errors.top_um * per_um, room=_ROOM)
+    guides = [] if errors.zero_outside else [Guide(Entry("zero"), y=0.0)]
+    limits = () if limit_mm is None else (-limit_mm * 1e3 * per_um, limit_mm * 1e3 * per_um)
+    guides += [Guide(TOLERANCE, y=limit) for limit in limits if up.low <= limit <= up.high]
+    curves = tuple(_curve(curve, up, row, per_um=per_um) for curve in row.curves)
+    during = (Shade(Entry("during"), *curve.time_s[[0, -1]].tolist()) for curve in row.curves if curve.measured)
+    across = numbers("time [s]", 0.0, float(row.curves[-1].time_s[-1]))
+    return Panel(Curves(across, up, curves, tuple(guides), tuple(during)), f"mean {mean}, max {largest}")
 
 
-def _curve(plot: PlotArea, curve: Curve, *, per_um: float) -> None:
-    """Draw a part of the move: the measured part bold and shaded, the rest pale."""
+def _curve(curve: Stretch, up: Ruler, row: CircleRow, *, per_um: float) -> Curve:
+    """A part of the move; far outside, where no huge coordinate can be drawn, the place does not matter."""
+    spread, is_turn = up.high - up.low, row.result.path != "trapezoid"
+    errors = np.clip(curve.error_um * per_um, up.low - spread, up.high + spread)
     if curve.measured:
-        start, end = (plot.across.share(float(curve.time_s[end])) for end in (0, -1))
-        box = {"x": f"{100 * start:.5g}%", "width": f"{100 * (end - start):.5g}%", "y": str(plot.top)}
-        SubElement(plot.area, "rect", {**box, "height": str(plot.height), "class": "during"})
-    # Far outside, the place of a point does not matter; a huge coordinate cannot be drawn.
-    spread = plot.up.high - plot.up.low
-    errors = np.clip(curve.error_um * per_um, plot.up.low - spread, plot.up.high + spread)
-    points = (plot.point(float(x), float(error)) for x, error in zip(curve.time_s, errors, strict=True))
-    css = "measured" if curve.measured else "apart"
-    SubElement(plot.paths, "path", {"class": f"curve {css}", "d": f"M{'L'.join(points)}"})
+        entry = Entry(
+            "first", "measured: one whole turn" if is_turn else "measured: arc at constant speed", shape="line"
+        )
+    else:
+        words = "the rest: lead-in and ramps" if is_turn else "the rest: ramps and settling"
+        entry = Entry("apart", words, shape="line")
+    return Curve(entry, tuple(zip(curve.time_s.tolist(), errors.tolist(), strict=True)))
 
 
-def _ranking(body: Element, row: CircleRow, rows: Sequence[CircleRow], scales: Scales, *, y: int) -> int:
-    """Draw what each error source takes from the largest error, largest first, and return the y below it.
+def _ranking(row: CircleRow, rows: Sequence[CircleRow], scales: Scales) -> Panel | None:
+    """What each error source takes from the largest error, largest first.
 
     Periods whose table followed the circle share a scale; the others share a second.
     """
     if not row.result.contributions:
-        return y
+        return None
     unit = scales.unit
-    y = (
-        paragraph(
-            body, f"Each error source removed in turn: taken from the largest error [{unit.name}]", y=y, css="head"
-        )
-        + 4
-    )
     alike = [drawn for drawn in rows if drawn.run.diverged == row.run.diverged]
-    taken = [source.removed_mm * 1e3 * unit.per_um for row in alike for source in row.result.contributions or ()]
-    low, high = min(0.0, *taken), max(0.0, *taken)
-    scale = Scale(low, high if high > low else low + 1.0)
-    bars = []
+    taken = [source.removed_mm * 1e3 * unit.per_um for drawn in alike for source in drawn.result.contributions or ()]
+    lanes = []
     for source in row.result.contributions:
         value = source.removed_mm * 1e3 * unit.per_um
-        words = decimals_of(value, 3, signed=True)
-        bars.append(
-            SignedBar(source.source.replace("_", " "), value, words, unit.name, "takes" if value >= 0 else "hides")
-        )
-    bottom = y + ROW * len(bars)
-    draw_zero(body, scale, top=y, bottom=bottom)
-    draw_bars(body, bars, scale, y=y)
-    return scale.marks(SubElement(body, "g"), top=bottom, bottom=bottom)
-
-
-def _legend(body: Element, rows: Sequence[CircleRow], *, y: int) -> int:
-    """Explain each kind of line that is drawn once, and return the y below."""
-    drawn = {element.get("class") for element in body.iter()}
-    turn = rows[0].result.path != "trapezoid"
-    entries = {
-        "curve measured": "measured: one whole turn" if turn else "measured: arc at constant speed",
-        "curve apart": "the rest: lead-in and ramps" if turn else "the rest: ramps and settling",
-        "nominal": "nominal circle",
-        "tolerance": "tolerance of the largest contour error",
-    }
-    for css, words in entries.items():
-        if css not in drawn:
-            continue
-        SubElement(body, "line", {"x1": "0", "x2": "28", "y1": str(y + 11), "y2": str(y + 11), "class": css})
-        text_at(body, words, x="36", y=y + 15)
-        y += LINE
-    return y
+        bar = Span(Entry("takes" if value >= 0 else "hides"), min(value, 0.0), max(value, 0.0))
+        note = f"{decimals_of(value, 3, signed=True)} {unit.name}"
+        lanes.append(Lane(source.source.replace("_", " "), (bar,), note, is_thin=True))
+    low, high = min(0.0, *taken), max(0.0, *taken)
+    scale = numbers(unit.name, low, high if high > low else low + 1.0)
+    title = "Each error source removed in turn: taken from the largest error"
+    return Panel(Lanes(scale, tuple(lanes), (Guide(Entry("zero"), x=0.0),)), title)

@@ -25,7 +25,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import listed, period, period_value
 from busplan.questions.circle.contour import ContourProfile, drawn_profile
-from busplan.questions.circle.drawing import CircleDrawing
+from busplan.questions.circle.drawing import circle_drawing, largest_mm, magnified
 from busplan.questions.circle.failures import MARGINS, Stated
 from busplan.questions.circle.figures import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTest
 from busplan.questions.circle.roundness import failed_measure, to_attack
@@ -206,10 +206,10 @@ def _blocks(test: CircleTest) -> Iterator[Block]:
     for result, run in zip(test.results, test.runs, strict=True):
         # A cycle that does not fit has no circle; the verdict says why.
         if result.stable is not None:
-            yield circle_drawing(drawn_profile(run), result, test.profile)
+            yield circle_or_reason(drawn_profile(run), result, test.profile)
 
 
-def circle_drawing(contour: ContourProfile | None, result: CircleFigures, profile: Profile) -> Chart | Sentence:
+def circle_or_reason(contour: ContourProfile | None, result: CircleFigures, profile: Profile) -> Chart | Sentence:
     """The circle with its error magnified, or the reason why it is not drawn.
 
     Parameters
@@ -283,8 +283,7 @@ def circle_chart(contour: ContourProfile, result: CircleFigures, profile: Profil
         The network and its tolerances.
     """
     tolerance_mm = profile.tolerance.max_contour_error_mm
-    drawing = CircleDrawing(contour, tolerance_mm=tolerance_mm, direction=profile.circle.direction)
-    scale = drawing.scale
+    scale = magnified(largest_mm(contour), tolerance_mm=tolerance_mm)
     if scale is None:
         return None
     part = "at constant speed" if result.path == "trapezoid" else "on the turn"
@@ -301,13 +300,14 @@ def circle_chart(contour: ContourProfile, result: CircleFigures, profile: Profil
         if scale.tolerance_mm is None
         else sentence("the tolerance of {} dashed.", tolerance)
     )
-    magnified = sentence(
+    times = sentence(
         "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; the dot is the start of "
         "the turn, the arrow its direction; ",
         ShownValue(scale.times(result.radius_mm), decimals=0),
         ShownValue(scale.ring_um * scale.unit.per_um, unit=scale.unit.name),
     )
-    return Chart(drawing, caption, joined(magnified, limit, by=""))
+    drawing = circle_drawing(contour, scale, profile.circle.direction)
+    return Chart(drawing, caption, joined(times, limit, by=""))
 
 
 def circle_records(test: CircleTest) -> list[Record]:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import sentence_text
+from busplan.forms.charts import Drawing
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, with_cycle
 from busplan.questions.compare import kinds as analysis
@@ -33,31 +33,17 @@ class CompareAnswer(Answer, KindComparison):
             machine.kind if isinstance(machine, NotOnKind) else machine.figures.kind: machine for machine in self.kinds
         }[kind]
 
-    def svg(self, *, note: str = "") -> str:
-        """Draw the most axes over the period, a line for each kind of bus, as an SVG file.
-
-        Parameters
-        ----------
-        note
-            Words after the title.
+    def drawing(self) -> Drawing:
+        """The most axes over the period, a curve for each kind of bus.
 
         Raises
         ------
         BusplanError
             No kind of bus can have the machine.
         """
-        from busplan.questions.compare.drawing import compare_svg
-        from busplan.questions.compare.report import headline
-
         if not self.compared:
             raise BusplanError("there is nothing to draw: no kind of bus that was asked for can have this machine")
-        return compare_svg(self, title=f"{sentence_text(headline(self))} {note}".rstrip())
-
-    def _svg(self) -> str:
-        return self.svg()
-
-    def _repr_svg_(self) -> str | None:
-        return self.svg() if self.compared else None
+        return super().drawing()
 
     def report(self) -> Report:
         """The answer in blocks."""

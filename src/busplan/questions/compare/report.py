@@ -1,7 +1,6 @@
 """Answer of `busplan compare`: its blocks, and its document."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Final
 
 from busplan.buses import kind_named
@@ -16,7 +15,6 @@ from busplan.forms.blocks import (
     Chart,
     Code,
     JsonDocument,
-    OwnPicture,
     Record,
     Report,
     Sentence,
@@ -33,7 +31,7 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import listed, nouns, period, period_value, sentence_text
 from busplan.profile.conversion import AssumedKey
 from busplan.profile.write import short_text
-from busplan.questions.compare.drawing import STYLE, compare_lines, compare_svg
+from busplan.questions.compare.drawing import CAPTION, compare_drawing
 from busplan.questions.compare.kinds import (
     KindComparison,
     MachineOnKind,
@@ -329,9 +327,7 @@ def _verdict(machine: MachineOnKind) -> Words:
 
 def compare_chart(comparison: KindComparison) -> Chart:
     """The most axes over the period, a line for each kind of bus."""
-    caption = "Most axes that are shown to fit over the period, both logarithmic"
-    svg = partial(compare_svg, comparison, title=sentence_text(headline(comparison)), inline=True)
-    return Chart(OwnPicture(svg, partial(compare_lines, comparison), stylesheet=STYLE), Sentence((caption,)))
+    return Chart(compare_drawing(comparison, title=sentence_text(headline(comparison))), Sentence((CAPTION,)))
 
 
 def assumed_table(comparison: KindComparison) -> Table:

@@ -5,7 +5,6 @@ from concurrent.futures import Executor
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import sentence_text
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_network, with_cycle
@@ -23,22 +22,6 @@ class MapAnswer(Answer, TradeOff):
     """Answer of `map_`: where a design fits, which a notebook draws. Its `rows` have cells, or reasons for none."""
 
     __slots__ = ()
-
-    def svg(self, *, note: str = "") -> str:
-        """Draw the map as an SVG file.
-
-        Parameters
-        ----------
-        note
-            Words after the title.
-        """
-        from busplan.questions.map.drawing import map_svg
-        from busplan.questions.map.report import headline
-
-        return map_svg(self, title=f"{sentence_text(headline(self))} {note}".rstrip())
-
-    def _repr_svg_(self) -> str:
-        return self.svg()
 
     def report(self) -> Report:
         """The answer in blocks."""

@@ -1,14 +1,12 @@
 """Answer of `busplan map`."""
 
 from collections.abc import Iterator
-from functools import partial
 
 from busplan.forms.blocks import (
     Block,
     Chart,
     Code,
     JsonDocument,
-    OwnPicture,
     Record,
     Report,
     Sentence,
@@ -24,11 +22,9 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import nouns, sentence_text
 from busplan.questions.map.drawing import (
     LOOKS,
-    STYLE,
     limit_words,
     looks_of,
-    map_lines,
-    map_svg,
+    map_drawing,
     map_title,
     setting_words,
     state_words,
@@ -92,13 +88,12 @@ def _remarks(trade_off: TradeOff) -> Iterator[Sentence]:
 
 def map_chart(trade_off: TradeOff) -> Chart:
     """The picture, with how much fits and what lies along which direction."""
-    svg = partial(map_svg, trade_off, title=sentence_text(headline(trade_off)), inline=True)
     fitting = sum(cell.state == "fits" for cell in trade_off.cells)
     marked = "" if trade_off.own is None else ", this design marked"
     caption = sentence(
         f"{{}} of {{}} settings fit, {map_title(trade_off)}{marked}", *_counts(fitting, len(trade_off.cells))
     )
-    return Chart(OwnPicture(svg, partial(map_lines, trade_off), stylesheet=STYLE), caption)
+    return Chart(map_drawing(trade_off, title=sentence_text(headline(trade_off))), caption)
 
 
 def _counts(*numbers: int) -> tuple[ShownValue, ...]:

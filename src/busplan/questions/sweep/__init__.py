@@ -13,6 +13,7 @@ from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
 from busplan.forms import ROWS_ENDINGS, RowsForm
 from busplan.forms.blocks import Code, Report, Sentence
+from busplan.forms.charts import Drawing
 from busplan.forms.csv_rows import spelled
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
@@ -203,7 +204,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
     def _bytes_in(self, form: RowsForm) -> bytes:
         return b"".join(self.rows_in(form))
 
-    def svg(self, *, figure: str | None = None) -> str:
+    def drawing(self, *, figure: str | None = None) -> Drawing:
         """Draw a figure over one or two varied keys: the picture of `busplan sweep --plot`.
 
         Parameters
@@ -218,13 +219,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         """
         self.sweep.require_number(figure, name="figure")
         title = ", ".join(filter(None, (self.profile.name, self.sweep.changes.words)))
-        return FigureData(self.sweep, self.table, figure=figure).svg(title)
-
-    def _svg(self) -> str:
-        return self.svg()
-
-    def _repr_svg_(self) -> str | None:
-        return self.svg() if is_drawable(self.sweep.grid) else None
+        return FigureData(self.sweep, self.table, figure=figure).drawing(title)
 
     def _repr_html_(self) -> str:
         from busplan.forms.html import fragment

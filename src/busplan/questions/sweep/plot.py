@@ -7,11 +7,12 @@ import numpy as np
 from busplan.buses.figure import VERDICT
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Chart, Sentence
+from busplan.forms.charts import Drawing
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.grid import Grid
-from busplan.questions.sweep.panels import SweepDrawing, sweep_svg
-from busplan.questions.sweep.plotted import Panel, Plotted, caption, is_constant, key_label, plot_scale, plotted_figure
+from busplan.questions.sweep.panels import sweep_drawing
+from busplan.questions.sweep.plotted import Plotted, SweptModel, is_constant, key_label, plot_scale, plotted_figure
 from busplan.questions.sweep.table import Columns
 from busplan.sections.base import value_at
 
@@ -86,8 +87,8 @@ class FigureData:
         self._unsafe = ~np.broadcast_to(safe, by_model[VERDICT.key].shape)
         self._fits = (by_model[VERDICT.key] == FITS).any(axis=1)
 
-    def svg(self, title: str) -> str:
-        """Draw the collected values; the same sweep gives the same SVG.
+    def drawing(self, title: str) -> Drawing:
+        """Draw the collected values.
 
         Parameters
         ----------
@@ -95,12 +96,12 @@ class FigureData:
             Name of the profile, and what was set.
         """
         plotted = self.plotted()
-        return sweep_svg(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
+        return sweep_drawing(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
 
     def chart(self) -> Chart:
         """The picture as a block of a page."""
-        plotted = self.plotted()
-        return Chart(SweepDrawing(plotted), Sentence((caption(plotted),)))
+        drawing = self.drawing(self._network.profile.name)
+        return Chart(drawing, Sentence(drawing.words))
 
     def plotted(self) -> Plotted:
         """The picture's content, in words and in the unit of the figure."""
@@ -109,9 +110,8 @@ class FigureData:
         figure, factor = plotted_figure(self._network, name)
         shape, bus = tuple(self._grid.axes[key].size for key in keys), self._network.bus
         panels = tuple(
-            Panel(
+            SweptModel(
                 model,
-                number,
                 factor * values.reshape(shape),
                 unsafe.reshape(shape),
                 self._fits.reshape(shape) if model == bus.deciding_model else None,

@@ -8,7 +8,6 @@ from busplan.buses.figure import NODES, PERIOD, Figure, unit_of
 from busplan.buses.network import Network
 from busplan.forms.blocks import ShownValue, figure_value
 from busplan.forms.numbers import SILENT_UNITS, factor_of, with_unit
-from busplan.profile.kinds import words_of
 from busplan.questions.fit.network import bus_of
 from busplan.questions.sweep.asked import column_figures
 from busplan.questions.sweep.grid import Array
@@ -43,8 +42,7 @@ class PlotScale(NamedTuple):
 def plot_scale(profile: Profile, key: str, axis: Array, *, as_cells: bool) -> PlotScale:
     """Make the scale of a key.
 
-    Words, and numbers of a key that takes words, too, such as a gap count, are choices; so are numbers that do not
-    ascend. Others stand on a number line.
+    Words and numbers among words are choices, as are numbers that do not ascend. Others stand on a number line.
 
     Parameters
     ----------
@@ -58,8 +56,7 @@ def plot_scale(profile: Profile, key: str, axis: Array, *, as_cells: bool) -> Pl
         If True, numbers that are not evenly spaced are choices, too: cells of a map are equally wide.
     """
     values, own = axis, value_at(profile, key)
-    are_words = values.dtype == object or bool(words_of(profile, key))
-    are_choices = are_words or not _on_a_line(values, evenly=as_cells)
+    are_choices = values.dtype == object or not _on_a_line(values, evenly=as_cells)
     whole = values.dtype != object and bool(np.equal(np.mod(values, 1), 0).all())
     label = key_label(profile, key)
     if not are_choices:
@@ -121,12 +118,10 @@ def figure_label(figure: Figure) -> str:
     return ", ".join(filter(None, (figure.label or figure.key, "" if unit in SILENT_UNITS else unit)))
 
 
-class Panel(NamedTuple):
+class SweptModel(NamedTuple):
     """The values under one timing model."""
 
     model: str
-    number: int
-    """Number of the model among those asked for, from 0: its colour."""
     values: Array
     """In the unit of the label, shaped as the scales; NaN for a missing value."""
     unsafe: Array
@@ -152,7 +147,7 @@ class Plotted(NamedTuple):
     figure: Figure
     scales: tuple[PlotScale, ...]
     """Of two, the first is the y axis and the second the x axis."""
-    panels: tuple[Panel, ...]
+    panels: tuple[SweptModel, ...]
     deciding: str
     """The timing model that decides."""
     safety: str
@@ -169,16 +164,24 @@ class Plotted(NamedTuple):
         return self.figure.scale is not None
 
     @property
-    def any_unsafe(self) -> bool:
-        """Whether any point is set unsafely."""
-        return any(bool(panel.unsafe.any()) for panel in self.panels)
+    def unsafe(self) -> Array:
+        """Where the network is not set safely under any timing model."""
+        unsafe: Array = np.logical_or.reduce([panel.unsafe for panel in self.panels])
+        return unsafe
 
     @property
-    def told(self) -> Panel | None:
+    def not_shown(self) -> Array:
+        """Where the cycle is not shown to fit, if that differs from setting to setting."""
+        frontiers = [~panel.frontier for panel in self.panels if panel.frontier is not None]
+        not_shown: Array = np.logical_or.reduce([np.zeros_like(self.unsafe), *frontiers])
+        return not_shown
+
+    @property
+    def told(self) -> SweptModel | None:
         """The panel that the caption tells of: that of the model that decides, where it has one."""
         return next((panel for panel in self.panels if panel.model == self.deciding), next(iter(self.panels), None))
 
-    def value_at_own(self, panel: Panel) -> float | None:
+    def value_at_own(self, panel: SweptModel) -> float | None:
         """The figure at this design; None if it is no point of the grid."""
         places = []
         for scale in self.scales:
@@ -201,9 +204,9 @@ def caption(plotted: Plotted) -> str:
     design = "" if own is None else f"; this design has {value_text(plotted, own)}"
     name = plotted.figure.label or plotted.figure.key
     if plotted.has_zero and panel.fits is None and known.min() < 0 <= known.max():
-        fitting, line = int((known >= 0).sum()), "line" if len(plotted.scales) > 1 else "dashed line"
-        settings = f"{fitting:,} of {known.size:,} settings"
-        return f"A {name} of 0 or more in {settings} {by}, on one side of the {line}{design}."
+        settings = f"{int((known >= 0).sum()):,} of {known.size:,} settings"
+        where = "in blue" if len(plotted.scales) > 1 else "above the dashed line"
+        return f"A {name} of 0 or more in {settings} {by}, {where}{design}."
     least, most = value_text(plotted, float(known.min())), value_text(plotted, float(known.max()))
     spread = f"{least} to {most}"
     if least == most:
@@ -211,7 +214,7 @@ def caption(plotted: Plotted) -> str:
     return f"{name[:1].upper()}{name[1:]} {by}: {spread}{design}.{_fitting(plotted, panel)}"
 
 
-def _fitting(plotted: Plotted, panel: Panel) -> str:
+def _fitting(plotted: Plotted, panel: SweptModel) -> str:
     """Say at how many settings the cycle is shown to fit, and how they are drawn."""
     if panel.fits is None:
         return ""
@@ -226,5 +229,10 @@ def _fitting(plotted: Plotted, panel: Panel) -> str:
 
 def value_text(plotted: Plotted, value: float) -> str:
     """Write a value of the figure with its unit."""
-    unit = plotted.figure.column or plotted.figure.unit
-    return with_unit(ShownValue(value, unit=unit, digits=_DIGITS))
+    shown = shown_value(value)._replace(unit=plotted.figure.column or plotted.figure.unit)
+    return with_unit(shown._replace(value=value / factor_of(shown)))
+
+
+def shown_value(value: float) -> ShownValue:
+    """A number with enough digits, and all before the point."""
+    return ShownValue(value, digits=max(_DIGITS, len(f"{abs(value):.0f}")))

@@ -7,7 +7,6 @@ from busplan.buses.network import Network
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import sentence_text
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole, with_cycle
 from busplan.questions.fit.network import network_of
@@ -31,22 +30,6 @@ class TimelineAnswer(Answer, Schedule):
         from busplan.questions.timeline.report import timeline_report
 
         return timeline_report(self)
-
-    def svg(self, *, note: str = "") -> str:
-        """The cycle to scale, as an SVG file.
-
-        Parameters
-        ----------
-        note
-            What the title says after the headline.
-        """
-        from busplan.questions.timeline.report import headline
-        from busplan.questions.timeline.svg import timeline_svg
-
-        return timeline_svg(self, title=f"{sentence_text(headline(self))} {note}".rstrip())
-
-    def _repr_svg_(self) -> str:
-        return self.svg()
 
 
 def timeline(

@@ -1,17 +1,15 @@
 """Answer of `busplan timeline`."""
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Final
 
-from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
+from busplan.buses.figure import MARGIN, VERDICT
 from busplan.buses.parts import IDLE
 from busplan.forms.blocks import (
     Block,
     Chart,
     Code,
     JsonDocument,
-    OwnPicture,
     Part,
     Record,
     Report,
@@ -29,12 +27,17 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import period_value, sentence_text
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.timeline.characters import timeline_lines
 from busplan.questions.timeline.cycles import CommonMultiple
+from busplan.questions.timeline.drawing import (
+    charged,
+    drawn_window,
+    is_coarse,
+    kind_of,
+    model_needs,
+    overruns,
+    timeline_drawing,
+)
 from busplan.questions.timeline.events import EVENTS, SHARE, TOTAL, Schedule, Total, totals
-from busplan.questions.timeline.lanes import charged, drawn_window, kind_of, overruns
-from busplan.questions.timeline.period import model_bars
-from busplan.questions.timeline.svg import STYLE, is_coarse, timeline_svg
 from busplan.questions.words.documents import document
 from busplan.questions.words.sentences import safety_record, story, warnings
 
@@ -88,9 +91,7 @@ def timeline_chart(schedule: Schedule) -> Chart:
     window = drawn_window(schedule)
     caption = joined(_most(window), charged(window), by="; ")
     legend = Sentence(("A bar is a whole transaction.",)) if is_coarse(window) else None
-    svg = partial(timeline_svg, schedule, title=sentence_text(headline(schedule)), inline=True)
-    picture = OwnPicture(svg, partial(timeline_lines, schedule), stylesheet=STYLE)
-    return Chart(picture, caption, legend)
+    return Chart(timeline_drawing(schedule, title=sentence_text(headline(schedule))), caption, legend)
 
 
 def _most(window: Schedule) -> Sentence:
@@ -108,8 +109,8 @@ def _most(window: Schedule) -> Sentence:
 def margins_sentence(schedule: Schedule) -> Sentence:
     """Say what each timing model leaves of the slice."""
     margins = (
-        sentence(f"{{}} by the {bar.timing_model} model", figure_value(MARGIN, bar.margin_us))
-        for bar in model_bars(schedule)
+        sentence(f"{{}} by the {model.timing_model} model", figure_value(MARGIN, model.margin_us))
+        for model in model_needs(schedule)
     )
     return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
 
@@ -174,10 +175,7 @@ def _facts(schedule: Schedule) -> JsonDocument:
 
 def timeline_document(schedule: Schedule) -> JsonDocument:
     """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
-    margins = [
-        {"timing_model": bar.timing_model, REQUIRED.key: bar.required_us, MARGIN.key: bar.margin_us}
-        for bar in model_bars(schedule)
-    ]
+    margins = [model._asdict() for model in model_needs(schedule)]
     totals_ = [total._asdict() for total in totals(schedule)]
     return {**_facts(schedule), "margins": margins, "events": _event_records(schedule), "totals": totals_}
 

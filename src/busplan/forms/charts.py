@@ -1,0 +1,264 @@
+"""Charts as data: cells of a grid, curves, bars in lanes and a circle, with their scales and what their marks mean.
+
+A question gives these records; `forms.svg` draws them as SVG and PNG, `forms.characters` in characters.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from string import ascii_letters
+from typing import Final, Literal, NamedTuple
+
+from busplan.forms.lines import Tone
+from busplan.forms.scale import Tick, round_numbers, ticks
+
+_MOST_ROUND: Final = 7
+"""Most ticks of a logarithmic scale."""
+
+
+class Entry(NamedTuple):
+    """What a mark means; an entry of the legend, if it has words."""
+
+    ink: str
+    """Its colour: an ink, or another CSS class of `chart.css`."""
+    words: str = ""
+    mark: str = ""
+    """A letter or a sign in it."""
+    shape: Literal["area", "line"] = "area"
+
+
+class Ruler(NamedTuple):
+    """A scale."""
+
+    label: str
+    """Quantity, with its unit."""
+    low: float
+    high: float
+    ticks: tuple[Tick, ...]
+    own: float | None = None
+    """Tick of this design, which is always shown."""
+    is_log: bool = False
+
+
+class Cell(NamedTuple):
+    """A cell of a grid."""
+
+    ink: str
+    mark: str = ""
+    words: str = ""
+    """Tooltip."""
+    tone: Tone = "neutral"
+    """Its colour on a terminal."""
+    is_inside: bool | None = None
+    """A line is drawn between cells where it is True and where it is False."""
+
+
+class Grid(NamedTuple):
+    """Cells of equal size over two scales, the first row at the bottom."""
+
+    across: Ruler
+    up: Ruler
+    rows: tuple[tuple[Cell | None, ...], ...]
+    """Cells by row and column; None where there is nothing to show."""
+    legend: tuple[Entry, ...]
+    own: tuple[float, float] | None = None
+    """Place of this design, across and up, on the scales."""
+
+
+class Curve(NamedTuple):
+    """Points that a line joins."""
+
+    entry: Entry
+    points: tuple[tuple[float, float | None], ...]
+    """Places across and up; the line has a gap where there is no value."""
+    words: tuple[str, ...] = ()
+    """Tooltips of the points."""
+    has_dots: bool = True
+    """If True, its mark is on every point, else on the last alone."""
+    has_line: bool = True
+
+
+class Guide(NamedTuple):
+    """A line from edge to edge at a value, across or up."""
+
+    entry: Entry
+    x: float | None = None
+    y: float | None = None
+
+
+class Shade(NamedTuple):
+    """A part of the scale across, shaded from top to bottom."""
+
+    entry: Entry
+    low: float
+    high: float
+
+
+class Curves(NamedTuple):
+    """Curves over two scales."""
+
+    across: Ruler
+    up: Ruler
+    curves: tuple[Curve, ...]
+    guides: tuple[Guide, ...] = ()
+    shades: tuple[Shade, ...] = ()
+
+
+class Span(NamedTuple):
+    """A bar in a lane, from a start to an end on the scale."""
+
+    entry: Entry
+    start: float
+    end: float
+    words: str = ""
+    """Tooltip."""
+
+
+class Lane(NamedTuple):
+    """A row of bars."""
+
+    label: str
+    spans: tuple[Span, ...]
+    note: str = ""
+    """A figure at the end of its row."""
+    is_thin: bool = False
+
+
+class Lanes(NamedTuple):
+    """Rows of bars on one scale."""
+
+    across: Ruler
+    lanes: tuple[Lane, ...]
+    guides: tuple[Guide, ...] = ()
+    is_beside: bool = False
+    """If True, labels stand left of their lanes, else above."""
+
+
+class Dial(NamedTuple):
+    """A band around a circle, between two radii in equal sectors from the x axis on, counter-clockwise.
+
+    Radii are multiples of the nominal radius.
+    """
+
+    entry: Entry
+    inner: tuple[float | None, ...]
+    """None in a sector without points."""
+    outer: tuple[float | None, ...]
+    rings: tuple[tuple[float, Entry], ...]
+    words: tuple[str, ...]
+    """Lines in the middle."""
+    is_clockwise: bool
+
+
+class Panel(NamedTuple):
+    """One chart of a drawing."""
+
+    plot: Grid | Curves | Lanes | Dial | None
+    title: str = ""
+    words: str = ""
+    tone: Tone = "neutral"
+    """Its verdict."""
+
+
+class Drawing(NamedTuple):
+    """Charts one below the other, with one legend."""
+
+    title: str
+    """Its message; for screen readers, and at the top of a file."""
+    panels: tuple[Panel, ...]
+    words: tuple[str, ...] = ()
+    """Below the title of a file."""
+    description: str = ""
+    """For screen readers."""
+    has_characters: bool = False
+    """If True, text and Markdown show it in characters; panels are grids or lanes."""
+
+    @property
+    def is_round(self) -> bool:
+        """Whether it is a circle, which needs no wide place."""
+        return all(isinstance(panel.plot, Dial) for panel in self.panels)
+
+
+def legend(panels: Iterable[Panel]) -> list[Entry]:
+    """Every entry with words of some charts, once, in the order of the drawing."""
+    entries = (entry for panel in panels for entry in _entries(panel.plot))
+    return list(dict.fromkeys(entry for entry in entries if entry.words))
+
+
+def _entries(plot: Grid | Curves | Lanes | Dial | None) -> Iterator[Entry]:
+    match plot:
+        case Grid():
+            yield from plot.legend
+        case Curves():
+            yield from (curve.entry for curve in plot.curves)
+            yield from (guide.entry for guide in plot.guides)
+            yield from (shade.entry for shade in plot.shades)
+        case Lanes():
+            yield from (span.entry for lane in plot.lanes for span in lane.spans)
+            yield from (guide.entry for guide in plot.guides)
+        case Dial():
+            yield from (plot.entry, *(entry for _, entry in plot.rings))
+
+
+def numbers(label: str, low: float, high: float, *, most: int = 6, whole: bool = False, room: float = 0.0) -> Ruler:
+    """Make a scale of numbers; a single number gets room at both sides.
+
+    Parameters
+    ----------
+    label
+        What the numbers are, with their unit.
+    low, high
+        Ends of the scale.
+    most
+        Most ticks.
+    whole
+        If True, only whole numbers have a tick.
+    room
+        Empty part beyond an end that is not zero, as a share of the scale.
+    """
+    size = high - low or (1.0 if whole else abs(low) / 10 or 1.0)
+    below, above = (size, size) if high == low else (room * size * bool(low), room * size * bool(high))
+    low, high = low - below, high + above
+    most = min(most, int(high - low) + 1) if whole else most
+    return Ruler(label, low, high, ticks(low, high, most=most))
+
+
+def logarithmic(
+    label: str,
+    low: float,
+    high: float,
+    write: Callable[[float], str],
+    *,
+    at: Iterable[float] | None = None,
+    own: float | None = None,
+) -> Ruler:
+    """Make a logarithmic scale.
+
+    Parameters
+    ----------
+    label
+        What the numbers are, with their unit.
+    low, high
+        Ends of the scale, above 0.
+    write
+        Function that writes a number.
+    at
+        Numbers that have a tick; by default round ones.
+    own
+        That of this design.
+    """
+    marks = round_numbers(low, high, most=_MOST_ROUND) if at is None else at
+    return Ruler(label, low, high, tuple(Tick(value, write(value)) for value in marks), own, is_log=True)
+
+
+def choices(label: str, names: Iterable[str], *, own: float | None = None) -> Ruler:
+    """Make a scale of names, at 0, 1, 2 and so on; `own` is the place of this design."""
+    marks = tuple(Tick(place, name) for place, name in enumerate(names))
+    return Ruler(label, -0.5, len(marks) - 0.5, marks, own)
+
+
+def letters(names: Iterable[str]) -> list[str]:
+    """Choose a letter of each name, none twice; the next letter of the alphabet where all of its own are taken."""
+    taken: list[str] = []
+    for name in names:
+        free = (letter for letter in name + ascii_letters if letter in ascii_letters and letter not in taken)
+        taken.append(next(free, "#"))
+    return taken

@@ -1,0 +1,370 @@
+"""Any drawing as SVG, PNG and characters: everything is there once, in its place, in words that fit."""
+
+import re
+from functools import cache, partial
+from io import BytesIO
+from itertools import pairwise
+from typing import Any
+from xml.etree.ElementTree import Element, fromstring
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+import busplan
+from busplan.forms.characters import drawing_lines
+from busplan.forms.charts import (
+    Cell,
+    Curve,
+    Curves,
+    Dial,
+    Drawing,
+    Entry,
+    Grid,
+    Guide,
+    Lane,
+    Lanes,
+    Panel,
+    Shade,
+    Span,
+    choices,
+    legend,
+    letters,
+    logarithmic,
+    numbers,
+)
+from busplan.forms.svg import content, inline
+
+SVG = "{http://www.w3.org/2000/svg}"
+HOSTILE = '<b>$x_1$ & "q" ]]> </svg>機械'
+FITS, LATE = Entry("fits", "fits", "#"), Entry("short", "does not fit", ".")
+
+
+@cache
+def shown() -> dict[str, Drawing]:
+    """A picture of each question that has one."""
+    return {
+        "map": busplan.map_("dvrk").drawing(),
+        "compare": busplan.compare("paper-1ms").drawing(),
+        "timeline": busplan.timeline("paper-1ms").drawing(),
+        "transaction": busplan.timeline("paper-1ms", transaction="read:1").drawing(),
+        "sensitivity": busplan.capacity("gantry-24", sensitivity=True).drawing(),
+        "curves": busplan.sweep("paper-1ms", vary={"bus.nodes": range(1, 40)}).drawing(),
+        "colours": busplan.sweep(
+            "paper-1ms", vary={"bus.gap_count": [5, 7, "optimal"], "cycle.period_us": range(250, 4001, 250)}
+        ).drawing(),
+        "circle": busplan.circle_test("dvrk", contributions=True).drawing(),
+    }
+
+
+EACH = pytest.mark.parametrize(
+    "name", ["map", "compare", "timeline", "transaction", "sensitivity", "curves", "colours", "circle"]
+)
+
+
+def grid(*rows: str, **more: Any) -> Grid:
+    look = {"#": Cell("fits", "#", tone="passes"), ".": Cell("short", "."), " ": None}
+    cells = tuple(tuple(look[mark] for mark in row) for row in rows)
+    across, up = choices("across", map(str, range(len(rows[0])))), choices("up", map(str, range(len(rows))))
+    return Grid(across, up, cells, (FITS, LATE))._replace(**more)
+
+
+def svg_of(plot: Grid | Curves | Lanes | Dial) -> Element:
+    return fromstring(inline(Drawing("title", (Panel(plot),))))
+
+
+def percent(element: Element, key: str) -> float:
+    return float((element.get(key) or "").rstrip("%"))
+
+
+def texts(root: Element) -> list[str]:
+    return [text.text or "" for text in root.iter(f"{SVG}text")]
+
+
+@EACH
+def test_a_file_has_its_title_its_legend_and_both_schemes_of_colours(name: str) -> None:
+    drawing = shown()[name]
+    root = fromstring(str(content(drawing, "svg", note="With x.")))
+    assert (root.get("width"), root.get("role")) == ("100%", "img")
+    assert root.findtext(f"{SVG}title") == f"{drawing.title} With x."
+    assert " ".join(texts(root)).startswith(f"{drawing.title} With x.")
+    style = root.findtext(f"{SVG}style") or ""
+    assert "prefers-color-scheme:dark" in style
+    assert "var(" not in style
+    said = " ".join(texts(root))
+    assert len(set(legend(drawing.panels))) == len(legend(drawing.panels))
+    for entry in legend(drawing.panels):
+        assert entry.words in said
+        # Whatever is drawn has a colour.
+        assert re.search(rf"\.{entry.ink}\b", style), entry
+
+
+@EACH
+def test_in_a_page_it_has_no_title_and_no_styles(name: str) -> None:
+    root = fromstring(inline(shown()[name]))
+    assert root.find(f"{SVG}style") is None
+    assert root.findtext(f"{SVG}title") == shown()[name].title
+    assert shown()[name].title not in " ".join(texts(root))
+
+
+@EACH
+def test_words_are_no_wider_than_a_phone_and_those_of_a_png_use_its_width(name: str) -> None:
+    drawing = shown()[name]._replace(title="word " * 30)
+    root, png = fromstring(str(content(drawing, "svg"))), content(drawing, "png")
+    assert max(map(len, texts(root))) <= 42
+    assert isinstance(png, bytes)
+    width, height = Image.open(BytesIO(png)).size
+    assert width == 1280
+    # Two pixels for a px, and two lines less for the title alone.
+    assert height <= 2 * (int(root.get("height") or 0) - 40)
+
+
+@EACH
+def test_the_same_drawing_gives_the_same_bytes(name: str) -> None:
+    assert content(shown()[name], "svg") == content(shown()[name], "svg")
+    assert content(shown()[name], "png") == content(shown()[name], "png")
+
+
+@EACH
+def test_hostile_names_are_text(name: str) -> None:
+    root = fromstring(str(content(shown()[name]._replace(title=HOSTILE, words=(HOSTILE,)), "svg")))
+    assert root.findtext(f"{SVG}title") == HOSTILE
+    assert {element.tag.removeprefix(SVG) for element in root.iter()} <= {
+        *("svg", "title", "desc", "style", "rect", "line", "text", "path", "circle"),
+    }
+
+
+# --- cells
+
+
+def test_cells_stand_in_their_rows_and_columns_with_their_marks() -> None:
+    root = svg_of(grid("##.", "# ."))
+    cells = [rect for rect in root.iter(f"{SVG}rect") if (rect.get("class") or "").startswith("cell ")]
+    # Neighbours that are alike are one box; nothing is drawn where nothing is known.
+    places = [(round(percent(one, "x")), round(percent(one, "width")), one.get("class")) for one in cells]
+    assert places == [(0, 67, "cell fits"), (67, 33, "cell short"), (0, 33, "cell fits"), (67, 33, "cell short")]
+    # The first row is at the bottom.
+    assert float(cells[0].get("y") or 0) == float(cells[2].get("y") or 0) + 20
+    marks = [text for text in root.iter(f"{SVG}text") if len((text.get("x") or "").split()) > 1]
+    assert [text.text for text in marks] == ["##.", "#."]
+
+
+def test_a_line_parts_the_cells_inside_from_those_outside() -> None:
+    inside = {"#": True, ".": False, " ": None}
+    rows = ("##.", "# .", "...")
+    one = grid(*rows)
+    cells = tuple(
+        tuple(cell and cell._replace(is_inside=inside[mark]) for cell, mark in zip(row, marks, strict=True))
+        for row, marks in zip(one.rows, rows, strict=True)
+    )
+    (path,) = svg_of(one._replace(rows=cells)).iter(f"{SVG}path")
+    pieces = re.findall(r"M([\d.]+) ([\d.]+)L([\d.]+) ([\d.]+)", path.get("d") or "")
+    place = {
+        tuple(round(float(value) / size) for value, size in zip(piece, (194, 20, 194, 20), strict=True))
+        for piece in pieces
+    }
+    # Right of the second cell, and above the first of the second row; y from the top.
+    assert len(pieces) == len(place) == 2
+    assert not list(svg_of(one).iter(f"{SVG}path"))
+
+
+def test_the_largest_grid_is_a_small_picture() -> None:
+    rows = ["#" * number + "." * (500 - number) for number in range(500)]
+    assert len(inline(Drawing("t", (Panel(grid(*rows)),)))) < 500_000
+
+
+def test_this_design_is_framed_in_its_cell() -> None:
+    root = svg_of(grid("##.", "#..", own=(1, 0)))
+    (frame,) = (rect for rect in root.iter(f"{SVG}rect") if rect.get("class") == "frame")
+    cells = [rect for rect in root.iter(f"{SVG}rect") if (rect.get("class") or "").startswith("cell ")]
+    assert percent(frame, "x") == pytest.approx(100 / 3, abs=0.01)
+    assert (frame.get("y"), frame.get("height")) == (cells[0].get("y"), cells[0].get("height"))
+
+
+def test_a_grid_in_characters_has_its_marks_this_design_and_its_colours() -> None:
+    lines = drawing_lines(Drawing("t", (Panel(grid("##.", "# .", own=(1, 0))),)), 80)
+    assert [line.text for line in lines] == [
+        *("  1 | #     . |", "> 0 | # [#] . |", "         ^", "      0  1  2", "", "Legend: # fits, . does not fit"),
+    ]
+    assert [(lines[1].text[mark.start : mark.end], mark.tone) for mark in lines[1].marks] == [(" # [#]", "passes")]
+
+
+# --- curves
+
+
+def curves(*points: tuple[float, float | None], **more: Any) -> Curves:
+    curve = Curve(Entry("first", "one", "o", "line"), points)
+    return Curves(numbers("x", 0, 10), numbers("y", 0, 100), (curve,))._replace(**more)
+
+
+def points_of(root: Element) -> list[list[tuple[float, float]]]:
+    """Pieces of the line in percent of the plot's width and height, from its lower left corner."""
+    (box,) = (svg for svg in root.iter(f"{SVG}svg") if svg.get("viewBox"))
+    width, height = map(float, (box.get("viewBox") or "").split()[2:])
+    (path,) = box
+    return [
+        [(100 * float(x) / width, 100 - 100 * float(y) / height) for x, y in re.findall(r"([-\d.]+) ([-\d.]+)", piece)]
+        for piece in (path.get("d") or "").split("M")[1:]
+    ]
+
+
+def test_a_curve_goes_through_its_points_with_gaps_and_has_a_mark_on_each() -> None:
+    root = svg_of(curves((0, 0), (5, 50), (6, None), (10, 100)))
+    assert points_of(root) == [
+        [pytest.approx((0, 0), abs=0.1), pytest.approx((50, 50), abs=0.1)],
+        [pytest.approx((100, 100), abs=0.1)],
+    ]
+    dots = [dot for dot in root.iter(f"{SVG}circle") if (dot.get("cx") or "").endswith("%")]
+    assert [percent(dot, "cx") for dot in dots] == [0, 50, 100]
+    heights = [float(dot.get("cy") or 0) for dot in dots]
+    assert heights[0] - heights[1] == pytest.approx(heights[1] - heights[2])
+    last = curves((0, 0), (5, 50)).curves[0]._replace(has_dots=False)
+    assert sum((dot.get("cx") or "").endswith("%") for dot in svg_of(curves(curves=(last,))).iter(f"{SVG}circle")) == 1
+
+
+def test_a_logarithmic_scale_has_its_middle_at_the_geometric_mean() -> None:
+    across = logarithmic("x", 1, 100, lambda value: f"{value:g}")
+    root = svg_of(curves((1, 0), (10, 50), (100, 100), across=across))
+    assert [x for x, _ in points_of(root)[0]] == pytest.approx([0, 50, 100], abs=0.1)
+    assert {"1", "10", "100"} <= set(texts(root))
+
+
+def test_guides_and_shades_stand_at_their_values() -> None:
+    guides = (Guide(Entry("own", "here", shape="line"), x=5), Guide(Entry("limit", "limit", shape="line"), y=50))
+    shades = (Shade(Entry("unsafe", "unsafe", "!"), 2, 4),)
+    root = svg_of(curves((0, 0), (10, 100), guides=guides, shades=shades))
+    lines = {line.get("class"): line for line in root.iter(f"{SVG}line") if (line.get("x2") or "").endswith("%")}
+    assert percent(lines["line own"], "x1") == 50
+    middle = float(lines["line limit"].get("y1") or 0)
+    ends = [float(lines["line own"].get(key) or 0) for key in ("y1", "y2")]
+    assert middle == pytest.approx(sum(ends) / 2)
+    (shade,) = (rect for rect in root.iter(f"{SVG}rect") if (rect.get("class") or "") == "shade unsafe")
+    assert (percent(shade, "x"), percent(shade, "width")) == (20, 20)
+    assert {"here", "limit", "unsafe", "!"} <= set(texts(root))
+
+
+# --- bars
+
+
+WORK, WAIT = Entry("work", "work", "="), Entry("idle", "idle", "~")
+
+
+def lanes(*spans: tuple[Entry, float, float], **more: Any) -> Lanes:
+    lane = Lane("node 1", tuple(Span(entry, start, end, f"{start} to {end}") for entry, start, end in spans), "7 us")
+    return Lanes(numbers("us", 0, 100), (lane,))._replace(**more)
+
+
+def test_bars_are_to_scale_with_their_label_figure_and_tooltip() -> None:
+    root = svg_of(lanes((WORK, 10, 30), (WAIT, 90, 120), guides=(Guide(Entry("edge", "end", shape="line"), x=50),)))
+    bars = {rect.findtext(f"{SVG}title"): rect for rect in root.iter(f"{SVG}rect") if len(rect)}
+    assert [(key, percent(bar, "x"), percent(bar, "width")) for key, bar in bars.items()] == [
+        *(("10 to 30", 10, 20), ("90 to 120", 90, 10)),
+    ]
+    (edge,) = (line for line in root.iter(f"{SVG}line") if line.get("x1") == "50%" and line.get("class") == "line edge")
+    assert edge.get("x2") == "50%"
+    assert {"node 1", "7 us", "=", "~", "end"} <= set(texts(root))
+
+
+@given(start=st.floats(0, 99), size=st.floats(0.5, 60), width=st.integers(60, 200))
+def test_bars_in_characters_are_to_scale_and_fit(start: float, size: float, width: int) -> None:
+    end = min(100.0, start + size)
+    lines = [line.text for line in drawing_lines(Drawing("t", (Panel(lanes((WORK, start, end)), "A title"),)), width)]
+    row = next(line for line in lines if line.startswith("node 1"))
+    assert max(map(len, lines)) <= width
+    assert row.startswith("node 1  7 us |")
+    bar = row.partition("|")[2].removesuffix("|")
+    assert bar.count("=") == pytest.approx((end - start) / 100 * len(bar), abs=2)
+    assert lines[-1].split()[0] == "us"
+    assert lines[0].startswith("A title, ")
+
+
+def test_a_column_shows_what_takes_most_of_it() -> None:
+    plot = lanes((WAIT, 0, 0.4), (WORK, 0.4, 1.2), (WAIT, 1.2, 100))
+    _, row, _, explained = [line.text for line in drawing_lines(Drawing("t", (Panel(plot),)), 115)]
+    assert row.endswith(f"|={'~' * 99}|")
+    assert explained == "Legend: ~ idle, = work"
+    # What ends where a column begins takes nothing of it.
+    (_, row, *_) = [line.text for line in drawing_lines(Drawing("t", (Panel(lanes((WORK, 0, 50))),)), 115)]
+    assert row.endswith(f"|{'=' * 50}{' ' * 50}|")
+
+
+# --- circles
+
+
+def dial(*radii: float | None, **more: Any) -> Dial:
+    rings = ((1.0, Entry("nominal", "nominal circle", shape="line")), (1.25, Entry("ring")))
+    return Dial(Entry("first"), radii, radii, rings, ("10 um", "a ring"), is_clockwise=False)._replace(**more)
+
+
+def band(root: Element) -> list[list[tuple[float, float]]]:
+    (path,) = (path for path in root.iter(f"{SVG}path") if (path.get("class") or "").startswith("band"))
+    pieces = (path.get("d") or "").split("M")[1:]
+    return [[(float(x), -float(y)) for x, y in re.findall(r"(-?[\d.]+) (-?[\d.]+)", piece)] for piece in pieces]
+
+
+def test_a_band_is_as_far_out_as_its_radii_and_goes_counter_clockwise_from_the_x_axis() -> None:
+    root = svg_of(dial(1.1, 1.0, 0.9, 1.0))
+    rings = {ring.get("class"): float(ring.get("r") or 0) for ring in root.iter(f"{SVG}circle")}
+    nominal = rings["line nominal"]
+    outer, _ = band(root)
+    assert [(x**2 + y**2) ** 0.5 / nominal for x, y in outer] == pytest.approx([1.1, 1.0, 0.9, 1.0], abs=0.01)
+    assert [(x > 0, y > 0) for x, y in outer] == [(True, True), (False, True), (False, False), (True, False)]
+    assert rings["line ring"] == pytest.approx(1.25 * nominal)
+    assert {"10 um", "a ring", "nominal circle", "X 0°", "Y 90°"} <= set(texts(root))
+
+
+def test_a_gap_in_a_circle_stays_a_gap() -> None:
+    assert [len(piece) for piece in band(svg_of(dial(None, 1.0, 1.0, None, 1.0, 1.0)))] == [4, 4]
+    # A part around the x axis is one.
+    assert [len(piece) for piece in band(svg_of(dial(1.0, None, 1.0)))] == [4]
+
+
+@pytest.mark.parametrize("is_clockwise", [True, False])
+def test_the_arrow_points_in_the_direction_and_the_dot_is_the_start(is_clockwise: bool) -> None:
+    root = svg_of(dial(1.0, is_clockwise=is_clockwise))
+    (arrow,) = (path.get("d") or "" for path in root.iter(f"{SVG}path") if path.get("class") == "line arrow")
+    tail, *_, head, _ = re.findall(r"[ML ](-?[\d.]+) (-?[\d.]+)", arrow)
+    # y points down in SVG: the arrow stands right of the centre, above the x axis.
+    assert (float(head[1]) < float(tail[1])) is not is_clockwise
+    (dot,) = (one for one in root.iter(f"{SVG}circle") if one.get("class") == "start")
+    (nominal,) = (one for one in root.iter(f"{SVG}circle") if one.get("class") == "line nominal")
+    assert float(dot.get("cx") or 0) == float(nominal.get("r") or 0)
+
+
+# --- scales
+
+
+@EACH
+def test_no_two_labels_of_a_scale_touch_on_a_phone(name: str) -> None:
+    root = fromstring(inline(shown()[name]))
+    for area in root.findall(f"{SVG}svg"):
+        ends: dict[str, list[tuple[float, float]]] = {}
+        width = 335 * percent(area, "width") / 100
+        for text in area.findall(f"{SVG}text"):
+            if (text.get("class") or "").startswith("small"):
+                size = 7 * len(text.text or "")
+                start = width * percent(text, "x") / 100
+                start -= {"start": 0, "middle": size / 2, "end": size}[text.get("text-anchor") or ""]
+                ends.setdefault(text.get("y") or "", []).append((start, start + size))
+        for row in ends.values():
+            assert all(end <= start + 0.1 for (_, end), (start, _) in pairwise(sorted(row)))
+
+
+@given(st.lists(st.text("abcXYZ19 ", max_size=6), max_size=30))
+def test_letters_are_all_different(names: list[str]) -> None:
+    found = letters(names)
+    assert len(set(found)) == len(names)
+    if names and any(letter.isalpha() for letter in names[0]):
+        assert found[0] in names[0]
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 0.0), (5.0, 5.0), (-3.0, 7.0), (0.0, 1e-6), (1e5, 1e6)])
+def test_a_scale_of_numbers_holds_its_ends_and_has_ticks_in_it(low: float, high: float) -> None:
+    for make in (numbers, partial(numbers, room=0.1), partial(numbers, most=8)):
+        ruler = make("x", low, high)
+        assert ruler.low <= low <= high <= ruler.high
+        assert ruler.low < ruler.high
+        assert ruler.ticks
+        assert all(ruler.low <= tick.at <= ruler.high for tick in ruler.ticks)
+    assert all(tick.label.lstrip("-").isdigit() for tick in numbers("x", 1, 2, whole=True).ticks)
