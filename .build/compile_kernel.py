@@ -1,4 +1,4 @@
-"""Compile the kernel of the simulation when the package is built; without a compiler, plain Python runs instead."""
+"""Compile the kernels when the package is built; without a compiler, plain Python runs instead."""
 
 import shutil
 import tempfile
@@ -10,9 +10,10 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from setuptools import Distribution, Extension
 from setuptools.command.build_ext import build_ext
 
-_MODULE = "busplan.servo._kernel"
-_SOURCE = "src/busplan/servo/kernel.py"
-_DIRECTIVES = {"boundscheck": False, "wraparound": False, "initializedcheck": False}
+_KERNELS = {"servo/_kernel": "servo/kernel.py", "buses/can/_response": "buses/can/response.py"}
+"""Compiled module and its source, below the package."""
+# Types stand in the .pxd beside each source.
+_DIRECTIVES = {"annotation_typing": False, "boundscheck": False, "wraparound": False, "initializedcheck": False}
 
 
 class CompileKernel(BuildHookInterface[Any]):
@@ -21,38 +22,45 @@ class CompileKernel(BuildHookInterface[Any]):
     PLUGIN_NAME = "custom"
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Compile into a wheel, or for an editable installation beside the source."""
+        """Compile into a wheel, or for an editable installation beside the sources."""
         self._work = Path(tempfile.mkdtemp())
-        folder = Path(self.root, _SOURCE).parent
-        built = self._compiled()
-        if version == "editable":
-            # What an earlier installation compiled may be another kernel.
-            for old in folder.glob("_kernel.*"):
-                if old.suffix != ".pxd":
-                    old.unlink()
-        if built is None:
-            self.app.display_warning("busplan: no C compiler, so circle tests run in plain Python, which takes longer")
-        elif version == "editable":
-            shutil.copy(built, folder)
-        else:
-            build_data["force_include"][str(built)] = f"busplan/servo/{built.name}"
-        if built is not None:
+        package = Path(self.root, "src", "busplan")
+        self._compile()
+        for name, source in _KERNELS.items():
+            built = next(Path(self._work, "lib", "busplan").glob(f"{name}.*"), None)
+            if version == "editable":
+                # What an earlier installation compiled may be another kernel.
+                for old in package.glob(f"{name}.*"):
+                    if old.suffix != ".pxd":
+                        old.unlink()
+            if built is None:
+                self.app.display_warning(
+                    f"busplan: no C compiler, so {source} runs as plain Python, which takes longer"
+                )
+                continue
+            if version == "editable":
+                shutil.copy(built, package / Path(name).parent)
+            else:
+                build_data["force_include"][str(built)] = f"busplan/{Path(name).parent}/{built.name}"
             build_data["pure_python"], build_data["infer_tag"] = False, True
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:  # noqa: ARG002
         """Remove what the compiler left."""
         shutil.rmtree(self._work, ignore_errors=True)
 
-    def _compiled(self) -> Path | None:
-        """Compile the extension; None if that is not possible here."""
-        extension = Extension(
-            _MODULE,
-            [str(Path(self.root, _SOURCE))],
-            # Fused operations would round otherwise than Python does.
-            extra_compile_args=["-O2", "-g0", "-ffp-contract=off"],
-        )
+    def _compile(self) -> None:
+        """Compile the extensions into the folder of work, as far as that is possible here."""
+        extensions = [
+            Extension(
+                f"busplan.{name.replace('/', '.')}",
+                [str(Path(self.root, "src", "busplan", source))],
+                # Fused operations would round otherwise than Python does.
+                extra_compile_args=["-O2", "-g0", "-ffp-contract=off"],
+            )
+            for name, source in _KERNELS.items()
+        ]
         generated = cythonize(
-            [extension], build_dir=str(self._work / "c"), language_level=3, compiler_directives=_DIRECTIVES, quiet=True
+            extensions, build_dir=str(self._work / "c"), language_level=3, compiler_directives=_DIRECTIVES, quiet=True
         )
         for one in generated:
             one.optional = True
@@ -60,4 +68,3 @@ class CompileKernel(BuildHookInterface[Any]):
         command.build_lib, command.build_temp = str(self._work / "lib"), str(self._work / "objects")
         command.ensure_finalized()
         command.run()
-        return next(Path(command.build_lib).rglob("_kernel.*"), None)

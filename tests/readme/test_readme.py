@@ -128,7 +128,7 @@ def reference_row(model: type[BaseModel], name: str, key: str) -> str:
         if field.default is PydanticUndefined
         else "required, without groups"
         if key == "bus.nodes"
-        else repr(field.default).replace("'", '"').replace("False", "false")
+        else repr(field.default).replace("'", '"').replace("False", "false").replace("True", "true")
     )
     range_ = allowed(properties(model)[name])
     return f"| `{key}` | {range_} | {default.replace('None', 'none')} | {field.description} |"

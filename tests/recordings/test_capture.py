@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
 from busplan.recordings.ethercat import EthercatFrames, read_ethercat
-from busplan.recordings.statistics import grid, middle, quantile
-from tests.oracles.ethercat_recording import Machine, ethernet, pcap, pcapng, simulated
+from busplan.recordings.statistics import grid, lateness, quantile
+from tests.oracles.ethercat_recording import Machine, ethernet, pcap, pcapng, simulated, statistics
 
 MACHINE = Machine()
 PACKETS = simulated(MACHINE, 40)
@@ -111,6 +111,20 @@ def test_an_interface_that_is_no_ethernet_is_left_out(tmp_path: Path) -> None:
         read(pcap(PACKETS)[:20] + b"\x69\x00\x00\x00", tmp_path)
 
 
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_packets_that_the_recorder_dropped_are_counted(order: str, tmp_path: Path) -> None:
+    content = pcapng(PACKETS, order=order)
+    assert read(content, tmp_path).notes.dropped == 0
+    for code, counted in ((5, 12), (7, 12), (4, 0)):
+        assert read(content + statistics(code, 12, order=order), tmp_path).notes.dropped == counted
+    # Statistics count from the start on: the last ones count.
+    both = content + statistics(5, 3, order=order) + statistics(5, 12, order=order)
+    assert read(both, tmp_path).notes.dropped == 12
+    before = pcapng(PACKETS, order=order, dropped_before={3: 2, 20: 5})
+    assert read(before, tmp_path).notes.dropped == 7
+    assert len(read(before, tmp_path).times_ns) == len(PACKETS)
+
+
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=200), st.floats(0.5, 1))
 def test_a_quantile_is_not_exceeded_by_its_share(values: list[float], share: float) -> None:
     found = quantile(np.array(values), share)
@@ -124,7 +138,7 @@ def test_the_uncertainty_of_a_quantile_is_what_repetitions_scatter() -> None:
     found = [quantile(random.exponential(10, 2000), 0.95) for _ in range(300)]
     scatter = float(np.std([each.value for each in found]))
     assert np.mean([each.uncertainty for each in found]) == pytest.approx(scatter, rel=0.15)
-    medians = [middle(random.normal(0, 3, 400)) for _ in range(300)]
+    medians = [quantile(random.normal(0, 3, 400), 0.5) for _ in range(300)]
     assert np.mean([each.uncertainty for each in medians]) == pytest.approx(
         np.std([each.value for each in medians]), rel=0.15
     )
@@ -141,3 +155,33 @@ def test_a_period_is_found_whatever_is_missing(seed: int, scatter: float, count:
     assert found is not None
     assert found.missing == missing
     assert found.period_us == pytest.approx(100, abs=8 * found.uncertainty_us + 1e-9)
+
+
+@pytest.mark.parametrize("shape", ["uniform", "normal", "exponential"])
+@pytest.mark.parametrize("count", [10, 40, 400, 4000])
+def test_the_latest_event_is_found_within_its_u(shape: str, count: int) -> None:
+    random, within, ever_more = np.random.default_rng(3), 0, 0.0
+    for _ in range(100):
+        late = getattr(random, shape)(size=count)
+        found = grid(np.arange(count) * 1000.04 + late - late[0])
+        assert found is not None
+        latest, spread = lateness(found, 1), float(late.max() - late.min())
+        assert latest.uncertainty is not None
+        within += abs(latest.value - spread) <= 2 * latest.uncertainty
+        ever_more = max(ever_more, latest.value / spread)
+    assert within >= 90
+    # By the kindest clock it is no more than there was.
+    assert ever_more <= 1 + 1e-3
+
+
+def test_clocks_that_drift_are_in_the_u_of_the_latest_event() -> None:
+    random, within = np.random.default_rng(4), 0
+    for _ in range(30):
+        late, count = random.uniform(0, 10, 20_000), 20_000
+        times = np.arange(count) * 1000.0 + late
+        found = grid(times + 20e-6 * times**2 / (2 * times[-1]) - times[0])
+        assert found is not None
+        latest = lateness(found, 1)
+        assert latest.uncertainty is not None
+        within += abs(latest.value - float(late.max() - late.min())) <= 2 * latest.uncertainty
+    assert within >= 27

@@ -67,6 +67,8 @@ class Bus(ABC):
     """In the order of the cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
     """Stretches that several events make together."""
+    rate_keys: ClassVar[tuple[str, ...]] = ()
+    """Bit rates that a profile gives [kbit/s]: all times on the wire follow from them."""
     constants: ClassVar[Mapping[str, Sourced]] = {}
     """Its constants, each with its source, by name."""
     keys: ClassVar[Mapping[str, Key]] = {}

@@ -255,6 +255,10 @@ class BusCycle(ABC):
         """Parts of the cycle that the profile does not give."""
         return ()
 
+    def premises(self) -> tuple[str, ...]:
+        """Properties of the bus that all figures rest on and no key gives, in words."""
+        return ()
+
     def events(self) -> Iterator[BusEvent]:
         """The same cycle laid out, of plain numbers only."""
         return chain.from_iterable(self.each_round())

@@ -104,9 +104,6 @@ class Limit(NamedTuple):
     """A cycle fits without it, but nothing is advised that breaks it."""
     says: Callable[[Network], str] | None = None
     """Sentence on the broken limit, where it says more than its value: instead of `over`."""
-    breaks: Callable[[Network], Number] | None = None
-    """Whether a network breaks it, where that is quicker to tell than its value; of a limit without doubt."""
-
     is_of_period: bool = False
     """The period alone breaks it: a plan takes no period that does."""
     kept_from_us: Callable[[Network], float] | None = None
@@ -141,8 +138,6 @@ class Limit(NamedTuple):
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
-        if self.breaks is not None:
-            return self.breaks(network)
         return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
 
     def period_us(self, network: Network) -> Number:

@@ -18,7 +18,7 @@ _FIRST_DAY_NS: Final = 10 * 365 * 86400 * 1_000_000_000
 _LAST_DAY_NS: Final = 1 << 63
 _ROUNDING: Final = 1e-9
 """Share of a figure that is rounding."""
-_SURE: Final = 3.29 / 2
+SURE: Final = 3.29 / 2
 """Expanded uncertainties (k = 2) from its plan on which a figure is outside it: k = 3.29, 99.9 % of a normal error."""
 Sense = Literal["equal", "at most", "at least", "shown"]
 """How a recorded figure is within its plan; shown: it has none."""
@@ -74,7 +74,7 @@ class RecordedFigure(NamedTuple):
         doubt, rounding = self.uncertainty or 0.0, _ROUNDING * abs(self.planned or 0.0)
         if self.beyond <= rounding + (doubt if self.is_mean or self.sense == "equal" else 0.0):
             return "within"
-        return "outside" if self.beyond > _SURE * doubt + rounding else "not shown"
+        return "outside" if self.beyond > SURE * doubt + rounding else "not shown"
 
 
 class Recorded(NamedTuple):

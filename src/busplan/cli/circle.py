@@ -64,9 +64,9 @@ def circle_test_command(
 
     The test has three parts. The bus: a cycle that does not fit its period fails before any simulation. Stability: a
     loop without its phase and gain margin fails, however round its circle. The tolerances of the profile: without any,
-    the circle is not judged. Errors are in um in the table, in mm in JSON and CSV; F_min, F_max and G are the terms of
-    ISO 230-4, and circle.path = "iso230-4" measures them on a whole turn. Exits 0 when the test passes or the circle is
-    not judged, and 1 when it fails.
+    the circle is not judged, nor below 0.1 um, where no error source of the profile matters. Errors are in um in the
+    table, in mm in JSON and CSV; F_min, F_max and G are the terms of ISO 230-4, and circle.path = "iso230-4" measures
+    them on a whole turn. Exits 0 when the test passes or the circle is not judged, and 1 when it fails.
 
     Example: busplan circle-test paper-4ms --contributions
     """

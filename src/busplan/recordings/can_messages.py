@@ -1,6 +1,6 @@
 """The messages of a CAN log: frames of each identifier, when they come, and what stamps and bit rate allow."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
 from typing import Final, NamedTuple
 
@@ -16,7 +16,9 @@ CAN_BIT_RATE: Final = 1000.0
 _WINDOWS: Final = (10, 20, 30)
 """Frames over which stamps show a bit rate: of two the stamps may be wrong."""
 _LATE_SHARE: Final = 0.05
-"""What late stamps of some of these frames add to the rate, as a share."""
+"""By how much frames are closer than on any bus, as a share, where a driver took them at once."""
+_LATEST_US: Final = 1000.0
+"""No later does a driver take frames one after the other: later ones have stamps of no bus [us]."""
 _LATE_US: Final = 100.0
 """How late a driver that takes each frame by itself may take one [us]."""
 _LEAST_US: Final = 1e-3
@@ -163,12 +165,21 @@ def step_us(stretch: ClockStretch) -> float:
     return float(np.gcd.reduce(apart_us))
 
 
-def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> float:
-    """The bit rate that a bus has at least, for frames do not overlap; 0 where too few frames say it [kbit/s].
+class LeastBitRate(NamedTuple):
+    """A bit rate below which a log is not possible [kbit/s]."""
+
+    likely: float
+    """With stamps as late as those of most drivers."""
+    surely: float
+    """With stamps up to a millisecond late."""
+
+
+def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
+    """The bit rate that a bus has at least, for frames do not overlap; 0 where too few frames say it.
 
     Frames are stamped at their ends, or by some controllers at their starts: the smaller sum of bits lies between both
-    stamps in either case. A stamp may be wrong by its step and by what a late one takes to be taken. Where frames come
-    closer than on any bus, a driver took several at once, and only long windows tell.
+    stamps in either case. A stamp may be wrong by its step and by what a late one takes to be taken: where frames come
+    closer than on any bus, a driver took several at once, the first of them late by as much as they take.
     """
     bits, times_us = frames.bits[stretch.taken].astype(np.float64), stretch.times_us
     sent, error_us = np.concatenate(([0.0], np.cumsum(bits))), step_us(stretch)
@@ -178,11 +189,17 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> float:
         between = np.minimum(sent[count + 1 :] - sent[1:-count], sent[count:-1] - sent[: -count - 1])
         return np.asarray(1000 * between / np.maximum(window_us, _LEAST_US), dtype=np.float64)
 
-    pairs = rates(1, 0.0) if len(bits) > 1 else np.zeros(0)
-    at_once = np.count_nonzero(pairs > CAN_BIT_RATE * (1 + _LATE_SHARE)) >= LEAST_EVENTS
-    windows = [(count, 0.0) for count in _WINDOWS] if at_once else [(count, _LATE_US) for count in (4, *_WINDOWS)]
-    least = max((float(rates(count, late_us).max()) for count, late_us in windows if len(bits) > count), default=0.0)
-    return least / (1 + _LATE_SHARE) if at_once else least
+    def most(windows: Sequence[int], late_us: float) -> float:
+        return max((float(rates(count, late_us).max()) for count in windows if len(bits) > count), default=0.0)
+
+    closer = rates(1, 0.0) > CAN_BIT_RATE * (1 + _LATE_SHARE) if len(bits) > 1 else np.zeros(0, dtype=np.bool_)
+    if np.count_nonzero(closer) < LEAST_EVENTS:
+        least = most((4, *_WINDOWS), _LATE_US)
+    else:
+        starts, ends = (np.flatnonzero(np.diff(np.concatenate(([0], closer, [0]))) == step) for step in (1, -1))
+        at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / CAN_BIT_RATE
+        least = most(_WINDOWS, min(at_once_us, _LATEST_US))
+    return LeastBitRate(least, most((4, *_WINDOWS), _LATEST_US))
 
 
 def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:

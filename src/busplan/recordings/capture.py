@@ -36,9 +36,13 @@ _PCAP: Final = {
 """Byte order, and the nanoseconds of a tick, by the first bytes of a pcap file."""
 _SECTION: Final = b"\x0a\x0d\x0d\x0a"
 _ORDER: Final = {b"\x4d\x3c\x2b\x1a": "<", b"\x1a\x2b\x3c\x4d": ">"}
-_INTERFACE, _OLD_PACKET, _SIMPLE_PACKET, _PACKET = 1, 2, 3, 6
+_INTERFACE, _OLD_PACKET, _SIMPLE_PACKET, _STATISTICS, _PACKET = 1, 2, 3, 5, 6
 _RESOLUTION, _OFFSET = 9, 14
 """Options of an interface: the tick of its stamps, and the seconds to add."""
+_DROPPED: Final = {_PACKET: (4,), _STATISTICS: (5, 7)}
+"""Options of a block that count dropped packets: before a packet; by the interface, and by the operating system."""
+_NOT_COUNTED: Final = 0xFFFF
+"""Dropped packets of an old packet block that does not know them."""
 
 
 class CapturedPackets(NamedTuple):
@@ -62,6 +66,8 @@ class CaptureNotes:
     """CapturedPackets of interfaces that are no Ethernet."""
     without_time: int = 0
     """CapturedPackets in records that have no stamp, or one that is no time."""
+    dropped: int = 0
+    """Packets that the recorder says it dropped; a pcap file has no word of them."""
     broken_at: int | None = None
     """Byte of the file from which on nothing can be read; None of a whole file."""
 
@@ -202,7 +208,11 @@ class _PcapNg(_Walker):
                 break
             if kind == _PACKET and size >= 32:  # noqa: PLR2004 - the fields of a packet
                 number, high, low, kept = packet.unpack_from(content, at + 8)
-                self._packet(rows, number, high << 32 | low, at + 28, min(kept, size - 32))
+                kept = min(kept, size - 32)
+                self._packet(rows, number, high << 32 | low, at + 28, kept)
+                options = at + 28 + (kept + 3) // 4 * 4
+                if options < at + size - 4:
+                    self._notes.dropped += self._dropped(content[options : at + size - 4], _PACKET)
             else:
                 self._other(content, at, kind, size, rows)
             at += size
@@ -231,23 +241,41 @@ class _PcapNg(_Walker):
         elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
             self._interfaces.append(self._interface(content[at + 8 : at + size - 4]))
         elif kind == _OLD_PACKET and size >= 32:  # noqa: PLR2004 - its fields
-            number, _, high, low, kept = Struct(f"{order}HHIII").unpack_from(content, at + 8)
+            number, dropped, high, low, kept = Struct(f"{order}HHIII").unpack_from(content, at + 8)
+            self._notes.dropped += dropped if dropped != _NOT_COUNTED else 0
             self._packet(rows, number, high << 32 | low, at + 28, min(kept, size - 32))
         elif kind == _SIMPLE_PACKET:
             self._notes.without_time += 1
+        elif kind == _STATISTICS:
+            # Each counts from the start of its interface, and what packets count is among it.
+            dropped = self._dropped(content[at + 20 : at + size - 4], _STATISTICS)
+            self._notes.dropped = max(self._notes.dropped, dropped)
+
+    def _dropped(self, options: bytes, kind: int) -> int:
+        """Packets that the options of a block say were dropped."""
+        number = Struct(f"{self._order}Q")
+        return sum(
+            number.unpack(value)[0]
+            for code, value in self._options(options)
+            if code in _DROPPED[kind] and len(value) == number.size
+        )
+
+    def _options(self, content: bytes) -> Iterator[tuple[int, bytes]]:
+        """Code and value of each option."""
+        field, at = Struct(f"{self._order}HH"), 0
+        while at + 4 <= len(content):
+            code, size = field.unpack_from(content, at)
+            yield code, content[at + 4 : at + 4 + size]
+            at += 4 + (size + 3) // 4 * 4
 
     def _interface(self, body: bytes) -> _Interface:
         (link,) = Struct(f"{self._order}H").unpack_from(body)
-        ticks, offset_ns, at = 1_000_000, 0, 8
-        field = Struct(f"{self._order}HH")
-        while at + 4 <= len(body):
-            code, size = field.unpack_from(body, at)
-            value = body[at + 4 : at + 4 + size]
+        ticks, offset_ns = 1_000_000, 0
+        for code, value in self._options(body[8:]):
             if code == _RESOLUTION and value:
                 ticks = 2 ** (value[0] & 0x7F) if value[0] & 0x80 else 10 ** min(value[0], 18)
             elif code == _OFFSET and len(value) == 8:  # noqa: PLR2004 - a number of 64 bits
                 offset_ns = Struct(f"{self._order}q").unpack(value)[0] * _NS
-            at += 4 + (size + 3) // 4 * 4
         return _Interface(link, ticks, offset_ns)
 
 

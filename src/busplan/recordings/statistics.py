@@ -1,6 +1,6 @@
 """Periods, lateness and quantiles of stamps."""
 
-from math import ceil, hypot, inf, sqrt
+from math import ceil, hypot, inf, log, sqrt
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,24 +11,25 @@ LEAST_EVENTS: Final = 10
 """Fewest events that have a period."""
 _BLOCK: Final = 500
 """Events over which a clock runs evenly."""
-_LEAST_BLOCKS: Final = 4
+_BLOCKS: Final = range(8, 513)
+"""Number of blocks."""
+_ALONE: Final = 40
+"""Fewer events are blocks of one."""
+_FEW: Final = 6.0
+"""Share of n events, over n, by which their scatter is taken for more: for 99.9 % of n - 2 degrees of freedom."""
 _LEAST_ERROR_US: Final = 1e-6
-_ROUNDING_US: Final = 1e-3
-"""What the rounding of times may add to a jitter [us]."""
-_LEAST_STEP: Final = 1e-9
-"""Where a search by halves ends, as a share of the value."""
-_DRIFT_SIGMAS: Final = 10.0
-"""How far beyond 1 the mean square of the distances of medians from a line, in their standard errors, is a drift."""
+_DRIFT_SIGMAS: Final = 8.0
+"""How far beyond 1 the mean square of the distances of blocks from a line, in their standard errors, is a drift."""
+_REACH: Final = 4.0
+"""Standard errors within which a clock is looked for."""
 _EARLY_SHARE: Final = 0.999
 """Share of the events that are taken for no earlier than the earliest: a stamp may be wrong."""
+_THIRDS: Final = 25
+"""Steps in which it is found."""
 _AHEAD: Final = 20
 """Events behind a block that tell a late one at its end."""
 _COVERAGE: Final = 2
 """Standard uncertainties of an expanded one."""
-_MEDIAN_SHARE: Final = 1.2533
-"""Standard error of a median, of that of a mean of normal values: sqrt(pi / 2)."""
-_QUARTILES_OF_NORMAL: Final = 1.349
-"""Distance of the quartiles of a normal distribution in standard deviations."""
 
 
 class Quantile(NamedTuple):
@@ -48,7 +49,7 @@ class PeriodicEvents(NamedTuple):
     late_us: Floats
     """Each event behind its place in the period, the middle of them at 0, without the drift of clocks [us]."""
     doubt_us: float
-    """Standard uncertainty of the places [us]."""
+    """Standard uncertainty of the places by clocks that drift; that of the period is not in it [us]."""
     places: npt.NDArray[np.int64]
     """Number of the period of each event, from 0."""
 
@@ -75,7 +76,7 @@ def quantile(values: Floats, share: float) -> Quantile:
     """
     ordered = np.sort(values)
     count = len(ordered)
-    rank = min(max(ceil(count * share - 1e-9), 1), count)
+    rank = _rank(count, share)
     spread = _COVERAGE * sqrt(count * share * (1 - share))
     low, high = ceil(rank - spread), ceil(rank + spread)
     value = float(ordered[rank - 1])
@@ -85,27 +86,51 @@ def quantile(values: Floats, share: float) -> Quantile:
 
 
 def lateness(events: PeriodicEvents, share: float) -> Quantile:
-    """How much the latest events, but for a share of them, are behind the earliest ones [us]."""
-    latest, earliest = quantile(events.late_us, share), quantile(-events.late_us, max(share, _EARLY_SHARE))
-    known = expanded(latest.uncertainty, earliest.uncertainty or 0.0, events.doubt_us)
-    return Quantile(latest.value + earliest.value, None if known is None else known / _COVERAGE)
+    """How much the latest events, but for a share of them, are behind the earliest ones [us].
+
+    Of the even clocks that the events do not contradict, the kindest counts: by others it is more, which is in the
+    uncertainty. That of the rank is in it only where enough events lie beyond.
+    """
+    at, early = events.places - float(np.mean(events.places)), max(share, _EARLY_SHARE)
+
+    def spread_us(slope: float) -> float:
+        late = events.late_us - slope * at
+        return _ranked(late, share) + _ranked(-late, early)
+
+    low, high = -_REACH * events.uncertainty_us, _REACH * events.uncertainty_us
+    for _ in range(_THIRDS):
+        third = (high - low) / 3
+        if spread_us(low + third) < spread_us(high - third):
+            high -= third
+        else:
+            low += third
+    late = events.late_us - (low + high) / 2 * at
+    latest, earliest = quantile(late, share), quantile(-late, early)
+    value = latest.value + earliest.value
+    unkind = max(spread_us(sign * _COVERAGE * events.uncertainty_us) for sign in (-1, 1)) - value
+    parts = latest.uncertainty or 0.0, earliest.uncertainty or 0.0, max(unkind, 0.0) / _COVERAGE, events.doubt_us
+    return Quantile(value, hypot(*parts))
 
 
-def middle(values: Floats) -> Quantile:
-    """Median of some values, with its standard error by their quartiles; None of fewer than four."""
-    low, value, high = (float(part) for part in np.quantile(values, (0.25, 0.5, 0.75)))
-    if len(values) < 4:  # noqa: PLR2004 - quartiles
-        return Quantile(value, None)
-    return Quantile(value, _MEDIAN_SHARE * (high - low) / _QUARTILES_OF_NORMAL / sqrt(len(values)))
+def _ranked(values: Floats, share: float) -> float:
+    """The value that a share of some values does not exceed."""
+    place = _rank(len(values), share) - 1
+    return float(np.partition(values, place)[place])
 
 
-def grid(times_us: Floats) -> PeriodicEvents | None:
+def _rank(count: int, share: float) -> int:
+    return min(max(ceil(count * share - 1e-9), 1), count)
+
+
+def grid(times_us: Floats, near_us: float | None = None) -> PeriodicEvents | None:
     """Find the period of events, and how late each is; None of too few events, or of several at once.
 
     Parameters
     ----------
     times_us
         Ascending times, n of them [us].
+    near_us
+        A time near the period [us]; by default the median distance.
 
     Examples
     --------
@@ -115,15 +140,13 @@ def grid(times_us: Floats) -> PeriodicEvents | None:
     """
     if len(times_us) < LEAST_EVENTS:
         return None
-    period_us = _period(times_us)
+    period_us = _period(times_us, float(np.median(np.diff(times_us))) if near_us is None else near_us)
     if period_us <= 0:
         return None
     places = _places(times_us, period_us)
     late = times_us - times_us[0] - places * period_us
-    late, slope, error, bend_us = _without_drift(places.astype(np.float64), late)
-    # The places of the first and of the last event scatter as all do.
-    doubt_us = hypot(float(np.std(late)) * sqrt(3 / len(late)), bend_us)
-    return PeriodicEvents(period_us + slope, error, late, doubt_us, places)
+    clock = _clock(places.astype(np.float64), late)
+    return PeriodicEvents(period_us + clock.slope_us, clock.error_us, late - clock.at_us, clock.doubt_us, places)
 
 
 def ahead(times_us: Floats, period_us: float) -> Floats:
@@ -151,9 +174,9 @@ def ahead(times_us: Floats, period_us: float) -> Floats:
     return np.asarray(early - np.minimum.accumulate(early), dtype=np.float64)
 
 
-def _period(times_us: Floats) -> float:
+def _period(times_us: Floats, period_us: float) -> float:
     """The period: medians over ever longer distances, each of which says how many periods the next one is."""
-    lag, period_us = 1, float(np.median(np.diff(times_us)))
+    lag = 1
     while period_us > 0:
         lag = min(lag * 8, len(times_us) // 2)
         apart = times_us[lag:] - times_us[:-lag]
@@ -180,31 +203,58 @@ def _places(times_us: Floats, period_us: float) -> npt.NDArray[np.int64]:
     return places
 
 
-def _without_drift(places: Floats, late: Floats) -> tuple[Floats, float, float, float]:
-    """Lateness about a straight line, its slope and the standard error of that; where clocks drift, about a bent one.
+class _Clock(NamedTuple):
+    """The clock of some events, as it goes beside an even one."""
 
-    The last value is the standard error of the bends. The line goes through medians of blocks. A clock drifts where
-    they lie further off than they scatter.
+    at_us: Floats
+    """What it differs by at each event [us]."""
+    slope_us: float
+    """What a period is longer by [us]."""
+    error_us: float
+    """Standard uncertainty of the slope [us]."""
+    doubt_us: float
+    """Standard uncertainty of where it goes, beside that of the slope [us]."""
+
+
+def _clock(places: Floats, late: Floats) -> _Clock:
+    """A straight line through the means of blocks of events; a bent one, of few pieces, where the clock drifts.
+
+    Outliers count as the end of the others. Neighbours say how much events scatter, whatever the clock does.
     """
-    blocks = np.array_split(np.arange(len(late)), max(len(late) // _BLOCK, _LEAST_BLOCKS))
+    count = len(late)
+    if count >= _ALONE:
+        count = min(max(count // _BLOCK, _BLOCKS.start), _BLOCKS.stop - 1)
+    blocks = np.array_split(np.arange(len(late)), count)
+    sizes = np.array([len(block) for block in blocks])
     at = np.array([places[block].mean() for block in blocks])
-    found = [middle(late[block]) for block in blocks]
-    value = np.array([median.value for median in found])
-    error_of = np.array([max(median.uncertainty or 0.0, _LEAST_ERROR_US) for median in found])
-    weight = 1 / error_of**2
-    centre, level = np.average(at, weights=weight), np.average(value, weights=weight)
-    spread = float(np.sum(weight * (at - centre) ** 2))
-    slope = float(np.sum(weight * (at - centre) * (value - level))) / spread
-    left = value - level - slope * (at - centre)
-    free = len(blocks) - 2
-    misfit = float(np.sum(weight * left**2)) / free
-    straight, bend_us = level + slope * (places - centre), 0.0
-    if misfit > 1 + _DRIFT_SIGMAS * sqrt(2 / free):
-        straight, bend_us = straight + np.interp(places, at, left), float(np.mean(error_of))
-    return late - straight, slope, sqrt(max(misfit, 1.0) / spread), bend_us
+    middle_us = np.repeat([np.median(late[block]) for block in blocks], sizes)
+    low, high = np.quantile(late - middle_us, (0.05, 0.95))
+    kept = middle_us + np.clip(late - middle_us, 2 * low - high, 2 * high - low)
+    scatter_us = max(sqrt(float(np.mean(np.diff(kept) ** 2)) / 2) * (1 + _FEW / len(late)), _LEAST_ERROR_US)
+    weight = np.sqrt(sizes) / scatter_us
+    means = np.array([kept[block].mean() for block in blocks]) * weight
+    pieces = 1
+    while True:
+        knots = np.interp(np.linspace(0, count - 1, pieces + 1), np.arange(count), at)
+        knots[[0, -1]] = places[[0, -1]]
+        parts = np.stack([np.interp(at, knots, one) for one in np.eye(pieces + 1)], axis=1) * weight[:, None]
+        heights = np.linalg.lstsq(parts, means, rcond=None)[0]
+        free = count - pieces - 1
+        misfit = float(np.sum((means - parts @ heights) ** 2)) / free
+        if misfit <= 1 + _DRIFT_SIGMAS * sqrt(2 / free) or 4 * pieces > count:
+            break
+        pieces *= 2
+    covariance = np.linalg.inv(parts.T @ parts) * max(misfit, 1.0)
+    length = float(knots[-1] - knots[0])
+    slope_us = float(heights[-1] - heights[0]) / length
+    error_us = sqrt(float(covariance[0, 0] + covariance[-1, -1] - 2 * covariance[0, -1])) / length
+    # What the pieces leave of the blocks, and the largest of so many normal errors.
+    left_us = sqrt(max(misfit - 1.0, 0.0) * float(np.mean(weight**-2)))
+    bent_us = sqrt(2 * log(pieces + 1) * float(covariance.diagonal().max())) if pieces > 1 else 0.0
+    return _Clock(np.interp(places, knots, heights), slope_us, error_us, hypot(left_us, bent_us))
 
 
-def line(sizes: Floats, values: Floats) -> tuple[float, float] | None:
+def line(sizes: Floats, values: Floats, doubt: float) -> tuple[float, float] | None:
     """Slope of the medians of values over their sizes, with its standard uncertainty; None of fewer than two sizes.
 
     Sizes with fewer than ten values are left out. Where medians scatter more about the line than their own errors say,
@@ -214,13 +264,15 @@ def line(sizes: Floats, values: Floats) -> tuple[float, float] | None:
     ----------
     sizes, values
         Of n things.
+    doubt
+        Standard uncertainty that all values of a size have alike, in that of a value.
     """
     rows = []
     for size in np.unique(sizes):
         of_size = values[sizes == size]
         if len(of_size) >= LEAST_EVENTS:
-            value, error = middle(of_size)
-            rows.append((float(size), value, max(error or 0.0, _LEAST_ERROR_US)))
+            median = quantile(of_size, 0.5)
+            rows.append((float(size), median.value, max(hypot(median.uncertainty or 0.0, doubt), _LEAST_ERROR_US)))
     if len(rows) < 2:  # noqa: PLR2004 - a line
         return None
     x, y, error_of = (np.array(part) for part in zip(*rows, strict=True))

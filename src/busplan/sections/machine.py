@@ -231,6 +231,11 @@ class ToleranceSection(Section):
     )
 
     @property
+    def judged(self) -> tuple[str, ...]:
+        """The measures of roundness that have a tolerance."""
+        return tuple(name for name in CONTOUR_MEASURES if getattr(self, name) is not None)
+
+    @property
     def judges_contour(self) -> bool:
         """Whether it says how round the circle must be."""
-        return any(getattr(self, name) is not None for name in CONTOUR_MEASURES)
+        return bool(self.judged)

@@ -1,11 +1,12 @@
 """A CAN bus: its cycle by hand, its identifiers, its limits and rules, and every question in some form."""
 
+import importlib.util
 import json
 import re
 from collections.abc import Callable
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import given
@@ -14,11 +15,10 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named
 from busplan.buses.can.limits import shared_identifiers
-from busplan.buses.can.response import Sender, worst_response
 from busplan.buses.can.section import CanProfile
 from busplan.buses.can.streams import streams
 from busplan.buses.can.traffic import traffic_of_profile
-from busplan.buses.can.waiting import response
+from busplan.buses.can.waiting import responses
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
@@ -28,6 +28,14 @@ from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from tests.oracles import can_textbook as textbook
+else:
+    path = Path(__file__).parents[2] / "oracles" / "can_textbook.py"
+    spec = importlib.util.spec_from_file_location("can_textbook", path)
+    textbook = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(textbook)
 
 Run = Callable[..., Any]
 
@@ -70,6 +78,28 @@ def test_its_cycle_is_that_by_hand() -> None:
     assert terms(profile(), "no-stuffing")["feedback"] == 3 * (47 + 64 + 47 + 16) * BIT_US
     assert terms(profile(bus__sync_counter=True))["sync"] == 65 * BIT_US
     assert terms(profile(bus__identifier_bits=29))["command"] == 3 * 140 * BIT_US
+
+
+@pytest.mark.parametrize("load", [0.5, 0.975, 0.985, 0.9895, 0.9905, 0.995, 0.9998, 1.0, 1.2])
+def test_a_cycle_behind_a_nearly_full_bus_is_a_bound_in_closed_form(load: float) -> None:
+    # One message goes before all PDOs, and one behind them may block: three frames of it, in a cycle so long.
+    frame, period_us, others = 135 * BIT_US, 135 * BIT_US / load, (55 + 3 * (135 + 75) + 3 * 115) * BIT_US
+    urgent = {"name": "urgent", "identifier": 0x10, "payload_bytes": 8, "period_us": period_us}
+    low = {"name": "low", "identifier": 0x7FF, "payload_bytes": 0, "period_us": 50_000.0, "deadline_us": 50_000.0}
+    own = profile(message=[urgent, low], node__execution__base_us=0, node__execution__per_byte_us=0)
+
+    def blocked(span: float) -> float:
+        return ceil(min((span + 50_000) / 50_000, 3)) * 55 * BIT_US
+
+    if load > 0.99:
+        span = (others + blocked(inf) + frame + load * BIT_US) / (1 - min(load, 0.9999))
+    else:
+        span = float(others)
+        while span < (wider := others + blocked(span) + ceil((span + BIT_US) / period_us) * frame):
+            span = wider
+    found = terms(own)
+    assert found["interference"] == pytest.approx(ceil((span + BIT_US) / period_us) * frame)
+    assert found["blocking"] == blocked(span)
 
 
 def test_a_pdo_for_each_axis_shares_the_payload() -> None:
@@ -205,29 +235,29 @@ def test_the_last_pdo_of_a_group_answers_last_of_it(data: st.DataObject) -> None
         "cycle.period_us": float(data.draw(st.integers(4000, 9000))),
     }
     traffic = traffic_of_profile(override(profile(), changes))
-    each = streams(traffic, is_stuffed=True)
     sent = {
-        identifier: Sender(one.frame_us, one.period_us, one.jitter_us)
-        for one in each
+        identifier: textbook.Sender(int(one.frame_us), int(one.period_us), int(one.jitter_us))
+        for one in streams(traffic, is_stuffed=True)
         for identifier in range(one.first, one.last + 1)
     }
-    for own in each:
+    for own, worst in responses(traffic, is_stuffed=True):
         # No PDO of a cycle that fits blocks the next SYNC.
         alarm = changes["message.alarm.identifier"]
         blocking = sent if own.name != "SYNC" else {alarm: sent[alarm]}
         alone = [
-            worst_response(
+            textbook.response_us(
                 sent[identifier],
                 [one for other, one in sent.items() if other < identifier],
-                blocking_us=max((one.frames_us for other, one in blocking.items() if other > identifier), default=0.0),
+                blocking_us=max((one.frame_us for other, one in blocking.items() if other > identifier), default=0),
                 bit_us=BIT_US,
+                most_us=500_000,
             )
             for identifier in range(own.first, own.last + 1)
         ]
-        found = response(own, traffic, is_stuffed=True)
+        us, instance = alone[-1] or (inf, worst.instance)
         # A message may also meet a late cycle, and the next one soon behind it.
-        assert found == alone[-1] or (own.is_message and (found is None or (alone[-1] and found.us > alone[-1].us)))
-        assert found is None or all(one is not None and one.us <= found.us for one in alone)
+        assert (worst.us, worst.instance) == (us, instance) or (own.is_message and worst.us > us)
+        assert worst.us == inf or all(one is not None and one[0] <= worst.us for one in alone)
 
 
 def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ one.
 import importlib.util
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import cycle, islice
 from pathlib import Path
 from random import Random
@@ -20,8 +21,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import pytest
 
 from busplan.buses.can.streams import Stream, streams
-from busplan.buses.can.traffic import SYNC, Message, MessageList, Pdos, Traffic
-from busplan.buses.can.waiting import messages, response, waits
+from busplan.buses.can.traffic import SYNC, Message, Pdos, Traffic
+from busplan.buses.can.waiting import responses, waits
 from busplan.elementwise import plain
 from busplan.sections.transactions import TRANSACTION_KINDS
 
@@ -138,7 +139,7 @@ def traffic(random: Random, *, nodes: int) -> Traffic:
             Pdos("read", "", 0x181, nodes, random.choice([1, 4, 8, 8, 10, 16])),
             Pdos("write", "", command, nodes, random.choice([1, 4, 8, 8, 10, 16])),
         ),
-        messages=MessageList(messages),
+        messages=tuple(messages),
     )
 
 
@@ -151,7 +152,7 @@ def of_both_formats(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
             identifier = (identifier << 18) + random.choice([0, 5, (1 << 18) - 200])
         senders = random.choice([1, 1, nodes])
         each.append(message._replace(identifier=identifier, identifier_bits=bits, senders=senders))
-    return sent._replace(messages=MessageList(each))
+    return replace(sent, messages=tuple(each))
 
 
 def of_fd(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
@@ -167,7 +168,7 @@ def of_fd(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
         own._replace(frame_bytes=(64,), most_bytes=256, payload_bytes=random.choice([1, 8, 20, 64, 70]))
         for own in sent.pdos
     )
-    return sent._replace(bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=tuple(pdos), messages=MessageList(each))
+    return replace(sent, bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=tuple(pdos), messages=tuple(each))
 
 
 def of_rates(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
@@ -180,7 +181,7 @@ def of_rates(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
     ]
     between = (0x188, 0x18D, 0x195, 0x208, 0x20E, 0x215, 0x12E)  # and further frames
     fresh = [one._replace(identifier=random.choice([one.identifier, *between])) for one in sent.messages]
-    return sent._replace(pdos=tuple(pdos), messages=MessageList(fresh))
+    return replace(sent, pdos=tuple(pdos), messages=tuple(fresh))
 
 
 def of_bursts(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
@@ -191,7 +192,7 @@ def of_bursts(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
         jitter_us = random.choice([0, 0, random.randint(0, 3 * period_us)])
         deadline_us = jitter_us + random.choice([1, 2, 5]) * plain(message.deadline_us)
         each.append(message._replace(burst=burst, jitter_us=jitter_us, deadline_us=deadline_us))
-    return sent._replace(messages=MessageList(each))
+    return replace(sent, messages=tuple(each))
 
 
 KINDS: Final = {"both formats": of_both_formats, "CAN FD": of_fd, "rates": of_rates, "bursts": of_bursts}
@@ -210,7 +211,7 @@ def scene(random: Random, *, kind: str = "") -> Scene | None:
         return found
     # The tightest deadlines: fewer frames block.
     tight = (one._replace(deadline_us=found.responses_us[one.name]) for one in sent.messages)
-    return judged(sent._replace(messages=MessageList(tight)), nodes=nodes, write_us=write_us, slack_us=slack_us)
+    return judged(replace(sent, messages=tuple(tight)), nodes=nodes, write_us=write_us, slack_us=slack_us)
 
 
 def judged(sent: Traffic, *, nodes: int, write_us: int, slack_us: int) -> Scene | None:
@@ -221,15 +222,15 @@ def judged(sent: Traffic, *, nodes: int, write_us: int, slack_us: int) -> Scene 
         return None
     own_us = sum(one.identifiers * one.frame_us for one in each if not one.is_message)
     lasts_us = waits(sent, own_us + plain(sent.read_us) + plain(sent.host_us), is_stuffed=True).lasts_us
-    sent = sent._replace(period_us=int(lasts_us) + write_us + slack_us)
+    sent = replace(sent, period_us=int(lasts_us) + write_us + slack_us)
     each = streams(sent, is_stuffed=True)
-    if sum(one.sender().load for one in each) > MOST_LOAD:
+    if sum(one.frames_us / one.period_us for one in each) > MOST_LOAD:
         return None
-    ranked = messages(sent, is_stuffed=True)
-    if any(share > 1 for _, share in ranked.deadline_shares()):
+    worst = responses(sent, is_stuffed=True)
+    if any(one.is_message and found.us > one.deadline_us for one, found in worst):
         return None
-    bounds = {one.name: response(one, sent, is_stuffed=True) for one in each if one.is_message or one.name == SYNC}
-    return Scene(sent, each, nodes, write_us, lasts_us, {name: one.us for name, one in bounds.items() if one})
+    bounds = {one.name: found.us for one, found in worst if one.is_message or one.name == SYNC}
+    return Scene(sent, each, nodes, write_us, lasts_us, bounds)
 
 
 def run(own: Scene, at: Moments) -> Run:
@@ -270,15 +271,16 @@ def _instants(message: Message, own: Scene, random: Random) -> tuple[Whole, Whol
     """When instances of a message are due and queued: no more than b - 1 + ceil(t / T) of them are due in a time t."""
     period_us, jitter_us = int(plain(message.period_us)), int(plain(message.jitter_us))
     saved_us = (int(plain(message.burst)) - 1) * period_us
-    at_us, found = random.randint(-period_us - jitter_us, own.period_us), []
+    at_us, dues_us, queues_us = random.randint(-period_us - jitter_us, own.period_us), [], []
     # From one to the next it is a period; what was not sent is made up for later, up to a burst.
     regular_us = at_us
     while at_us < CYCLES * own.period_us:
-        queued_us = at_us + random.choice([0, jitter_us, random.randint(0, jitter_us)])
-        if queued_us >= 0:
-            found.append((at_us, queued_us))
+        dues_us.append(at_us)
+        queues_us.append(at_us + random.choice([0, jitter_us, random.randint(0, jitter_us)]))
         regular_us = max(regular_us, at_us) + period_us
         at_us = max(at_us, regular_us - saved_us) + random.choice([0, 0, 0, 0, random.randint(0, 200)])
+    # They are queued in their order.
+    found = [(due, queued) for due, queued in zip(dues_us, sorted(queues_us), strict=True) if queued >= 0]
     return tuple(due for due, _ in found), tuple(queued for _, queued in found)
 
 
@@ -374,7 +376,8 @@ def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str)
 def drives(nodes: int, *low: Message, read_us: int = 150, host_us: int = 0) -> Traffic:
     """Nodes with full PDOs, and messages of lower priorities."""
     pdos = (Pdos("read", "", 0x181, nodes, 8), Pdos("write", "", 0x201, nodes, 8))
-    return Traffic(1.0, 1000, 0.0, 11, 0x80, 0, read_us, host_us, pdos, MessageList(low))
+    more = {"period_us": 1.0, "sync_identifier": 0x80, "read_us": read_us, "host_us": host_us}
+    return Traffic(bit_rate_kbit_s=1000, pdos=pdos, messages=low, **more)
 
 
 LOW: Final = tuple(Message(f"low{number}", 0x7F0 + number, 8, 50_000, 0, 50_000) for number in range(3))
@@ -427,7 +430,7 @@ def test_a_burst_of_messages_meets_slow_pdos_twice() -> None:
         for kind, base in zip(TRANSACTION_KINDS, (0x181, 0x201), strict=True)
         for node in range(4)
     )
-    sent = drives(4, *burst, read_us=0)._replace(pdos=pdos)
+    sent = replace(drives(4, *burst, read_us=0), pdos=pdos)
     own = judged(sent, nodes=4, write_us=0, slack_us=0)
     assert own is not None
     assert own.period_us == 55 + 8 * FRAME_US + 3 * FRAME_US
@@ -448,7 +451,7 @@ def test_a_message_between_pdos_makes_no_cycle_longer_than_the_fullest() -> None
         Pdos("write", "slow", 0x7F1, 1, 1, every=2),
     )
     between = Message("between", 0x300, 8, 2000, 0, 2000)
-    own = judged(drives(2, between, host_us=20)._replace(pdos=pdos), nodes=2, write_us=0, slack_us=0)
+    own = judged(replace(drives(2, between, host_us=20), pdos=pdos), nodes=2, write_us=0, slack_us=0)
     assert own is not None
     assert own.lasts_us == 55 + 150 + 4 * 65 + 20 + FRAME_US
     longest_us = [0] * CYCLES
@@ -473,7 +476,7 @@ def mixed(*, is_fd: bool) -> Traffic:
     if not is_fd:
         return own
     pdos = tuple(pdo._replace(frame_bytes=(64,), most_bytes=256, payload_bytes=20) for pdo in own.pdos)
-    return own._replace(bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=pdos)
+    return replace(own, bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=pdos)
 
 
 @pytest.mark.parametrize("place", range(6))

@@ -1,138 +1,297 @@
-"""Response times against published examples, and against a brute-force simulation of the arbiter."""
+"""Response times of messages alone, by both forms of the same file, against a simulation and the printed equations.
 
-from collections.abc import Sequence
-from math import ceil
+The simulation of arbitration, tests/oracles/can_simulation.py, knows nothing of the model, and the equations,
+tests/oracles/can_textbook.py, nothing of its short cuts.
+"""
+
+import importlib.util
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from random import Random
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from unittest import mock
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from busplan.buses.can.response import Response, Sender, settled_us, worst_response
+import busplan
+from busplan.buses.can.section import CanProfile
+from busplan.errors import BusplanError
+from busplan.profile.toml import override
 
-JUST_BEFORE = 2.0**-10
-"""How much earlier than all others the frame that blocks them starts [us]."""
+if TYPE_CHECKING:
+    from tests.oracles import can_textbook as textbook
+    from tests.oracles.can_simulation import Frame, SimulatedMessage, simulate
+else:
 
+    def oracle(name: str) -> Any:
+        path = Path(__file__).parents[2] / "oracles" / f"{name}.py"
+        spec = importlib.util.spec_from_file_location(name, path)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
 
-class Queued(NamedTuple):
-    """One instance of a message, in the order of arbitration."""
+    simulation, textbook = oracle("can_simulation"), oracle("can_textbook")
+    Frame, SimulatedMessage, simulate = simulation.Frame, simulation.SimulatedMessage, simulation.simulate
 
-    priority: int
-    due_us: float
-    """When its period began."""
-    queued_us: float
-    frame_us: float
-
-
-def simulated(queued: Sequence[Queued]) -> list[tuple[Queued, float]]:
-    """Send every frame: whenever the bus is free the first of those that are queued; each with its end."""
-    left = sorted(queued, key=lambda one: one.queued_us)
-    now_us, sent = 0.0, []
-    while left:
-        now_us = max(now_us, left[0].queued_us)
-        first = min((one for one in left if one.queued_us <= now_us), key=lambda one: (one.priority, one.queued_us))
-        left.remove(first)
-        now_us += first.frame_us
-        sent.append((first, now_us))
-    return sent
+WORST: Final = "worst-stuffing"
+KBIT_S: Final = 500
+BIT_US: Final = 2
 
 
-@st.composite
-def messages(draw: st.DrawFn, most_load: float = 0.95) -> list[Sender]:
-    """Some messages with whole microseconds, by priority; together they leave the bus some time."""
-    found: list[Sender] = []
-    for _ in range(draw(st.integers(1, 5))):
-        frame_us = draw(st.integers(5, 13))
-        period_us = draw(st.integers(15, 90))
-        jitter_us = draw(st.sampled_from([0, 0, 3, 14]))
-        one = Sender(frame_us, period_us, min(jitter_us, period_us))
-        if sum(each.load for each in (*found, one)) <= most_load:
-            found.append(one)
-    return found or [Sender(10, 40)]
+FORMS: Final = ("compiled", "python")
 
 
-def arrived_us(each: Sequence[Sender], span_us: float) -> float:
-    """Frames that arrive in a span of time [us]."""
-    return sum(float(ceil((span_us + one.jitter_us) / one.period_us) * one.frames_us) for one in each)
+@contextmanager
+def computed_by(form: str) -> Iterator[None]:
+    """Compute with the compiled form, where there is one, or without it."""
+    if form == "compiled":
+        yield
+        return
+    with mock.patch("busplan.buses.can.waiting._compiled", return_value=None):
+        yield
 
 
-def analysed(each: Sequence[Sender], place: int, *, bit_us: float) -> Response:
-    blocking_us = max((one.frames_us for one in each[place + 1 :]), default=0.0)
-    found = worst_response(each[place], each[:place], blocking_us=blocking_us, bit_us=bit_us)
-    assert found is not None
-    return found
+def network(*messages: dict[str, Any], **bus: Any) -> CanProfile:
+    """Messages alone, the first goes first."""
+    each = [
+        {"name": f"m{place}", "identifier": 16 * place, "payload_bytes": 8, **keys}
+        for place, keys in enumerate(messages)
+    ]
+    bus = {"kind": "can", "bit_rate_kbit_s": KBIT_S, **bus}
+    return CanProfile.model_validate({"schema_version": 1, "name": "bursts", "bus": bus, "message": each})
 
 
-@settings(max_examples=80)  # a wrong end of the busy period shows in few
-@given(messages())
-@example([Sender(9, 24), Sender(5, 44), Sender(11, 39), Sender(5, 29)])  # the last one's second instance is the worst
-def test_it_is_what_a_simulation_of_the_critical_instant_finds(each: list[Sender]) -> None:
-    for place, own in enumerate(each):
-        # Behind a frame that started just before, all starts are so much before what arrives with the whole clock.
-        found = analysed(each, place, bit_us=0.0 if each[place + 1 :] else JUST_BEFORE)
-        lower = [Queued(9, 0.0, -JUST_BEFORE, one.frames_us) for one in each[place + 1 :]]
-        blocking = [max(lower, key=lambda one: one.frame_us)] if lower else []
-        queued = [
-            Queued(priority, due_us, max(due_us, 0.0), one.frames_us)
-            for priority, one in enumerate(each[: place + 1])
-            for due_us in (number * one.period_us - one.jitter_us for number in range(200))
-            if due_us < 1500
-        ]
-        shift_us = JUST_BEFORE if blocking else 0.0
-        at = [
-            one._replace(due_us=one.due_us + shift_us, queued_us=one.queued_us + shift_us)
-            for one in [*queued, *blocking]
-        ]
-        ended = [(one, end_us) for one, end_us in simulated(at) if one.priority == place]
-        # Nothing before them at all, and the smallest span would be none.
-        busy_us = settled_us(found.blocking_us or JUST_BEFORE, [*each[: place + 1]])
-        responses_us = [end_us - one.due_us for one, end_us in ended if one.queued_us <= busy_us]
-        assert max(responses_us) + shift_us == pytest.approx(found.us, abs=1e-9)
-        # The worst is not found twice: its place among the instances is the analysis's, or an equal one.
-        assert responses_us[found.instance] == max(responses_us)
-        assert own.frames_us <= found.us
+class Sent(NamedTuple):
+    """A message as it is sent, in whole microseconds."""
+
+    frame_us: int
+    period_us: int
+    jitter_us: int
+    burst: int
+
+    def queued(self, identifier: int, until_us: int) -> SimulatedMessage:
+        """All instances up to a time, those of before 0 as late as they may be, and then as early."""
+        due = (*(-self.jitter_us,) * (self.burst - 1), *range(-self.jitter_us, until_us, self.period_us))
+        return SimulatedMessage(Frame(identifier, self.frame_us), due, tuple(max(us, 0) for us in due))
 
 
-@given(messages(), st.randoms(use_true_random=False))
-def test_no_simulated_start_takes_longer(each: list[Sender], random: Random) -> None:
-    draw = random.randint
-    queued = []
-    for priority, one in enumerate(each):
-        start_us = draw(0, int(one.period_us))
-        for number in range(12):
-            due_us = start_us + number * one.period_us
-            queued.append(Queued(priority, due_us, due_us + draw(0, int(one.jitter_us)), one.frames_us))
-    for sent, end_us in simulated(queued):
-        assert end_us - sent.due_us <= analysed(each, sent.priority, bit_us=1.0).us
+def simulated_us(each: Sequence[Sent], place: int, until_us: int) -> tuple[int, ...]:
+    """Responses of a message in the busy period that the longest frame of a lower priority opens [us]."""
+    queued = [one.queued(number, until_us) for number, one in enumerate(each[: place + 1])]
+    # It has won the arbitration before any of the others came.
+    lower = [Frame(-1, one.frame_us) for one in each[place + 1 :]]
+    blocking = [SimulatedMessage(max(lower, key=lambda frame: frame.us), (0,), (0,))] if lower else []
+    # A frame that is queued within a bit still takes part in the arbitration.
+    found = simulate(Frame(0, 1), (), [*queued, *blocking], period_us=1, host_us=(), late_us=BIT_US - 1)
+    return found.responses_us[place]
 
 
-def test_the_worst_instance_is_not_always_the_first() -> None:
-    # Davis et al. 2007, Table 2: 7 bytes at 125 kbit/s take 1 ms; the old analysis says 3 ms of the last, within 3.25.
-    each = [Sender(1000, 2500), Sender(1000, 3500), Sender(1000, 3500)]
-    assert [analysed(each, place, bit_us=8).us for place in range(3)] == [2000, 3000, 3500]
-    assert analysed(each, 2, bit_us=8).instance == 1
+def latencies(own: CanProfile, *, form: str = "compiled") -> tuple[Any, ...]:
+    """Figures of each message in the worst case."""
+    with computed_by(form):
+        return busplan.latency(own, timing_model=[WORST]).transactions
+
+
+def frames_us(own: CanProfile) -> list[float]:
+    """Frame of each message [us]."""
+    return [float(one.frame_us) for one in latencies(own)]
+
+
+def responses_us(own: CanProfile) -> list[float | None]:
+    """Worst-case response of each message [us]."""
+    return [one.worst_response_us for one in latencies(own)]
+
+
+MESSAGES: Final = st.lists(
+    st.fixed_dictionaries(
+        {
+            "payload_bytes": st.integers(0, 8),
+            "period_us": st.sampled_from([700, 1300, 2000, 2500, 6000, 20_000]),
+            "jitter_us": st.sampled_from([0, 0, 300, 1900, 5000, 30_000]),
+            "burst": st.sampled_from([1, 1, 2, 3, 7]),
+        },
+        optional={"fd": st.just(True), "brs": st.just(False)},
+    ).filter(lambda one: one.get("fd", False) or "brs" not in one),
+    min_size=1,
+    max_size=6,
+)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@given(messages=MESSAGES)
+@settings(max_examples=150, deadline=None)
+def test_a_simulation_reaches_each_response_and_never_passes_it(messages: list[dict[str, Any]], form: str) -> None:
+    # Data at 1000 kbit/s: all frames are whole microseconds, with a switch of bit rate and without.
+    found = latencies(network(*messages, data_bit_rate_kbit_s=1000), form=form)
+    each = [
+        Sent(int(one.frame_us or 0), own["period_us"], own["jitter_us"], own["burst"])
+        for one, own in zip(found, messages, strict=True)
+        if one.worst_response_us is not None
+    ]
+    assume(len(each) == len(messages))
+    load = sum(one.frame_us / one.period_us for one in each)
+    at_once_us = sum(one.frame_us * (one.burst + (one.jitter_us + 20) / one.period_us + 1) for one in each)
+    assume(at_once_us / (1 - load) < 2e5)
+    for place, one in enumerate(found):
+        us = simulated_us(each, place, int(at_once_us / (1 - load)) + 1)
+        assert max(us) == pytest.approx(one.worst_response_us, abs=1e-6)
+        assert us[one.instance] == max(us)
+
+
+@given(MESSAGES, st.randoms(use_true_random=False))
+@settings(max_examples=100, deadline=None)
+def test_no_other_start_takes_longer(messages: list[dict[str, Any]], random: Random) -> None:
+    found = latencies(network(*messages, data_bit_rate_kbit_s=1000))
+    sent = []
+    for number, (one, own) in enumerate(zip(found, messages, strict=True)):
+        # From one to the next it is a period; what was not sent is made up for later, up to a burst.
+        at_us = regular_us = random.randint(0, own["period_us"])
+        due = []
+        for _ in range(12):
+            due.append(at_us)
+            regular_us = max(regular_us, at_us) + own["period_us"]
+            at_us = max(at_us, regular_us - (own["burst"] - 1) * own["period_us"]) + random.choice([0, 0, 7, 3000])
+        queued = [us + random.choice([0, own["jitter_us"], random.randint(0, own["jitter_us"])]) for us in due]
+        # They are queued in their order.
+        sent.append(SimulatedMessage(Frame(number, int(one.frame_us or 0)), tuple(due), tuple(sorted(queued))))
+    run = simulate(Frame(0, 1), (), sent, period_us=1, host_us=(), late_us=random.choice([0, BIT_US - 1]))
+    for one, us in zip(found, run.responses_us, strict=True):
+        assert one.worst_response_us is None or max(us) <= one.worst_response_us + 1e-6
+
+
+def random_network(random: Random, *, count: int, load: float) -> CanProfile:
+    """Messages of all sorts that together make a load, with few periods between them or many."""
+    periods_us = [random.uniform(3000, 200_000) for _ in range(random.choice([2, 9, count]))]
+    messages = []
+    for _ in range(count):
+        period_us = random.choice(periods_us)
+        keys = {"payload_bytes": random.randint(0, 8), "burst": random.choice([1, 1, 1, 4]), "period_us": period_us}
+        messages.append({**keys, "jitter_us": random.choice([0, 0, random.randint(0, int(2 * period_us))])})
+    scale = sum(BIT_US * (55 + 10 * one["payload_bytes"]) / one["period_us"] for one in messages) / load
+    return network(*({**one, "period_us": round(scale * one["period_us"], 1)} for one in messages))
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("seed", range(12))
+def test_networks_have_the_responses_of_the_printed_equations(seed: int, form: str) -> None:
+    random = Random(seed)
+    own = random_network(random, count=random.randint(2, 40), load=random.choice([0.3, 0.7, 0.95, 1.05]))
+    found = latencies(own, form=form)
+    tenths = 10
+    each = [
+        textbook.Sender(
+            tenths * BIT_US * (55 + 10 * one.payload_bytes),
+            round(tenths * one.period_us),
+            round(tenths * one.jitter_us),
+            one.burst,
+        )
+        for one in own.message
+    ]
+    for place, one in enumerate(found):
+        blocking_us = max((lower.frame_us for lower in each[place + 1 :]), default=0)
+        expected = textbook.response_us(each[place], each[:place], blocking_us=blocking_us, bit_us=tenths * BIT_US)
+        if expected is None:
+            assert one.worst_response_us is None
+        else:
+            assert (one.worst_response_us, one.instance) == (pytest.approx(expected[0] / tenths), expected[1])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_both_forms_give_the_same_floats(seed: int) -> None:
+    own = random_network(Random(seed), count=60, load=0.9)
+    first, second = (latencies(own, form=form) for form in FORMS)
+    assert [dict(one.phases) for one in first] == [dict(one.phases) for one in second]
+
+
+def test_a_burst_waits_for_itself_and_others_wait_for_all_of_it() -> None:
+    # 270 us a frame: five at once, and behind them a message that meets one of them and one of a lower priority.
+    own = network({"period_us": 100_000, "burst": 5}, {"period_us": 10_000}, {"period_us": 50_000})
+    assert frames_us(own) == [270.0] * 3
+    assert responses_us(own) == [270 * 6, 270 * 7, 270 * 7]
+    (first, *_) = busplan.latency(own, timing_model=[WORST]).transactions
+    assert (first.blocking_us, first.interference_us, first.instance, first.backlog_us) == (270, 0, 4, 4 * 270)
+    # Its period is the mean: the load is that of a frame in each of them.
+    (found,) = busplan.capacity(own, timing_model=[WORST]).results
+    assert found.bus_load == pytest.approx(270 / 100_000 + 270 / 10_000 + 270 / 50_000)
+
+
+def test_the_deadline_of_a_burst_counts_from_when_it_is_queued() -> None:
+    burst = {"period_us": 100_000, "burst": 5}
+    for deadline_us, is_kept in [(270 * 5, True), (270 * 5 - 1, False)]:
+        (found,) = busplan.capacity(network({**burst, "deadline_us": deadline_us}), timing_model=[WORST]).results
+        assert ("deadline" in found.exceeded) is not is_kept
 
 
 def test_a_load_of_one_or_more_has_no_response_time() -> None:
-    full = [Sender(500, 1000), Sender(500, 1000)]
-    assert worst_response(full[1], full[:1], blocking_us=0, bit_us=1) is None
-    assert worst_response(full[0], [], blocking_us=500, bit_us=1) is not None
-    assert worst_response(Sender(499, 1000), full[:1], blocking_us=0, bit_us=1) is not None
+    own = network({"period_us": 540}, {"period_us": 540}, {"period_us": 1e6})
+    assert responses_us(own) == [540, None, None]
+    assert responses_us(network({"period_us": 540}, {"period_us": 545}))[1] is not None
 
 
-@given(messages(), st.integers(0, 300))
-def test_a_span_ends_when_all_that_arrives_in_it_is_sent(each: list[Sender], others_us: int) -> None:
-    span_us = settled_us(others_us, each)
-    assert span_us == others_us + arrived_us(each, span_us)
-    for shorter_us in range(int(others_us + sum(one.frames_us for one in each)), int(span_us)):
-        assert shorter_us < others_us + arrived_us(each, shorter_us)
+def test_a_jitter_beyond_the_period_queues_several_at_once() -> None:
+    # Three periods late: four are there at once, the first of them was due three periods before, and a fifth comes.
+    own = network({"period_us": 1000, "jitter_us": 3000}, {"period_us": 100_000})
+    assert responses_us(own) == [3000 + 270 + 270, 270 * 6]
 
 
-@pytest.mark.parametrize("load", [0.991, 0.9999, 1.0, 3.0])
-def test_a_span_of_a_nearly_full_bus_is_a_bound_that_grows(load: float) -> None:
-    each = [Sender(load * 1000, 1000, 10)]
-    near_us, far_us = settled_us(50, each), settled_us(60, each)
-    assert near_us < far_us < float("inf")
-    if load < 0.9999:
-        assert near_us >= 50 + arrived_us(each, near_us) - load * 1000
+@pytest.mark.parametrize(("size", "bits"), [(0, 67), (8, 147), (64, 712)])
+def test_an_fd_frame_without_a_switch_has_the_bit_rate_of_the_bus_in_all_parts(size: int, bits: int) -> None:
+    message = {"period_us": 100_000, "payload_bytes": size, "fd": True}
+    (us,) = frames_us(network({**message, "brs": False}))
+    assert us == frames_us(network(message, data_bit_rate_kbit_s=KBIT_S))[0]
+    assert us == bits * BIT_US
+    assert frames_us(network({**message, "brs": False}, data_bit_rate_kbit_s=5000))[0] == us
+    assert frames_us(network(message, data_bit_rate_kbit_s=5000))[0] < us
+
+
+def test_brs_needs_no_data_bit_rate_and_is_of_fd_alone() -> None:
+    message = {"period_us": 100_000, "payload_bytes": 64}
+    with pytest.raises(ValueError, match="brs = false says a frame without a switch"):
+        network({**message, "fd": True})
+    with pytest.raises(ValueError, match="write fd = true"):
+        network({"period_us": 100_000, "brs": False})
+    own = network({**message, "fd": True, "brs": False})
+    with pytest.raises(BusplanError, match=r"asks for bus\.data_bit_rate_kbit_s"):
+        override(own, {"message.m0.brs": True})
+
+
+@pytest.mark.parametrize("key", ["burst", "jitter_us", "period_us"])
+def test_a_sweep_has_at_each_point_what_the_point_has(key: str) -> None:
+    own = network(
+        {"period_us": 5000, "burst": 3, "deadline_us": 2000},
+        {"period_us": 9000, "jitter_us": 10_000, "deadline_us": 20_000},
+    )
+    values = {"burst": [1, 2, 8], "jitter_us": [0, 400, 12_000], "period_us": [300, 5000, 90_000]}[key]
+    swept = busplan.sweep(own, vary={f"message.m0.{key}": values}, timing_model=[WORST])
+    for value, load, fits in zip(values, swept["bus_load"], swept["fits"], strict=True):
+        (found,) = busplan.capacity(override(own, {f"message.m0.{key}": value}), timing_model=[WORST]).results
+        assert (load, fits) == (pytest.approx(found.bus_load), found.fits)
+    assert len(set(swept["fits"])) > 1
+
+
+@pytest.mark.parametrize("profile", ["can-servo-8", "canopen-6", "can-fd-arm-7"])
+def test_a_derivation_lists_the_frames_that_were_counted(profile: str) -> None:
+    derivations = busplan.explain(profile, "worst_response_us").to_dict()["derivations"]
+    assert len(derivations) > 5
+    for one in derivations:
+        for step in one["steps"]:
+            before, _, listed = step["formula"].partition(", in its worst instance")
+            if not before.startswith("frames of higher priorities before "):
+                continue
+            frames = re.findall(r"(\d+) [\w-]+ of ([\d.]+) us", listed)
+            assert sum(int(number) * float(us) for number, us in frames) == pytest.approx(step["value"])
+            assert bool(frames) == bool(step["value"])
+
+
+def test_a_derivation_of_a_burst_has_its_periods() -> None:
+    own = network({"period_us": 100_000, "burst": 5}, {"period_us": 10_000})
+    first = busplan.explain(own, "latency.worst_response_us").to_dict()["derivations"][0]
+    steps = {step["key"]: (step["formula"], step["value"]) for step in first["steps"]}
+    assert steps["blocking_us"] == ("the longest frame of a lower priority than m0: m1", 270)
+    assert steps["burst"] == ("frames of m0 that may come at once", 5)
+    assert steps["backlog_us"] == ("q C - (q - b + 1) T", 4 * 270)
+    assert [one["name"] for one in first["inputs"] if one["name"].endswith("burst")] == ["message.m0.burst"]

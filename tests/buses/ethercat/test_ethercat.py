@@ -290,6 +290,21 @@ def test_a_loop_takes_whole_periods_with_distributed_clocks() -> None:
     assert free["feedback"] == pytest.approx(500 + own_us - 20 * BYTE_US + 3 * 0.1507)
 
 
+def test_a_frame_takes_no_sample_that_it_triggers_itself() -> None:
+    def feedback(execution_us: float) -> Any:
+        found = busplan.latency(profile(node__execution__base_us=execution_us), timing_model=["last-byte"]).transactions
+        return next(each for each in found if each.transaction == "feedback")
+
+    # Without clocks a drive samples when a frame passes; however fast it is, the next one takes the sample.
+    assert feedback(0.0).frame_wait_us == 500
+    assert feedback(1.0).frame_wait_us == 499
+    assert feedback(0.0).end_to_end_us == pytest.approx(feedback(1.0).end_to_end_us)
+    for update, periods in (("next_sync", 3), ("on_arrival", 2)):
+        at_once = override(profile(node__execution__base_us=0.0), {"servo.loop": "host", "servo.update": update})
+        first, last = loop_delays_us(at_once)
+        assert (first // 500, last // 500) == (periods, periods)
+
+
 def test_the_circle_has_the_delay_of_the_loop() -> None:
     for shift in [0.0, 0.1, 0.3, 0.9]:
         for pipeline in [0, 1, 2]:

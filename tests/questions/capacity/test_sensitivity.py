@@ -252,3 +252,20 @@ def test_without_the_limit_the_next_one_keeps_one_node_more_off(
     assert not is_kept(found.next_safe_nodes + 1)
     assert found.next_safe_nodes >= found.safe_nodes
     assert found.next_limited_by != found.limited_by
+
+
+def test_a_change_that_moves_no_margin_says_what_it_takes_from_other_limits() -> None:
+    def of_execution(base_us: float) -> Effect:
+        execution = {"base_us": base_us, "per_byte_us": 0.0, "uncertainty_us": 0.0, "worst_extra_us": 0.0}
+        changes: dict[str, object] = {f"node.execution.{key}": value for key, value in execution.items()}
+        profile = override(load("ethercat-servo-8").profile, changes)
+        return next(effect for effect in sensitivity(profile).effects if effect.key == "execution_us")
+
+    exact = of_execution(100.0)
+    assert exact.margin_change_us == 0
+    why, node, sync0 = exact.note.split("; ")
+    assert why == "no execution time is on the bus"
+    assert node == "it takes 20.0 us of the 800.0 us before the limit of node"
+    assert sync0.startswith("it takes 10.0 us of the ")
+    assert sync0.endswith(" us before the limit of sync0")
+    assert "it adds 120.0 us to the 200.0 us beyond the limit of node" in of_execution(600.0).note

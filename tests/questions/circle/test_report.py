@@ -4,9 +4,11 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
+from typing import Literal
 
 import pytest
 
+import busplan
 from busplan.forms import render
 from busplan.forms.blocks import Bar, Chart, Report, Sentence, ShownValue, Table
 from busplan.forms.numbers import figure_text, sentence_text
@@ -84,7 +86,7 @@ def test_the_table_has_every_figure_of_the_answer_that_a_reader_asks_for(values_
     record = circle_document(small()._replace(with_contributions=False))["results"][0]
     assert {key for key in record if key not in shown} == {
         *("steps", "timing_model", "bus_fits", "verdict", "required_us", "available_us", "servo_grade"),
-        *("centre_offset_mm", "constant_speed_deg", "failures", "settled", "ideal_drive"),
+        *("centre_offset_mm", "constant_speed_deg", "failures", "settled", "ideal_drive", "sources_matter"),
         *("update", "delay_us", "delay_x_us", "delay_y_us", "jitter_us"),
     }
     host = circle_of(*SMALL.items(), ("servo.loop", "host"))
@@ -92,6 +94,40 @@ def test_the_table_has_every_figure_of_the_answer_that_a_reader_asks_for(values_
 
 
 # --- sentences --------------------------------------------------------------------------------------------------
+
+
+def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None:
+    # Equal axes without friction: a G of picometres, whatever the machine is.
+    test = busplan.circle_test("ethercat-servo-8")
+    (result,) = test.results
+    assert (result.passed, result.sources_matter, result.failures) == (None, False, ())
+    assert test.passed is None
+    said = next(circle_sentences(test.profile, result))
+    assert sentence_text(said) == (
+        "ethercat-servo-8 at 1 ms and 3000 mm/min: no error source of this profile matters; circular deviation G "
+        "below 0.1 um, which says nothing of how round a machine is."
+    )
+    assert said.state == "warns"
+    forms: tuple[Literal["table", "markdown", "html"], ...] = ("table", "markdown", "html")
+    for form in forms:
+        shown = render(test.report(), form)
+        assert "no error source of this profile matters" in shown
+        assert "PASSED" not in shown
+        assert "every tolerance" not in shown
+    assert test.to_dict()["results"][0]["passed"] is None
+    assert test.to_dict()["results"][0]["sources_matter"] is False
+    assert ">NO SOURCE MATTERS<" in test.svg()
+    compared = render(busplan.compare("ethercat-servo-8", circle=True).report(), "table")
+    assert "NO SOURCE MATTERS" in compared
+    # It is no failure, and without a tolerance the largest error says the same.
+    assert busplan.check("ethercat-servo-8").passed
+    ideal = busplan.circle_test("dvrk")
+    assert "largest contour error below 0.1 um" in sentence_text(
+        next(circle_sentences(ideal.profile, ideal.results[0]))
+    )
+    # A tolerance that is broken fails, however small the error.
+    tight = busplan.load_profile("ethercat-servo-8", changes={"tolerance.circular_deviation_mm": 1e-10})
+    assert busplan.circle_test(tight).passed is False
 
 
 def test_a_circle_that_holds_says_so() -> None:

@@ -191,7 +191,7 @@ def spaced(gaps_us: list[float]) -> str:
         ([180, 180, 180, 180, 4001] * 40, 800, "541"),
         ([4001, 180] * 9 + [2000] * 100, 83.3, "70.7"),
         # A driver hands several frames over at once: long windows say something.
-        ([10, 11, 10, 4000] * 40, 250, "131"),
+        ([10, 11, 10, 4000] * 40, 250, "130"),
         # Frames as close as by 125, and as many a little later: chance.
         ([888, 4001] * 12 + [*range(910, 980)], 125, "120"),
         # Stamps of a step of 1 ms.
@@ -215,9 +215,10 @@ def test_periods_without_a_frame_do_not_make_a_period_longer(tmp_path: Path) -> 
 
 
 def test_a_log_may_end_with_a_frame_more_than_its_length_has_periods(tmp_path: Path) -> None:
-    queued = [Queued(k * 10_000.0 + start, 0x180 + start, bytes(8), fd=True) for k in range(20) for start in (0, 1000)]
+    queued = [Queued(k * 10_000.0 + start, 0x180 + start, b"\x3c" * 8) for k in range(10) for start in range(4)]
     answer = imported(candump(arbitrated(queued)), tmp_path)
-    load, *_ = busplan.measured(answer.profile, tmp_path / "drive.log").figures
+    figures = busplan.measured(answer.profile, tmp_path / "drive.log").figures
+    (load,) = (figure for figure in figures if figure.quantity == "load")
     assert load.recorded > load.planned  # type: ignore[operator]
     assert load.verdict == "not shown"
 

@@ -124,11 +124,11 @@ def test_a_message_that_comes_more_often_or_longer_is_outside_and_measured(tmp_p
     answer = of_log(candump(logged), tmp_path, plan=plan)
     assert [found.quantity for found in answer.outside] == ["heartbeats: period", "heartbeats: data"]
     assert answer.edits["message.heartbeats.payload_bytes"] == 2
-    assert answer.edits["message.heartbeats.period_us"] == pytest.approx(50_000, rel=1e-3)
+    assert answer.edits["message.heartbeats.period_us"] == pytest.approx(50_000, rel=2e-3)
 
 
 def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
-    late = [frame._replace(us=frame.us + 1500 * (frame.identifier == 0x208)) for frame in servo_8(100)]
+    late = [frame._replace(us=frame.us + 3000 * (frame.identifier == 0x208)) for frame in servo_8(100)]
     shaken = arbitrated(servo_8(300, sync_jitter_us=900))
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").recorded == pytest.approx(900, abs=150)
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").verdict == "outside"
@@ -169,23 +169,24 @@ def test_errors_remote_frames_and_can_fd_are_said(tmp_path: Path) -> None:
     more = "(1700000000.000001) can0 123#R\n(1700000000.000002) can0 20000080#0000000000000000\n"
     fd = "(1700000000.000003) can0 124##1" + "AA" * 16 + "\n"
     answer = of_log(more + fd + candump(LOGGED), tmp_path)
-    assert (
-        "1 frame of CAN FD: in the load with the most stuff bits, 1 in no load, for the plan has no data bit rate."
-        in answer.remarks
-    )
+    said = "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 in no load, for the plan has no "
+    assert f"{said}data bit rate." in answer.remarks
     assert "1 remote frame: the length code is shown as data." in answer.remarks
     assert figure(answer, "error frames").recorded == 1
 
 
-def test_frames_of_can_fd_are_in_the_load_with_the_most_stuff_bits(tmp_path: Path) -> None:
+def test_frames_of_can_fd_are_in_the_load_with_half_of_the_possible_stuff_bits(tmp_path: Path) -> None:
     lines = [
         f"({1_700_000_000 + cycle // 1000}.{cycle % 1000:03d}000) can0 181##1{'5A' * 12}\n" for cycle in range(2000)
     ]
     answer = of_log("".join(lines), tmp_path, plan="can-fd-arm-7")
-    assert "2,000 frames of CAN FD: in the load with the most stuff bits." in answer.remarks
+    assert "2,000 frames of CAN FD: in the load with half of the possible stuff bits." in answer.remarks
     plan: Any = busplan.load_profile("can-fd-arm-7")
-    us = 32 * 1000 / plan.bus.bit_rate_kbit_s + (5 + 96 + 4 + 17 + 6 + 1 + 26) * 1000 / plan.bus.data_bit_rate_kbit_s
-    assert figure(answer, "load ").recorded == pytest.approx(us / 1000, rel=0.01)
+    nominal_us, data_us = 1000 / plan.bus.bit_rate_kbit_s, 1000 / plan.bus.data_bit_rate_kbit_s
+    least_us, most_us = 29 * nominal_us + 129 * data_us, 32 * nominal_us + 155 * data_us
+    load = figure(answer, "load ")
+    assert load.recorded == pytest.approx((least_us + most_us) / 2 / 1000, rel=0.01)
+    assert load.uncertainty == pytest.approx((most_us - least_us) / 2 / 1000, rel=0.05)
 
 
 def test_stuffing_is_that_of_classical_frames(tmp_path: Path) -> None:
@@ -242,7 +243,8 @@ def test_a_damaged_log_says_where(tmp_path: Path) -> None:
                 )
         content, random = path.read_bytes(), Random(1)
         for _ in range(15):
-            end = random.randrange(4, len(content))
+            # python-can's reader of BLF leaves a file open whose head is cut.
+            end = random.randrange(200 if ending == "blf" else 4, len(content))
             path.write_bytes(content[:end] + random.choice((b"", b"\xff\0\n", b"nonsense\n")))
             try:
                 read_can(path, progress=lambda _done, _total: None)
@@ -274,9 +276,9 @@ def test_apply_writes_the_keys_of_a_message(run: Run, tmp_path: Path) -> None:
     (tmp_path / "bus.log").write_text(candump(LOGGED))
     done = run("measured", "arm.toml", "bus.log", "--apply", "--format", "json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["measured"] == {"message.heartbeats.period_us": pytest.approx(50_000, rel=1e-3)}
+    assert json.loads(done.stdout)["measured"] == {"message.heartbeats.period_us": pytest.approx(50_000, rel=2e-3)}
     profile: Any = busplan.load_profile(path)
-    assert profile.message[2].period_us == pytest.approx(50_000, rel=1e-3)
+    assert profile.message[2].period_us == pytest.approx(50_000, rel=2e-3)
     assert "# busplan measured: the worst of " in path.read_text()
     again = run("measured", "arm.toml", "bus.log", "--apply", cwd=tmp_path)
     assert again.returncode == 2

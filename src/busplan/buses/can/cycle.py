@@ -1,8 +1,7 @@
 """The SYNC cycle: SYNC, feedback, the host, commands, and the waits for other messages."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from functools import cached_property, lru_cache, partial, reduce
+from functools import cached_property, partial, reduce
 from itertools import islice
 from math import inf
 from typing import Final, Literal
@@ -10,18 +9,9 @@ from typing import Final, Literal
 from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
 from busplan.buses.can.figures import BUS_LOAD, TERMS
-from busplan.buses.can.response import Response, TooManyStepsError
-from busplan.buses.can.streams import (
-    MessageStreams,
-    Stream,
-    frame_sizes,
-    last_identifier,
-    message_streams,
-    place,
-    streams,
-)
-from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import messages, response, sent_in, sync_spread_us, waits
+from busplan.buses.can.streams import Stream, frame_sizes, last_identifier, place, streams
+from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Traffic, traffic_of
+from busplan.buses.can.waiting import counted, message_responses, responses, sent_in, sync_response, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Group, Network
@@ -30,6 +20,7 @@ from busplan.buses.rates import Rate
 from busplan.elementwise import (
     FIT_ROUNDING,
     Number,
+    Traced,
     choose,
     is_off,
     larger,
@@ -113,10 +104,6 @@ class CanCycle(BusCycle):
         return traffic_of(self.network)
 
     @cached_property
-    def _sent(self) -> Sent:
-        return Sent(self.traffic)
-
-    @cached_property
     def _wire(self) -> dict[str, Number]:
         keys = ("identifier_bits", "bit_rate_kbit_s", "data_bit_rate_kbit_s")
         return {key: getattr(self.traffic, key) for key in keys}
@@ -144,22 +131,20 @@ class CanCycle(BusCycle):
     @cached_property
     def _messages(self) -> tuple[tuple[Message, Number], ...]:
         """All other messages, each with the time of its frame."""
-        if self.traffic.is_plain:
-            us = (stream.frame_us for stream in self._message_streams.each)
+        if self.traffic.is_ordered:
+            us = (stream.frame_us for stream in self._streams if stream.is_message)
             return tuple(zip(self.traffic.messages, us, strict=True))
         return tuple((message, self._message_us(message)) for message in self.traffic.messages)
 
     @property
-    def _message_streams(self) -> MessageStreams:
-        return message_streams(self.traffic, is_stuffed=self.is_stuffed)
+    def _streams(self) -> tuple[Stream, ...]:
+        return streams(self.traffic, is_stuffed=self.is_stuffed)
 
     @cached_property
-    def _before(self) -> tuple[tuple[Message, Number], ...]:
-        """Messages that may go before the last PDO, each with the time of its frame."""
-        if not self.traffic.is_plain:
-            return self._messages
-        last = place(int(plain(self._last)), self.traffic.identifier_bits)
-        return tuple(self._messages[number] for number in self._message_streams.around(last)[0])
+    def _before(self) -> tuple[tuple[Message, Number, Number], ...]:
+        """Messages that may go before the last PDO, each with the time of its frame, and whether it does."""
+        each = ((message, us, self._goes_before_last(message)) for message, us in self._messages)
+        return tuple(one for one in each if one[2] is not False)
 
     @cached_property
     def sync_us(self) -> Number:
@@ -215,7 +200,7 @@ class CanCycle(BusCycle):
         yield Run((), laid_out=lambda _: self._blocks(blocking, 1, 2))
         yield from self._feedback
         yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
-        for count, (message, us) in zip(counts, self._before, strict=True):
+        for count, (message, us, _) in zip(counts, self._before, strict=True):
             yield Run((BusEvent("message", "cycle_interference_us", us, f"message {message.name}"),), count)
         yield from self._commands
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
@@ -256,7 +241,7 @@ class CanCycle(BusCycle):
         """
         is_own = is_off(extra_us)
         blocking_us, counts = self._own_waits if is_own else self._waits_beside(self._on_bus_us + extra_us)
-        return blocking_us + total(count * us for count, (_, us) in zip(counts, self._before, strict=True))
+        return blocking_us + total(count * us for count, (_, us, _) in zip(counts, self._before, strict=True))
 
     @cached_property
     def _own_waits(self) -> tuple[Number, tuple[Number, ...]]:
@@ -269,7 +254,7 @@ class CanCycle(BusCycle):
         others_us = named(others_us, "others_us", "others")
 
         def figure(key: str, words: str) -> Number:
-            return self._sent.of(partial(_waits, self.is_stuffed, key, self._due), others_us, words=words)
+            return self.traffic.ask(partial(_waits, self.is_stuffed, key, self._due), others_us, words=words)
 
         words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
         lasts_us = named(figure("lasts_us", words), "busy_us", "w")
@@ -279,10 +264,10 @@ class CanCycle(BusCycle):
     def _higher(self, lasts_us: Number) -> Iterator[Number]:
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
-        for message, _ in self._before:
+        for message, _, goes_before in self._before:
             each = rounded_up((window_us + message.jitter_us) / message.period_us)
             count = _of_all(message, each if is_off(message.burst - 1) else each + message.burst - 1)
-            yield choose(self._goes_before_last(message), count, 0)
+            yield choose(goes_before, count, 0)
 
     def _goes_before_last(self, message: Message) -> Number:
         """Whether a message goes before the last of SYNC and all PDOs."""
@@ -300,8 +285,8 @@ class CanCycle(BusCycle):
     @cached_property
     def _last(self) -> Number:
         """The largest identifier of SYNC and all PDOs."""
-        sent, words = Sent(without_times(self.traffic)), "the largest identifier of SYNC and all PDOs"
-        return named(sent.of(partial(_last, self._due), words=words), "last_identifier", "id_last")
+        sent, words = self.traffic.without_times(), "the largest identifier of SYNC and all PDOs"
+        return named(sent.ask(partial(_last, self._due), words=words), "last_identifier", "id_last")
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """Growth of the cycle if its nodes take longer: more messages may arrive, too [us]."""
@@ -333,6 +318,10 @@ class CanCycle(BusCycle):
         traffic = () if self._messages or self.network.nonperiodic_us else (LeftOut("other messages", "message"),)
         return (*host, *slowest, *traffic)
 
+    def premises(self) -> tuple[str, ...]:
+        """Each node offers its highest message first, and no error repeats a frame."""
+        return "priority queues: assumed", "no repeated frames"
+
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
         least, most = (CanCycle(self.network, model).load for model in (NONE, WORST))
@@ -362,9 +351,6 @@ class CanCycle(BusCycle):
 
     @property
     def _messages_load(self) -> Number:
-        if self.traffic.is_plain:
-            load: Number = self._message_streams.load
-            return load
         return total(_of_all(message, us) / message.period_us for message, us in self._messages)
 
     @property
@@ -385,15 +371,14 @@ class CanCycle(BusCycle):
         load = ("load", words)
         if not self._messages:
             return (load,)
-        latest, worst = messages(self.traffic, is_stuffed=self.is_stuffed).latest()
-        if worst is None:
+        each = message_responses(self.traffic, is_stuffed=self.is_stuffed)
+        latest, worst = max(each, key=lambda pair: plain(pair[1].us) / plain(pair[0].deadline_us))
+        if worst.us == inf:
             return load, ("latest message", f"{latest.name}, without a worst-case response time")
         return load, ("latest message", f"{latest.name}, {_short(worst.us)} us of {_short(latest.deadline_us)}")
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
-        if self._messages and self.traffic.is_plain:
-            messages(self.traffic, is_stuffed=self.is_stuffed).find_all()
         ends = ((SYNC, ""), *((pdos.name, pdos.group) for pdos in self.traffic.pdos)) if self.traffic.has_cycle else ()
         names = (*ends, *((message.name, "") for message in self.traffic.messages))
         each = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
@@ -435,21 +420,21 @@ class CanCycle(BusCycle):
         """Delay of SYNC by other messages, B + I [us]; infinite where it has no end, 0 where no SYNC is sent."""
         if not self.traffic.has_cycle:
             return 0.0
-        if self._sent.is_ordered:
-            with suppress(TooManyStepsError):
-                us: Number = sync_spread_us(self.traffic, is_stuffed=self.is_stuffed)
-                return us
+        if self.traffic.is_ordered:
+            worst = sync_response(self.traffic, is_stuffed=self.is_stuffed)
+            return choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)
         blocking_us, interference_us = self._waits_of(0, SYNC)
         return named(blocking_us + interference_us, "sync_spread_us", "B + I")
 
     def _figure(self, place: int, key: str, words: str) -> Number:
         """A figure of the stream at a place among those that end a PDO or a message."""
-        return self._sent.of_points(partial(_phase, self.is_stuffed, place, key), words=words)
+        return self.traffic.ask_points(partial(_phase, self.is_stuffed, place, key), words=words)
 
     def _waits_of(self, place: int, name: str) -> tuple[Number, Number]:
         """Blocking and interference of such a stream [us]."""
-        blocking = f"the longest frame of a lower priority than {name}"
-        interference = f"frames of higher priorities before {name}, in its worst instance"
+        blocks, before = self._counted(place)
+        blocking = f"the longest frame of a lower priority than {name}{blocks}"
+        interference = f"frames of higher priorities before {name}, in its worst instance{before}"
         return (
             named(self._figure(place, "blocking_us", blocking), "blocking_us", "B"),
             named(self._figure(place, "interference_us", interference), "interference_us", "I"),
@@ -465,7 +450,8 @@ class CanCycle(BusCycle):
         period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
         periods = instance
         if any(value_of(message.burst) > 1 for message in self.traffic.messages if message.name == name):
-            periods = instance - figure("burst", f"frames of {name} that may come at once") + 1
+            burst = named(figure("burst", f"frames of {name} that may come at once"), "burst", "b")
+            periods = instance - burst + 1
         backlog_us = choose(instance < inf, instance * frame_us_ - periods * period_us, instance)
         parts_us = {
             "jitter_us": named(jitter_us, "jitter_us", "J"),
@@ -483,6 +469,13 @@ class CanCycle(BusCycle):
             instance=instance,
             deadline_us=figure("deadline_us", f"deadline of {name}"),
         )
+
+    def _counted(self, place: int) -> Iterator[str]:
+        """The frames that a derivation of a response says were counted: the one that blocks, and those before it."""
+        at, words = self.traffic.place, ("", "")
+        if isinstance(at, Traced):
+            words = counted(self.traffic.at(at.value), place, is_stuffed=self.is_stuffed)
+        return (f": {one}" if one else "" for one in words)
 
 
 def _numbered(parts_us: Mapping[str, Number], **figures: Number) -> dict[str, Number]:
@@ -528,19 +521,6 @@ def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:
 
     It is infinite where it does not exist.
     """
-    own, worst = _answer(traffic, place, is_stuffed=is_stuffed)
-    said: float = getattr(own if hasattr(own, key) else worst, key, inf)
+    own, worst = responses(traffic, is_stuffed=is_stuffed)[place]
+    said: float = getattr(own, key) if hasattr(own, key) else getattr(worst, key) if worst.us < inf else inf
     return said
-
-
-@lru_cache(maxsize=1024)
-def _answer(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[Stream, Response | None]:
-    """The stream at a place among those that end a PDO or a message, with its response."""
-    own = _ends(traffic, is_stuffed=is_stuffed)[place]
-    return own, response(own, traffic, is_stuffed=is_stuffed)
-
-
-@lru_cache(maxsize=16)
-def _ends(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
-    """Streams that end a PDO or a message."""
-    return tuple(stream for stream in streams(traffic, is_stuffed=is_stuffed) if stream.is_end)

@@ -1,11 +1,14 @@
 """Figures of CAN frames and messages for rows of evidence; each function takes any cycle of the kind."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, Literal
+from math import inf
+from typing import Final, Literal
 
 from busplan.buses.can import equations
-from busplan.buses.can.constants import BASE_BITS, EXPECTED_STUFFING
-from busplan.buses.can.response import Sender, worst_response
+from busplan.buses.can.constants import EXPECTED_STUFFING
+from busplan.buses.can.streams import streams
+from busplan.buses.can.traffic import Message, Traffic
+from busplan.buses.can.waiting import message_responses
 from busplan.elementwise import plain
 
 Stuffing = Literal["worst", "expected", "none"]
@@ -40,24 +43,23 @@ def response_us(
     _cycle: object, *, message: int, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]
 ) -> float | None:
     """Worst-case response time of a message, counted from 1 in the order of identifiers [us]; None without an end."""
-    senders = _senders(bit_rate_kbit_s, payload_bytes, period_us)
-    own, higher, lower = senders[message - 1], senders[: message - 1], senders[message:]
-    blocking_us = max((sender.frames_us for sender in lower), default=0.0)
-    bit_us = plain(equations.bit_us(bit_rate_kbit_s))
-    worst = worst_response(own, higher, blocking_us=blocking_us, bit_us=bit_us)
-    return None if worst is None else float(worst.us)
+    _, worst = message_responses(_messages(bit_rate_kbit_s, payload_bytes, period_us), is_stuffed=True)[message - 1]
+    return None if worst.us == inf else plain(worst.us)
 
 
 def load(_cycle: object, *, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> float:
     """Share of the bus that messages take [1]."""
-    return float(sum(sender.load for sender in _senders(bit_rate_kbit_s, payload_bytes, period_us)))
+    each = streams(_messages(bit_rate_kbit_s, payload_bytes, period_us), is_stuffed=True)
+    return float(sum(own.frame_us / own.period_us for own in each))
 
 
-def _senders(bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> list[Sender]:
-    """Messages with the stuff bits of the worst case, by payload [bytes] and period [us]."""
-    wire: dict[str, Any] = {"identifier_bits": BASE_BITS, "bit_rate_kbit_s": bit_rate_kbit_s, "is_stuffed": True}
-    sizes = zip(payload_bytes, period_us, strict=True)
-    return [Sender(plain(equations.frame_us(size, **wire)), each_us) for size, each_us in sizes]
+def _messages(bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> Traffic:
+    """Messages alone by payload [bytes] and period [us], in the order of identifiers."""
+    each = (
+        Message(f"{place}", place, size, us, jitter_us=0.0, deadline_us=us)
+        for place, (size, us) in enumerate(zip(payload_bytes, period_us, strict=True))
+    )
+    return Traffic(bit_rate_kbit_s=bit_rate_kbit_s, messages=tuple(each))
 
 
 FUNCTIONS: Final = {function.__name__: function for function in (stuffed, frame_bits, fd_frame_bits, response_us, load)}

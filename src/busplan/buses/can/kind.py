@@ -74,6 +74,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     )
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
+    rate_keys = ("bus.bit_rate_kbit_s", "bus.data_bit_rate_kbit_s")
     constants = CONSTANTS
     keys: ClassVar[Mapping[str, Key]] = {
         "bus.nodes": Key(meaning="the others on a second bus"),

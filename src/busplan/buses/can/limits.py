@@ -1,162 +1,69 @@
 """Limits of a CAN bus and of the CANopen identifiers, the load of the bus, and deadlines."""
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import reduce
 from math import inf
-from typing import Any, Final
+from typing import Final
 
 from busplan.buses.can.constants import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.response import TooManyStepsError
-from busplan.buses.can.streams import (
-    Stream,
-    collisions,
-    has_format,
-    identifiers_twice,
-    last_identifier,
-    remembered,
-    streams,
-)
-from busplan.buses.can.traffic import Sent, Traffic, pdos_of, traffic_of, without_times
-from busplan.buses.can.waiting import Messages, messages
+from busplan.buses.can.streams import Stream, collisions, has_format, identifiers_twice, last_identifier, streams
+from busplan.buses.can.traffic import Traffic, pdos_of, traffic_of
+from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT
 from busplan.buses.network import Network
 from busplan.buses.parts import Limit
-from busplan.elementwise import Number, is_everywhere, larger, plain, pointwise, total
+from busplan.elementwise import Number, larger, plain, pointwise, total, within
 from busplan.sections.base import MAX_TIME_US
 
 
 def late_messages(traffic: Traffic) -> Iterator[tuple[str, str]]:
     """Names of the messages of plain numbers that miss their deadline, each with by how much in words."""
-    return ((stream.name, _late(stream, share, traffic)) for stream, share in _late_streams(traffic))
+    return ((stream.name, _late(stream, response_us, traffic)) for stream, response_us in _late_streams(traffic))
 
 
-def _late_streams(traffic: Traffic) -> tuple[tuple[Stream, float], ...]:
-    """Messages of plain numbers that miss their deadline, in the order of the profile, with response over deadline."""
-    return _known_late(traffic, is_stuffed=True)
-
-
-@remembered(maxsize=16)
-def _known_late(traffic: Traffic, *, is_stuffed: bool) -> tuple[tuple[Stream, float], ...]:
-    each = messages(traffic, is_stuffed=is_stuffed).deadline_shares()
-    late = {stream.name: (stream, plain(share)) for stream, share in each if share > 1}
-    return tuple(late[message.name] for message in traffic.messages if message.name in late)
+def _late_streams(traffic: Traffic) -> list[tuple[Stream, float]]:
+    """Messages of plain numbers that miss their deadline, in the order of the profile, with their response [us]."""
+    each = message_responses(traffic, is_stuffed=True, is_verdict=True)
+    return [(own, worst.us) for own, worst in each if not within(worst.us, own.deadline_us)]
 
 
 def _all_late(traffic: Traffic) -> str:
     """Say of all messages that miss their deadline in one clause, the worst first."""
-    late = sorted(_late_streams(traffic), key=lambda pair: -pair[1])
-    endless = [stream.name for stream, share in late if share == inf]
+    late = sorted(_late_streams(traffic), key=lambda pair: -pair[1] / pair[0].deadline_us)
+    endless = [stream.name for stream, us in late if us == inf]
     if endless:
         more = len(endless) - 1
         rest = f" and {more} more message{'s' * (more > 1)} have" if more else " has"
         return f"{endless[0]}{rest} no worst-case response time"
     return _and_more(
         [
-            f"the worst-case response time of {stream.name} is {share * stream.deadline_us:g} us, "
-            f"over its {stream.deadline_us:g} us"
-            for stream, share in late
+            f"the worst-case response time of {stream.name} is {us:g} us, over its {stream.deadline_us:g} us"
+            for stream, us in late
         ]
     )
 
 
-def _late(stream: Stream, share: float, traffic: Traffic) -> str:
-    if share < inf:
-        us = share * stream.deadline_us
-        return f"its worst-case response time is {us:g} us, over its {stream.deadline_us:g} us"
-    load = _messages(traffic).load(stream)
+def _late(own: Stream, response_us: float, traffic: Traffic) -> str:
+    if response_us < inf:
+        return f"its worst-case response time is {response_us:g} us, over its {own.deadline_us:g} us"
+    each = (stream for stream in streams(traffic, is_stuffed=True) if stream.block <= own.last_place)
+    load = sum(stream.frames_us / stream.period_us for stream in each)
     steps = "" if load >= SATURATED else f", and its busy period takes over {MOST_STEPS:.0f} steps to find"
     return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}{steps}"
 
 
-def _slowest(traffic: Traffic) -> float:
-    """The largest response over deadline of any message of plain numbers [1]."""
-    largest = 0.0
-    # The lowest priorities first: where they all have a response time, every message has.
-    for _, share in _messages(traffic).deadline_shares():
-        largest = max(largest, plain(share))
-        if largest == inf:
-            break
-    return largest
+def _slowest(traffic: Traffic) -> Number:
+    """The largest response over deadline of any message [1]."""
+    each = message_responses(traffic, is_stuffed=True, is_verdict=True)
+    slowest: Number = reduce(larger, (worst.us / own.deadline_us for own, worst in each))
+    return slowest
 
 
 def _deadline(network: Network) -> Number:
     if not network.profile.message:
         return 0.0
-    return Sent(traffic_of(network)).of_points(_slowest, words=_DEADLINE_WORDS)
-
-
-def _messages(traffic: Traffic) -> Messages:
-    return messages(traffic, is_stuffed=True)
-
-
-def _is_late(network: Network) -> Number:
-    """Whether any message misses its deadline: exact response times only where bounds do not tell."""
-    if not network.profile.message:
-        return False
-    sent = Sent(traffic_of(network))
-    least = sent.of(lambda traffic: _messages(traffic).largest_least(), words=_DEADLINE_WORDS)
-    most = sent.of(lambda traffic: _messages(traffic).largest_bound(), words=_DEADLINE_WORDS)
-
-    def is_late(at: float, least: float, most: float) -> bool:
-        return bool(_has_late(sent.at(at))) if least <= 1 < most else least > 1
-
-    if sent.is_ordered and not isinstance(least + most, float):
-        return _late_points(sent.traffic, least, most)
-    return pointwise(is_late, sent.place, least, most, words=_DEADLINE_WORDS)
-
-
-def _late_points(traffic: Traffic, least: Any, most: Any) -> Number:
-    """Whether any message misses its deadline at each point of arrays, of which bounds of it are known."""
-    import numpy as np
-
-    numbers: tuple[Any, ...] = traffic.numbers()
-    shape = np.broadcast_shapes(np.shape(least), np.shape(most), *map(np.shape, numbers))
-    least, most = (np.broadcast_to(share, shape).ravel() for share in (least, most))
-    columns = [
-        number if isinstance(number, int | float) else np.broadcast_to(number, shape).ravel() for number in numbers
-    ]
-    late = least > 1
-    asked = np.flatnonzero((least <= 1) & (most > 1))
-    # Points of like loads take like numbers of steps.
-    asked = asked[np.argsort(most[asked])]
-    # Few points of many messages are quicker one by one: then arrays are of messages.
-    size = 1 if len(asked) < len(traffic.messages) else _POINTS_AT_ONCE
-    waiting = [asked[first : first + size] for first in range(0, len(asked), size)]
-    while waiting:
-        some = waiting.pop()
-        at = some if len(some) > 1 else some[0]
-        row = (column if isinstance(column, int | float) else column[at] for column in columns)
-        try:
-            late[some] = _has_late(traffic.with_numbers(*map(_as_plain, row)))
-        except TooManyStepsError:
-            waiting += np.array_split(some, 2)
-    is_late: Number = late.reshape(shape)
-    return is_late
-
-
-def _as_plain(number: Any) -> Any:
-    """A single point of an array as a plain number."""
-    return number.item() if getattr(number, "shape", None) == () else number
-
-
-_POINTS_AT_ONCE: Final = 4096
-"""Points whose response times are computed together."""
-
-
-def _has_late(traffic: Traffic) -> Number:
-    each, late = _messages(traffic), False
-    if traffic.is_plain:
-        worst = each.responses(own for own, _ in each.may_be_late())
-        return any(response is None or response.us / own.deadline_us > 1 for own, response in worst)
-    for _, share in each.deadline_shares():
-        late = late | (share > 1)
-        if is_everywhere(late):
-            break
-    return late
-
-
-_DEADLINE_WORDS: Final = "busy periods of all messages"
+    return traffic_of(network).ask(_slowest, words="busy periods of all messages")
 
 
 def shared_identifiers(traffic: Traffic) -> tuple[tuple[str, str], ...]:
@@ -203,7 +110,7 @@ def _largest_identifier(network: Network) -> Number:
 
 
 def _of_identifiers(network: Network, function: Callable[[Traffic], Number], *, words: str) -> Number:
-    return Sent(without_times(traffic_of(network))).of(function, words=words)
+    return traffic_of(network).without_times().ask(function, words=words)
 
 
 def _most_identifier(network: Network) -> Number:
@@ -232,21 +139,21 @@ def _payload_words(network: Network) -> str:
     return f"a PDO of {plain(over.payload_bytes):.0f} bytes is over the {over.most_bytes} bytes of {frames}"
 
 
-def _kept_from_us(is_broken: Callable[[Network], Number], network: Network) -> float:
-    """The period from which on a limit holds; infinite where none is long enough, or messages have no cycle [us]."""
+def _kept_from_us(network: Network) -> float:
+    """The period from which on deadlines are kept; infinite where none is long enough, or without a cycle [us]."""
     if not traffic_of(network).has_cycle:
         return inf
     broken_us = kept_us = plain(network.period_us)
-    while is_broken(network._replace(period_us=kept_us)):
+    while not within(_deadline(network._replace(period_us=kept_us)), 1):
         broken_us, kept_us = kept_us, 2 * kept_us
         if kept_us > MAX_TIME_US:
             return inf
     for _ in range(_HALVINGS):
         middle_us = (broken_us + kept_us) / 2
-        if is_broken(network._replace(period_us=middle_us)):
-            broken_us = middle_us
-        else:
+        if within(_deadline(network._replace(period_us=middle_us)), 1):
             kept_us = middle_us
+        else:
+            broken_us = middle_us
     return kept_us
 
 
@@ -324,7 +231,6 @@ LIMITS: Final = (
         has_rule=True,
         is_slow=True,
         says=lambda network: _all_late(traffic_of(network)),
-        breaks=_is_late,
-        kept_from_us=partial(_kept_from_us, _is_late),
+        kept_from_us=_kept_from_us,
     ),
 )

@@ -9,13 +9,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from busplan.buses.can.constants import BASE_BITS, FD_FRAME_BYTES, FRAME_BYTES
+from busplan.buses.can.constants import BASE_BITS, FD_FRAME_BYTES, FD_LENGTHS, FRAME_BYTES
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.equations import bit_us, frame_us
 from busplan.buses.can.streams import Stream, streams
 from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
-from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, Sense, day_of
+from busplan.buses.recorded import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, Sense, day_of
 from busplan.elementwise import plain
 from busplan.progress import Progress
 from busplan.recordings.can import CanFrames, read_can
@@ -45,6 +45,7 @@ _MADE_UP: Final = 10
 _BLOCK: Final = 50
 """Due cycles over which PDOs of every n-th SYNC keep their place among the SYNCs."""
 _ROUNDING_US: Final = 1.0
+_CLASSICAL: Final = "classical CAN"
 _TOO_FEW: Final = f"fewer than {LEAST_EVENTS} frames"
 
 
@@ -182,7 +183,9 @@ class _Seen:
         """How much closer frames come than the bus sends them, stamped at their ends or at their starts [us]."""
         sent_us = np.concatenate(([0.0], self.frames.bits[self.taken].cumsum() * self.bit_us))
         ahead_us = [wire_us - self.times_us for wire_us in (sent_us[1:], sent_us[:-1])]
-        return min(float((us - np.minimum.accumulate(us)).max()) for us in ahead_us)
+        late_us = min(float((us - np.minimum.accumulate(us)).max()) for us in ahead_us)
+        # A frame that no other one follows so soon may be as late, and as late again as the longest frame is.
+        return late_us + float(self.frames.bits.max()) * self.bit_us if late_us > self.step_us else late_us
 
     def figures(self) -> Iterator[RecordedFigure]:
         """All figures."""
@@ -227,20 +230,21 @@ class _Seen:
             yield f"no identifier comes {LEAST_EVENTS} times: the log is too short"
         if not self.step_us:
             yield "all frames have one stamp"
-        elif reason := stamps_of_no_bus(self.least_bit_rate):
+        elif reason := stamps_of_no_bus(self.least_bit_rate.likely):
             yield reason
         period_us = plain(self.cycle.traffic.period_us) if self.cycle.traffic.has_cycle else np.inf
         if 2 * self.step_us > period_us:
             yield f"its stamps have steps of {self.step_us:,.0f} us, and a cycle lasts {period_us:,.0f}"
 
     def _bit_rate(self) -> Iterator[RecordedFigure]:
-        if self.least_bit_rate:
+        least = self.least_bit_rate
+        if least.likely:
             yield RecordedFigure(
                 "bit rate that the frames need",
                 "kbit/s",
                 plain(self.cycle.traffic.bit_rate_kbit_s),
-                self.least_bit_rate,
-                None,
+                least.likely,
+                (least.likely - least.surely) / SURE,
                 "at most",
                 len(self.taken),
                 "bus.bit_rate_kbit_s",
@@ -272,10 +276,12 @@ class _Seen:
         if count < 2 or span_us <= 0:  # noqa: PLR2004 - a distance
             return
         worst_us, none_us = self._wire_us(is_stuffed=True), self._wire_us(is_stuffed=False)
-        own_us = np.where(is_fd, worst_us, self.frames.bits[self.taken] * self.bit_us)
+        # Of CAN FD the stuff bits are not known: any number of the possible ones.
+        own_us = np.where(is_fd, (worst_us + none_us) / 2, self.frames.bits[self.taken] * self.bit_us)
+        stuffing_us = float((worst_us - none_us)[1:][is_fd[1:]].sum()) / 2
         # The first frame ended with its stamp.
         load, worst, none = (float(us[1:].sum()) / span_us for us in (own_us, worst_us, none_us))
-        note = "exact bits of each frame, at the bit rate of the profile"
+        note = "exact bits of each classical frame, at the bit rate of the profile"
         sense: Sense = "at most"
         unknown = self.frames.switched[self.taken].any() and not self.has_switch
         if unknown:
@@ -286,7 +292,8 @@ class _Seen:
         _, each = np.unique(
             self.frames.identifiers[self.taken] * 2 + self.frames.extended[self.taken], return_index=True
         )
-        doubt = float(own_us[each].sum() + load * self.stamp_error_us) / span_us if sense == "at most" else None
+        doubt_us = float(own_us[each].sum() + load * self.stamp_error_us + stuffing_us)
+        doubt = doubt_us / span_us if sense == "at most" else None
         yield RecordedFigure("load", "share", plain(self.cycle.load), load, doubt, sense, count, note=note)
         yield RecordedFigure("load, worst stuffing of these frames", "share", None, worst, None, "shown", count)
         yield RecordedFigure("load, no stuffing of these frames", "share", None, none, None, "shown", count)
@@ -384,6 +391,8 @@ class _Seen:
             yield from self._sync(stream, each[0], spread_us)
         fullest = max(each, key=lambda sent: sent.most_bytes)
         planned_bytes = plain(stream.data_bytes)
+        if self._planned_format(stream) != _CLASSICAL:
+            planned_bytes = next(length for length in FD_LENGTHS if length >= planned_bytes)
         key = f"message.{stream.name}" if stream.is_message else ""
         count = sum(len(sent.times_us) for sent in each)
         if key and fullest.most_bytes > planned_bytes:
@@ -408,15 +417,15 @@ class _Seen:
 
     def _format(self, sent: SentFrames) -> str:
         if not sent.is_fd:
-            return "classical CAN"
+            return _CLASSICAL
         return "CAN FD" if sent.switches else "CAN FD without a switch of bit rate"
 
     def _planned_format(self, stream: Stream) -> str:
         if not stream.is_message:
-            return "CAN FD" if self.has_switch else "classical CAN"
+            return "CAN FD" if self.has_switch else _CLASSICAL
         message = self._said(stream)
         if not message.fd:
-            return "classical CAN"
+            return _CLASSICAL
         return "CAN FD" if message.brs else "CAN FD without a switch of bit rate"
 
     def _sync(self, stream: Stream, sent: SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
@@ -435,7 +444,7 @@ class _Seen:
             "SYNC: period", "us", planned_us, mean.value, doubt, "equal", count, "cycle.period_us", is_mean=True
         )
         late = lateness(periods, self.share)
-        doubt = expanded(late.uncertainty or periods.doubt_us)
+        doubt = expanded(late.uncertainty or 0.0)
         if spread_us is not None:
             yield RecordedFigure(
                 "SYNC: jitter of the arrival",
@@ -534,7 +543,7 @@ class _Seen:
                 if switched and not self.has_switch
                 else ""
             )
-            yield f"{counted(fd, 'frame')} of CAN FD: in the load with the most stuff bits{left}."
+            yield f"{counted(fd, 'frame')} of CAN FD: in the load with half of the possible stuff bits{left}."
         if frames.remote:
             yield f"{counted(frames.remote, 'remote frame')}: the length code is shown as data."
         if self.stamp_error_us > self.step_us + _ROUNDING_US:

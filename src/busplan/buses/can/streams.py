@@ -1,22 +1,19 @@
 """Every frame of a network with its identifiers, and which of them collide."""
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cached_property, lru_cache, reduce
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache, reduce
 from itertools import accumulate, chain, combinations, islice, product, repeat
 from math import inf
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from busplan.buses.can.constants import BASE_BITS, MAX_IDENTIFIER, MOST_PDOS, PDO_STEP
-from busplan.buses.can.equations import frame_bits, frame_us
-from busplan.buses.can.response import Points, Sender
-from busplan.buses.can.traffic import FOLLOWS, SYNC, Message, MessageList, Pdos, Traffic
-from busplan.elementwise import choose, larger, plain, smaller, total
+from busplan.buses.can.equations import frame_us
+from busplan.buses.can.traffic import FOLLOWS, SYNC, Message, Pdos, Traffic
+from busplan.elementwise import choose, larger, plain, smaller
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-Found = TypeVar("Found")
+Points: TypeAlias = Any
+"""A plain number, or an array of a number for each point; never a traced number."""
 
 
 def place(identifier: Points, identifier_bits: Points) -> Points:
@@ -76,131 +73,36 @@ class Stream(NamedTuple):
         """Name beside other streams, with its group."""
         return f"{self.group} {self.name}" if self.group else self.name
 
-    def sender(self, count: Points | None = None) -> Sender:
-        """Its frames, or some of them, as a source."""
-        return Sender((self.identifiers if count is None else count) * self.frame_us, self.period_us, self.jitter_us)
+    @property
+    def frames_us(self) -> Points:
+        """A frame of each identifier [us]."""
+        return self.identifiers * self.frame_us
 
-    def burst_us(self, count: Points | None = None) -> Points:
-        """Frames that come at once beside the first, of all its identifiers or of some of them [us]."""
-        return (self.burst - 1) * self.sender(count).frames_us
-
-    def goes_before(self, stream: "Stream") -> Points:
-        """Whether its frames win the arbitration against the last frame of another."""
-        return (self.block if stream.is_message else self.first_place) <= stream.last_place
+    @property
+    def burst_us(self) -> Points:
+        """Frames that come at once beside the first of each identifier [us]."""
+        return (self.burst - 1) * self.frames_us
 
 
-def remembered(*, maxsize: int) -> "Callable[[Callable[..., Found]], Callable[..., Found]]":
-    """Remember what a function of traffic gives for plain numbers; arrays are computed each time."""
-
-    def of(function: Callable[..., Found]) -> Callable[..., Found]:
-        known = lru_cache(maxsize=maxsize)(function)
-
-        def ask(traffic: Traffic, *arguments: Any, is_stuffed: bool) -> Found:
-            try:
-                hash((traffic, arguments))
-            except TypeError:
-                return function(traffic, *arguments, is_stuffed=is_stuffed)
-            return known(traffic, *arguments, is_stuffed=is_stuffed)
-
-        return ask
-
-    return of
-
-
-@remembered(maxsize=256)
+@lru_cache(maxsize=4)
 def streams(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
     """Every stream of a network: SYNC, feedback, command, and other messages.
 
     Parameters
     ----------
     traffic
-        What it sends, as `Sent.of` gives it.
+        What it sends, as `Traffic.ask` gives it.
     is_stuffed
         Whether the stuff bits of the worst case are counted.
     """
-    return (*_cyclic(traffic, is_stuffed), *message_streams(traffic, is_stuffed=is_stuffed).each)
-
-
-class MessageStreams:
-    """The streams of all messages, and what rests on them alone.
-
-    Parameters
-    ----------
-    each
-        The streams, in the order of the profile.
-    is_stuffed
-        Whether the stuff bits of the worst case are counted.
-    """
-
-    def __init__(self, each: tuple[Stream, ...], *, is_stuffed: bool) -> None:
-        self.each = each
-        self.by_length = sorted(each, key=lambda stream: -_length(stream, is_stuffed=is_stuffed))
-        self._known: dict[Points, tuple[list[int], tuple[Stream, ...]]] = {}
-
-    @cached_property
-    def load(self) -> Points:
-        """Share of the bus, 0..1 [1]."""
-        return total(stream.sender().load for stream in self.each)
-
-    @cached_property
-    def twice(self) -> int:
-        """Number of identifiers that stand twice among messages, without those that vary from point to point [1]."""
-        fixed = [stream for stream in self.each if isinstance(stream.last, int)]
-        return sum(shared for *_, shared in collisions(fixed))
-
-    def around(self, last: Points) -> tuple[list[int], tuple[Stream, ...]]:
-        """Numbers of messages that may go before a place in the arbitration, and those behind it, the longest first."""
-        if not isinstance(last, int):
-            return self._around(last)
-        if last not in self._known:
-            self._known[last] = self._around(last)
-        return self._known[last]
-
-    def _around(self, last: Points) -> tuple[list[int], tuple[Stream, ...]]:
-        before = [number for number, stream in enumerate(self.each) if (stream.first_place <= last) is not False]
-        return before, tuple(stream for stream in self.by_length if (stream.last_place > last) is not False)
-
-    @cached_property
-    def columns(self) -> "NDArray[Any]":
-        """As `columns_of` of all of them."""
-        return columns_of(self.each)
-
-    @cached_property
-    def groups(self) -> "NDArray[Any]":
-        """Of each, the number of its pair of period and jitter, from 0: many messages have few of them."""
-        import numpy as np
-
-        _, period_us, jitter_us, *_ = self.columns
-        return np.unique(period_us + 1j * jitter_us, return_inverse=True)[1].ravel()
-
-
-def columns_of(each: Iterable[Stream]) -> "NDArray[Any]":
-    """Of plain streams: all frames, period, jitter, a frame, deadline, block, last place and burst."""
-    import numpy as np  # of many streams alone
-
-    rows = [(*own.sender(), own.frame_us, own.deadline_us, own.block, own.last_place, own.burst_us()) for own in each]
-    return np.array(rows, dtype=float).reshape(len(rows), _COLUMNS).T
-
-
-_COLUMNS: Final = 8
-"""Numbers of a stream in `columns_of`."""
-
-
-def message_streams(traffic: Traffic, *, is_stuffed: bool) -> MessageStreams:
-    """The streams of the messages; those of plain numbers are remembered."""
-    make = _known_messages if traffic.messages.is_plain and isinstance(traffic.bit_rate_kbit_s, int | float) else _made
-    return make(traffic.messages, traffic.bit_rate_kbit_s, is_stuffed)
-
-
-def _made(messages: MessageList, bit_rate_kbit_s: Points, is_stuffed: bool) -> MessageStreams:
-    each = tuple(_of_message(message, bit_rate_kbit_s, is_stuffed) for message in messages)
-    return MessageStreams(each, is_stuffed=is_stuffed)
+    messages = (_of_message(message, traffic.bit_rate_kbit_s, is_stuffed) for message in traffic.messages)
+    return (*_cyclic(traffic, is_stuffed), *messages)
 
 
 def _of_message(message: Message, bit_rate_kbit_s: Points, is_stuffed: bool) -> Stream:
-    first, size, bits = int(plain(message.identifier)), int(plain(message.payload_bytes)), message.identifier_bits
+    first, bits = int(plain(message.identifier)), message.identifier_bits
     us = frame_us(
-        size,
+        message.payload_bytes,
         identifier_bits=bits,
         bit_rate_kbit_s=bit_rate_kbit_s,
         data_bit_rate_kbit_s=message.data_bit_rate_kbit_s,
@@ -212,7 +114,7 @@ def _of_message(message: Message, bit_rate_kbit_s: Points, is_stuffed: bool) -> 
         block=place(first, bits),
         first=first,
         identifiers=_whole(message.senders),
-        data_bytes=size,
+        data_bytes=_whole(message.payload_bytes),
         frame_us=us,
         period_us=message.period_us,
         jitter_us=message.jitter_us,
@@ -220,24 +122,6 @@ def _of_message(message: Message, bit_rate_kbit_s: Points, is_stuffed: bool) -> 
         identifier_bits=bits,
         is_message=True,
         burst=message.burst,
-    )
-
-
-_known_messages: Callable[..., MessageStreams] = lru_cache(maxsize=8)(_made)
-
-
-def _length(stream: Stream, *, is_stuffed: bool) -> float:
-    """Number by which the frames of messages are in order of their length, at every point of arrays."""
-    if isinstance(stream.frame_us, float):
-        return stream.frame_us
-    # Bit rates, and formats that are no plain numbers, are the same for all messages.
-    bits = stream.identifier_bits
-    return plain(
-        frame_bits(
-            stream.data_bytes,
-            identifier_bits=bits if isinstance(bits, int | float) else BASE_BITS,
-            is_stuffed=is_stuffed,
-        )
     )
 
 
@@ -342,18 +226,12 @@ def identifiers_twice(traffic: Traffic) -> Points:
     Parameters
     ----------
     traffic
-        What is sent, as `Sent.of` gives it.
+        What is sent, as `Traffic.ask` gives it.
     """
-    each, sent = streams(traffic, is_stuffed=True), message_streams(traffic, is_stuffed=True)
+    each = streams(traffic, is_stuffed=True)
     fixed = [stream for stream in each if isinstance(stream.last, int)]
     varied = [stream for stream in each if not isinstance(stream.last, int)]
-    cyclic = [stream for stream in fixed if not stream.is_message]
-    least, most = min((own.first for own in cyclic), default=0), max((own.last for own in cyclic), default=-1)
-    near = [own for own in fixed if own.is_message and own.first <= most and own.last >= least]
-    # Pairs of messages are the same whatever the nodes.
-    twice: Points = sent.twice + sum(
-        shared for early, late, _, shared in collisions([*cyclic, *near]) if not (early.is_message and late.is_message)
-    )
+    twice: Points = sum(shared for *_, shared in collisions(fixed))
     for early, late in chain(combinations(varied, 2), product(varied, fixed)):
         if has_format(early, late.identifier_bits):
             twice = twice + larger(smaller(early.last, late.last) - larger(early.first, late.first) + 1, 0)

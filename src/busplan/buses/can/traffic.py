@@ -1,9 +1,9 @@
 """All that a network sends: SYNC, the PDOs of its nodes, and other messages."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache, reduce
 from itertools import islice
-from operator import is_
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.can.constants import (
@@ -72,56 +72,23 @@ class Message(NamedTuple):
     """Frames that may come at once [1]."""
 
 
-class MessageList(tuple[Message, ...]):  # noqa: SLOT001 - a tuple's subclass with slots holds no attribute
-    """Messages of a network. What rests on them alone is computed once for all networks that have them."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Traffic:
+    """All that is sent. The numbers may be of any sort. Without PDOs it is messages alone."""
 
-    @cached_property
-    def _hash(self) -> int:
-        return tuple.__hash__(self)
-
-    def __hash__(self) -> int:
-        return self._hash
-
-    @cached_property
-    def numbers(self) -> tuple[Number, ...]:
-        """All their numbers in a row."""
-        return tuple(number for message in self for number in message[_MESSAGE_WORDS:])
-
-    @cached_property
-    def is_plain(self) -> bool:
-        """Whether all their numbers are plain."""
-        return all(isinstance(number, int | float) for number in self.numbers)
-
-    @cached_property
-    def timeless(self) -> "MessageList":
-        """The same with all times alike, which identifiers do not rest on."""
-        return MessageList(
-            message._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0, data_bit_rate_kbit_s=0.0, burst=1)
-            for message in self
-        )
-
-
-class Traffic(NamedTuple):
-    """All that is sent. The numbers may be of any sort."""
-
-    period_us: Number
+    period_us: Number = MAX_TIME_US
     bit_rate_kbit_s: Number
-    data_bit_rate_kbit_s: Number
+    data_bit_rate_kbit_s: Number = 0.0
     """Of SYNC and PDOs as FD frames; 0 where they are classical."""
-    identifier_bits: Number
-    sync_identifier: Number
-    sync_bytes: Number
-    read_us: Number
+    identifier_bits: Number = BASE_BITS
+    sync_identifier: Number = 0
+    sync_bytes: Number = 0
+    read_us: Number = 0.0
     """The slowest execution of any node, from SYNC to its queued feedback [us]."""
-    host_us: Number
+    host_us: Number = 0.0
     """From the last feedback to the queued commands [us]."""
-    pdos: tuple[Pdos, ...]
-    messages: MessageList
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether all its numbers are plain."""
-        return self.messages.is_plain and all(isinstance(number, int | float) for number in self._own())
+    pdos: tuple[Pdos, ...] = ()
+    messages: tuple[Message, ...] = ()
 
     @property
     def has_cycle(self) -> bool:
@@ -133,106 +100,99 @@ class Traffic(NamedTuple):
         """Whether some PDOs are not in every cycle."""
         return not all(is_off(pdos.every - 1) for pdos in self.pdos)
 
-    def numbers(self) -> tuple[Number, ...]:
-        """All its numbers in a row, as `with_numbers` takes them."""
-        return (*self._own(), *self.messages.numbers)
-
-    def _own(self) -> tuple[Number, ...]:
-        """Its numbers without those of messages."""
-        pdos = (getattr(pdos, key) for pdos in self.pdos for key in _OF_PDOS)
-        own: tuple[Any, ...] = self[:_OWN_NUMBERS]
-        return (*own, *pdos)
-
-    def with_numbers(self, *numbers: Number) -> "Traffic":
-        """The same senders with other numbers, in the order of `numbers`."""
-        rest: Iterator[Any] = iter(numbers)
-        own = tuple(islice(rest, _OWN_NUMBERS))
-        pdos = tuple(
-            pdos._replace(**dict(zip(_OF_PDOS, islice(rest, len(_OF_PDOS)), strict=True))) for pdos in self.pdos
-        )
-        messages = self.messages
-        if not messages.is_plain:
-            count = len(Message._fields) - _MESSAGE_WORDS
-            messages = MessageList(Message(message.name, *islice(rest, count)) for message in messages)
-        return Traffic._make((*own, pdos, messages))
-
-
-_OWN_NUMBERS: Final = len(Traffic._fields) - 2
-"""Fields before the PDOs and the messages."""
-_OF_PDOS: Final = ("identifier", "pdos", "payload_bytes", "every")
-_MESSAGE_WORDS: Final = 1
-"""Fields of words, which stand before the numbers."""
-
-
-class Sent:
-    """Traffic whose numbers may be of any sort, to be asked with functions that put its senders in order.
-
-    Parameters
-    ----------
-    traffic
-        What is sent.
-    """
-
-    def __init__(self, traffic: Traffic) -> None:
-        self.traffic = traffic
-        self._known: Callable[[int], Traffic]
-
-    def of(self, function: Callable[..., Any], *arguments: Number, words: str) -> Number:
+    def ask(self, function: Callable[..., Any], *arguments: Number, words: str) -> Number:
         """Result of a function of the traffic.
 
         Parameters
         ----------
         function
-            Takes traffic of plain numbers and arrays, with plain identifiers and sizes of messages, and `arguments`. It
-            is called once, or for each point alone where those vary or a derivation is recorded.
+            Takes traffic of plain numbers and arrays, with plain identifiers, and `arguments`. It is called once, or
+            for each point alone where identifiers vary or a derivation is recorded.
         arguments
             Arguments behind the traffic.
         words
             What a derivation says of it.
         """
         if self.is_ordered:
-            result: Number = function(self.traffic, *arguments)
+            result: Number = function(self, *arguments)
             return result
-        return self.of_points(function, *arguments, words=words)
+        return self.ask_points(function, *arguments, words=words)
 
-    def of_points(self, function: Callable[..., float], *arguments: Number, words: str) -> Number:
-        """Result of a function of traffic of plain numbers, point by point; arguments as `of` has them."""
+    def ask_points(self, function: Callable[..., float], *arguments: Number, words: str) -> Number:
+        """Result of a function of traffic of plain numbers, point by point; arguments as `ask` has them."""
         return pointwise(lambda at, *more: function(self.at(at), *more), self.place, *arguments, words=words)
-
-    def at(self, place: float) -> Traffic:
-        """The traffic of plain numbers at a place."""
-        return self._known(int(place))
 
     @cached_property
     def is_ordered(self) -> bool:
-        """Whether identifiers and sizes of messages are plain, formats alike or plain, and no number is traced."""
-        traffic = self.traffic
-        if traffic.is_plain:
-            return True
-        messages = (number for message in traffic.messages for number in (message.identifier, message.payload_bytes))
-        order = [traffic.sync_identifier, *(pdos.identifier for pdos in traffic.pdos), *messages]
-        if not all(message.identifier_bits is traffic.identifier_bits for message in traffic.messages):
-            order += (traffic.identifier_bits, *(message.identifier_bits for message in traffic.messages))
-        if not all(is_off(message.data_bit_rate_kbit_s) for message in traffic.messages):
-            # Which of an FD frame and any other frame is longer rests on the rates and the format.
-            order += (traffic.bit_rate_kbit_s, traffic.data_bit_rate_kbit_s, traffic.identifier_bits)
+        """Whether identifiers are plain, formats alike or plain, and no number is traced."""
+        order = [self.sync_identifier, *(pdos.identifier for pdos in self.pdos)]
+        order += (message.identifier for message in self.messages)
+        if not all(message.identifier_bits is self.identifier_bits for message in self.messages):
+            order += (self.identifier_bits, *(message.identifier_bits for message in self.messages))
         return all(isinstance(number, int | float) for number in order) and not any(
-            isinstance(number, Traced) for number in traffic.numbers()
+            isinstance(number, Traced) for number in self._numbers
         )
 
     @cached_property
     def place(self) -> Number:
-        """The place of the traffic of each point; points that are alike share it."""
-        if self.traffic.is_plain:
-            self._known = lambda _: self.traffic
-            return 0
-        places: dict[tuple[float, ...], int] = {}
-        place = pointwise(
-            lambda *numbers: places.setdefault(numbers, len(places)), *self.traffic.numbers(), words="all that is sent"
+        """The place of the traffic of each point; points that are alike share it, and plain traffic has one."""
+        places = self._places
+        return pointwise(
+            lambda *numbers: places.setdefault(numbers, len(places)), *self._numbers, words="all that is sent"
         )
-        rows = tuple(places)
-        self._known = lru_cache(maxsize=1024)(lambda at: self.traffic.with_numbers(*rows[at]))
-        return place
+
+    def at(self, place: float) -> "Traffic":
+        """The traffic of plain numbers at a place."""
+        return self if isinstance(self.place, int) else self._made(int(place))
+
+    @cached_property
+    def _places(self) -> dict[tuple[float, ...], int]:
+        return {}
+
+    @cached_property
+    def _made(self) -> Callable[[int], "Traffic"]:
+        rows = tuple(self._places)
+        return lru_cache(maxsize=1024)(lambda place: self._with_numbers(iter(rows[place])))
+
+    @cached_property
+    def _numbers(self) -> tuple[Number, ...]:
+        """All its numbers in a row, as `_with_numbers` takes them."""
+        own = (getattr(self, key) for key in _OWN)
+        pdos = (getattr(pdos, key) for pdos in self.pdos for key in _OF_PDOS)
+        return (*own, *pdos, *(number for message in self.messages for number in message[_MESSAGE_WORDS:]))
+
+    def _with_numbers(self, rest: Iterator[Any]) -> "Traffic":
+        """The same senders with other numbers."""
+        own = dict(zip(_OWN, islice(rest, len(_OWN)), strict=True))
+        pdos = [each._replace(**dict(zip(_OF_PDOS, islice(rest, len(_OF_PDOS)), strict=True))) for each in self.pdos]
+        count = len(Message._fields) - _MESSAGE_WORDS
+        messages = (Message(each.name, *islice(rest, count)) for each in self.messages)
+        return Traffic(**own, pdos=tuple(pdos), messages=tuple(messages))
+
+    def without_times(self) -> "Traffic":
+        """The same identifiers with all times alike, where a point is asked alone: alike points are computed once."""
+        if self.is_ordered:
+            return self
+        messages = (
+            each._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0, data_bit_rate_kbit_s=0.0, burst=1)
+            for each in self.messages
+        )
+        return replace(
+            self,
+            period_us=1.0,
+            bit_rate_kbit_s=1.0,
+            data_bit_rate_kbit_s=0.0,
+            read_us=0.0,
+            host_us=0.0,
+            messages=tuple(messages),
+        )
+
+
+_OWN: Final = tuple(field.name for field in fields(Traffic))[:-2]
+"""Fields before the PDOs and the messages."""
+_OF_PDOS: Final = ("identifier", "pdos", "payload_bytes", "every")
+_MESSAGE_WORDS: Final = 1
+"""Fields of words, which stand before the numbers."""
 
 
 class _Senders(NamedTuple):
@@ -293,14 +253,6 @@ def traffic_of_profile(profile: Any) -> Traffic:
     return _traffic(profile, senders, profile.cycle.period_us, sum(alike.nodes for alike in profile.alike_nodes))
 
 
-def without_times(traffic: Traffic) -> Traffic:
-    """Traffic of the same identifiers, with all times alike: over arrays of times they are computed once."""
-    if traffic.is_plain:
-        return traffic
-    own = traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, data_bit_rate_kbit_s=0.0, read_us=0.0, host_us=0.0)
-    return own._replace(messages=traffic.messages.timeless)
-
-
 def host_us(bus: Any) -> Number:
     """The host's own time within the cycle: none where it computes in a cycle of its own [us].
 
@@ -315,20 +267,15 @@ def host_us(bus: Any) -> Number:
 def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes: Number) -> Traffic:
     bus = profile.bus
     alone = Traffic(
-        period_us=MAX_TIME_US,
         bit_rate_kbit_s=bus.bit_rate_kbit_s,
         data_bit_rate_kbit_s=0.0 if bus.data_bit_rate_kbit_s is None else bus.data_bit_rate_kbit_s,
         identifier_bits=bus.identifier_bits,
-        sync_identifier=0,
-        sync_bytes=0,
-        read_us=0.0,
-        host_us=0.0,
-        pdos=(),
-        messages=_messages(profile.message, bus, nodes),
+        messages=tuple(_message(message, bus, nodes) for message in profile.message),
     )
     if not senders:
         return alone
-    return alone._replace(
+    return replace(
+        alone,
         period_us=period_us,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
@@ -340,23 +287,6 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes
             for place, sender in enumerate(senders)
         ),
     )
-
-
-_known: tuple[tuple[Any, ...], MessageList, bool] | None = None
-"""What messages rest on, the messages, and whether they rest on the number of nodes."""
-
-
-def _messages(said: tuple[Any, ...], bus: Any, nodes: Number) -> MessageList:
-    """Messages of a profile. The last result is remembered: searches change the nodes and times of a network."""
-    global _known  # noqa: PLW0603 - a profile may hold arrays, and is told apart by identity alone
-    key = nodes, bus.identifier_bits, bus.bit_rate_kbit_s, bus.data_bit_rate_kbit_s, *said
-    if _known is not None and len(key) == len(_known[0]):
-        has_same_nodes, *rest_same = map(is_, key, _known[0])
-        if all(rest_same) and (has_same_nodes or not _known[2]):
-            return _known[1]
-    messages = MessageList(_message(message, bus, nodes) for message in said)
-    _known = key, messages, any(message.per_node for message in said)
-    return messages
 
 
 def _pdos(sender: _Senders, bus: Any, kind: TransactionKind, number: int, *, is_first: bool) -> Pdos:
@@ -385,5 +315,6 @@ def _message(said: Any, bus: Any, nodes: Number) -> Message:
         bus.identifier_bits if said.identifier_bits is None else said.identifier_bits,
         nodes if said.per_node else 1,
         0.0 if not said.fd else bus.data_bit_rate_kbit_s if said.brs else bus.bit_rate_kbit_s,
-        said.burst,
+        # A burst of one is none, and no input of a derivation.
+        1 if isinstance(said.burst, Traced) and said.burst.value == 1 else said.burst,
     )

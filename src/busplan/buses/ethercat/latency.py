@@ -117,7 +117,7 @@ def _feedback(group: Group, network: Network, sent_us: Number, way_us: Number) -
     ready_us = group.read_execution_us + group.worst_extra_us
     behind_us = sync0_us(network) + ready_us
     period_us = _period_us(group, network)
-    wait_us = rounded_up(behind_us / period_us) * period_us - behind_us
+    wait_us = _cycles(behind_us / period_us) * period_us - behind_us
     return {
         "drive_us": ready_us,
         "frame_wait_us": wait_us,
@@ -128,6 +128,11 @@ def _feedback(group: Group, network: Network, sent_us: Number, way_us: Number) -
         "path_us": way_us,
         "sync_wait_us": 0.0,
     }
+
+
+def _cycles(share: Number) -> Number:
+    """Periods until the frame that takes a sample: none takes one that it triggers, however fast the drive."""
+    return larger(rounded_up(share), 1)
 
 
 def loop_periods(network: Network, *, at_sync: bool) -> int:
@@ -151,7 +156,7 @@ def loop_periods(network: Network, *, at_sync: bool) -> int:
 
     def of(group: Group) -> float:
         extra_us = plain(group.worst_extra_us)
-        sampled = rounded_up((shift_us + plain(group.read_execution_us) + extra_us) / period_us)
+        sampled = _cycles((shift_us + plain(group.read_execution_us) + extra_us) / period_us)
         late_us = last_us + plain(group.write_execution_us) + extra_us - shift_us
         return plain(sampled) + (max(plain(rounded_up(late_us / period_us)), 0) if at_sync else 0)
 

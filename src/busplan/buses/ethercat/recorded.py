@@ -1,7 +1,7 @@
 """A capture of the master's port beside the plan: period, jitter, round trips, bytes, and what got lost."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
+from math import ceil
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -19,26 +19,38 @@ from busplan.buses.ethercat.equations import (
     frame_bytes,
     sending_us,
 )
+from busplan.buses.ethercat.numbering import Places, SeenCycles, seen_cycles
 from busplan.buses.ethercat.ports import line_delays
-from busplan.buses.ethercat.traffic import cables_us, devices_doubts, devices_us, housekeeping_bytes
+from busplan.buses.ethercat.traffic import (
+    cables_us,
+    devices_doubts,
+    devices_us,
+    has_rates,
+    housekeeping_bytes,
+)
+from busplan.buses.ethercat.units import UnitCycle
 from busplan.buses.network import Network
 from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings.ethercat import COMMANDS, Datagram, EthercatFrames, read_ethercat
-from busplan.recordings.statistics import Floats, Quantile, expanded, grid, lateness, line, middle, quantile, step
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, Quantile, expanded, lateness, line, quantile, step
 from busplan.recordings.words import counted
 
+_PERIOD: Final = "cycle.period_us"
 _MASTER: Final = "bus.master_us"
 _JITTER: Final = "bus.master_jitter_us"
+_MISSED: Final = "limits.missed_cycles"
 _STEP_BACK_NS: Final = 50_000
 """Stamps of neighbours are so far out of order only where a clock was set; less is the order of two queues [ns]."""
 _GAP_US: Final = plain(sending_us(GAP_BYTES))
-_TWO_STAMPS: Final = 6**-0.5
-"""Standard uncertainty of the distance of two stamps, in their step (JCGM 100, 4.3.7)."""
+_TWO_STAMPS: Final = 0.5
+"""Standard uncertainty of the largest distances of two stamps, in their step: none is off by more than a step."""
 _LEAST_SPAN_BYTES: Final = 200
 """Least distance of the sizes of frames that says what a byte takes: the host takes them differently, too [bytes]."""
+_STRAY: Final = 0.01
+"""Share of the frames whose stamps may be wrong, or that may be taken for others."""
 _NOT_SHOWN: Final = (
     "Not shown by a capture of the master's port: its time from the task to the stamp of a frame, SYNC0, and the "
     "devices' own time."
@@ -48,26 +60,30 @@ _NOT_SHOWN: Final = (
 class _Trips(NamedTuple):
     """Frames that were sent, each with the one that returned."""
 
-    sent: npt.NDArray[np.int64]
-    returned: npt.NDArray[np.int64]
+    sent: Places
+    returned: Places
     """Places of both in the recording."""
-    lost: npt.NDArray[np.int64]
+    lost: Places
     """Places of frames that did not return."""
     unsent: int
     """Returned frames that were not seen to be sent."""
 
 
 class _Cycles(NamedTuple):
-    """Cycles with as many frames as most have, all returned."""
+    """What each cycle with process data has, n of them."""
 
-    frames: int
-    """Of each [1]."""
-    starts: npt.NDArray[np.int64]
-    """Places of their first frames."""
+    frames: Places
+    """Number of its frames of process data [1]."""
+    is_back: npt.NDArray[np.bool_]
+    """Whether all have returned."""
     trips_us: Floats
-    """From the first frame sent to the last one returned [us]."""
-    wire_us: Floats
-    """All frames on the wire [us]."""
+    """From the first one sent to the last one returned [us]."""
+    host_us: Floats
+    """What that is without the wire, the devices and cables of the plan, and the copy of the bytes [us]."""
+    data_bytes: npt.NDArray[Any]
+    """Process data [bytes]."""
+    datagrams_bytes: npt.NDArray[Any]
+    """All their datagrams [bytes]."""
 
 
 def recorded(network: Network, path: Path, *, share: float, progress: Progress) -> Recorded:
@@ -95,7 +111,9 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
             f"{path}: none of its {len(frames.times_ns):,} EtherCAT frames returned; record both ways of the port"
         )
     seen = _Seen(network, frames, share)
-    return Recorded(tuple(seen.figures()), tuple(seen.remarks()), seen.edits(), day_of(int(frames.times_ns[0])))
+    figures = tuple(seen.figures())
+    day = day_of(int(frames.times_ns[0]))
+    return Recorded(figures, tuple(seen.remarks()), seen.edits(), day, seen.shows_nothing())
 
 
 class _Seen:
@@ -103,175 +121,246 @@ class _Seen:
 
     def __init__(self, network: Network, frames: EthercatFrames, share: float) -> None:
         self.network, self.frames, self.share = network, frames, share
-        self.cycle = EthercatCycle(network, LAST_BYTE)
+        self.limit = network.profile.limits.missed_cycles
         steps_back = np.diff(frames.times_ns) < -_STEP_BACK_NS
         self.steps_back = int(np.count_nonzero(steps_back))
-        self.stretch = np.concatenate(([0], np.cumsum(steps_back)))
-        """Number of the stretch between two steps of the clock that each frame lies in."""
+        stretch = np.concatenate(([0], np.cumsum(steps_back)))
         self.stamp_us = step(frames.times_ns)
         self.wire_us = np.array([_wire_us(layout) for layout in frames.layouts])[frames.layout]
         self.trips = _trips(frames)
+        self.trips_us = (frames.times_ns[self.trips.returned] - frames.times_ns[self.trips.sent]) / 1000
         self.delays = line_delays(frames.latches, frames.unlatched)
-        self.has_period = False
+        self.dropped = frames.notes.dropped + frames.cut
+        """Packets that the recorder says it dropped, or that it cut."""
+        process = [tuple(part for part in layout if part.is_process_data) for layout in frames.layouts]
+        self.data_bytes = np.array([float(sum(part.data_bytes for part in parts)) for parts in process])[frames.layout]
+        kinds = {parts: kind for kind, parts in enumerate(dict.fromkeys(process))}
+        self.is_data = np.array([bool(parts) for parts in process])[frames.layout]
+        sent = np.flatnonzero(self.is_data & ~frames.returned)
+        self.cycles: SeenCycles | None = None
+        if len(sent):
+            # Of several stretches of the clock the longest is taken.
+            sent = sent[stretch[sent] == np.bincount(stretch[sent]).argmax()]
+            sent = sent[np.argsort(frames.times_ns[sent], kind="stable")]
+            times_us = (frames.times_ns[sent] - frames.times_ns[sent[0]]) / 1000
+            kind = np.array([kinds[parts] for parts in process])[frames.layout[sent]]
+            self.cycles = seen_cycles(sent, times_us, kind, self.data_bytes[sent], network)
+        self.bad_stamps = self._bad_stamps()
+        """Why the stamps cannot say what takes how long; empty where they can."""
         self.jitter: Quantile | None = None
         self.master: Quantile | None = None
         self.own_bytes: tuple[int, ...] | None = None
         """Data of the master's own datagrams, where they are not as planned [bytes]."""
-        self._cycles()
 
-    def _cycles(self) -> None:
-        """Find the frames of process data, and which of them begins a cycle."""
-        frames = self.frames
-        has_data = np.array([any(part.is_process_data for part in layout) for layout in frames.layouts])
-        self.is_data = has_data[frames.layout]
-        places = np.flatnonzero(self.is_data & ~frames.returned)
-        self.starts = places[:0]
-        if not len(places):
-            return
-        layouts, counts = np.unique(frames.layout[places], return_counts=True)
-        # All frames of a cycle come as often, but for those at the ends of the recording.
-        often = counts >= counts.max() - 1
-        leading = layouts[np.argmax(counts)]
-        if np.count_nonzero(often) > 1:
-            leading = self._after_pauses(places, set(layouts[often].tolist()))
-        starts = places[frames.layout[places] == leading]
-        # Of several stretches of the clock the longest is taken.
-        stretches, sizes = np.unique(self.stretch[starts], return_counts=True)
-        self.starts = starts[self.stretch[starts] == stretches[np.argmax(sizes)]]
-
-    def _after_pauses(self, places: npt.NDArray[np.int64], often: set[int]) -> int:
-        """The layout that most often comes behind a pause: the first frame of a cycle."""
-        apart = np.diff(self.frames.times_ns[places])
-        behind = self.frames.layout[places[1:]][apart > (apart.min() + apart.max()) / 2]
-        known = Counter(value for value in behind.tolist() if value in often)
-        return known.most_common(1)[0][0] if known else min(often)
+    def _bad_stamps(self) -> str:
+        count = len(self.trips_us)
+        if not count:
+            return "no frame that it has as sent is among those that returned"
+        typical_us = quantile(self.trips_us, 0.5).value
+        if self.cycles is not None and self.cycles.in_bursts:
+            return "the frames were stamped in bursts, and not as they passed the port"
+        if self.short > _STRAY * count:
+            return (
+                f"{self.short:,} of {counted(count, 'frame')} returned sooner than it takes to send them: the stamps "
+                "were not taken at the master's port"
+            )
+        if typical_us <= self.stamp_us:
+            return f"the stamps have steps of {self.stamp_us:g} us, and frames return within {typical_us:g} us"
+        return ""
 
     @property
-    def times_us(self) -> Floats:
-        """When each cycle begins, from the first [us]."""
-        times = self.frames.times_ns[self.starts]
-        return np.asarray((times - times[0]) / 1000, dtype=np.float64)
+    def short(self) -> int:
+        """Frames that returned sooner than they can be sent."""
+        least_us = self.wire_us[self.trips.sent] - _GAP_US - 2 * self.stamp_us
+        return int(np.count_nonzero(self.trips_us < least_us))
 
-    def _whole_cycles(self) -> _Cycles:
-        """Cycles whose frames have all returned."""
-        frames, starts = self.frames, self.starts
-        sent = np.flatnonzero(self.is_data & ~frames.returned & (self.stretch == self.stretch[starts[0]]))
-        number = np.searchsorted(starts, sent, side="right") - 1
-        sent, number = sent[number >= 0], number[number >= 0]
-        back = np.full(len(frames.times_ns), -1)
-        back[self.trips.sent] = self.trips.returned
-        back = back[sent]
-        count = np.bincount(number, minlength=len(starts))
-        usual = int(np.bincount(count).argmax())
-        returned = np.bincount(number, weights=back >= 0, minlength=len(starts))
-        end_ns = np.full(len(starts), np.iinfo(np.int64).min)
-        np.maximum.at(end_ns, number[back >= 0], frames.times_ns[back[back >= 0]])
-        wire_us = np.bincount(number, weights=self.wire_us[sent], minlength=len(starts))
-        whole = (returned == count) & (count == usual)
-        trips_us = (end_ns[whole] - frames.times_ns[starts[whole]]) / 1000
-        return _Cycles(usual, starts[whole], trips_us, wire_us[whole])
+    @property
+    def too_few(self) -> str:
+        """Why the recording has no period; empty where it has one."""
+        if self.cycles is None or self.cycles.periods is not None or self.cycles.in_bursts:
+            return ""
+        return f"{counted(len(self.cycles.first), 'cycle')}, and a period takes {LEAST_EVENTS}"
+
+    def shows_nothing(self) -> tuple[str, ...]:
+        """Why the recording shows no machine within its plan."""
+        reasons = (
+            "" if self.cycles else "it has no frame of process data (LRD, LWR, LRW)",
+            self.too_few and f"it has {self.too_few}",
+            self.bad_stamps,
+            self._dropped,
+        )
+        return tuple(filter(None, reasons))
+
+    @property
+    def _dropped(self) -> str:
+        return f"the recorder dropped or cut {counted(self.dropped, 'packet')}" if self.dropped else ""
 
     def figures(self) -> Iterator[RecordedFigure]:
         """All figures."""
-        if len(self.starts):
-            yield from self._period()
-            cycles = self._whole_cycles()
-            yield from self._host(cycles)
-            yield from self._layout(cycles)
+        if self.cycles is not None:
+            yield from self._period(self.cycles)
+            yield from self._cycles(self.cycles)
         yield from self._lost()
         yield from self._byte()
         yield from self.delays.figures(self.network)
 
-    def _period(self) -> Iterator[RecordedFigure]:
-        found = grid(self.times_us)
-        self.has_period = found is not None
+    def _period(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
+        """Period and starts of the cycles."""
+        found, count = cycles.periods, len(cycles.first)
+        period_us = plain(self.network.period_us)
+        planned_us = plain(self.network.profile.bus.master_jitter_us)
         if found is None:
+            hidden = self.too_few or self.bad_stamps
+            yield RecordedFigure("period", "us", period_us, None, None, "equal", count, _PERIOD, hidden=hidden)
+            yield RecordedFigure("latest start", "us", planned_us, None, None, "at most", count, _JITTER, hidden=hidden)
             return
-        count, planned_us = len(self.starts), plain(self.network.period_us)
-        apart_us = np.diff(self.times_us)
-        doubt = expanded(found.uncertainty_us, CLOCK_TOLERANCE * planned_us / 3**0.5, self.stamp_us / len(apart_us))
-        note = f"{counted(found.missing, 'period')} without a frame" if found.missing else ""
-        yield RecordedFigure(
-            "period", "us", planned_us, found.period_us, doubt, "equal", count, "cycle.period_us", note
-        )
+        clocks_us = CLOCK_TOLERANCE * period_us / 3**0.5
+        doubt = expanded(found.uncertainty_us, clocks_us, self.stamp_us / count)
+        yield RecordedFigure("period", "us", period_us, found.period_us, doubt, "equal", count, _PERIOD)
         deviation_us = float(np.std(np.diff(found.late_us)))
         yield RecordedFigure("standard deviation of the period", "us", None, deviation_us, None, "shown", count - 1)
-        self.jitter = lateness(found, self.share)
-        doubt = expanded(self.jitter.uncertainty or found.doubt_us, self.stamp_us * _TWO_STAMPS)
-        planned_us = plain(self.network.profile.bus.master_jitter_us)
+        latest = lateness(found, self.share)
+        doubt = expanded(latest.uncertainty, self.stamp_us * _TWO_STAMPS)
+        is_hidden = self.stamp_us > max(planned_us, latest.value)
+        hidden = f"stamps have steps of {self.stamp_us:g} us" if is_hidden else ""
+        if not (hidden or self.bad_stamps):
+            self.jitter = latest
         yield RecordedFigure(
-            "latest start",
-            "us",
-            planned_us,
-            self.jitter.value,
-            doubt,
-            "at most",
-            count,
-            _JITTER,
+            "latest start", "us", planned_us, latest.value, doubt, "at most", count, _JITTER, hidden=hidden
         )
 
-    def _host(self, cycles: _Cycles) -> Iterator[RecordedFigure]:
-        count = len(cycles.starts)
-        if not count:
+    def _cycles(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
+        """What is missing, and each sort of cycle beside that of the plan."""
+        each = self._each(cycles)
+        if cycles.periods is None:
+            yield from self._times(cycles.sorts[0], "", each.trips_us, (each.host_us,))
             return
-        bus, terms = self.network.profile.bus, self.cycle.by_term
-        way_us = plain(devices_us(self.network)) + plain(cables_us(self.network))
-        bias_us = plain(self.cycle.bias_us())
+        frames, data_bytes = (_usual(of, cycles.sort) for of in (each.frames, each.data_bytes))
+        has_less = (each.frames < frames) | (each.data_bytes < data_bytes)
+        yield self._without_frame(cycles, int(np.count_nonzero(has_less)))
+        whole = each.is_back & (each.frames == frames) & (each.data_bytes == data_bytes)
+        for place, sort in enumerate(cycles.sorts):
+            names = [group.name for group, is_due in zip(self.network.groups, sort.due, strict=True) if is_due]
+            with_names = f" with {' and '.join(names) or 'no group'}" if has_rates(self.network) else ""
+            own = np.flatnonzero(whole & (cycles.sort == place))
+            if sort.data_bytes:
+                host_us = () if place else (each.host_us[own], each.host_us[whole])
+                yield from self._times(sort, with_names, each.trips_us[own], host_us)
+            yield from self._layout(sort, with_names, cycles, own, each)
+
+    def _each(self, cycles: SeenCycles) -> _Cycles:
+        """What each cycle has."""
+        frames, sent, number, count = self.frames, cycles.frames, cycles.number, len(cycles.first)
+        back = np.full(len(frames.times_ns), -1)
+        back[self.trips.sent] = self.trips.returned
+        back = back[sent]
+        in_each = np.bincount(number, minlength=count)
+        returned = np.bincount(number, weights=back >= 0, minlength=count)
+        end_ns = np.full(count, np.iinfo(np.int64).min)
+        np.maximum.at(end_ns, number[back >= 0], frames.times_ns[back[back >= 0]])
+        is_back = returned == in_each
+        trips_us = np.where(is_back, (end_ns - frames.times_ns[cycles.first]) / 1000, 0.0)
+        way_us = plain(devices_us(self.network)) + plain(cables_us(self.network)) + self.delays.more_us(self.network)
+        datagrams = np.array([_datagrams_bytes(layout) for layout in frames.layouts])[frames.layout]
+        wire_us, data_bytes, datagrams_bytes = (
+            np.bincount(number, weights=of[sent]) for of in (self.wire_us, self.data_bytes, datagrams)
+        )
+        host_us = trips_us - wire_us - data_bytes * BYTE_BIAS_US - way_us
+        return _Cycles(in_each, is_back, trips_us, host_us, data_bytes, datagrams_bytes)
+
+    def _without_frame(self, cycles: SeenCycles, with_less: int) -> RecordedFigure:
+        """Cycles that have no frame, or less in their frames than most of their sort."""
+        longest, missing = int(cycles.gaps.max(initial=0)), int(cycles.gaps.sum())
+        notes = []
+        if longest > 1:
+            at = int(cycles.gaps.argmax())
+            first, end = cycles.first[at : at + 2]
+            pause_us = (self.frames.times_ns[end] - self.frames.times_ns[first]) / 1000
+            notes.append(f"{longest:,} in a row, {pause_us / 1e6:.3g} s without set-points")
+        if with_less:
+            notes.append(f"{with_less:,} with less than most have")
+        events = missing + len(cycles.first)
+        return self._missed("cycles without a frame", missing + with_less, events, ", ".join(notes), self._dropped)
+
+    def _missed(self, quantity: str, number: int, events: int, note: str, hides: str = "") -> RecordedFigure:
+        """What counts against the limit; hidden where dropped packets may be all that is beyond it."""
+        hidden = hides if number - self.dropped <= self.limit else ""
+        return RecordedFigure(quantity, "1", self.limit, number, None, "at most", events, _MISSED, note, hidden=hidden)
+
+    def _times(
+        self, sort: UnitCycle, with_names: str, trips_us: Floats, host_us: tuple[Floats, ...]
+    ) -> Iterator[RecordedFigure]:
+        """Round trip of a sort of cycle, and the master's time: the largest that some sets of cycles say, if any."""
+        bus, count = self.network.profile.bus, len(trips_us)
+        planned = EthercatCycle(self.network, LAST_BYTE, sort.numbers[0])
         known = ("cycle_master_us", "cycle_frames_us", "cycle_data_us", "cycle_devices_us", "cycle_cable_us")
-        planned_us = sum(plain(terms[key]) for key in known) + bias_us
-        bytes_us = plain(self.cycle.process_bytes) * BYTE_BIAS_UNCERTAINTY_US
-        way_doubts = [plain(device_us(doubt.one_way_us)) for doubt in devices_doubts(self.network)]
-        plan_doubts = [*way_doubts, bytes_us, plain(bus.master_doubt_us)]
-        stamps_us = self.stamp_us * _TWO_STAMPS
-        trip, typical = quantile(cycles.trips_us, self.share), middle(cycles.trips_us)
-        yield RecordedFigure("round trip, median", "us", None, typical.value, None, "shown", count)
-        doubt = expanded(*plan_doubts, trip.uncertainty or 0.0, stamps_us)
-        yield RecordedFigure("round trip", "us", planned_us, trip.value, doubt, "at most", count)
-        host_us = cycles.trips_us - cycles.wire_us - way_us - self.delays.more_us(self.network) - bias_us
-        self.master = quantile(host_us, self.share)
-        yield RecordedFigure(
-            "master's time",
-            "us",
-            plain(bus.master_us),
-            self.master.value,
-            expanded(*plan_doubts, self.master.uncertainty or 0.0, stamps_us),
-            "at most",
-            count,
-            _MASTER,
-            f"median {middle(host_us).value:.1f}: round trip less wire, devices and cables",
+        planned_us = sum(plain(planned.by_term[key]) for key in known) + plain(planned.bias_us())
+        few = f"{counted(count, 'whole cycle')}, and a figure takes {LEAST_EVENTS}" if count < LEAST_EVENTS else ""
+        trip_name, hidden = f"round trip{with_names}", self.bad_stamps or few
+        of_trip = RecordedFigure(trip_name, "us", planned_us, None, None, "at most", count, hidden=hidden)
+        of_master = RecordedFigure(
+            "master's time", "us", plain(bus.master_us), None, None, "at most", count, _MASTER, hidden=hidden
         )
+        if hidden:
+            yield from (of_trip, of_master) if host_us else (of_trip,)
+            return
+        doubts = [
+            *(plain(device_us(doubt.one_way_us)) for doubt in devices_doubts(self.network)),
+            plain(planned.process_bytes) * BYTE_BIAS_UNCERTAINTY_US,
+            plain(bus.master_doubt_us),
+            self.stamp_us * _TWO_STAMPS,
+        ]
+        trip = quantile(trips_us, self.share)
+        if host_us:
+            typical_us = quantile(trips_us, 0.5).value
+            yield RecordedFigure("round trip, median", "us", None, typical_us, None, "shown", count)
+        yield of_trip._replace(recorded=trip.value, uncertainty=expanded(*doubts, trip.uncertainty or 0.0))
+        if host_us:
+            longest_us = max(host_us, key=lambda us: quantile(us, self.share).value)
+            self.master = quantile(longest_us, self.share)
+            typical_us = quantile(longest_us, 0.5).value
+            yield of_master._replace(
+                recorded=self.master.value,
+                uncertainty=expanded(*doubts, self.master.uncertainty or 0.0),
+                events=len(longest_us),
+                note=f"median {typical_us:.1f}: round trip less wire, devices and cables",
+            )
 
-    def _layout(self, cycles: _Cycles) -> Iterator[RecordedFigure]:
-        """Frames of a cycle, and their datagrams."""
-        count, planned = len(cycles.starts), self.cycle.packing
-        yield RecordedFigure("frames in a cycle", "1", plain(planned.frames), cycles.frames, None, "equal", count)
+    def _layout(
+        self, sort: UnitCycle, with_names: str, cycles: SeenCycles, own: Places, each: _Cycles
+    ) -> Iterator[RecordedFigure]:
+        """Frames of a sort of cycle, and their datagrams."""
+        count, planned = len(own), EthercatCycle(self.network, LAST_BYTE, sort.numbers[0]).packing
+        name, planned_frames = f"frames in a cycle{with_names}", plain(planned.frames)
+        if sort.data_bytes:
+            hidden = "" if count else "no such cycle is in the recording"
+            frames = int(each.frames[own[0]]) if count else None
+            yield RecordedFigure(name, "1", planned_frames, frames, None, "equal", count, hidden=hidden)
         if not count:
             return
-        frames = self.frames
-        places = np.flatnonzero(self.is_data & ~frames.returned)
-        # A cycle in the middle: the first ones may be of a bus that starts.
-        at = int(np.searchsorted(places, cycles.starts[count // 2]))
-        layouts = [frames.layouts[layout] for layout in frames.layout[places[at : at + cycles.frames]]]
-        parts = [part for layout in layouts for part in layout]
-        note = " | ".join(" ".join(map(_words, layout)) for layout in layouts)
+        # Of those that are as most are, one in the middle: now and then a master adds a datagram.
+        sizes, often = np.unique(each.datagrams_bytes[own], return_counts=True)
+        usual = own[each.datagrams_bytes[own] == sizes[often.argmax()]]
+        places = cycles.frames[cycles.number == usual[len(usual) // 2]]
+        layouts = [self.frames.layouts[layout] for layout in self.frames.layout[places]]
         yield RecordedFigure(
-            "datagrams of a cycle",
+            f"datagrams of a cycle{with_names}",
             "bytes",
             plain(planned.datagrams_bytes),
-            _datagrams_bytes(parts),
+            float(sizes[often.argmax()]),
             None,
             "at most",
             count,
-            note=note,
+            note=" | ".join(" ".join(map(_words, layout)) for layout in layouts),
         )
-        own = [part for part in parts if not part.is_process_data]
-        if _datagrams_bytes(own) != plain(housekeeping_bytes(self.network)):
-            self.own_bytes = tuple(part.data_bytes for part in own)
+        own_parts = [part for layout in layouts for part in layout if not part.is_process_data]
+        if sort is cycles.sorts[0] and _datagrams_bytes(own_parts) != plain(housekeeping_bytes(self.network)):
+            self.own_bytes = tuple(part.data_bytes for part in own_parts)
 
     def _lost(self) -> Iterator[RecordedFigure]:
         frames, trips = self.frames, self.trips
         sent = int(np.count_nonzero(~frames.returned))
-        yield RecordedFigure("lost frames", "1", 0, len(trips.lost), None, "at most", sent)
+        yield self._missed("lost frames", len(trips.lost), sent, "", self._dropped)
         wrong = total = 0
         back = trips.returned[self.is_data[trips.returned]]
         for layout in np.unique(frames.layout[back]):
@@ -279,37 +368,42 @@ class _Seen:
             total += int(counts.sum())
             wrong += int(counts.sum() - counts.max())
         if total:
-            note = "the most frequent ones are taken for right"
-            yield RecordedFigure("wrong working counters", "1", 0, wrong, None, "at most", total, note=note)
+            yield self._missed("wrong working counters", wrong, total, "the most frequent ones are taken for right")
 
     def _byte(self) -> Iterator[RecordedFigure]:
-        trips = self.trips
-        sizes = self.wire_us[trips.sent] / BYTE_US
-        times_us = (self.frames.times_ns[trips.returned] - self.frames.times_ns[trips.sent]) / 1000
-        if not len(sizes) or sizes.max() - sizes.min() < _LEAST_SPAN_BYTES:
+        """The time of a byte, of frames that no other one is on the way with: others wait for those before them."""
+        if self.bad_stamps:
             return
-        fitted = line(sizes, times_us)
+        sent_ns, back_ns = self.frames.times_ns[self.trips.sent], self.frames.times_ns[self.trips.returned]
+        order = np.argsort(sent_ns, kind="stable")
+        last_ns = np.maximum.accumulate(back_ns[order])
+        alone = order[np.concatenate(([True], sent_ns[order][1:] >= last_ns[:-1]))]
+        sizes = self.wire_us[self.trips.sent[alone]] / BYTE_US
+        if sizes.max() - sizes.min() < _LEAST_SPAN_BYTES:
+            return
+        fitted = line(sizes, self.trips_us[alone], self.stamp_us * _TWO_STAMPS)
         if fitted is None:
             return
         slope, error = fitted
-        doubt = expanded(error, BYTE_BIAS_UNCERTAINTY_US)
+        doubt = expanded(error, BYTE_BIAS_UNCERTAINTY_US) or 0.0
         planned = BYTE_US + BYTE_BIAS_US
         note = f"round trips of {int(sizes.min())} to {int(sizes.max())} bytes on the wire"
-        yield RecordedFigure("time of a byte", "us", planned, slope, doubt, "at most", len(sizes), note=note)
+        hidden = "less than on the wire: the host waits for more than the frame" if slope + doubt < BYTE_US else ""
+        yield RecordedFigure(
+            "time of a byte", "us", planned, slope, doubt, "at most", len(sizes), "", note, is_mean=True, hidden=hidden
+        )
 
     def remarks(self) -> Iterator[str]:
         """What the recording has beside the figures."""
         frames, notes = self.frames, self.frames.notes
         if notes.broken_at is not None:
             yield f"The file is cut or damaged from byte {notes.broken_at:,} on: read up to there."
-        if not len(self.starts):
-            yield "It has no frame of process data (LRD, LWR, LRW), so no period, no jitter and no time of the master."
-        elif not self.has_period:
-            yield f"It has {counted(len(self.starts), 'cycle')}, too few for a period."
         if self.steps_back:
+            yield (f"Its clock was set back {counted(self.steps_back, 'time')}: the longest stretch between is taken.")
+        if self.cycles is not None and self.cycles.left_out:
             yield (
-                f"Its clock was set back {counted(self.steps_back, 'time')}: cycles are those of the longest stretch "
-                "between, round trips over a step are left out."
+                f"{counted(self.cycles.left_out, 'frame')} of process data at its ends are left out: of the master's "
+                "start or end, where more cycles are missing than are there, or of cycles that the capture has in part."
             )
         if self.trips.unsent:
             yield f"{counted(self.trips.unsent, 'frame')} returned without having been seen to be sent."
@@ -318,12 +412,10 @@ class _Seen:
         left_out = frames.others + notes.other_links + notes.without_time
         if left_out:
             yield f"Left out: {counted(left_out, 'packet')} of other protocols or interfaces, or without a time."
-        times_us = (frames.times_ns[self.trips.returned] - frames.times_ns[self.trips.sent]) / 1000
-        short = int(np.count_nonzero(times_us < self.wire_us[self.trips.sent] - _GAP_US - 2 * self.stamp_us))
-        if short:
+        if not self.bad_stamps and self.short:
             yield (
-                f"{counted(short, 'frame')} returned sooner than it takes to send them: the stamps were not taken at "
-                "the master's port."
+                f"{counted(self.short, 'frame')} returned sooner than it takes to send them: their stamps were not "
+                "taken at the master's port."
             )
         if self.master is not None and self.master.value < 0:
             yield "The machine is faster than wire and devices of the profile, which has more of them than it."
@@ -335,16 +427,30 @@ class _Seen:
         """New value of each key that was measured; None removes one."""
         edits: dict[str, Any] = {**self.delays.edits(self.network)}
         if self.master is not None and self.master.value > 0:
-            edits[_MASTER] = round(self.master.value, 3)
+            edits[_MASTER] = _up(self.master.value)
             edits["bus.master_grade"] = "measured"
             # What the delays of devices leave open is an uncertainty of the cycle already.
             doubt = expanded(self.master.uncertainty, self.stamp_us * _TWO_STAMPS)
             edits["bus.master_uncertainty_us"] = None if doubt is None else round(doubt / 2, 4)
         if self.jitter is not None:
-            edits[_JITTER] = round(self.jitter.value, 3)
+            edits[_JITTER] = _up(self.jitter.value)
         if self.own_bytes is not None:
             edits["bus.housekeeping_bytes"] = list(self.own_bytes)
         return edits
+
+
+def _usual(values: npt.NDArray[Any], sort: Places) -> npt.NDArray[Any]:
+    """For each of n things the value that most of its sort have."""
+    usual = np.zeros_like(values)
+    for own in np.unique(sort):
+        each, often = np.unique(values[sort == own], return_counts=True)
+        usual[sort == own] = each[often.argmax()]
+    return usual
+
+
+def _up(us: float) -> float:
+    """A time that is to hold what was measured, to a nanosecond [us]."""
+    return ceil(us * 1000) / 1000
 
 
 def _words(part: Datagram) -> str:

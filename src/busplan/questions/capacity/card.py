@@ -182,9 +182,11 @@ def _rests_on(verdict: Verdict, profile: Profile) -> Iterator[_Line]:
     for assumption in heavy_assumptions(figures, profile):
         them = "it" if len(assumption.keys) == 1 else "them"
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
-    left_out = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
-    if left_out:
+    cycle = bus.cycle(network_of(profile), model=bus.deciding_model)
+    if left_out := cycle.left_out():
         yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in left_out)),))
+    if premises := cycle.premises():
+        yield "rests on", Sentence(("; ".join(premises),))
     tested = parts_tested(bus.evidence_data)
     words = "; ".join(
         filter(

@@ -248,7 +248,7 @@ class Effect(NamedTuple):
     then: Standing | None
     """Where the network stands with the change."""
     note: str
-    """Why the change cannot be made, or why the margin stays as it is."""
+    """Why the change cannot be made, or why the margin stays as it is, and which limits come nearer then."""
 
 
 class Sensitivity(NamedTuple):
@@ -280,7 +280,7 @@ def sensitivity(profile: Profile) -> Sensitivity:
     """
     network = network_of(profile)
     now = standing(network)
-    effects = [_effect(change, now) for change in perturbed(network)]
+    effects = [_effect(change, now, network) for change in perturbed(network)]
     effects.sort(key=lambda effect: (effect.margin_change_us is None, -abs(effect.margin_change_us or 0.0)))
     return Sensitivity(profile, bus_of(profile).deciding_model, now, tuple(effects), next_bottleneck(profile))
 
@@ -309,10 +309,28 @@ def standing(network: Network) -> Standing:
     )
 
 
-def _effect(cause: Perturbed, now: Standing) -> Effect:
+def _effect(cause: Perturbed, now: Standing, network: Network) -> Effect:
     change_us, then = None, None
     if cause.network is not None:
         then = standing(cause.network)
         change_us = then.margin_corrected_us - now.margin_corrected_us
-    note = "" if change_us else cause.note
+    note = ""
+    if not change_us:
+        note = "; ".join(
+            filter(None, (cause.note, *(() if cause.network is None else _nearer(network, cause.network))))
+        )
     return Effect(cause.change, cause.key, cause.before, cause.after, change_us, then, note)
+
+
+def _nearer(network: Network, changed: Network) -> Iterator[str]:
+    """Say how much nearer a change comes to limits that are times, each with its doubt as a shown verdict has it."""
+    for limit in bus_of(network.profile).limits:
+        if limit.period is None:
+            continue
+        left_us, then_us = (
+            plain(limit.most(of)) - plain(limit.value(of)) - plain(limit.uncertainty(of)) for of in (network, changed)
+        )
+        if then_us < left_us and left_us > 0:
+            yield f"it takes {left_us - then_us:.1f} us of the {left_us:.1f} us before the limit of {limit.key}"
+        elif then_us < left_us:
+            yield f"it adds {left_us - then_us:.1f} us to the {-left_us:.1f} us beyond the limit of {limit.key}"

@@ -183,11 +183,13 @@ def _margin(figures: CapacityFigures, bus: "Bus") -> Sentence:
 
 
 def not_in_it(profile: Profile) -> Iterator[Sentence]:
-    """Say what the verdict leaves out, with the key that would give it; nothing if it leaves nothing out."""
+    """Say what the verdict leaves out, with the key that would give it, and what it rests on without one."""
     bus = bus_of(profile)
-    left = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
-    if left:
+    cycle = bus.cycle(network_of(profile), model=bus.deciding_model)
+    if left := cycle.left_out():
         yield Sentence((f"Not included: {', '.join(f'{missing.label} ({missing.key})' for missing in left)}.",))
+    if premises := cycle.premises():
+        yield Sentence((f"Rests on {'; '.join(premises)}.",))
 
 
 def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:

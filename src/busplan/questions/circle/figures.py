@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from busplan.servo.circle import CircleRun
 
 
+NEGLIGIBLE_MM: Final = 1e-4
+"""Contour error below which nothing of the profile makes a circle what it is: chosen, far below any machine [mm]."""
 _CYCLE: Final = by(time_slice_us, required_time_slice_us)
 _ISO: Final = "ISO 230-4"
 
@@ -146,10 +148,17 @@ CIRCLE_FIGURES: Final = (
     Figure("centre_offset_mm", "centre", "least squares", "least-squares centre, x and y"),
     Figure("constant_speed_deg", "arc", "simulation", "arc that F, G, centre and radius are taken on: 360 for a turn"),
     Figure(
+        "sources_matter",
+        "matter",
+        "simulation",
+        "whether a measure with a tolerance, or without any the largest error, is 0.1 um or more; null without a turn",
+    ),
+    Figure(
         "passed",
         "passed",
         "profile",
-        "whether the circle holds every tolerance; null if nothing fails, and no contour tolerance is asked for",
+        "whether the circle holds every tolerance; null if nothing fails, and no contour tolerance is asked for or no "
+        "error source matters",
         "passed",
         sort="truth",
         better="more",
@@ -213,11 +222,23 @@ class CircleFigures(NamedTuple):
     centre_offset_mm: tuple[float, float] | None
     constant_speed_deg: float | None
     """Arc at constant speed from which F, G, radius and centre are taken: 360 on a turn."""
+    sources_matter: bool | None
+    """Whether a judged measure, or without any the largest error, is 0.1 um or more: below, the profile has no error
+    source that matters, which says nothing of how round a machine is. None if none was measured."""
     passed: bool | None
-    """None if the profile has no contour tolerance, and nothing else fails: it is not judged."""
+    """None if nothing fails, and the profile has no contour tolerance or no error source matters: it is not judged."""
     failures: "tuple[Failure, ...]"
     contributions: "tuple[Contribution, ...] | None"
     """Largest first; None if they were not requested and no contour measure failed."""
+
+    @property
+    def verdict_word(self) -> str:
+        """The verdict in a word or two."""
+        if self.stable is None:
+            return "NOT RUN"
+        if self.passed is not None:
+            return "PASSED" if self.passed else "FAILED"
+        return "NO SOURCE MATTERS" if self.sources_matter is False else "NOT JUDGED"
 
 
 class CircleTest(NamedTuple):

@@ -168,8 +168,8 @@ _STYLE: Final = """\
 .chart .verdict.passes { fill: var(--good); }
 .chart .verdict.fails { fill: var(--paper); }
 """
-_VERDICTS: Final = {True: ("PASSED", "passes"), False: ("FAILED", "fails"), None: ("NOT JUDGED", "")}
-"""Word of each verdict, and class of its frame: an outline, a filled box, a dashed outline."""
+_VERDICTS: Final = {True: "passes", False: "fails", None: ""}
+"""Class of the frame of each verdict: an outline, a filled box, a dashed outline."""
 _DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
 
 
@@ -214,7 +214,7 @@ def _head(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
     result = row.result
     setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
     y = paragraph(body, setup, y=y, css="head") + 4
-    word, css = _VERDICTS[result.passed]
+    word, css = result.verdict_word, _VERDICTS[result.passed]
     frame = {"x": "1", "y": str(y), "width": str(_LETTER * len(word) + 16), "height": str(LINE)}
     SubElement(body, "rect", {**frame, "class": f"frame {css}".rstrip()})
     text_at(body, word, x=str(9 + _LETTER * len(word) / 2), y=y + 15, css=f"verdict {css}".rstrip(), anchor="middle")

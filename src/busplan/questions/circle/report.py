@@ -24,11 +24,11 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.numbers import period, period_value
+from busplan.forms.numbers import listed, period, period_value
 from busplan.questions.circle.contour import ContourProfile, drawn_profile
 from busplan.questions.circle.drawing import CircleDrawing
 from busplan.questions.circle.failures import MARGINS, Stated
-from busplan.questions.circle.figures import CIRCLE_BY_KEY, JITTER, CircleFigures, CircleTest
+from busplan.questions.circle.figures import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTest
 from busplan.questions.circle.roundness import failed_measure, to_attack
 from busplan.questions.words.documents import Owner, document, figure_table, with_profile
 from busplan.sections.profile import Profile
@@ -42,11 +42,9 @@ def verdict_words(result: CircleFigures) -> Words:
     result
         The circle test at one period.
     """
-    if result.stable is None:
-        return Words("NOT RUN", "fails")
-    if result.passed is None:
-        return Words("NOT JUDGED", "warns")
-    return Words("PASSED", "passes") if result.passed else Words("FAILED", "fails")
+    if result.passed is None and result.stable is not None:
+        return Words(result.verdict_word, "warns")
+    return Words(result.verdict_word, "passes" if result.passed else "fails")
 
 
 def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
@@ -68,6 +66,13 @@ def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Senten
         return
     if result.passed:
         yield Sentence((*subject, ": ", Words("the circle holds every tolerance", verdict.state), "."), verdict.state)
+    elif result.sources_matter is False:
+        none = Words("no error source of this profile matters", verdict.state)
+        labels = [CIRCLE_BY_KEY[key].label for key in profile.tolerance.judged or ("max_contour_error_mm",)]
+        least = f"{listed(labels, 'and')} below {NEGLIGIBLE_MM * 1e3:g} um"
+        yield Sentence(
+            (*subject, ": ", none, f"; {least}, which says nothing of how round a machine is."), verdict.state
+        )
     else:
         yield Sentence((*subject, ": ", *_unjudged(result), "."), verdict.state)
     yield sentence(

@@ -14,7 +14,7 @@ from busplan.questions.circle.failures import (
     circle_failures,
     tightest_margins,
 )
-from busplan.questions.circle.figures import CircleFigures, CircleTest
+from busplan.questions.circle.figures import NEGLIGIBLE_MM, CircleFigures, CircleTest
 from busplan.questions.circle.setup import Contribution, Setup, announce, bus, contributions, estimate, setup, sources
 from busplan.questions.fit.circle_refusal import loop_timing, path_setpoints, require_circle
 from busplan.questions.fit.figures import CapacityFigures
@@ -192,6 +192,9 @@ def _figures(
     delay_x_us, delay_y_us = loop_delays_us(profile)
     circle = profile.circle
     setpoints = path_setpoints(profile)
+    judged = profile.tolerance.judged
+    measures = [getattr(contour, key) for key in judged or ("max_contour_error_mm",)] if contour else []
+    matter = any(value is None or value >= NEGLIGIBLE_MM for value in measures) if contour else None
     circle_fails = () if run is None else circle_failures(profile, run, settled=settled)
     failures = (*bus_failures(profile, capacity), *circle_fails)
     return CircleFigures(
@@ -229,7 +232,8 @@ def _figures(
         radius_deviation_mm=round_.radius_deviation_mm if round_ else None,
         centre_offset_mm=round_.centre_offset_mm if round_ else None,
         constant_speed_deg=run.constant_speed_deg if run else None,
-        passed=False if failures else True if profile.tolerance.judges_contour else None,
+        sources_matter=matter,
+        passed=False if failures else True if judged and matter else None,
         failures=failures,
         contributions=None,
     )

@@ -11,6 +11,7 @@ from busplan.profile.conversion import AssumedKey, converted
 from busplan.profile.toml import override
 from busplan.progress import Progress
 from busplan.questions.circle.check import ComputeCircleFigures, circle_tests
+from busplan.questions.fit.assumed import assumed_rates
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.circle_refusal import STEP
 from busplan.questions.fit.figures import CapacityFigures, after_reset, figures
@@ -19,7 +20,7 @@ from busplan.questions.fit.network import varied_nodes
 from busplan.questions.fit.node_limit import safe_nodes
 from busplan.questions.plan.freedoms import PERIOD
 from busplan.questions.plan.smallest_period import SmallestPeriod, needed_settings, smallest_period
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 from busplan.servo.checks import dividing_step_us
 
@@ -182,16 +183,18 @@ def _on_kind(profile: Profile, kind: str) -> MachineOnKind | NotOnKind:
         conversion = converted(profile, kind)
     except BusplanError as error:
         return NotOnKind(kind, error.problems)
-    needed = {} if kind == profile.bus.kind else needed_settings(conversion.profile)
+    is_own = kind == profile.bus.kind
+    needed = {} if is_own else needed_settings(conversion.profile)
     if needed:
         assumed = (assumed for assumed in conversion.assumed if assumed.key not in needed)
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
         conversion = conversion._replace(profile=override(conversion.profile, dict(needed)), assumed=(*tried, *assumed))
+    rates = (AssumedKey(key, value_at(profile, key), "profile") for key in assumed_rates(profile))
     capacity = figures(conversion.profile, model=kind_named(kind).deciding_model)
     return MachineOnKind(
         profile=conversion.profile,
-        is_own=kind == profile.bus.kind,
-        assumed=conversion.assumed,
+        is_own=is_own,
+        assumed=tuple(rates) if is_own else conversion.assumed,
         left_out=conversion.left_out,
         figures=capacity,
         after_reset=after_reset(conversion.profile, capacity),

@@ -20,6 +20,7 @@ from busplan.forms.blocks import (
     Report,
     Sentence,
     ShownValue,
+    State,
     Table,
     TableColumn,
     TableRow,
@@ -227,11 +228,7 @@ _CIRCLE: Final = (
     TableColumn("", kind="words", group="circle"),
     TableColumn("step", "us", group="circle"),
 )
-_CIRCLE_WORDS: Final = {
-    True: Words("PASSED", "passes"),
-    False: Words("FAILED", "fails"),
-    None: Words("NOT JUDGED", "warns"),
-}
+_CIRCLE_STATES: Final[dict[bool | None, State]] = {True: "passes", False: "fails", None: "warns"}
 _ASSUMED: Final = (
     TableColumn("bus", kind="words"),
     TableColumn("key", kind="words", wraps=True),
@@ -311,8 +308,8 @@ def _words(assumed: Sequence[AssumedKey]) -> str:
 
 
 def _assumed(machine: MachineOnKind) -> str:
-    """Values that a kind takes from a new profile, with the number of its defaults."""
-    new = [assumed for assumed in machine.assumed if assumed.source == "new profile"]
+    """Values that a kind takes from a new profile or its own, with the number of its defaults."""
+    new = [assumed for assumed in machine.assumed if assumed.source in ("new profile", "profile")]
     defaults = len(machine.assumed) - len(new)
     return ", ".join(filter(None, (_words(new), f"{defaults} {nouns(defaults, 'default')}" if defaults else ""))) or "-"
 
@@ -375,7 +372,8 @@ def _circle(machine: MachineOnKind) -> tuple[Cell, ...]:
     step = ShownValue(machine.circle.step_us, "step_us", "us", 3)
     if machine.circle.figures is None:
         return Words("NOT RUN", "warns"), step
-    return _CIRCLE_WORDS[machine.circle.figures.passed], step
+    figures = machine.circle.figures
+    return Words(figures.verdict_word, _CIRCLE_STATES[figures.passed]), step
 
 
 def compare_chart(comparison: KindComparison) -> Chart:
@@ -386,7 +384,7 @@ def compare_chart(comparison: KindComparison) -> Chart:
 
 
 def assumed_table(comparison: KindComparison) -> Table:
-    """Values that each kind needs and the machine does not give; defaults are details.
+    """Values that each kind needs and nobody knows; defaults are details.
 
     Parameters
     ----------
@@ -401,5 +399,5 @@ def assumed_table(comparison: KindComparison) -> Table:
         for machine in comparison.compared
         for assumed in machine.assumed
     ]
-    words = "Assumed, as a new profile of the kind has it or by default, until somebody knows better"
+    words = "Assumed, by the profile, as a new profile of the kind has it or by default, until somebody knows better"
     return Table(_ASSUMED, tuple(rows), Sentence((words,)))

@@ -1,6 +1,6 @@
 """Assumed keys that carry much of the cycle or of its uncertainty: a verdict rests on them unmeasured."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.network import Group, Network
@@ -8,7 +8,7 @@ from busplan.buses.rule import RuleFigures
 from busplan.elementwise import plain
 from busplan.questions.fit.inputs import given
 from busplan.questions.fit.network import bus_of, network_of
-from busplan.sections.base import value_at
+from busplan.sections.base import value_at, with_unchecked
 from busplan.sections.profile import Profile
 from busplan.sourced import Sourced
 
@@ -20,6 +20,8 @@ _MUCH: Final = Sourced(
     meaning="share of the variance, or of the required time, from which on a verdict rests on a key",
 )
 _EXECUTION: Final = "execution"
+_ENDLESS: Final = 1e12
+"""A bit rate at which nothing takes time [kbit/s]."""
 _Share = tuple[tuple[str, ...], float, str]
 """Keys, what they carry [1], and of what."""
 
@@ -60,6 +62,7 @@ def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssu
     # What is no key has no grade, and execution times are no term or doubt of one key.
     shares = [share for share in shares if share[1] > _MUCH and _is_assumed(profile, share[0][0])]
     shares += _of_execution(figures, profile, variance)
+    shares += _of_rates(figures, profile)
     said: dict[tuple[str, ...], list[str]] = {}
     for keys, share, whole in shares:
         if share > _MUCH:
@@ -86,6 +89,23 @@ def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> li
     carried_us = sum(max(0.0, plain(term.us) - rest[term.key]) for term in figures.terms)
     of_time = (keys, carried_us / figures.required_us, "the required time")
     return [(keys, whole_us * (whole_us - rest_us) / variance, "the variance"), of_time] if variance else [of_time]
+
+
+def assumed_rates(profile: Profile) -> tuple[str, ...]:
+    """Keys of the bit rates that a profile calls assumed."""
+    return tuple(key for key in bus_of(profile).rate_keys if _is_assumed(profile, key))
+
+
+def _of_rates(figures: RuleFigures, profile: Profile) -> Iterator[_Share]:
+    """Shares of the assumed bit rates: what of the required time, or without a cycle of the load, goes without them."""
+    bus, network = bus_of(profile), network_of(profile)
+    for key in assumed_rates(profile):
+        endless = network_of(with_unchecked(profile, key, _ENDLESS))
+        if profile.has_cycle:
+            cycle = bus.cycle(endless._replace(period_us=figures.period_us), model=figures.timing_model)
+            yield (key,), 1 - plain(cycle.required_us) / figures.required_us, "the required time"
+        elif (load := bus.limit("load")) is not None:
+            yield (key,), 1 - plain(load.value(endless)) / plain(load.value(network)), "the load"
 
 
 def _counts(group: Group, network: Network) -> bool:

@@ -80,7 +80,7 @@ def read(path: Path, name: str, *, progress: Progress) -> Reading:
     frames = read_can(path, progress=progress)
     stretch = longest_stretch(frames)
     messages = sent_messages(frames, stretch).values()
-    least = least_bit_rate(frames, stretch)
+    least = least_bit_rate(frames, stretch).likely
     _require_times(stretch, messages, least, name)
     machine = Reading("can", "CAN log", name, rank=2, lists_all=False, is_log=True)
     length_us, error_us = float(stretch.times_us[-1] - stretch.times_us[0]), step_us(stretch)

@@ -87,7 +87,9 @@ def _remarks(trade_off: TradeOff) -> Iterator[Sentence]:
         number = count_value(len(missing))
         yield sentence(f"{{}} {nouns(len(missing), 'setting')} cannot exist, as {missing[0].reason}.", number)
     if any(cell.state == "circle not judged" for cell in trade_off.cells):
-        yield Sentence(("Not every circle is judged: no contour tolerance is asked for.",), "warns")
+        yield Sentence(
+            ("Not every circle is judged: no contour tolerance is asked for, or no error source matters.",), "warns"
+        )
     yield from payload_sentences(trade_off.profile, (trade_off.x.key, trade_off.y.key))
 
 

@@ -214,7 +214,7 @@ class Digest:
 
     def _unjudged(self) -> Iterator[Sentence]:
         if self._counts["unjudged"]:
-            words = "The circle is not judged at {}: no contour tolerance is asked for."
+            words = "The circle is not judged at {}: no contour tolerance is asked for, or no error source matters."
             yield sentence(words, count_value(self._counts["unjudged"], grouped=True), state="warns")
 
     def report(self, document: Callable[[], JsonDocument] = _not_kept) -> Report:

@@ -123,7 +123,8 @@ def summary(results: Array) -> dict[str, float]:
         Shape (seeds, CIRCLE_COLUMNS), as from `run_chunk`.
     """
     by_key = dict(zip(CIRCLE_COLUMNS, results.T, strict=True))
-    failed = float(np.sum(1 - by_key["passed"]))
+    judged = by_key["passed"][~np.isnan(by_key["passed"])]
+    failed = float(np.sum(1 - judged)) if len(judged) else float("nan")
     spreads = (_spread(key, by_key[key]) for key in _SPREAD)
     numbers = (len(results), *_shares(failed, len(results)), *(number for own in spreads for number in own))
     return dict(zip(SUMMARY_COLUMNS, numbers, strict=True))

@@ -1,0 +1,109 @@
+"""What a verdict on CAN rests on: a bit rate that is assumed, priority queues, no repeated frames."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import busplan
+
+Run = Callable[..., Any]
+HEAD = """\
+schema_version = 1
+name = "line"
+
+[bus]
+kind = "can"
+bit_rate_kbit_s = 500      # assumed: the least usual one that the log allows
+"""
+MESSAGES = """
+[[message]]
+name = "door"
+identifier = 0x100
+payload_bytes = 8
+period_us = 10000
+"""
+MACHINE = """\
+nodes = 2
+
+[cycle]
+period_us = 4000
+
+[payload]
+read_bytes = 8
+write_bytes = 8
+
+[node]
+axes = 1
+
+[node.execution]
+kind = "linear"
+grade = "measured"
+base_us = 50
+per_byte_us = 0
+"""
+KEY = "bus.bit_rate_kbit_s"
+
+
+@pytest.fixture(params=[HEAD + MESSAGES, HEAD + MACHINE], ids=["messages", "machine"])
+def plan_file(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    path = tmp_path / "line.toml"
+    path.write_text(request.param, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("form", ["table", "markdown", "html"])
+def test_the_card_says_what_it_rests_on_in_every_form(run: Run, plan_file: Path, form: str) -> None:
+    said = run("capacity", plan_file.name, "--format", form, cwd=plan_file.parent).stdout.replace("\\", "")
+    assert "priority queues: assumed; no repeated frames" in said
+    assert "bus.bit_rate_kbit_s: measure it first" in said
+
+
+def test_so_does_the_text_of_json(run: Run, plan_file: Path) -> None:
+    document = json.loads(run("capacity", plan_file.name, "--format", "json", cwd=plan_file.parent).stdout)
+    text = document["verdicts"][0]["text"]
+    assert "Rests on priority queues: assumed; no repeated frames." in text
+    assert "Assumed: bus.bit_rate_kbit_s, which carries " in text
+
+
+def test_an_assumed_bit_rate_warns_where_it_stands(run: Run, plan_file: Path) -> None:
+    done = run("check", plan_file.name, cwd=plan_file.parent)
+    assert "line.toml:6:1: BP112 warning: bus.bit_rate_kbit_s: an assumption, which carries " in done.stdout
+    assert done.returncode == 0
+
+
+def test_every_later_answer_calls_it_assumed(run: Run, plan_file: Path) -> None:
+    for arguments in (
+        ("explain", "bus_load"),
+        ("explain", "worst_response_us"),
+        ("capacity", "--set", "limits.max_load=0.5"),
+        ("report", "--no-circle"),
+    ):
+        command, *rest = arguments
+        said = run(command, plan_file.name, *rest, cwd=plan_file.parent).stdout
+        lines = [part for part in said.splitlines() if KEY in part]
+        assert any("assumed" in part or "measure it first" in part for part in lines), command
+
+
+def test_compare_names_it_beside_what_other_kinds_assume(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "line.toml").write_text(HEAD + MACHINE, encoding="utf-8")
+    document = json.loads(
+        run("compare", "line.toml", "--buses", "can,ethercat", "--format", "json", cwd=tmp_path).stdout
+    )
+    own = next(one for one in document["buses"] if one["kind"] == "can")
+    assert [(one["key"], one["source"]) for one in own["assumed"]] == [(KEY, "profile")]
+
+
+def test_a_bit_rate_that_is_given_warns_of_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "line.toml"
+    path.write_text((HEAD + MACHINE).replace("assumed: the least usual", "set: the usual"), encoding="utf-8")
+    assert busplan.check(path).findings == ()
+
+
+def test_a_bit_rate_that_carries_little_is_no_warning(tmp_path: Path) -> None:
+    path = tmp_path / "line.toml"
+    slow = (HEAD + MACHINE).replace("base_us = 50", "base_us = 1900")
+    path.write_text(slow.replace("period_us = 4000", "period_us = 100000"), encoding="utf-8")
+    assert busplan.check(path).findings == ()
