@@ -2,11 +2,12 @@
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from busplan.errors import BusplanError
-from busplan.gate.baseline import MODELS, Baseline, Record, read_baseline, worse, write_baseline
+from busplan.gate.baseline import MODELS, Baseline, Record, load_baseline, read_baseline, worse, write_baseline
 from busplan.gate.gate import FileResult, check_document
 from busplan.profile.document import Document
 from busplan.profile.shipped import load
@@ -155,6 +156,8 @@ def test_both_timing_models_are_held() -> None:
         (100.0, 100.0 * (1 - 1e-6), True),
         (0.0, -1e-12, False),
         (0.0, -1e-6, True),
+        (1.0, 1.0 - 1.5e-9, True),
+        (1.5, 1.5 - 1.4e-9, False),
         (-5.0, -5.1, True),
         (-5.0, -4.9, False),
     ],
@@ -243,3 +246,60 @@ def test_safe_axes_are_held_where_the_closed_form_still_has_them(clean: str, che
     # 1911.497 us for 14 nodes, and 1737.510 us for 13, of 1800 us.
     assert now.findings[0].problem.endswith("0.1, was 0: safe axes fell from 56 to 52")
     assert now.figures["standard.max_axes"] == before.figures["standard.max_axes"] == 60
+
+
+def test_a_figure_that_no_bus_has_any_more_is_called_by_its_key(clean: str, changed: Changed, check: Check) -> None:
+    before = record(check(clean))
+    older = Record({**before.figures, "standard.most_old_nodes": 4.5, "plain": 3}, before.keys)
+    (finding,) = check(clean, baseline=older).findings
+    assert finding.problem == ("name: most old nodes fell from 4.5 to none, plain from 3 to none by the plain timing")
+    # It behind those that are known; and of two changed keys only the one that costs something is to blame.
+    text = changed(("nodes = 2", "nodes = 3"), ("read_bytes = 12", "read_bytes = 8"))
+    (finding,) = check(text, baseline=older).findings
+    assert finding.problem.startswith("bus.nodes: 3, was 2: corrected margin fell from ")
+    assert finding.problem.endswith(", most old nodes from 4.5 to none, and 2 more")
+
+
+def test_a_key_that_cannot_be_taken_back_alone_is_not_blamed(clean: str, changed: Changed, check: Check) -> None:
+    linear = 'kind = "linear"\ngrade = "measured"\nbase_us = 30\nper_byte_us = 0.35'
+    table = 'kind = "table"\ngrade = "measured"\npayload_bytes = [8, 16]\ntime_us = [30, 31]'
+    text = changed((linear, table), ("nodes = 2", "nodes = 4"))
+    (finding,) = check(text, baseline=record(check(clean))).findings
+    assert finding.problem.startswith("bus.nodes: 4, was 2: corrected margin fell from ")
+
+
+def test_a_long_value_is_cut(changed: Changed, check: Check) -> None:
+    linear = 'kind = "linear"\ngrade = "measured"\nbase_us = 30\nper_byte_us = 0.35'
+    table = 'kind = "table"\ngrade = "measured"\npayload_bytes = [{}]\ntime_us = [{}]'
+    before = changed((linear, table.format("8, 12, 16, 20, 24, 28, 32, 36", "30, 31, 32, 33, 34, 35, 36, 37")))
+    after = changed((linear, table.format("8, 12, 16, 20, 24, 28, 32, 36", "90, 91, 92, 93, 94, 95, 96, 97")))
+    (finding,) = check(after, baseline=record(check(before))).findings
+    assert finding.problem.startswith(
+        "node.execution.time_us: [90.0, 91.0, 92.0, 93.0, 94.0,..., was [30.0, 31.0, 32.0, 33.0, 34.0,...: "
+    )
+
+
+def test_a_file_that_is_no_baseline_is_refused_with_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "b.json"
+    with pytest.raises(BusplanError, match=r"b\.json: no such file; record it with --update-baseline"):
+        load_baseline(path)
+    path.write_bytes(b"\xff")
+    with pytest.raises(BusplanError, match=r"b\.json: is not UTF-8, so it is no baseline; give another"):
+        load_baseline(path)
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(BusplanError, match=r"b\.json: no JSON, so no baseline; remove it"):
+        load_baseline(path)
+    with path.open("wb") as file:
+        file.truncate(32_000_001)
+    with pytest.raises(BusplanError, match=r"b\.json: is larger than 32,000,000 bytes, so it is no baseline"):
+        load_baseline(path)
+    path.write_text(write_baseline({"a.toml": Record({"standard.max_axes": 4.0}, {"bus.nodes": 2})}), encoding="utf-8")
+    assert load_baseline(path) == Baseline({"a.toml": Record({"standard.max_axes": 4}, {"bus.nodes": 2})}, MODELS, path)
+
+
+@pytest.mark.parametrize(
+    ("count", "words"), [(1, "0.toml"), (3, "0.toml, 1.toml, 2.toml"), (4, "0.toml, 1.toml, 2.toml, 1 more")]
+)
+def test_three_files_are_named_and_the_others_counted(count: int, words: str) -> None:
+    said = Baseline({}, MODELS).unmatched([f"{number}.toml" for number in range(count)], checked=())
+    assert f"no record ({words}); " in said

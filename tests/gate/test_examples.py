@@ -15,6 +15,7 @@ import pytest
 
 from busplan.errors import PlacedError
 from busplan.gate.baseline import MODELS, read_baseline
+from busplan.gate.finding import finding_line
 from busplan.gate.gate import FileResult, check_document, unreadable
 from busplan.gate.recording import Recording
 from busplan.gate.rules import all_rules
@@ -25,6 +26,7 @@ from busplan.questions.fit.circle_refusal import path_steps
 from busplan.sections.profile import Profile
 
 EXAMPLES = Path(__file__).parent / "examples"
+MESSAGES = Path(__file__).parent / "messages.txt"
 INVALID = sorted(EXAMPLES.glob("*/invalid*.toml"))
 VALID = sorted(EXAMPLES.glob("*/valid*.toml"))
 CURED = ("BP101", "BP103", "BP104", "BP105", "BP109", "BP114", "BP115", "BP121", "BP141", "BP151")
@@ -64,6 +66,20 @@ def test_an_invalid_example_triggers_its_rule_alone_and_in_place() -> None:
         assert {(one.code, one.rule, one.severity) for one in result.findings} == {
             (rule.code, rule.name, rule.severity)
         }
+
+
+def messages() -> str:
+    """What is said of every invalid example, a line for each finding."""
+    return "".join(
+        f"{finding_line(f'{path.parent.name}/{path.name}', finding)}\n"
+        for path in INVALID
+        for finding in checked(path).findings
+    )
+
+
+def test_the_words_of_every_rule_are_those_that_were_read_and_found_good() -> None:
+    """After a change of words: `python -m tests.gate.test_examples`, and read the difference."""
+    assert messages().splitlines() == MESSAGES.read_text(encoding="utf-8").splitlines()
 
 
 def test_a_valid_example_triggers_nothing() -> None:
@@ -251,3 +267,7 @@ def test_a_check_runs_a_circle_of_ten_million_steps_and_none_longer(
     monkeypatch.setattr("busplan.questions.circle.roundness.circle_test", simulated)
     found = {one.code for one in check_document(decode(text.encode(), name="x.toml")).findings}
     assert (ran, "BP204" in found) == (([10_000_000], False) if is_run else ([], True))
+
+
+if __name__ == "__main__":
+    MESSAGES.write_text(messages(), encoding="utf-8")

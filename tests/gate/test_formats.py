@@ -25,7 +25,7 @@ from busplan.forms.blocks import Sentence
 from busplan.gate.finding import Finding, finding_of
 from busplan.gate.formats import FORMATS
 from busplan.gate.formats.text import concise, full
-from busplan.gate.gate import FileResult, check_document
+from busplan.gate.gate import FileResult, Fit, check_document
 from busplan.gate.report import CheckReport, check_report
 from busplan.gate.rules import all_rules
 from busplan.profile.document import Document, Spot
@@ -425,16 +425,22 @@ def test_gitlab_fingerprints_are_unique() -> None:
 
 
 def test_junit_has_one_case_a_profile_also_when_clean(mixed: CheckReport) -> None:
-    root = ET.fromstring(render(mixed, file_format="junit"))
-    assert root.tag == "testsuites"
+    text = render(mixed, file_format="junit")
+    assert text.startswith("<?xml version='1.0' encoding='utf-8'?>\n<testsuites ")
+    root = ET.fromstring(text)
+    assert (root.tag, root.attrib["name"]) == ("testsuites", "busplan check")
     (suite,) = root
-    assert suite.tag == "testsuite"
+    assert (suite.tag, suite.attrib) == ("testsuite", root.attrib)
     assert {key: suite.attrib[key] for key in ("tests", "failures", "errors")} == {
         "tests": "4", "failures": "2", "errors": "1",
     }  # fmt: skip
     cases = suite.findall("testcase")
     assert [case.attrib["name"] for case in cases] == ["p/clean.toml", "p/fails.toml", "p/broken.toml", "gone.toml"]
     assert [[one.tag for one in case] for case in cases] == [[], ["failure", "system-out"], ["failure"], ["error"]]
+    assert [(case.attrib["classname"], case.attrib["file"]) for case in cases] == [
+        ("busplan.check", case.attrib["name"]) for case in cases
+    ]
+    assert [one.attrib for one in cases[1].findall("system-out")] == [{}]
     failure = cases[1].find("failure")
     assert failure is not None
     assert failure.attrib["type"] == "BP101"
@@ -612,3 +618,34 @@ def test_every_key_of_the_profile_schema_is_described_with_its_unit() -> None:
         assert key.get("description"), name
         unit = next((unit for ending, unit in units.items() if f"_{name}".endswith(f"_{ending}")), "")
         assert unit in key["description"], name
+
+
+def test_several_findings_of_one_file_are_lines_of_one_case() -> None:
+    found = [finding_at(Spot(line, 1, 1, 2), words=f"m{line}") for line in (1, 2)]
+    text = render(report(FileResult("a.toml", "a", tuple(found), {}, ("x", "y"))), file_format="junit")
+    (case,) = ET.fromstring(text)[0]
+    assert (case.findtext("failure") or "").splitlines() == [
+        "a.toml:1:1: BP002 error: m1", "a.toml:2:1: BP002 error: m2",
+    ]  # fmt: skip
+
+
+def test_markdown_says_a_margin_as_far_as_it_is_known() -> None:
+    def row(margin_us: float | None, uncertainty_us: float | None) -> str:
+        file = FileResult("a.toml", "a", (), {}, fit=Fit("fits", margin_us, uncertainty_us))
+        return render(report(file), file_format="markdown").splitlines()[-1]
+
+    assert row(1.04, 2.5) == "| `a.toml` | passes | fits | 1.0 +/- 2.5 |"
+    assert row(-20.0, None) == "| `a.toml` | passes | fits | -20.0 |"
+    assert row(None, None) == "| `a.toml` | passes | fits | - |"
+
+
+def test_every_way_to_mend_is_in_the_row_of_a_finding() -> None:
+    def row(**mending: Any) -> str:
+        found = finding_at(Spot(1, 1, 1, 2), **mending)
+        file = FileResult("a.toml", "a", (found,), {}, ("x",))
+        return render(report(file), file_format="markdown").splitlines()[-1].rpartition(" | ")[2]
+
+    assert row().strip() == "|"
+    assert row(help="do it") == "do it |"
+    assert row(cure=("a = 1", "b = 2")) == "`a = 1`<br>`b = 2` |"
+    assert row(help="do it", cure=("a = 1",)) == "do it<br>`a = 1` |"

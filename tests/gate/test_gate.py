@@ -4,9 +4,11 @@ import subprocess
 import sys
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
+import busplan
 from busplan.errors import PlacedError
 from busplan.gate.formats import FORMATS
 from busplan.gate.gate import FileResult, check_document, unreadable
@@ -268,3 +270,36 @@ def test_problems_that_are_not_listed_are_counted() -> None:
     told = [one for one in result.findings if "more problems of this file are not listed" in one.message]
     assert [one.message.rpartition("; ")[2] for one in told] == ["17 more problems of this file are not listed"]
     assert told == [result.findings[-1]]
+
+
+@pytest.mark.parametrize(
+    ("section", "place"),
+    [
+        ("[servo]\nstep_us = 100", (26, "servo")),
+        ("[circle]\nramp_periods = 10", (26, "circle")),
+        ("[tolerance]\nmax_contour_error_mm = 1", (1, "circle")),
+    ],
+)
+def test_a_circle_that_is_too_long_is_said_at_the_section_that_asks_for_it(
+    section: str, place: tuple[int, str], changed: Changed, check: Check
+) -> None:
+    (finding,) = check(changed(more=f"\n{section}\n"), circle_steps=1000).findings
+    assert (finding.code, finding.line, finding.key) == ("BP204", *place)
+
+
+def test_a_file_that_is_not_text_has_no_figures(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_bytes(b"schema_version = 1\n\xff\n")
+    (file,) = busplan.check(path, record=True).files
+    assert (file.figures, file.keys, file.fit) == ({}, None, None)
+
+
+def test_the_answer_has_a_title_and_a_row_for_each_finding(changed: Changed, tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(changed(("nodes = 2", "nodes = 0")), encoding="utf-8")
+    answer = busplan.check(path)
+    assert "<title>Check of profiles" in answer.html
+    answer.save(tmp_path / "found.csv")
+    head, row = (tmp_path / "found.csv").read_text(encoding="utf-8").splitlines()
+    assert head.startswith("path,code,rule,severity,message,key,line,column,")
+    assert row.startswith(f"{path},BP005,out-of-range,error,bus.nodes = 0: must be 1 or more,bus.nodes,")

@@ -105,8 +105,8 @@ class Baseline(NamedTuple):
         """Name of a profile's record, whatever the working folder is."""
         if source.is_shipped:
             return Path(source.name).stem
-        # Standard input is the file that it is called.
-        path = Path(source.name) if str(source.path) == "-" else source.path
+        # Standard input is the file that it is called; every other name leads to its file.
+        path = Path(source.name)
         return Path(os.path.relpath(os.path.realpath(path.parent) / Path(path.name), self._folder)).as_posix()
 
     @property
