@@ -159,7 +159,7 @@ def sweep_command(
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    from busplan.questions.fit.network import network_of
+    from busplan.questions.base.inputs import load_network
     from busplan.questions.sweep import checked_sweep, computed, require_drawable
 
     loaded, varied = load_changed(profile, changes), parse_axes(vary or [])
@@ -167,7 +167,7 @@ def sweep_command(
         require_separate(change, key, typed=f"--vary {key}")
     model = chosen_model(timing_model)
     asked = checked_sweep(
-        network_of(loaded),
+        load_network(loaded),
         varied,
         timing_models=None if model is None else [model],
         group=group,
