@@ -172,11 +172,11 @@ class Bus(ABC):
 
     def broken(self, network: Network) -> tuple[Limit, ...]:
         """The limits that plain numbers break, those of safety left out."""
-        return tuple(limit for limit in self.limits if not limit.is_safety and limit.is_broken(network))
+        return tuple(limit for limit in self.limits if limit.role != "safety" and limit.is_broken(network))
 
     def is_safe(self, network: Network) -> bool:
         """Whether plain numbers keep every safety limit."""
-        return not any(limit.is_broken(network) for limit in self.limits if limit.is_safety)
+        return not any(limit.is_broken(network) for limit in self.limits if limit.role == "safety")
 
     def event_kind(self, key: str) -> EventKind:
         """Name and colour of an event or a stretch of events."""

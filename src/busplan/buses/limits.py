@@ -7,7 +7,7 @@ from math import inf
 from typing import Final, NamedTuple
 
 from busplan.buses.network import Group, Network
-from busplan.buses.parts import COVERAGE, Limit, share_limit
+from busplan.buses.parts import COVERAGE, Bound, Limit, share_of_period
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, told_apart
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry, plain
 
@@ -90,13 +90,11 @@ def period_limit(periods: Periods) -> Limit:
     """
     return Limit(
         PERIOD_LIMIT,
-        "the bus does not allow this period",
-        lambda network: choose(periods.from_us(network.period_us) > network.period_us, 1, 0),
-        lambda _network: 0,
+        lambda network: periods.refusal(plain(network.period_us)),
+        Bound(lambda network: choose(periods.from_us(network.period_us) > network.period_us, 1, 0), lambda _network: 0),
         way_out="a period that the bus allows will do",
+        role="period",
         has_rule=True,
-        is_of_period=True,
-        says=lambda network: periods.refusal(plain(network.period_us)),
     )
 
 
@@ -197,14 +195,11 @@ def _doubt_us(network: Network) -> Number:
     return (most_us - least_us) / 2 / COVERAGE
 
 
-NODE_LIMIT: Final = share_limit(
+NODE_LIMIT: Final = Limit(
     NODE,
-    "",
-    _middle_us,
-    share=lambda _network: 1,
-    doubt=_doubt_us,
+    _all_words,
+    *share_of_period(_middle_us, share=lambda _network: 1, doubt=_doubt_us),
     way_out="a longer period or a faster node would do",
     has_rule=True,
-    says=_all_words,
 )
 """T_exec(read) + T_exec(write) + both worst extras <= n T_s, of every group with data in every n-th cycle."""

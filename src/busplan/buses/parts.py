@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
-from typing import Any, Final, Literal, NamedTuple
+from math import inf
+from typing import Final, Literal, NamedTuple
 
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Network
@@ -81,68 +82,40 @@ KEPT, NOT_SHOWN_KEPT, BROKEN = range(3)
 """Verdicts on a limit, the better first."""
 
 
-class Limit(NamedTuple):
-    """A value that must not be exceeded. Neither the value nor the ends of its doubt fall with the number of nodes."""
+class Bound(NamedTuple):
+    """A value that must not exceed another one. Value and doubt must not decrease as nodes are added."""
 
-    key: str
-    over: str
-    """Sentence on a limit that is broken or not shown to be kept: a format of `value`, its `uncertainty`, `most` and
-    the profile's `bus`."""
     value: Callable[[Network], Number]
     most: Callable[[Network], Number]
     doubt: Callable[[Network], Number] | None = None
     """Standard uncertainty of the value, less that of the most; without it both are exact."""
     perhaps: Callable[[Network], Number] | None = None
-    """A part of the value that may not be there: it counts where a limit must be shown to be kept, and breaks none."""
-    way_out: str = ""
-    """Advice that makes room where this limit keeps nodes out."""
-    failure: str = ""
-    """Name of the broken limit in a circle test, where that is not its key."""
-    has_rule: bool = False
-    """A rule of the kind reports the broken limit; otherwise the rule of the verdict does."""
-    is_safety: bool = False
-    """A cycle fits without it, but nothing is advised that breaks it."""
-    says: Callable[[Network], str] | None = None
-    """Sentence on the broken limit, where it says more than its value: instead of `over`."""
-    is_of_period: bool = False
-    """The period alone breaks it: a plan takes no period that does."""
-    kept_from_us: Callable[[Network], float] | None = None
-    """The period from which on plain numbers are shown to keep it, where a longer period is a cure [us]; None where no
-    period is."""
-    is_slow: bool = False
-    """Whether its value takes long to find: of a number of nodes it is asked last."""
-    period: "Callable[[Limit, Network], Number] | None" = None
-    """The shortest period that keeps it, where operators alone give it; with its doubt as the limit has it [us]."""
+    """Part of the value that may not be there: it counts where a limit must be shown to be kept, and breaks none."""
 
     def uncertainty(self, network: Network) -> Number:
-        """Expanded uncertainty U of its value, two standard uncertainties; 0 where it is exact."""
+        """Expanded uncertainty U of the value, two standard uncertainties; 0 where it is exact."""
         return 0.0 if self.doubt is None else COVERAGE * self.doubt(network)
 
     def least_value(self, network: Network) -> Number:
-        """Lower bound of its value: less U, and without what may not count."""
+        """Lower bound of the value: less U, and without what may not count."""
         least = self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
         return least if self.perhaps is None else least - self.perhaps(network)
 
     @property
-    def nominal(self) -> "Limit":
-        """The limit of the value as it is, its uncertainty left out."""
-        return self if self.doubt is None else self._replace(doubt=None, perhaps=None)
+    def nominal(self) -> "Bound":
+        """The bound of the value as it is, its uncertainty left out."""
+        return self._replace(doubt=None, perhaps=None)
 
     @property
-    def shown(self) -> "Limit":
-        """The stricter limit that a network keeps where it is shown to keep this limit: of value + U."""
+    def shown(self) -> "Bound":
+        """The bound that a network keeps where it is shown to keep this one: of value + U."""
         if self.doubt is None:
             return self
-        most = self._replace(value=lambda network: self.value(network) + self.uncertainty(network))
-        return most._replace(doubt=None, perhaps=None)
+        return Bound(lambda network: self.value(network) + self.uncertainty(network), self.most)
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
         return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
-
-    def period_us(self, network: Network) -> Number:
-        """The shortest period that keeps it, where `period` gives it; otherwise 0 [us]."""
-        return 0.0 if self.period is None else self.period(self, network)
 
     def verdict_code(self, network: Network) -> Number:
         """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
@@ -151,44 +124,74 @@ class Limit(NamedTuple):
             return surely
         return larger(surely, choose(self.shown.is_broken(network), NOT_SHOWN_KEPT, KEPT))
 
+
+class Limit(NamedTuple):
+    """A bound of the bus that a network must keep, with what is said where it does not."""
+
+    key: str
+    over: str | Callable[[Network], str]
+    """Sentence on a limit that is broken or not shown to be kept: a format of `value`, its `uncertainty`, `most` and
+    the profile's `bus`; or what writes it."""
+    bound: Bound
+    period: Callable[[Bound, Network], Number] | None = None
+    """Shortest period that keeps a bound, by network [us]; None where no longer period does."""
+    way_out: str = ""
+    """Advice that makes room where this limit keeps nodes out."""
+    role: Literal["cycle", "safety", "period"] = "cycle"
+    """safety: a cycle fits without it, but nothing is advised that breaks it. period: the period alone breaks it, and a
+    plan takes no period that does."""
+    has_rule: bool = False
+    """A rule of the kind reports the broken limit; otherwise the rule of the verdict does."""
+    is_slow: bool = False
+    """Its value and its period take long to find, and are of plain numbers: they are asked last."""
+
+    @property
+    def nominal(self) -> "Limit":
+        """The limit of the value as it is, its uncertainty left out."""
+        return self._replace(bound=self.bound.nominal)
+
+    @property
+    def shown(self) -> "Limit":
+        """The limit that a network keeps where it is shown to keep this one."""
+        return self._replace(bound=self.bound.shown)
+
+    def is_broken(self, network: Network) -> Number:
+        """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
+        return self.bound.is_broken(network)
+
+    def kept_from_us(self, network: Network) -> float:
+        """Shortest period that is shown to keep it, of plain numbers; infinite where no longer one does [us]."""
+        return inf if self.period is None else plain(self.period(self.bound.shown, network))
+
     def words(self, network: Network) -> str:
         """Say by how much a network breaks it."""
-        if self.says is not None:
-            return self.says(network)
-        value, most = self.value(network), self.most(network)
-        return self.over.format(value=value, uncertainty=self.uncertainty(network), most=most, bus=network.profile.bus)
+        if not isinstance(self.over, str):
+            return self.over(network)
+        value, most = self.bound.value(network), self.bound.most(network)
+        uncertainty = self.bound.uncertainty(network)
+        return self.over.format(value=value, uncertainty=uncertainty, most=most, bus=network.profile.bus)
 
 
-def share_limit(
-    key: str,
-    over: str,
+def share_of_period(
     value: Callable[[Network], Number],
     *,
     share: Callable[[Network], Number],
     doubt: Callable[[Network], Number] | None = None,
-    **more: Any,
-) -> Limit:
-    """The limit of a time that must be over within a share of the period, and that a longer period keeps.
+    perhaps: Callable[[Network], Number] | None = None,
+) -> tuple[Bound, Callable[[Bound, Network], Number]]:
+    """The bound of a time that must be over within a share of the period, and the shortest period that keeps it.
 
     Parameters
     ----------
-    key, over, doubt, more
-        As `Limit` has them.
     value
         The time, which rests on no period [us].
     share
         The share [1].
+    doubt, perhaps
+        As `Bound` has them.
     """
-    limit = Limit(
-        key,
-        over,
-        value,
-        lambda network: share(network) * network.period_us,
-        doubt=doubt,
-        period=lambda limit, network: limit.least_value(network) / share(network),
-        **more,
-    )
-    return limit._replace(kept_from_us=lambda network: plain(limit.shown.period_us(network)))
+    bound = Bound(value, lambda network: share(network) * network.period_us, doubt, perhaps)
+    return bound, lambda of, network: of.least_value(network) / share(network)
 
 
 class Starter(NamedTuple):
@@ -219,8 +222,6 @@ class Starter(NamedTuple):
 class Cost(IntEnum):
     """Cost of a change of a network, the cheapest first: the order of plans, of advice and of cures."""
 
-    SIMULATION = 0
-    """A number that the circle test alone knows."""
     REGISTER = 1
     """A number in the nodes, such as a gap count."""
     HOST_TIME = 2

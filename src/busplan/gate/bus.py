@@ -79,7 +79,7 @@ def _spare(counts: Any, spare: int, limit: int) -> str:
 def _room(subject: RuleSubject, counts: Any) -> Mending:
     """How to make room for more nodes."""
     limit = subject.network.bus.limit(counts.safe_limited_by)
-    return subject.cure() if limit is None or limit.is_safety else Mending(limit.way_out)
+    return subject.cure() if limit is None or limit.role == "safety" else Mending(limit.way_out)
 
 
 def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:

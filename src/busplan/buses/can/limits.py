@@ -12,7 +12,7 @@ from busplan.buses.can.traffic import Traffic, pdos_of, traffic_of
 from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT
 from busplan.buses.network import Network
-from busplan.buses.parts import Limit
+from busplan.buses.parts import Bound, Limit
 from busplan.elementwise import Number, larger, plain, pointwise, total, within
 from busplan.sections.base import MAX_TIME_US
 
@@ -180,57 +180,45 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",
-        lambda network: total(pdos_of(group) for group in network.groups),
-        lambda _network: MOST_NODES,
+        Bound(lambda network: total(pdos_of(group) for group in network.groups), lambda _network: MOST_NODES),
         way_out=f"a second bus has {MOST_NODES:g} more",
     ),
     Limit(
         "payload",
-        "a PDO of {value:.0f} bytes is over the {most:.0f} bytes of its frames",
-        _largest_pdo,
-        _most_bytes,
-        says=_payload_words,
+        _payload_words,
+        Bound(_largest_pdo, _most_bytes),
         way_out="a smaller payload would do",
-        failure="payload_bytes",
     ),
     Limit(
         "range",
         "identifier {value:.0f} is over {most:.0f}, the largest of {bus.identifier_bits} bits",
-        _largest_identifier,
-        _most_identifier,
+        Bound(_largest_identifier, _most_identifier),
         way_out="smaller identifiers, or those of 29 bits, have room",
         is_slow=True,
     ),
     Limit(
         "identifiers",
-        "{value:.0f} identifiers stand twice",
-        _collisions,
-        lambda _network: 0,
+        lambda network: _and_more([words for _, words in _collisions_in_words(traffic_of(network))]),
+        Bound(_collisions, lambda _network: 0),
         way_out="identifiers further apart have room",
         has_rule=True,
         is_slow=True,
-        says=lambda network: _and_more([words for _, words in _collisions_in_words(traffic_of(network))]),
     ),
     Limit(
         "load",
-        "the bus load is {value:.1%}, over the {most:.1%} of limits.max_load",
-        _load,
-        lambda network: network.profile.limits.max_load,
+        _load_words,
+        Bound(_load, lambda network: network.profile.limits.max_load),
         way_out="a longer period, fewer bytes or a faster bus takes load off",
+        period=lambda _bound, network: CanCycle(network, WORST).load_period_us,
         has_rule=True,
-        says=_load_words,
-        period=lambda _limit, network: CanCycle(network, WORST).load_period_us,
-        kept_from_us=lambda network: plain(CanCycle(network, WORST).load_period_us),
     ),
     Limit(
         "deadline",
-        "a message takes {value:.3f} of its deadline",
-        _deadline,
-        lambda _network: 1,
+        lambda network: _all_late(traffic_of(network)),
+        Bound(_deadline, lambda _network: 1),
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
+        period=lambda _bound, network: _kept_from_us(network),
         has_rule=True,
         is_slow=True,
-        says=lambda network: _all_late(traffic_of(network)),
-        kept_from_us=_kept_from_us,
     ),
 )

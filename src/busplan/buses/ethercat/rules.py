@@ -10,7 +10,7 @@ from busplan.buses.ethercat.latency import command_doubt_us, last_command_us, sy
 from busplan.buses.ethercat.traffic import data_bytes, datagrams, devices
 from busplan.buses.limits import NODE_LIMIT
 from busplan.buses.network import Network
-from busplan.buses.parts import NOT_SHOWN_KEPT, Limit, share_limit
+from busplan.buses.parts import NOT_SHOWN_KEPT, Bound, Limit, share_of_period
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, larger, plain, total
 
@@ -35,23 +35,24 @@ def _late_command_us(network: Network) -> Number:
 def _words(network: Network) -> str:
     """Say when the last command comes, and whether it is late only if all of the master's time is before the wire."""
     value_us, doubt_us, most_us = (
-        plain(us) for us in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
+        plain(us) for us in (_late_command_us(network), SYNC0.bound.uncertainty(network), SYNC0.bound.most(network))
     )
-    is_split = SYNC0.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
+    is_split = SYNC0.bound.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
     where = ", all of bus.master_us before the wire" if is_split else ""
     return f"the last command comes at {value_us:.1f} +/- {doubt_us:.1f} us{where}, SYNC0 at {most_us:.1f} us"
 
 
-SYNC0: Final = share_limit(
+SYNC0: Final = Limit(
     "sync0",
-    "",
-    _late_command_us,
-    share=sync0_share,
-    doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,
-    perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
+    _words,
+    *share_of_period(
+        _late_command_us,
+        share=sync0_share,
+        doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,
+        perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
+    ),
     way_out="a larger bus.sync_shift moves SYNC0 back",
     has_rule=True,
-    says=_words,
 )
 """A command must be in every device before SYNC0."""
 LIMITS: Final = (
@@ -59,25 +60,20 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} devices are over the {most:.0f} addresses of a segment",
-        lambda network: network.nodes,
-        lambda _network: MOST_DEVICES,
+        Bound(lambda network: network.nodes, lambda _network: MOST_DEVICES),
         way_out=f"a second segment has {MOST_DEVICES:g} more",
     ),
     Limit(
         "payload",
         "a device of {value:.0f} bytes is over the {most:.0f} bytes of a frame, and no device is split",
-        _largest_device,
-        lambda network: room_bytes(datagrams(network)),
+        Bound(_largest_device, lambda network: room_bytes(datagrams(network))),
         way_out="a smaller payload would do",
-        failure="payload_bytes",
     ),
     Limit(
         "cable",
         "a cable of {value:g} m is over the {most:g} m of 100BASE-TX",
-        _longest_cable,
-        lambda _network: MOST_CABLE_M,
+        Bound(_longest_cable, lambda _network: MOST_CABLE_M),
         way_out="a device between would do",
-        failure="cable_m",
     ),
     SYNC0,
 )

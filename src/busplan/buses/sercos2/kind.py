@@ -5,7 +5,7 @@ from typing import ClassVar, Final
 
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
-from busplan.buses.parts import Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
+from busplan.buses.parts import Bound, Key, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
 from busplan.buses.sercos2.cycle import EVENTS, NONE, STRETCHES, WORST, Sercos2Cycle
 from busplan.buses.sercos2.equations import (
@@ -28,17 +28,14 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} drives are over the {most:.0f} of a ring",
-        lambda network: network.nodes,
-        lambda _network: MOST_DRIVES,
+        Bound(lambda network: network.nodes, lambda _network: MOST_DRIVES),
         way_out=f"a second ring has {MOST_DRIVES:g} more",
     ),
     Limit(
         "payload",
         "the MDT has {value:.0f} bytes of data, over {most:.0f}",
-        lambda network: Sercos2Cycle(network, NONE).mdt_bytes,
-        lambda _network: MOST_MDT_BYTES,
+        Bound(lambda network: Sercos2Cycle(network, NONE).mdt_bytes, lambda _network: MOST_MDT_BYTES),
         way_out="a smaller payload or a second ring would do",
-        failure="payload_bytes",
     ),
 )
 

@@ -6,7 +6,7 @@ from typing import ClassVar, Final
 
 from busplan.buses.limits import NODE_LIMIT, period_limit, period_rule
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Bound, Cost, Key, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.sercos import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
 from busplan.buses.sercos3.cycle import EVENTS, STRETCHES, TELEGRAMS, WINDOW, Sercos3Cycle
 from busplan.buses.sercos3.equations import (
@@ -46,23 +46,19 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} devices are over the {most:.0f} of a network",
-        lambda network: network.nodes,
-        lambda _network: MOST_DEVICES,
+        Bound(lambda network: network.nodes, lambda _network: MOST_DEVICES),
         way_out=f"a second network has {MOST_DEVICES:g} more",
     ),
     Limit(
         "payload",
         "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
-        _largest_telegram,
-        lambda _network: MOST_BYTES,
+        Bound(_largest_telegram, lambda _network: MOST_BYTES),
         way_out="a smaller payload would do",
-        failure="payload_bytes",
     ),
     Limit(
         "telegrams",
         "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
-        _most_telegrams,
-        lambda _network: MOST_TELEGRAMS,
+        Bound(_most_telegrams, lambda _network: MOST_TELEGRAMS),
         way_out="a smaller payload or a second network would do",
     ),
 )

@@ -178,9 +178,9 @@ def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
     return (
         *(
             Failure(
-                limit.failure or limit.key,
-                existing(limit.value(network)),
-                existing(limit.most(network)),
+                limit.key,
+                existing(limit.bound.value(network)),
+                existing(limit.bound.most(network)),
                 limit.words(network),
             )
             for limit in broken

@@ -354,8 +354,8 @@ def assumptions(network: Network) -> tuple[Input, ...]:
         known = numbers_of(network, "capacity", model=model)[""]
         numbers += [known[key] for key in ("required_us", "available_us", "safe_required_us") if key in known]
     for limit in bus.limits:
-        if not limit.is_safety:
-            numbers += (limit.value(limited), limit.most(limited), limit.uncertainty(limited))
+        if limit.role != "safety":
+            numbers += (limit.bound.value(limited), limit.bound.most(limited), limit.bound.uncertainty(limited))
     by_name: dict[str, Input] = {}
     for given in inputs(Traced(None, parts=tuple(numbers))):
         by_name.setdefault(given.name, given)

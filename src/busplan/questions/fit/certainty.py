@@ -8,7 +8,7 @@ from typing import Final, Literal, NamedTuple, Protocol
 from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.network import Network
-from busplan.buses.parts import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
+from busplan.buses.parts import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Bound, Limit
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total, within
 
@@ -41,7 +41,7 @@ def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
     """The limits of a network's kind of bus, without those of safety and without doubts; time is the last."""
     bus = network.bus
     time = time_limit(lambda tried: bus.cycle(tried, model=model).most_required_us)
-    return (*(limit.nominal for limit in bus.limits if not limit.is_safety), time)
+    return (*(limit.nominal for limit in bus.limits if limit.role != "safety"), time)
 
 
 def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
@@ -49,9 +49,7 @@ def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
     return Limit(
         TIME,
         "{value:.3f} us needed of {most:.3f} us",
-        needed_us,
-        available_us,
-        failure="required_us",
+        Bound(needed_us, available_us),
     )
 
 
@@ -114,7 +112,7 @@ def certainty(cycle: BusCycle) -> Certainty:
 
 def limit_codes(network: Network) -> dict[str, Number]:
     """The place among `VERDICTS` of each limit of the bus by key, those of safety left out."""
-    return {limit.key: limit.verdict_code(network) for limit in network.bus.limits if not limit.is_safety}
+    return {limit.key: limit.bound.verdict_code(network) for limit in network.bus.limits if limit.role != "safety"}
 
 
 def time_code(weighed: Certainty, network: Network) -> Number:

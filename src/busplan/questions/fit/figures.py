@@ -308,10 +308,9 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     bus = network.bus
     period_us = bus.periods.from_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
-        if limit.period is not None:
-            period_us = larger(
-                period_us, bus.periods.from_us((limit.shown if is_shown else limit.nominal).period_us(network))
-            )
+        if limit.period is not None and not limit.is_slow:
+            bound = limit.bound.shown if is_shown else limit.bound.nominal
+            period_us = larger(period_us, bus.periods.from_us(limit.period(bound, network)))
     return period_us
 
 

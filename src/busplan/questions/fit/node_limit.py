@@ -114,7 +114,7 @@ def _most_within(limit: Limit, network: Network, cached_network: Callable[[int],
     if not _any(over):
         return ceiling
     if elements > 1:
-        asked = _size(limit.least_value(network.with_nodes(1)))
+        asked = _size(limit.bound.least_value(network.with_nodes(1)))
         counted = ceiling * (asked * _VALUE_COST + elements)
         if counted <= ceiling.bit_length() * elements * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))

@@ -96,7 +96,7 @@ def cell_of(network: Network, figures: Mapping[str, Any], *, x: Value, y: Value)
     x, y
         Values of the map's directions.
     """
-    unsafe = tuple(limit.key for limit in network.bus.limits if limit.is_safety and limit.is_broken(network))
+    unsafe = tuple(limit.key for limit in network.bus.limits if limit.role == "safety" and limit.is_broken(network))
     verdict: VerdictWord = figures["verdict"]
     state: State = verdict
     limits: tuple[str, ...] = ()

@@ -89,13 +89,13 @@ def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
     yield time
     least_us = 0.0
     for limit in bus.limits:
-        if limit.is_of_period or (limit.is_safety and not is_safe):
+        if limit.role == "period" or (limit.role == "safety" and not is_safe):
             continue
         # A limit that a period cures is asked at the shortest one that the others allow with any slice ratio.
         at_us = max(time.slice_us, least_us, MIN_STEP_US)
-        at = network if limit.kept_from_us is None else network._replace(period_us=at_us)
+        at = network if limit.period is None else network._replace(period_us=at_us)
         if limit.shown.is_broken(at):
-            kept_us = inf if limit.kept_from_us is None else limit.kept_from_us(at)
+            kept_us = limit.kept_from_us(at)
             if kept_us == inf:
                 way_out = f" ({limit.way_out})" if limit.way_out else ""
                 yield Need(inf, limit.key, f"{limit.words(at)}{way_out}", inf)
@@ -136,12 +136,12 @@ def unmet(network: Network) -> list[Need]:
     found = [
         Need(inf, limit.key, limit.words(network))
         for limit in limits
-        if limit.is_of_period and limit.is_broken(network)
+        if limit.role == "period" and limit.is_broken(network)
     ]
     found += _unmet([*to_be_shown(network), *_of_limits(network)], network)
     if not found:
         # What a limit needs of the slice was asked at the shortest period.
-        at = (limit for limit in limits if limit.kept_from_us is not None and limit.shown.is_broken(network))
+        at = (limit for limit in limits if limit.period is not None and limit.shown.is_broken(network))
         found = [Need(inf, limit.key, limit.words(network)) for limit in at]
     return found
 
@@ -194,7 +194,7 @@ def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool
     def missing(period_us: float) -> Need | None:
         at = at_period(network, period_us)
         need = most(at)
-        broken = any(limit.kept_from_us is not None and limit.shown.is_broken(at) for limit in bus.limits)
+        broken = any(limit.period is not None and limit.shown.is_broken(at) for limit in bus.limits)
         return need if broken or not within(need.period_us(ratio), period_us) else None
 
     need = most(network)
