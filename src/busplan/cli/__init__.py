@@ -1,5 +1,6 @@
 """The command line: parse, call, render, exit. Each command has a module; heavy imports are inside the commands."""
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +10,7 @@ import typer
 from busplan import __version__
 from busplan.cli.interrupt import signals_end_the_run
 from busplan.cli.lazy import SETTINGS, LazyGroup
-from busplan.cli.output import CANNOT, PLAN_FAILS, PlanFailsError, say
+from busplan.cli.output import CANNOT, PAGER, PLAN_FAILS, PlanFailsError, say
 from busplan.cli.streams import mend_streams
 from busplan.errors import BusplanError
 
@@ -46,8 +47,12 @@ def _options(
     _version: Annotated[
         bool, typer.Option("--version", help="Show the version and exit.", callback=_print_version, is_eager=True)
     ] = False,
+    no_pager: Annotated[
+        bool, typer.Option("--no-pager", help="Open no pager ($PAGER) where an answer is higher than the terminal.")
+    ] = False,
 ) -> None:
-    pass
+    if no_pager:
+        os.environ[PAGER] = ""
 
 
 def run() -> None:

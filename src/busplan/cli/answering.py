@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file
-from busplan.cli.output import emit_document, emit_text, is_styled, say
+from busplan.cli.output import emit_document, emit_pages, is_styled, refuse_terminal, say
 from busplan.errors import BusplanError
 from busplan.files import document_bytes, new_file
 from busplan.forms import ENDINGS, Form, render
@@ -61,12 +61,15 @@ def answer(
     Raises
     ------
     BusplanError
-        The file cannot be written or is an input, the form is refused, or the file name has no known ending.
+        The file cannot be written or is an input, the form is refused, or the file name has no known ending; a page of
+        HTML would go to a terminal.
     """
     chosen = form_of_file(form, output, forms=ENDINGS, default=default)
     if chosen in refused:
         raise BusplanError(f"--format {chosen}: {refused[chosen]}")
     if output is None:
+        if chosen == "html":
+            refuse_terminal(chosen)
         yield lambda report: give(_completed(report, changes, is_whole=is_whole), chosen)
         return
     require_apart({"--output": output}, inputs=inputs)
@@ -98,7 +101,7 @@ def give(report: "Report", form: Form) -> None:
     if form == "table":
         from busplan.forms import terminal
 
-        emit_text(terminal.text(report, width=terminal_width(), height=terminal_height(), styled=is_styled()))
+        emit_pages(terminal.text(report, width=terminal_width(), height=terminal_height(), styled=is_styled()))
     else:
         emit_document(render(report, form))
 

@@ -1,6 +1,5 @@
 """`busplan manual`."""
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -8,7 +7,7 @@ import typer
 
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import output_option
-from busplan.cli.output import is_terminal, write_document
+from busplan.cli.output import emit_pages, is_terminal, write_document
 from busplan.errors import BusplanError
 
 
@@ -47,19 +46,11 @@ def manual_command(
     if topic is None:
         write_document(_contents(known), output)
     elif output is None and is_terminal():
-        _show(page(topic))
+        from busplan.forms.pages import rendered
+
+        emit_pages(rendered(page(topic)))
     else:
         write_document(page(topic), output)
-
-
-def _show(markdown: str) -> None:
-    """Show a page on a terminal, by the pager that the user has set, as git does."""
-    from pydoc import pager
-
-    from busplan.forms.pages import rendered
-
-    os.environ.setdefault("LESS", "-FRX")
-    pager(rendered(markdown))
 
 
 def _contents(headings: dict[str, str]) -> str:

@@ -13,6 +13,8 @@ PLAN_FAILS: int = 1
 """Exit code if the answer is that the plan fails."""
 CANNOT: int = 2
 """Exit code if the program could not do its job."""
+PAGER: str = "PAGER"
+"""Variable with the user's pager; none where it is empty or cat."""
 
 
 class PlanFailsError(Exception):
@@ -57,6 +59,27 @@ def emit_text(text: str) -> None:
     sys.stdout.flush()
 
 
+def emit_pages(text: str) -> None:
+    """Write text that is read from its top: by the user's pager where the terminal is too low for it, as git does.
+
+    Raises
+    ------
+    BusplanError
+        As `emit_text`.
+    """
+    is_read = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+    if is_read and os.environ.get(PAGER, "less") not in ("", "cat"):
+        from shutil import get_terminal_size
+
+        if text.count("\n") >= get_terminal_size().lines:
+            from pydoc import pager
+
+            os.environ.setdefault("LESS", "-FRX")
+            pager(text)
+            return
+    emit_text(text)
+
+
 def emit_document(document: str | bytes) -> None:
     """Write a document for programs to stdout; text is UTF-8, whatever the terminal's encoding.
 
@@ -79,7 +102,7 @@ def refuse_terminal(form: str) -> None:
         stdout is a terminal.
     """
     if sys.stdout.isatty():
-        raise BusplanError(f"--format {form}: is not text for a terminal; give -o FILE.{form}, or use a pipe")
+        raise BusplanError(f"--format {form}: is not for a terminal; give -o FILE.{form}, or use a pipe")
 
 
 def write_document(document: str | bytes, output: Path | None, *, quiet: bool = False) -> None:
