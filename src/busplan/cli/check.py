@@ -12,6 +12,7 @@ from busplan.cli.destinations import require_apart
 from busplan.cli.options import complete_profile, option, output_option
 from busplan.cli.output import PlanFailsError, emit_text, is_styled, is_terminal, say, write_document
 from busplan.cli.rewrite import changing, require_changeable, rewrite
+from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.gate.formats import FORMATS
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -239,7 +240,7 @@ def _update_baseline(path: Path, sources: "Sequence[ProfileSource]", report: "Ch
         kept = {name: record for name, record in old.profiles.items() if old.is_current and name not in gone}
         rewrite(path, write_baseline({**kept, **now}).encode())
     if not quiet:
-        say(f"recorded {len(now)} profile{'s' * (len(now) != 1)} in {path}")
+        say(f"recorded {plural(len(now), 'profile')} in {path}")
     if gone:
         say(f"warning: {path}: dropped {', '.join(gone)}: no such profile any more")
     left = [name for name in old.profiles if not old.is_current and name not in (*now, *gone)]

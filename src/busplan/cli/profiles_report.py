@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
+from busplan.english import nouns
 from busplan.forms.blocks import Chapter, Code, Record, Report, Sentence, count_value, sentence
-from busplan.forms.numbers import nouns, period_value
+from busplan.forms.numbers import period_value
 from busplan.questions.words.documents import document
 from busplan.sections.profile import Profile
 

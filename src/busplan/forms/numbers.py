@@ -5,6 +5,7 @@ from math import isnan
 from typing import Final
 
 from busplan.buses.figure import unit_of
+from busplan.english import nouns
 from busplan.forms.blocks import (
     Bar,
     Block,
@@ -112,42 +113,6 @@ def period_value(period_us: float) -> ShownValue:
 def period(period_us: float) -> str:
     """Write a communication period in s, ms or us, by its size."""
     return with_unit(period_value(period_us))
-
-
-def plural(number: int, noun: str) -> str:
-    """Write a count with its noun.
-
-    Examples
-    --------
-    >>> plural(1, "node"), plural(2, "node"), plural(8, "axis")
-    ('1 node', '2 nodes', '8 axes')
-    """
-    return f"{number} {nouns(number, noun)}"
-
-
-def nouns(number: int, noun: str) -> str:
-    """Singular or plural of a noun, by its count.
-
-    Examples
-    --------
-    >>> nouns(1, "axis"), nouns(2, "axis")
-    ('axis', 'axes')
-    """
-    if number == 1:
-        return noun
-    return f"{noun.removesuffix('is')}es" if noun.endswith("is") else f"{noun}s"
-
-
-def listed(words: Sequence[str], last: str) -> str:
-    """Write a list in words.
-
-    Examples
-    --------
-    >>> listed(("speed", "slice ratio", "period"), "or")
-    'speed, slice ratio or period'
-    """
-    *before, end = words
-    return f"{', '.join(before)} {last} {end}" if before else end
 
 
 def factor_of(value: ShownValue) -> float:

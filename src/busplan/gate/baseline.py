@@ -22,8 +22,8 @@ from busplan.buses.figure import (
     by_key,
 )
 from busplan.buses.rule import RuleProblem, told_apart
+from busplan.english import first_of, plural
 from busplan.errors import BusplanError
-from busplan.forms.numbers import plural
 from busplan.gate.finding import Subject
 from busplan.printable import to_json
 from busplan.profile.collect import ProfileSource, claims
@@ -130,19 +130,14 @@ class Baseline(NamedTuple):
         """
         records = self.without_profile(checked)
         counts = (
-            f"{plural(len(names), noun)} {'has' if len(names) == 1 else 'have'} no {other} ({_first(names)})"
+            f"{plural(len(names), noun)} ha{'s' if len(names) == 1 else 've'} no {other} "
+            f"({first_of(names, _MOST_NAMED)})"
             for names, noun, other in ((profiles, "profile", "record"), (records, "record", "profile"))
             if names
         )
         words = ", ".join(counts)
         cure = "--update-baseline records and drops them, --pass-on-unmatched lets them pass"
         return f"{self}: {words}; {cure}" if words else ""
-
-
-def _first(names: Sequence[str]) -> str:
-    """The first of some names, and how many more there are."""
-    more = len(names) - _MOST_NAMED
-    return ", ".join((*names[:_MOST_NAMED], *([f"{more} more"] if more > 0 else ())))
 
 
 def load_baseline(path: Path) -> Baseline:

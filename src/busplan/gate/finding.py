@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from busplan.buses.parts import Value
 from busplan.buses.rule import Mending, Rule, RuleProblem, Severity
-from busplan.forms.numbers import listed
+from busplan.english import listed
 from busplan.printable import printable
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import Spot

@@ -5,8 +5,8 @@ from hashlib import sha256
 from typing import NamedTuple
 
 from busplan.buses.rule import Severity
+from busplan.english import nouns
 from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, State, count_value, joined, sentence
-from busplan.forms.numbers import nouns
 from busplan.gate.finding import Finding, finding_parts
 from busplan.gate.gate import FileResult, Fit
 from busplan.profile.changes import NO_CHANGES, KeyChanges

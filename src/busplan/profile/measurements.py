@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, Final, NamedTuple
 
+from busplan.english import plural
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.profile.document import text_of
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US
@@ -199,7 +200,7 @@ def _measurement(
     """Parse one line, or list all its problems."""
     if len(cells) != len(columns):
         hint = "; is there a decimal comma? Write 48.7" if len(cells) > len(columns) else ""
-        message = f"{len(cells)} value{'s' * (len(cells) > 1)} for {len(columns)} columns{hint}"
+        message = f"{plural(len(cells), 'value')} for {len(columns)} columns{hint}"
         return [PlacedProblem(line, 1, "inconsistent", message)]
     problems: list[PlacedProblem] = []
 

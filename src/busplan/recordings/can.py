@@ -13,11 +13,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.extras import require_extra
 from busplan.progress import Progress
 from busplan.recordings.statistics import Floats
-from busplan.recordings.words import counted
 
 _EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader", b"(": "CanutilsLogReader"}
@@ -205,11 +205,11 @@ class _Log:
         """All frames as arrays."""
         if not self._times:
             why = f" ({self.broken})" if self.broken else ""
-            errors = f" but {counted(self._errors, 'error frame')}" if self._errors else ""
+            errors = f" but {plural(self._errors, 'error frame')}" if self._errors else ""
             raise BusplanError(f"{path}: has no CAN frame{errors}{why}")
         if len(self._channels) > 1:
             named = ", ".join(
-                f"{channel} ({counted(count, 'frame')})" for channel, count in self._channels.most_common()
+                f"{channel} ({plural(count, 'frame')})" for channel, count in self._channels.most_common()
             )
             raise BusplanError(f"{path}: has frames of {len(self._channels)} channels: {named}; keep those of one bus")
         stamps = np.frombuffer(self._times, dtype=np.float64)

@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from busplan.english import plural
 from busplan.recordings.can import CanFrames
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, Quantile, ahead, grid
-from busplan.recordings.words import counted
 
 CAN_BIT_RATE: Final = 1000.0
 """No classical bus is faster [kbit/s]."""
@@ -29,7 +29,7 @@ _PERIODIC: Final = 0.15
 """Largest standard deviation of a periodic message, as a share of its period."""
 _MISSING: Final = 0.1
 """Most periods of a periodic message without a frame, as a share of its frames."""
-_SHOWN: Final = 6
+LISTED: Final = 6
 """Most identifiers that a sentence lists."""
 
 _ROUNDING: Final = 1e-9
@@ -216,16 +216,4 @@ def faults(frames: CanFrames, stretch: ClockStretch) -> Iterator[str]:
     if frames.broken:
         yield f"The log is cut or damaged after frame {len(frames.times_us):,}, read up to there: {frames.broken}."
     if stretch.steps_back:
-        yield f"Its clock was set back {counted(stretch.steps_back, 'time')}: the longest stretch between is taken."
-
-
-def listed(names: list[str]) -> str:
-    """Names of a sentence, no more than six.
-
-    Examples
-    --------
-    >>> listed(list("abcdefgh"))
-    'a, b, c, d, e, f and 2 more'
-    """
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(names[:_SHOWN]) + more
+        yield f"Its clock was set back {plural(stretch.steps_back, 'time')}: the longest stretch between is taken."

@@ -7,10 +7,10 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings.capture import CapturedPackets, CaptureNotes, Numbers, interned, packets
-from busplan.recordings.words import counted
 
 _TYPE: Final = 0x88A4
 _VLAN: Final = (0x8100, 0x88A8)
@@ -196,9 +196,7 @@ class _Reader:
                 "without it, and record again"
             )
         if len(self._masters) > 1:
-            named = ", ".join(
-                f"{_address(value)} ({counted(count, 'frame')})" for value, count in self._masters.items()
-            )
+            named = ", ".join(f"{_address(value)} ({plural(count, 'frame')})" for value, count in self._masters.items())
             raise BusplanError(
                 f"{path}: has frames of {len(self._masters)} masters: {named}; keep the frames of one, as in Wireshark "
                 "with the filter eth.src"

@@ -1,6 +1,6 @@
 """Limits of a CAN bus and of the CANopen identifiers, the load of the bus, and deadlines."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import reduce
 from math import inf
 from typing import Final
@@ -14,6 +14,7 @@ from busplan.buses.limits import NODE_LIMIT
 from busplan.buses.network import Network
 from busplan.buses.parts import Bound, Limit
 from busplan.elementwise import Number, larger, plain, pointwise, total, within
+from busplan.english import first_of
 from busplan.sections.base import MAX_TIME_US
 
 
@@ -33,14 +34,13 @@ def _all_late(traffic: Traffic) -> str:
     late = sorted(_late_streams(traffic), key=lambda pair: -pair[1] / pair[0].deadline_us)
     endless = [stream.name for stream, us in late if us == inf]
     if endless:
-        more = len(endless) - 1
-        rest = f" and {more} more message{'s' * (more > 1)} have" if more else " has"
-        return f"{endless[0]}{rest} no worst-case response time"
-    return _and_more(
+        return f"no worst-case response time: {first_of(endless, 1)}"
+    return first_of(
         [
             f"the worst-case response time of {stream.name} is {us:g} us, over its {stream.deadline_us:g} us"
             for stream, us in late
-        ]
+        ],
+        1,
     )
 
 
@@ -71,7 +71,7 @@ def shared_identifiers(traffic: Traffic) -> tuple[tuple[str, str], ...]:
     clauses: dict[str, list[str]] = {}
     for key, words in _collisions_in_words(traffic):
         clauses.setdefault(key, []).append(words)
-    return tuple((key, _and_more(each)) for key, each in clauses.items())
+    return tuple((key, first_of(each, 1)) for key, each in clauses.items())
 
 
 def _collisions_in_words(traffic: Traffic) -> Iterator[tuple[str, str]]:
@@ -79,10 +79,6 @@ def _collisions_in_words(traffic: Traffic) -> Iterator[tuple[str, str]]:
     for early, late, first, shared in collisions(streams(traffic, is_stuffed=True)):
         pair = f"{early.label} and {late.label}" if early.label != late.label else f"frames of {early.label} PDOs"
         yield _identifier_key(late), f"{pair} share {_from(first, shared)}"
-
-
-def _and_more(clauses: Sequence[str]) -> str:
-    return f"{clauses[0]}, and {len(clauses) - 1} more" if len(clauses) > 1 else clauses[0]
 
 
 def _identifier_key(stream: Stream) -> str:
@@ -198,7 +194,7 @@ LIMITS: Final = (
     ),
     Limit(
         "identifiers",
-        lambda network: _and_more([words for _, words in _collisions_in_words(traffic_of(network))]),
+        lambda network: first_of([words for _, words in _collisions_in_words(traffic_of(network))], 1),
         Bound(_collisions, lambda _network: 0),
         way_out="identifiers further apart have room",
         has_rule=True,

@@ -17,14 +17,15 @@ from busplan.buses.can.traffic import SYNC
 from busplan.buses.network import Network
 from busplan.buses.recorded import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, Sense, day_of
 from busplan.elementwise import plain
+from busplan.english import first_of, plural
 from busplan.progress import Progress
 from busplan.recordings.can import CanFrames, read_can
 from busplan.recordings.can_messages import (
+    LISTED,
     SentFrames,
     event_model,
     faults,
     least_bit_rate,
-    listed,
     longest_stretch,
     mean_period,
     sent_messages,
@@ -32,7 +33,6 @@ from busplan.recordings.can_messages import (
     step_us,
 )
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, grid, lateness, quantile
-from busplan.recordings.words import counted
 
 _NOT_SHOWN: Final = (
     "Not shown by a log: the bit rate, frames that the recorder did not take, when a frame was queued, commands that "
@@ -217,10 +217,10 @@ class _Seen:
                 None,
                 "at most",
                 len(self.taken),
-                hidden=f"never in the log: {listed(self.unseen)}",
+                hidden=f"never in the log: {first_of(self.unseen, LISTED)}",
             )
         frames = sum(len(sent.times_us) for sent in self.unplanned.values())
-        note = listed([f"{sent.identifier:#x}" for sent in self.unplanned.values()])
+        note = first_of([f"{sent.identifier:#x}" for sent in self.unplanned.values()], LISTED)
         yield RecordedFigure("frames of no message of the plan", "1", 0, frames, None, "at most", frames, note=note)
 
     def shows_nothing(self) -> Iterator[str]:
@@ -317,7 +317,7 @@ class _Seen:
         known = self.by_identifier.get((_whole(sync.first), sync.identifier_bits > BASE_BITS))
         periods = None if known is None else grid(known.times_us)
         if known is None or periods is None:
-            few = f"SYNC comes {counted(0 if known is None else len(known.times_us), 'time')}"
+            few = f"SYNC comes {plural(0 if known is None else len(known.times_us), 'time')}"
             yield self._missed("cycles without SYNC", None, 0, hidden=few)
             return
         yield self._missed("cycles without SYNC", periods.missing, int(periods.places[-1]) + 1)
@@ -340,7 +340,7 @@ class _Seen:
                     if number := getattr(due, name):
                         notes.append(f"{number:,} of {identifier:#x}")
         for name, notes in lost.items():
-            yield self._missed(f"PDOs {name}", counts[name], counts["due"], note=listed(notes))
+            yield self._missed(f"PDOs {name}", counts[name], counts["due"], note=first_of(notes, LISTED))
         behind_us = behind_us[behind_us >= 0]
         if not len(behind_us):
             return
@@ -543,9 +543,9 @@ class _Seen:
                 if switched and not self.has_switch
                 else ""
             )
-            yield f"{counted(fd, 'frame')} of CAN FD: in the load with half of the possible stuff bits{left}."
+            yield f"{plural(fd, 'frame')} of CAN FD: in the load with half of the possible stuff bits{left}."
         if frames.remote:
-            yield f"{counted(frames.remote, 'remote frame')}: the length code is shown as data."
+            yield f"{plural(frames.remote, 'remote frame')}: the length code is shown as data."
         if self.stamp_error_us > self.step_us + _ROUNDING_US:
             yield (
                 f"Frames come up to {self.stamp_error_us - self.step_us:.0f} us closer than the bus allows: stamps are "

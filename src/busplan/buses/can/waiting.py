@@ -15,6 +15,7 @@ from busplan.buses.can.equations import bit_us
 from busplan.buses.can.streams import Points, Stream, last_place, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic
 from busplan.elementwise import choose, from_rows, plain, rounded_up, rows, shape_of, smaller, total
+from busplan.english import first_of
 
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 
@@ -212,8 +213,7 @@ def counted(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[str, str
         us = sum(n * one.frame_us for n, one in zip(numbers, higher, strict=True))
         if isclose(us, worst.interference_us, abs_tol=1e-6):
             each = [f"{n} {one.label} of {one.frame_us:g} us" for n, one in zip(numbers, higher, strict=True) if n]
-            more = f", and of {len(each) - _LISTED} more" if len(each) > _LISTED else ""
-            return blocking[:2][-1], ", ".join(each[:_LISTED]) + more
+            return blocking[:2][-1], first_of(each, _LISTED)
     return "", ""
 
 

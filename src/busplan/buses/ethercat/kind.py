@@ -21,6 +21,7 @@ from busplan.buses.network import Network
 from busplan.buses.parts import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.recorded import Recorded
 from busplan.elementwise import plain
+from busplan.english import plural
 from busplan.progress import Progress
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         """Say whose latency it is, and what the master and the clocks add."""
         bus = network.profile.bus
         clocks = f"SYNC0 at {bus.sync_shift:.0%} of the period" if bus.distributed_clocks else "no distributed clocks"
-        cycles = f"{bus.pipeline_cycles} cycle{'s' * (bus.pipeline_cycles != 1)} in the master"
+        cycles = f"{plural(bus.pipeline_cycles, 'cycle')} in the master"
         return f"worst case of a command, of feedback and of a loop over both, {cycles}, {clocks}"
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
@@ -152,7 +153,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         """The layout of process data, the frames, and the clocks."""
         count = int(plain(self.cycle(network, model=LAST_BYTE).packing.frames))
         clocks = ("distributed clocks",) if network.profile.bus.distributed_clocks else ()
-        return (layout(network), f"{count} frame{'s' * (count != 1)}", *clocks)
+        return (layout(network), f"{plural(count, 'frame')}", *clocks)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
         """Functions of `busplan.buses.ethercat.evidence`."""

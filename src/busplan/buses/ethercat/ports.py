@@ -13,9 +13,9 @@ from busplan.buses.ethercat.equations import (
 from busplan.buses.network import Network
 from busplan.buses.recorded import RecordedFigure
 from busplan.elementwise import plain
+from busplan.english import plural
 from busplan.recordings.ethercat import Latch
 from busplan.recordings.statistics import expanded
-from busplan.recordings.words import counted
 from busplan.sections.alike_nodes import AlikeNodes
 
 _WRAP_NS: Final = 1 << 32
@@ -123,7 +123,7 @@ def line_delays(latches: tuple[Latch, ...], unlatched: int) -> LineDelays:
     remarks = []
     if unlatched:
         remarks.append(
-            f"Port times were read {counted(unlatched, 'time')} without the broadcast write to 0x0900 that stamps "
+            f"Port times were read {plural(unlatched, 'time')} without the broadcast write to 0x0900 that stamps "
             "them: not used; begin the recording before the master starts."
         )
     hops = []
@@ -152,7 +152,7 @@ def _spans_ns(latch: Latch) -> list[int]:
     """
     seen = len(latch.ports_ns)
     if seen != latch.devices:
-        raise _NoLineError(f"the write passed {counted(latch.devices, 'device')}, and those of {seen:,} were read")
+        raise _NoLineError(f"the write passed {plural(latch.devices, 'device')}, and those of {seen:,} were read")
     if seen == 1:
         raise _NoLineError("there is 1 device")
     spans = sorted(map(_span_ns, latch.ports_ns.values()), reverse=True)

@@ -32,11 +32,11 @@ from busplan.buses.ethercat.units import UnitCycle
 from busplan.buses.network import Network
 from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
 from busplan.elementwise import plain
+from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.recordings.ethercat import COMMANDS, Datagram, EthercatFrames, read_ethercat
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, Quantile, expanded, lateness, line, quantile, step
-from busplan.recordings.words import counted
 
 _PERIOD: Final = "cycle.period_us"
 _MASTER: Final = "bus.master_us"
@@ -161,7 +161,7 @@ class _Seen:
             return "the frames were stamped in bursts, and not as they passed the port"
         if self.short > _STRAY * count:
             return (
-                f"{self.short:,} of {counted(count, 'frame')} returned sooner than it takes to send them: the stamps "
+                f"{self.short:,} of {plural(count, 'frame')} returned sooner than it takes to send them: the stamps "
                 "were not taken at the master's port"
             )
         if typical_us <= self.stamp_us:
@@ -179,7 +179,7 @@ class _Seen:
         """Why the recording has no period; empty where it has one."""
         if self.cycles is None or self.cycles.periods is not None or self.cycles.in_bursts:
             return ""
-        return f"{counted(len(self.cycles.first), 'cycle')}, and a period takes {LEAST_EVENTS}"
+        return f"{plural(len(self.cycles.first), 'cycle')}, and a period takes {LEAST_EVENTS}"
 
     def shows_nothing(self) -> tuple[str, ...]:
         """Why the recording shows no machine within its plan."""
@@ -193,7 +193,7 @@ class _Seen:
 
     @property
     def _dropped(self) -> str:
-        return f"the recorder dropped or cut {counted(self.dropped, 'packet')}" if self.dropped else ""
+        return f"the recorder dropped or cut {plural(self.dropped, 'packet')}" if self.dropped else ""
 
     def figures(self) -> Iterator[RecordedFigure]:
         """All figures."""
@@ -295,7 +295,7 @@ class _Seen:
         planned = EthercatCycle(self.network, LAST_BYTE, sort.numbers[0])
         known = ("cycle_master_us", "cycle_frames_us", "cycle_data_us", "cycle_devices_us", "cycle_cable_us")
         planned_us = sum(plain(planned.by_term[key]) for key in known) + plain(planned.bias_us())
-        few = f"{counted(count, 'whole cycle')}, and a figure takes {LEAST_EVENTS}" if count < LEAST_EVENTS else ""
+        few = f"{plural(count, 'whole cycle')}, and a figure takes {LEAST_EVENTS}" if count < LEAST_EVENTS else ""
         trip_name, hidden = f"round trip{with_names}", self.bad_stamps or few
         of_trip = RecordedFigure(trip_name, "us", planned_us, None, None, "at most", count, hidden=hidden)
         of_master = RecordedFigure(
@@ -399,22 +399,22 @@ class _Seen:
         if notes.broken_at is not None:
             yield f"The file is cut or damaged from byte {notes.broken_at:,} on: read up to there."
         if self.steps_back:
-            yield (f"Its clock was set back {counted(self.steps_back, 'time')}: the longest stretch between is taken.")
+            yield (f"Its clock was set back {plural(self.steps_back, 'time')}: the longest stretch between is taken.")
         if self.cycles is not None and self.cycles.left_out:
             yield (
-                f"{counted(self.cycles.left_out, 'frame')} of process data at its ends are left out: of the master's "
+                f"{plural(self.cycles.left_out, 'frame')} of process data at its ends are left out: of the master's "
                 "start or end, where more cycles are missing than are there, or of cycles that the capture has in part."
             )
         if self.trips.unsent:
-            yield f"{counted(self.trips.unsent, 'frame')} returned without having been seen to be sent."
+            yield f"{plural(self.trips.unsent, 'frame')} returned without having been seen to be sent."
         if frames.cut:
-            yield f"Left out: {counted(frames.cut, 'EtherCAT frame')} that the recorder cut; record whole packets."
+            yield f"Left out: {plural(frames.cut, 'EtherCAT frame')} that the recorder cut; record whole packets."
         left_out = frames.others + notes.other_links + notes.without_time
         if left_out:
-            yield f"Left out: {counted(left_out, 'packet')} of other protocols or interfaces, or without a time."
+            yield f"Left out: {plural(left_out, 'packet')} of other protocols or interfaces, or without a time."
         if not self.bad_stamps and self.short:
             yield (
-                f"{counted(self.short, 'frame')} returned sooner than it takes to send them: their stamps were not "
+                f"{plural(self.short, 'frame')} returned sooner than it takes to send them: their stamps were not "
                 "taken at the master's port."
             )
         if self.master is not None and self.master.value < 0:

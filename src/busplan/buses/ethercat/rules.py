@@ -13,6 +13,7 @@ from busplan.buses.network import Network
 from busplan.buses.parts import NOT_SHOWN_KEPT, Bound, Limit, share_of_period
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, larger, plain, total
+from busplan.english import plural
 
 
 def _largest_device(network: Network) -> Number:
@@ -100,7 +101,7 @@ def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
     maybe = "" if SYNC0.key in figures.exceeded else "maybe "
     yield RuleProblem(
         "bus.sync_shift",
-        f"{subject.limit_words(SYNC0.key)}: {maybe}{late} cycle{'s' * (late > 1)} late",
+        f"{subject.limit_words(SYNC0.key)}: {maybe}{plural(late, 'cycle')} late",
         SYNC0.way_out,
         subject.cure().cure,
     )

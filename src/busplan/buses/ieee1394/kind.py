@@ -38,6 +38,7 @@ from busplan.buses.parts import (
     Value,
 )
 from busplan.elementwise import plain
+from busplan.english import plural
 from busplan.errors import BusplanError
 
 _HOST_STEP_US: Final = 10.0
@@ -194,7 +195,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """Say whose latency it is."""
         if is_broadcast(network):
             return ", ".join(("the data of all nodes to the host and the commands to them", *self.setup_words(network)))
-        nodes = f"{network.nodes} node{'s' * (network.nodes != 1)}"
+        nodes = f"{plural(int(plain(network.nodes)), 'node')}"
         farthest = f"farthest of {nodes}" if network.is_uniform else "the farthest node of each group"
         return ", ".join((farthest, *self.setup_words(network)))
 
@@ -243,7 +244,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """Hops, gap count, and a schedule other than the individual schedule."""
         hops, cycle = hops_of(network), network.profile.cycle
         schedule = (f"broadcast schedule by {cycle.broadcast_request} requests",) if is_broadcast(network) else ()
-        return (f"{hops} hop{'s' * (hops != 1)}", f"gap count {gap_count_of(network)}", *schedule)
+        return (f"{plural(int(plain(hops)), 'hop')}", f"gap count {gap_count_of(network)}", *schedule)
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:
         """An unsafe gap count, and cables that the table does not hold for."""
@@ -253,8 +254,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             if not self.is_safe(asked):
                 hops, given = hops_of(asked), gap_count_of(asked)
                 warnings.append(
-                    f"Warning: gap count {given} is unsafe for {hops} hop{'s' * (hops != 1)} "
-                    f"({asked.nodes} node{'s' * (asked.nodes != 1)}); "
+                    f"Warning: gap count {given} is unsafe for {plural(int(plain(hops)), 'hop')} "
+                    f"({plural(int(plain(asked.nodes)), 'node')}); "
                     f"the smallest safe one is {safe_gap_count(hops)}{limit}."
                 )
                 break

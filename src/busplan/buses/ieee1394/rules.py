@@ -28,6 +28,7 @@ from busplan.buses.network import Network
 from busplan.buses.parts import Bound, Limit
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, margin, told_apart
 from busplan.elementwise import Number
+from busplan.english import plural
 from busplan.sections.transactions import TRANSACTION_KINDS
 
 if TYPE_CHECKING:
@@ -214,7 +215,7 @@ def _wasted(subject: RuleSubject) -> str:
         return words
     (now,), (then,) = subject.counts(), subject.counts(changes)
     won = then.safe_nodes - now.safe_nodes
-    return f"{words} and wins {won} node{'s' * (won != 1)}"
+    return f"{words} and wins {plural(won, 'node')}"
 
 
 RULES: Final = (

@@ -6,8 +6,9 @@ from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from busplan.buses.rule import told_apart
+from busplan.english import plural
 from busplan.forms.markdown import code, escaped, table
-from busplan.forms.numbers import MISSING, plural, sentence_text
+from busplan.forms.numbers import MISSING, sentence_text
 from busplan.gate.finding import finding_line
 from busplan.gate.gate import FileResult, Fit
 from busplan.gate.report import CheckReport, Located, summary_sentence

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final, TypeVar
 
 from busplan.buses.network import Network
+from busplan.english import listed
 from busplan.errors import BusplanError
-from busplan.forms.numbers import listed
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load, shipped_names

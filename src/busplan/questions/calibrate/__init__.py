@@ -10,9 +10,10 @@ from typing import Any, Final, Protocol
 
 from busplan.buses.network import Network
 from busplan.buses.parts import MeasuredLatencies
+from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import plural, sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, measurements_from, parse_measurements
 from busplan.profile.shipped import locate_measurements
 from busplan.profile.toml import read_bytes

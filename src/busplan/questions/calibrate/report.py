@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
+from busplan.english import nouns
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -18,7 +19,7 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.numbers import nouns, sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.profile.write import value_text
 from busplan.questions.calibrate import CalibrateAnswer
 from busplan.questions.calibrate.fit import REPETITIONS_TO_COMPARE, Outlier

@@ -6,8 +6,9 @@ from typing import Final
 
 from busplan.buses.published import parts_tested
 from busplan.elementwise import FIT_ROUNDING, plain
+from busplan.english import listed, plural
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
-from busplan.forms.numbers import listed, period, plural, sentence_text
+from busplan.forms.numbers import period, sentence_text
 from busplan.questions.capacity.verdict import Verdict
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
 from busplan.questions.fit.figures import CapacityFigures

@@ -6,6 +6,7 @@ from typing import Any, Final
 from busplan.buses import figure
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
+from busplan.english import nouns
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -23,7 +24,7 @@ from busplan.forms.blocks import (
     sentence,
     state_of,
 )
-from busplan.forms.numbers import nouns, period, sentence_text
+from busplan.forms.numbers import period, sentence_text
 from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.lines import card, card_text, uncertainty_parts
 from busplan.questions.capacity.verdict import Verdict

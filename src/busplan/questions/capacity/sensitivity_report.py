@@ -6,6 +6,7 @@ from typing import Any, Final
 from busplan.buses.cycle import Term
 from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
 from busplan.buses.network import Network
+from busplan.english import listed, nouns
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -24,7 +25,7 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
-from busplan.forms.numbers import decimals_of, listed, nouns, period_value, sentence_text
+from busplan.forms.numbers import decimals_of, period_value, sentence_text
 from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.report import capacity_report
 from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Sensitivity, Standing

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from busplan.english import listed
 from busplan.forms.blocks import (
     Bar,
     Block,
@@ -23,7 +24,7 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.numbers import listed, period, period_value
+from busplan.forms.numbers import period, period_value
 from busplan.questions.circle.contour import ContourProfile, drawn_profile
 from busplan.questions.circle.drawing import circle_drawing, largest_mm, magnified
 from busplan.questions.circle.failures import MARGINS, Stated

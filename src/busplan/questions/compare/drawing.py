@@ -4,8 +4,9 @@ from typing import Final
 
 from busplan.buses.figure import Ink
 from busplan.elementwise import plain
+from busplan.english import plural
 from busplan.forms.charts import Curve, Curves, Drawing, Entry, Guide, Panel, letters, logarithmic
-from busplan.forms.numbers import period, plural
+from busplan.forms.numbers import period
 from busplan.questions.compare.kinds import KindComparison, MachineOnKind
 from busplan.questions.fit.network import bus_of, network_of
 

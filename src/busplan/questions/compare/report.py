@@ -9,6 +9,7 @@ from busplan.buses.figure import SAFE_AXES, VERDICT
 from busplan.buses.network import Network
 from busplan.buses.published import parts_tested
 from busplan.elementwise import plain
+from busplan.english import listed, nouns
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -28,7 +29,7 @@ from busplan.forms.blocks import (
     sentence,
     state_of,
 )
-from busplan.forms.numbers import listed, nouns, period, period_value, sentence_text
+from busplan.forms.numbers import period, period_value, sentence_text
 from busplan.profile.conversion import AssumedKey
 from busplan.profile.write import short_text
 from busplan.questions.compare.drawing import CAPTION, compare_drawing

@@ -5,6 +5,7 @@ from itertools import takewhile
 from operator import eq
 from typing import Final
 
+from busplan.english import listed, plural
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -20,7 +21,7 @@ from busplan.forms.blocks import (
     Words,
     figure_value,
 )
-from busplan.forms.numbers import MISSING, figure_text, listed, plural, sentence_text
+from busplan.forms.numbers import MISSING, figure_text, sentence_text
 from busplan.profile.keys import KeyValue
 from busplan.profile.write import value_text
 from busplan.questions.diff import ComparedFigure, DiffAnswer, DiffSide, Judgement, KeyDifference

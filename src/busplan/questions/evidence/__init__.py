@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 from busplan.buses import kind_named, kind_names
 from busplan.buses.published import Tested, parts_tested
+from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import plural
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.evidence.rows import EvidenceSection, sections_of

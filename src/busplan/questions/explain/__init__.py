@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from busplan.buses import kind_named, kind_names
 from busplan.buses.figure import Figure
+from busplan.english import listed, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import listed, plural
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_network, one_or_several
 from busplan.questions.explain.derivation import (

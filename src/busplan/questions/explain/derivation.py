@@ -14,8 +14,8 @@ from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure, by_key, term_name
 from busplan.buses.network import Network
 from busplan.elementwise import Number, Traced, value_of
+from busplan.english import listed
 from busplan.errors import BusplanError
-from busplan.forms.numbers import listed
 from busplan.questions.explain.formulas import formula_text, inputs, lines
 from busplan.questions.fit.certainty import certainty
 from busplan.questions.fit.figures import certainty_numbers, numeric_figures

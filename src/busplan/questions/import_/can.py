@@ -5,6 +5,7 @@ from itertools import groupby
 from typing import Any, Final, NamedTuple
 
 from busplan.buses import kind_named
+from busplan.english import first_of
 from busplan.errors import BusplanError
 from busplan.questions.import_.can_database import EXTENDED
 from busplan.questions.import_.canopen import Pdo
@@ -255,8 +256,7 @@ def _message(
 
 
 def _left_out(reason: str, names: list[str]) -> str:
-    more = f" and {len(names) - _LISTED} more" if names[_LISTED:] else ""
-    return f"left out, {reason}: {', '.join(names[:_LISTED])}{more}"
+    return f"left out, {reason}: {first_of(names, _LISTED)}"
 
 
 def settled(readings: Sequence[Reading]) -> None:

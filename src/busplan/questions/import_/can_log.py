@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.buses.recorded import CLOCK_TOLERANCE
+from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.questions.import_.can import BIT_RATE, LEAST, SHOWN
@@ -15,20 +16,19 @@ from busplan.questions.import_.can_database import EXTENDED
 from busplan.questions.import_.record import Fact, Reading
 from busplan.recordings.can import CanFrames, read_can
 from busplan.recordings.can_messages import (
+    LISTED,
     ClockStretch,
     EventModel,
     SentFrames,
     event_model,
     faults,
     least_bit_rate,
-    listed,
     longest_stretch,
     sent_messages,
     stamps_of_no_bus,
     step_us,
 )
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, expanded
-from busplan.recordings.words import counted
 
 _BIT_RATES: Final = (33.3, 50.0, 83.3, 100.0, 125.0, 250.0, 500.0, 800.0, 1000.0)
 """Usual bit rates [kbit/s]."""
@@ -98,7 +98,7 @@ def _require_times(stretch: ClockStretch, messages: Iterable[SentFrames], least_
     often = [sent for sent in messages if len(sent.times_us) >= LEAST_EVENTS]
     if not often:
         raise BusplanError(
-            f"{name}: {counted(len(stretch.taken), 'frame')}, none of an identifier that comes {LEAST_EVENTS} times: "
+            f"{name}: {plural(len(stretch.taken), 'frame')}, none of an identifier that comes {LEAST_EVENTS} times: "
             "too few for a plan; record for longer"
         )
     fastest = min(often, key=lambda sent: sent.mean.value)
@@ -145,7 +145,7 @@ def _roundest(value: float, doubt: float) -> float:
 
 def _facts(timing: _Timing, place: str) -> Iterator[tuple[str, Fact]]:
     sent, (burst, jitter_us) = timing.sent, timing.model
-    frames = counted(len(sent.times_us), "frame")
+    frames = plural(len(sent.times_us), "frame")
     yield "name", Fact(f"id-{sent.identifier:#x}", place)
     yield "identifier", Fact(sent.identifier + EXTENDED * sent.extended, place, "measured")
     if sent.is_fd:
@@ -168,12 +168,12 @@ def _facts(timing: _Timing, place: str) -> Iterator[tuple[str, Fact]]:
 
 def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing], length_us: float) -> Iterator[str]:
     yield from faults(frames, stretch)
-    number = counted(len(stretch.taken), "frame")
-    yield f"The log has {number} of {counted(len(timings), 'identifier')} in {length_us / 1e6:.3g} s"
+    number = plural(len(stretch.taken), "frame")
+    yield f"The log has {number} of {plural(len(timings), 'identifier')} in {length_us / 1e6:.3g} s"
     if frames.errors:
-        yield f"{counted(frames.errors, 'error frame')}: in no load"
+        yield f"{plural(frames.errors, 'error frame')}: in no load"
     if frames.remote:
-        yield f"{counted(frames.remote, 'remote frame')}: taken with the data of the length code"
+        yield f"{plural(frames.remote, 'remote frame')}: taken with the data of the length code"
     seldom = [timing for timing in timings if len(timing.sent.times_us) < LEAST_EVENTS]
     if seldom:
         yield f"fewer than {LEAST_EVENTS} frames, so a longer log knows the period better: {_names(seldom)}"
@@ -183,7 +183,7 @@ def _remarks(frames: CanFrames, stretch: ClockStretch, timings: list[_Timing], l
 
 
 def _names(timings: Iterable[_Timing]) -> str:
-    return listed([f"{timing.sent.identifier:#x}" for timing in timings])
+    return first_of([f"{timing.sent.identifier:#x}" for timing in timings], LISTED)
 
 
 def _bit_rate(machine: Reading, frames: CanFrames, stretch: ClockStretch, least_kbit_s: float) -> None:

@@ -5,6 +5,7 @@ from itertools import groupby
 from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
+from busplan.english import first_of
 from busplan.errors import BusplanError
 from busplan.questions.import_.igh import PDOS
 from busplan.questions.import_.record import Fact, Facts, Reading
@@ -44,10 +45,9 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
         raise BusplanError(f"{machine.file}: no devices")
     unknown = [number for number, facts in machine.nodes.items() if not facts.keys() >= {*_SIZES}]
     if unknown:
-        names = [f"{number} ({_name(machine.nodes[number])})" for number in unknown[:5]]
-        more = f" and {len(unknown) - 5} more" if unknown[5:] else ""
+        names = [f"{number} ({_name(machine.nodes[number])})" for number in unknown]
         raise BusplanError(
-            f"{machine.file}: how many bytes device {', '.join(names)}{more} has in a cycle is not known (the first is "
+            f"{machine.file}: how many bytes device {first_of(names, 5)} has in a cycle is not known (the first is "
             f"0); give the text of `{PDOS}` beside it, as in busplan import {machine.file} pdos.txt"
         )
     for number, facts in machine.nodes.items():

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from busplan.english import nouns
 from busplan.forms.blocks import (
     Block,
     Chart,
@@ -19,7 +20,7 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.numbers import nouns, sentence_text
+from busplan.forms.numbers import sentence_text
 from busplan.questions.map.drawing import (
     LOOKS,
     limit_words,

@@ -6,6 +6,7 @@ from pathlib import PurePath
 from typing import Final
 
 from busplan.buses.recorded import RecordedFigure, RecordedVerdict
+from busplan.english import plural
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -22,7 +23,6 @@ from busplan.forms.blocks import (
     TableRow,
     Words,
 )
-from busplan.forms.numbers import plural
 from busplan.profile.write import value_text
 from busplan.questions.measured import MeasuredAnswer
 from busplan.questions.words.documents import document, with_profile

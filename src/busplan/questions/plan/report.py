@@ -7,6 +7,7 @@ from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_
 from busplan.buses.network import Network
 from busplan.buses.parts import Value as BusValue
 from busplan.elementwise import plain
+from busplan.english import listed, nouns
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -26,7 +27,7 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.numbers import MISSING, listed, nouns, period_value, sentence_text
+from busplan.forms.numbers import MISSING, period_value, sentence_text
 from busplan.profile.keys import flat
 from busplan.questions.fit.certainty import FITS, limits_behind
 from busplan.questions.fit.figures import COUNTS

@@ -5,9 +5,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from busplan.buses.network import Network
+from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import plural
 from busplan.printable import has_controls
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.progress import Progress, part_of

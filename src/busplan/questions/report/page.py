@@ -13,6 +13,7 @@ from busplan.buses.figure import (
     UTILISATION,
     VERDICT,
 )
+from busplan.english import plural
 from busplan.forms.blocks import (
     Block,
     Card,
@@ -30,7 +31,6 @@ from busplan.forms.blocks import (
     TableRow,
     attribute_value,
 )
-from busplan.forms.numbers import plural
 from busplan.questions.base.shell import shell_word
 from busplan.questions.capacity.lines import card
 from busplan.questions.words.documents import document

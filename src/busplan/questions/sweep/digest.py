@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from busplan.buses.figure import EXCEEDED, TIMING_MODEL, VERDICT, Figure
+from busplan.english import nouns
 from busplan.forms.blocks import (
     Code,
     Record,
@@ -20,7 +21,6 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.numbers import nouns
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.sweep.asked import Sweep, column_figures
 from busplan.questions.sweep.rows import plain_rows

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from busplan.buses.network import Network
 from busplan.buses.parts import Value
+from busplan.english import listed
 from busplan.errors import BusplanError
-from busplan.forms.numbers import listed
 from busplan.profile.keys import named_tables
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override

@@ -6,9 +6,10 @@ from typing import Final, NamedTuple
 from busplan.buses.figure import MARGIN, REQUIRED
 from busplan.buses.parts import EventKind
 from busplan.elementwise import plain
+from busplan.english import nouns
 from busplan.forms.blocks import Sentence, ShownValue, count_value, figure_value, sentence
 from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
-from busplan.forms.numbers import figure_text, nouns, sentence_text, with_unit
+from busplan.forms.numbers import figure_text, sentence_text, with_unit
 from busplan.questions.fit.certainty import fits_in
 from busplan.questions.fit.figures import margin_us
 from busplan.questions.fit.network import bus_of, model_names
