@@ -85,8 +85,8 @@ def test_what_is_the_purpose_is_done(run: Callable[..., object], folder: Path) -
     for arguments in (
         update,
         update,
-        ("plan", "p.toml", "--nodes", "3", "--no-circle", "--apply"),
-        ("plan", "p.toml", "--no-circle", "-o", "new.toml"),
+        ("plan", "p.toml", "--nodes", "3", "--apply"),
+        ("plan", "p.toml", "-o", "new.toml"),
         ("sweep", "x.csv", *VARY, "-o", "a.svg", "--format", "csv", "--plot", "b.svg"),
     ):
         assert getattr(run(*arguments, cwd=folder), "returncode", None) == 0

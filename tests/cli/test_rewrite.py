@@ -24,7 +24,7 @@ Refused = Callable[..., str]
 SHIPPED = Path(__file__).parents[2] / "profiles"
 TABLE = str(SHIPPED / "table-1.csv")
 CHANGES = {
-    "plan": ("plan", "p.toml", "--nodes", "4", "--no-circle", "--apply"),
+    "plan": ("plan", "p.toml", "--nodes", "4", "--apply"),
     "calibrate": ("calibrate", "p.toml", TABLE, "--apply"),
     "baseline": ("check", "other.toml", "--no-circle", "--baseline", "b.json", "--update-baseline"),
 }
