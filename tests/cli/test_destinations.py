@@ -39,6 +39,10 @@ OVER_AN_INPUT = {
     "--output x.csv ": ("report", "paper-4ms", "x.csv", "-o", "x.csv", "--format", "html"),
     "--output x.csv  ": ("timeline", "x.csv", "-o", "x.csv"),
     "--output b.json": ("check", "p.toml", "--baseline", "b.json", "-o", "b.json"),
+    "--output link.csv ": ("diff", "paper-1ms", "x.csv", "-o", "link.csv"),
+    "--output link.csv  ": ("compare", "x.csv", "-o", "link.csv"),
+    "--output link.csv   ": ("explain", "x.csv", "required_us", "-o", "link.csv"),
+    "--output y.csv ": ("calibrate", "x.csv", "y.csv", "-o", "y.csv"),
     "--baseline y.csv": ("check", "y.csv", "--baseline", "y.csv", "--update-baseline"),
 }
 INTO_A_PROFILE = {

@@ -44,7 +44,7 @@ class Shown(NamedTuple):
 
 
 class Page(HTMLParser):
-    """The figures of a page, its commands, the lines of its cards, and numbers in a table's figures without their value."""
+    """The figures of a page, its commands, the lines of its cards, and numbers in a table that lack their value."""
 
     def __init__(self, html: str) -> None:
         super().__init__(convert_charrefs=True)

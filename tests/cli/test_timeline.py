@@ -20,7 +20,7 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 def test_json_holds_the_contract_and_agrees_with_capacity(busplan: Run, tmp_path: Path) -> None:
     options = ("--set", "bus.nodes=7", "--set", "bus.gap_count=optimal", "--period", "2ms")
-    run = busplan("timeline", "paper-1ms", *options, "--timing", "standard", "--format", "json", cwd=tmp_path)
+    run = busplan("timeline", "paper-1ms", *options, "--timing-model", "standard", "--format", "json", cwd=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")
     document = json.loads(run.stdout)
     assert (document["schema"], document["command"], document["profile"]) == (1, "timeline", "paper-1ms")
@@ -29,7 +29,7 @@ def test_json_holds_the_contract_and_agrees_with_capacity(busplan: Run, tmp_path
         assert {"kind", "node", "transaction", "start_us", "end_us"} <= set(event)
         assert event["transaction"] in ("read", "write", None)
         assert (event["node"] is None) == (event["transaction"] is None)
-    other = busplan("capacity", "paper-1ms", *options, "--timing", "standard", "--format", "json", cwd=tmp_path)
+    other = busplan("capacity", "paper-1ms", *options, "--timing-model", "standard", "--format", "json", cwd=tmp_path)
     (figures,) = json.loads(other.stdout)["results"]
     for key in ("required_us", "available_us", "margin_us", "fits", "gap_count", "period_us"):
         assert document[key] == figures[key]
@@ -38,34 +38,12 @@ def test_json_holds_the_contract_and_agrees_with_capacity(busplan: Run, tmp_path
     assert document["events"][-1]["end_us"] == figures["available_us"]
 
 
-def test_the_deciding_model_is_the_default_and_csv_has_the_same_events(busplan: Run, tmp_path: Path) -> None:
+def test_the_leading_model_is_the_default_and_csv_has_its_events_in_the_window(busplan: Run, tmp_path: Path) -> None:
     run = busplan("timeline", "paper-4ms", "--format", "csv", "--from", "0.1ms", "--to", "150us", cwd=tmp_path)
     rows = list(csv.DictReader(io.StringIO(run.stdout)))
     assert {row["timing_model"] for row in rows} == {"paper"}
     assert (float(rows[0]["start_us"]), float(rows[-1]["end_us"])) == (100.0, 150.0)
     assert all(one["end_us"] == other["start_us"] for one, other in pairwise(rows))
-
-
-def test_every_form_goes_to_a_file_by_its_name(busplan: Run, tmp_path: Path) -> None:
-    begins = {
-        "a.svg": b"<svg ",
-        "a.png": b"\x89PNG",
-        "a.json": b"{\n",
-        "a.csv": b"profile,",
-        "a.txt": b"paper-4ms at 4 ms: 1792.883 us to spare",
-        "a.md": b"### Timeline of `paper-4ms`\n",
-        "a.html": b"<!DOCTYPE html>",
-    }
-    for name, start in begins.items():
-        run = busplan("timeline", "paper-4ms", "-o", name, "--transaction", "write:2", cwd=tmp_path)
-        assert (run.returncode, run.stdout, run.stderr) == (0, "", f"wrote {name}\n")
-        assert (tmp_path / name).read_bytes().startswith(start)
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(begins)
-
-
-def test_a_form_may_be_named_whatever_the_file_is_called(busplan: Run, tmp_path: Path) -> None:
-    assert busplan("timeline", "paper-4ms", "-o", "cycle", "--format", "svg", cwd=tmp_path).returncode == 0
-    assert (tmp_path / "cycle").read_text(encoding="utf-8").startswith("<svg ")
 
 
 def test_an_overrun_is_a_report_and_exits_0(busplan: Run, tmp_path: Path) -> None:
@@ -79,19 +57,14 @@ def test_an_overrun_is_a_report_and_exits_0(busplan: Run, tmp_path: Path) -> Non
     ("arguments", "message"),
     [
         (["--from", "5"], "--from 5: expected a time with its unit, as 4ms, 250us or 0.001s"),
-        (["--to", "nan"], "--to nan: expected a time with its unit"),
         (["--from", "9us", "--to", "9us"], "--from 9us --to 9us: the window must end after it begins"),
         (["--from", "3ms"], "the window from 3000 us shows nothing: the cycle runs from 0 to 2000 us"),
-        (["--transaction", "read:3"], "--transaction read:3: expected read or write and a node from 1 to 2, as read:1"),
-        (["--transaction", "ping:1"], "--transaction ping:1: expected read or write"),
+        (["--transaction", "read:3"], "transaction read:3: expected read or write and a node from 1 to 2, as read:1"),
+        (["--transaction", "ping:1"], "transaction ping:1: expected read or write"),
         (["--transaction", "read:1", "--from", "1ms"], "shows nothing: the read of node 1 runs from 0.4 to 52.07"),
-        (["--period", "0s"], "--period 0s"),
         (["--set", "bus.nodes=1000000"], "a timeline shows up to 1000 nodes; one bus carries 62"),
-        (["-o", "cycle.doc"], "cycle.doc: expected a name ending in .txt, .md, .html, .csv, .json, .svg, .png"),
-        (["-o", "no/such/cycle.svg"], "there is no folder"),
-        (["--timing", "both"], "both"),
-        (["--cycle", "0"], "--cycle 0: expected a whole number from 1"),
-        (["--cycle", "-1"], "--cycle -1: expected a whole number from 1"),
+        (["--timing-model", "both"], "both"),
+        (["--cycle", "0"], "cycle 0: expected a whole number from 1"),
         (["--cycle", "first"], "invalid value for '--cycle': must be a valid integer"),
     ],
 )
