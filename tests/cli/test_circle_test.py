@@ -206,12 +206,6 @@ def test_the_report_the_trace_and_the_plot_go_to_their_files(circle_test: Run, p
         assert (profile.parent / name).read_bytes().startswith(start)
 
 
-def test_a_circle_that_fails_is_written_and_exits_1(circle_test: Run, profile: Path) -> None:
-    run = circle_test(profile, "--period", "100us", "-o", "report.md", cwd=profile.parent)
-    assert (run.returncode, run.stdout, run.stderr) == (1, "", "wrote report.md\n")
-    assert "NOT RUN, the cycle does not fit the bus" in (profile.parent / "report.md").read_text(encoding="utf-8")
-
-
 def test_a_report_that_cannot_be_written_is_said_before_the_simulation(
     circle_test: Run, profile: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -239,21 +233,6 @@ def test_a_broken_resvg_is_said_before_the_simulation(profile: Path) -> None:
     assert run.returncode == 2
     assert "does not load (RuntimeError: wrong ABI)" in run.stderr
     assert not (profile.parent / "c.png").exists()
-
-
-def test_options_override_the_profile(circle_test: Run, profile: Path) -> None:
-    run = circle_test(
-        profile,
-        "--set",
-        "circle.feed_mm_per_min=1500",
-        "--set",
-        "circle.radius_mm=50",
-        "--format",
-        "json",
-        cwd=profile.parent,
-    )
-    (result,) = json.loads(run.stdout)["results"]
-    assert (result["feed_mm_per_min"], result["radius_mm"]) == (1500, 50)
 
 
 def test_plain_python_without_a_compiled_kernel_gives_the_same_document(

@@ -59,11 +59,6 @@ def test_the_rows_of_csv_are_the_steps_of_json(run: Run) -> None:
         assert row["value"] == str(step["value"])
 
 
-def test_an_input_is_one_row_without_a_formula(run: Run) -> None:
-    (row,) = csv.DictReader(StringIO(run("explain", "paper-4ms", "period_us", "--format", "csv").stdout))
-    assert (row["symbol"], row["formula"], row["numbers"], row["value"]) == ("T_s", "", "", "4000.0")
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -80,11 +80,6 @@ def test_an_unknown_topic_is_refused_with_the_known_ones(refused: Refused, topic
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_cannot_be_written_is_said(refused: Refused, tmp_path: Path) -> None:
-    said = refused("manual", "gate", "-o", "no/x.md", cwd=tmp_path)
-    assert said.startswith("no/x.md: cannot be written: there is no folder")
-
-
 @pytest.mark.parametrize(("typed", "offered"), [("busplan man", "manual"), ("busplan manual p", "plan profile python")])
 def test_its_name_and_topics_are_completed(run: Run, typed: str, offered: str) -> None:
     at = str(len(typed.split()) - 1)
