@@ -2,17 +2,14 @@
 
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Any
 
 import pytest
 
 import busplan
 from busplan.buses import kind_names
 
-if TYPE_CHECKING:
-    import subprocess
-
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
+Run = Callable[..., Any]
 Refused = Callable[..., str]
 
 

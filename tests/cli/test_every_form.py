@@ -6,17 +6,14 @@ from collections.abc import Callable, Iterator
 from html.parser import HTMLParser
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from markdown_it import MarkdownIt
 
 from busplan.forms import ENDINGS
 
-if TYPE_CHECKING:
-    from subprocess import CompletedProcess
-
-Run = Callable[..., "CompletedProcess[str]"]
+Run = Callable[..., Any]
 Refused = Callable[..., str]
 
 QUESTIONS = (
@@ -37,18 +34,10 @@ NAME = "<script>alert(1)</script> | `x` [a](http://b) @team *c*"
 PROFILE = """schema_version = 1
 name = "<script>alert(1)</script> | `x` [a](http://b) @team *c*"
 description = "<img src=x onerror=alert(1)> **bold**"
-[bus]
-kind = "ieee1394"
-speed = "S400"
-nodes = 2
-[cycle]
-period_us = 1000
-[payload]
-read_bytes = 12
-write_bytes = 12
-[node]
-axes = 4
-execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 }
+bus = { kind = "ieee1394", speed = "S400", nodes = 2 }
+cycle.period_us = 1000
+payload = { read_bytes = 12, write_bytes = 12 }
+node = { axes = 4, execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 } }
 """
 MEASUREMENTS = "<b>m `1` *c*.csv"
 HOSTILE = (
@@ -94,7 +83,7 @@ def leaves(document: Any) -> Iterator[Any]:
 def written(run: Run, question: tuple[str, ...], form: str, **options: Any) -> str:
     done = run(*question, "--format", form, **options)
     assert (done.returncode, done.stderr) == (0, ""), done
-    return done.stdout
+    return str(done.stdout)
 
 
 @pytest.mark.parametrize("question", QUESTIONS, ids=" ".join)

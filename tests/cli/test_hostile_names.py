@@ -6,14 +6,11 @@ import re
 from collections.abc import Callable, Iterator
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import pytest
 
-if TYPE_CHECKING:
-    from subprocess import CompletedProcess
-
-Run = Callable[..., "CompletedProcess[str]"]
+Run = Callable[..., Any]
 
 # A colour, DEL, a C1 control, marks of direction, a line and a paragraph separator, a byte order mark, no UTF-8.
 EVIL = "a\x1b[31m\x7f\x9b2J\u202e\u2066\u2028\u2029\ufeff\udcff"

@@ -381,19 +381,6 @@ def test_a_limit_of_any_form_is_searched_whatever_the_profiles_own_stations(
             assert busplan.plan(changed(ring_file, bus__nodes=30)).recommended_changes is None
 
 
-def test_a_sweep_has_room_for_more_limits_than_bits_of_a_byte(run: Run, ring_file: Path) -> None:
-    def at_most(number: int) -> Limit:
-        return limit_of(lambda one: one.nodes, lambda _one: number, f"at most {number}")
-
-    limits = tuple(map(at_most, range(1, 12)))
-    with registered(ring_with(limits)):
-        vary = ("sweep", ring_file.name, "--vary", "bus.nodes=1,4,12", "--format", "json")
-        rows = json.loads(run(*vary, cwd=ring_file.parent).stdout)["rows"]
-    assert [[one for one in row["exceeded"] if one != "time"] for row in rows] == [
-        [f"at most {n}" for n in range(1, nodes)] for nodes in (1, 4, 12)
-    ]
-
-
 def test_keys_of_a_section_of_its_own_and_of_a_shared_one_are_the_cycles(run: Run, ring: Path) -> None:
     for key in ("guard.guard_us", "delivery.late_us"):
         done = run("sweep", ring.name, "--vary", f"{key}=0,7", "--format", "csv", cwd=ring.parent)

@@ -39,11 +39,6 @@ def test_a_topic_is_its_page_as_it_ships(run: Run, topic: str, tmp_path: Path) -
         assert (tmp_path / name).read_text(encoding="utf-8") == page
 
 
-def test_a_pipe_gets_the_same_bytes_whatever_the_environment(run: Run) -> None:
-    environment = {"COLUMNS": "40", "BUSPLAN_FORMAT": "sarif", "FORCE_COLOR": "1", "PYTHONIOENCODING": "ascii"}
-    assert run("manual", "models", env=environment).stdout == run("manual", "models").stdout
-
-
 def test_a_terminal_gets_the_page_set_for_reading_and_no_word_cut_off(
     on_terminal: Callable[..., tuple[int, str]], tmp_path: Path
 ) -> None:

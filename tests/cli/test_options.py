@@ -5,16 +5,13 @@ import json
 from collections.abc import Callable
 from fractions import Fraction
 from io import StringIO
-from typing import TYPE_CHECKING
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-if TYPE_CHECKING:
-    from subprocess import CompletedProcess
-
-Run = Callable[..., "CompletedProcess[str]"]
+Run = Callable[..., Any]
 Refused = Callable[..., str]
 
 

@@ -3,22 +3,20 @@
 import json
 import os
 import re
+import signal
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fcntl import LOCK_EX, flock
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
 from busplan import files
 from busplan.cli import rewrite
 
-if TYPE_CHECKING:
-    from subprocess import CompletedProcess
-
-Run = Callable[..., "CompletedProcess[str]"]
+Run = Callable[..., Any]
 Refused = Callable[..., str]
 
 SHIPPED = Path(__file__).parents[2] / "profiles"
@@ -56,6 +54,37 @@ def change(request: pytest.FixtureRequest, tmp_path: Path, run: Run) -> Change:
         return Change(CHANGES[request.param], tmp_path / "b.json")
     (tmp_path / "p.toml").write_text(text, encoding="utf-8")
     return Change(CHANGES[request.param], tmp_path / "p.toml")
+
+
+# The file is killed at the worst moments: before the new one is whole, before it takes the name, and just after.
+KILL = """
+import os
+def die(*_args, **_kwargs):
+    os.kill(os.getpid(), 9)
+{patch}
+"""
+KILLS = {
+    "half-written": """
+from busplan import files
+def half(self, data):
+    os.write(self.fileno(), bytes(data)[: len(data) // 2])
+    die()
+files._Raw.write = half
+""",
+    "not yet on the disk": "os.fsync = die",
+    "not yet renamed": "import pathlib; pathlib.Path.replace = die",
+}
+
+
+@pytest.mark.parametrize("moment", KILLS)
+def test_a_kill_while_writing_leaves_the_file_whole(change: Change, run: Run, tmp_path: Path, moment: str) -> None:
+    before = change.path.read_bytes()
+    killed = {"FORK_FIRST": KILL.format(patch=KILLS[moment])}
+    assert run(*change.command, cwd=tmp_path, env=killed).returncode == -signal.SIGKILL
+    assert change.path.read_bytes() == before
+    # What was being written had no name yet, where the system has such files.
+    left = [path.name for path in tmp_path.iterdir() if path.name.startswith(f".{change.path.name}.")]
+    assert len(left) == (0 if hasattr(os, "O_TMPFILE") and moment != "not yet renamed" else 1)
 
 
 def test_mode_and_links_stay(change: Change, tmp_path: Path, run: Run) -> None:

@@ -102,15 +102,6 @@ def test_a_pipe_is_as_wide_as_its_tables_whatever_columns_says(run: Run) -> None
         assert max(map(len, text.splitlines())) > 120
 
 
-def test_markup_in_a_name_is_shown_as_written_on_a_terminal(on_terminal: OnTerminal, tmp_path: Path) -> None:
-    names = ["[bold]x[/]", "[link=x]y[/]", ":smile:"]
-    for name in names:
-        (tmp_path / "x.toml").write_text(PROFILE.replace("NAME", name), encoding="utf-8")
-        code, shown = on_terminal("capacity", "x.toml", cwd=tmp_path, env={"COLUMNS": "200"})
-        assert code == 0
-        assert f"{name}  IEEE 1394, 2 nodes, 8 axes, 4 ms" in shown
-
-
 PROFILE = """\
 schema_version = 1
 name = "NAME"

@@ -2,31 +2,14 @@
 
 import csv
 import json
-import os
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "FORCE_COLOR"}
-
-
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
-
-
-def process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "busplan", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        check=False,
-        timeout=300,
-        env=ENVIRONMENT,
-    )
+Run = Callable[..., Any]
 
 
 def test_csv_has_the_columns_of_the_contract_and_the_rows_of_capacity(busplan: Run, tmp_path: Path) -> None:
@@ -100,13 +83,10 @@ def test_the_group_that_is_named_varies(busplan: Run, tmp_path: Path) -> None:
     assert [[row["safe_axes"] for row in document["rows"]] for document in documents] == [[29, 54], [28, 48]]
 
 
-def test_circle_tests_add_their_columns_and_processes_change_nothing(busplan: Run, tmp_path: Path) -> None:
-    grid = ["--vary", "cycle.period_us=500,4000", "--vary", "circle.feed_mm_per_min=15000", "--circle"]
-    shortened = ["--vary", "circle.radius_mm=20", *grid, "--format", "json"]
-    alone, together = (
-        call("sweep", "paper-4ms", *shortened, "--jobs", jobs, cwd=tmp_path)
-        for call, jobs in ((busplan, "1"), (process, "2"))
-    )
+def test_circle_tests_add_their_columns_and_processes_change_nothing(run: Run, tmp_path: Path) -> None:
+    circle = ("--set", "circle.radius_mm=20", "--set", "circle.feed_mm_per_min=15000", "--format", "json")
+    grid = ("sweep", "paper-4ms", "--vary", "cycle.period_us=500,4000", "--circle", *circle)
+    alone, together = run(*grid, "--jobs", "1", cwd=tmp_path), run(*grid, "--jobs", "2", cwd=tmp_path, env={})
     assert (alone.returncode, together.returncode) == (0, 0), alone.stderr + together.stderr
     assert alone.stdout == together.stdout
     rows = json.loads(alone.stdout)["rows"]
@@ -118,26 +98,9 @@ def test_circle_tests_add_their_columns_and_processes_change_nothing(busplan: Ru
     ]
     # What does not fit is not simulated, and does not pass.
     assert (rows[1]["max_contour_error_mm"], rows[1]["passed"]) == (None, False)
-    single = busplan(
-        "circle-test",
-        "paper-4ms",
-        "--set",
-        "circle.radius_mm=20",
-        "--set",
-        "circle.feed_mm_per_min=15000",
-        "--format",
-        "json",
-        cwd=tmp_path,
-    )
-    (result,) = json.loads(single.stdout)["results"]
-    for name in (
-        "mean_contour_error_mm",
-        "max_contour_error_mm",
-        "circular_deviation_mm",
-        "phase_margin_deg",
-        "passed",
-    ):
-        assert rows[2][name] == result[name]
+    (result,) = json.loads(run("circle-test", "paper-4ms", *circle, cwd=tmp_path).stdout)["results"]
+    keys = {"mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm", "phase_margin_deg", "passed"}
+    assert {key: rows[2][key] for key in keys} == {key: result[key] for key in keys}
 
 
 @pytest.mark.parametrize("grid", [["bus.nodes=1:9"], ["bus.gap_count=optimal,63", "cycle.period_us=250,1000,500"]])

@@ -2,10 +2,7 @@
 
 import csv
 import json
-import os
 import statistics
-import subprocess
-import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,7 +10,7 @@ from typing import Any
 
 import pytest
 
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
+Run = Callable[..., Any]
 Refused = Callable[..., str]
 LOSSY = ("sweep", "paper-4ms", "--set", "circle.radius_mm=20", "--set", "delivery.loss_probability=0.001", "--circle")
 SEEDS = ("--vary", "delivery.seed=1:12", "--jobs", "1")
@@ -128,12 +125,8 @@ def test_refusals(refused: Refused, line: str, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_terminal_gets_no_parquet(tmp_path: Path) -> None:
+def test_a_terminal_gets_no_parquet(on_terminal: Callable[..., tuple[int, str]], tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
-    ours, theirs = os.openpty()
-    call = [sys.executable, "-m", "busplan", "sweep", "paper-4ms", "--vary", "bus.nodes=1:2", "--format", "parquet"]
-    done = subprocess.run(call, stdout=theirs, stderr=subprocess.PIPE, cwd=tmp_path, check=False, text=True)
-    os.close(theirs)
-    os.close(ours)
-    assert done.returncode == 2
-    assert "--format parquet: is not text for a terminal; give -o FILE.parquet, or use a pipe" in done.stderr
+    sweep = ("sweep", "paper-4ms", "--vary", "bus.nodes=1:2", "--format", "parquet")
+    code, shown = on_terminal(*sweep, cwd=tmp_path, env={"COLUMNS": "200"})
+    assert (code, shown) == (2, "--format parquet: is not text for a terminal; give -o FILE.parquet, or use a pipe\n")

@@ -1,21 +1,16 @@
 """`busplan timeline` through the command line: contract, options together, files, errors."""
 
 import csv
-import fcntl
 import io
 import json
-import os
-import pty
-import struct
-import subprocess
-import termios
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
+Run = Callable[..., Any]
 
 
 def test_json_holds_the_contract_and_agrees_with_capacity(busplan: Run, tmp_path: Path) -> None:
@@ -79,48 +74,22 @@ def test_what_cannot_be_done_is_said_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_drawing_takes_the_width_of_its_terminal(program: Path, tmp_path: Path) -> None:
-    leader, follower = pty.openpty()
-    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 117, 0, 0))
-    environment = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "LINES")}
-    command = [str(program), "timeline", "paper-4ms"]
-    run = subprocess.Popen(command, stdout=follower, cwd=tmp_path, env={**environment, "NO_COLOR": "1"})
-    os.close(follower)
-    shown = b""
-    while True:
-        try:
-            block = os.read(leader, 65536)
-        except OSError:  # Linux says so when the other side is closed
-            break
-        if not block:
-            break
-        shown += block
-    os.close(leader)
-    assert run.wait(60) == 0
-    bars = [line for line in shown.decode().splitlines() if line.count("|") == 2]
-    assert {len(line) for line in bars} == {117}
+def test_a_drawing_takes_the_width_of_its_terminal(on_terminal: Callable[..., tuple[int, str]], tmp_path: Path) -> None:
+    _, shown = on_terminal("timeline", "paper-4ms", cwd=tmp_path, env={"COLUMNS": "117", "TERM": "dumb"})
+    assert {len(line) for line in shown.splitlines() if line.count("|") == 2} == {117}
 
 
 def test_a_cycle_of_groups_with_rates_of_their_own(busplan: Run, tmp_path: Path) -> None:
-    slow = """
-[[group]]
-name = "io"
-nodes = 2
-axes = 1
-every = 3
-read_bytes = 8
-write_bytes = 8
-[group.execution]
-kind = "linear"
-grade = "measured"
-base_us = 40.0
-per_byte_us = 1.0
+    execution = '{ kind = "linear", grade = "measured", base_us = 40.0, per_byte_us = 1.0 }'
+    group = f"nodes = 2, axes = 1, read_bytes = 8, write_bytes = 8, execution = {execution}"
+    profile = f"""\
+schema_version = 1
+name = "arm"
+bus = {{ kind = "can", bit_rate_kbit_s = 1000 }}
+cycle.period_us = 4000.0
+group = [{{ name = "drives", {group} }}, {{ name = "io", every = 3, {group} }}]
 """
-    drives = slow.replace('"io"', '"drives"').replace("every = 3\n", "")
-    head = (
-        'schema_version = 1\nname = "arm"\n[bus]\nkind = "can"\nbit_rate_kbit_s = 1000\n[cycle]\nperiod_us = 4000.0\n'
-    )
-    (tmp_path / "arm.toml").write_text(head + drives + slow, encoding="utf-8")
+    (tmp_path / "arm.toml").write_text(profile, encoding="utf-8")
     fullest, second = (
         json.loads(busplan("timeline", "arm.toml", *asked, "--format", "json", cwd=tmp_path).stdout)
         for asked in ((), ("--cycle", "5", "--transaction", "command:2"))

@@ -106,23 +106,6 @@ def test_a_document_is_utf_8_whatever_the_locale(run: Run, arguments: tuple[str,
         json.loads(theirs.stdout)
 
 
-@pytest.mark.parametrize("arguments", [("check", "-", "--format", "text"), ("capacity", "-")], ids=" ".join)
-def test_words_for_a_reader_keep_to_the_terminal(run: Run, arguments: tuple[str, ...]) -> None:
-    name = ("--stdin-filename", "größe.toml") if arguments[0] == "check" else ()
-    broken = MIXED.replace("nodes = 2", "nodes = 0") if name else MIXED
-    done = run(*arguments, *name, stdin=broken, inside={"encoding": "ascii"})
-    assert done.stdout.isascii()
-    assert "\\u00e4" in done.stdout or "\\u00f6" in done.stdout
-
-
-def test_a_path_that_is_no_utf_8_is_escaped_in_every_document(run: Run, tmp_path: Path) -> None:
-    odd = os.fsdecode(b"odd-\xff.toml")
-    (tmp_path / odd).write_text(MIXED, encoding="utf-8")
-    assert run("report", odd, "--format", "html", "-o", "page.html", cwd=tmp_path).returncode == 0
-    found = run("check", odd, "--no-circle", "--format", "json", cwd=tmp_path).stdout
-    assert json.loads(found)["files"][0]["path"] == odd
-
-
 # --- standard output by its name --------------------------------------------------------------------------
 
 
@@ -132,7 +115,6 @@ def test_a_path_that_is_no_utf_8_is_escaped_in_every_document(run: Run, tmp_path
         ("manual", "limits"),
         ("check", "paper-4ms", "--no-circle", "--format", "json"),
         ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3", "--format", "csv"),
-        ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3"),
         ("timeline", "paper-4ms", "--format", "svg"),
     ],
     ids=" ".join,
