@@ -158,7 +158,7 @@ class Ring(Bus):
         return (Perturbation("half the rate", {"bus.rate_mbit_s": network.profile.bus.rate_mbit_s / 2}),)
 
     def payloads(self, network: Network) -> PayloadRange:  # noqa: ARG002 - the same for any ring
-        return PayloadRange(1, 64, "frame")
+        return PayloadRange(1, 64)
 
 
 TEXT = """\
