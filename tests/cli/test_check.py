@@ -363,73 +363,6 @@ def test_what_is_no_baseline_is_never_overwritten(busplan: Busplan, folder: Path
         assert (folder / "b.json").read_text(encoding="utf-8") == content
 
 
-# Killed while it writes
-
-FORKED = """
-import os, sys
-from itertools import count
-from pathlib import Path
-from busplan.__main__ import main
-
-def child(last):
-    # Killed before the last of some steps that change files; gives whether it had fewer.
-    pid = os.fork()
-    if pid:
-        return os.WIFEXITED(os.waitpid(pid, 0)[1])
-    steps = count(1)
-
-    def step(*_):
-        if next(steps) == last:
-            os.kill(os.getpid(), 9)
-
-    def heard(event, arguments):
-        writes = event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR)
-        if writes or event in ("os.link", "os.rename", "os.remove", "os.truncate"):
-            step()
-
-    synced = os.fsync
-    os.fsync = lambda descriptor: (step(), synced(descriptor))
-    sys.addaudithook(heard)
-    try:
-        main()
-    finally:
-        os._exit(0)
-
-sys.argv = ["busplan", "check", *sys.argv[1:]]
-try:
-    main()  # which loads what each child has
-except SystemExit:
-    pass
-for number in count(1):
-    for name in ("baseline", "report"):
-        Path(name).write_bytes(Path(f"{name}.old").read_bytes())
-    whole = child(number)
-    for name in ("baseline", "report"):
-        os.link(name, f"{name}.{number}")
-        os.unlink(name)
-    if whole:
-        break
-print(number)
-"""
-
-
-def test_a_kill_at_any_step_leaves_one_file_or_the_other(busplan: Busplan, run: Busplan, folder: Path) -> None:
-    given = ["--baseline", "baseline", "--update-baseline", "-o", "report", "--format", "sarif"]
-    wholes: dict[str, set[bytes]] = {}
-    busplan("check", "p/clean.toml", *given, cwd=folder)
-    for name in ("baseline", "report"):
-        (folder / name).rename(folder / f"{name}.old")
-        wholes[name] = {(folder / f"{name}.old").read_bytes()}
-    done = run("p", *given, python=("-c", FORKED), cwd=folder)
-    assert done.returncode == 0, done.stderr
-    runs = int(done.stdout.split()[-1])
-    assert runs > 6  # each of two files is opened, synced and named
-    busplan("check", "p", *given, cwd=folder)
-    for name, whole in wholes.items():
-        whole.add((folder / name).read_bytes())
-        assert {(folder / f"{name}.{number}").read_bytes() for number in range(1, runs + 1)} == whole
-
-
 # rule and schema
 
 
@@ -605,8 +538,6 @@ def test_a_terminal_has_the_full_form_and_a_pipe_one_line_a_finding(
 
 INSTALL, CHECK = 1, 2
 """Steps of the action that are ours; the first sets up Python."""
-
-
 Step = Callable[..., Run]
 
 

@@ -37,11 +37,6 @@ def test_options_change_the_profile_before_it_is_put_on_other_kinds(run: Run) ->
     assert said[1].startswith("paper-1ms at 2 ms: ")
 
 
-def test_kinds_come_in_the_order_asked_for_and_once(run: Run) -> None:
-    done = run("compare", "paper-1ms", "--buses", "can, ieee1394,can", "--format", "json")
-    assert [one["kind"] for one in json.loads(done.stdout)["buses"]] == ["can", "ieee1394"]
-
-
 def test_what_cannot_be_is_refused(refused: Refused) -> None:
     said = refused("compare", "paper-1ms", "--buses", "can,iee1394")
     assert said.startswith("buses iee1394: no kind of bus; there are ieee1394, ")

@@ -48,16 +48,6 @@ def test_every_figure_is_that_of_its_own_command(run: Run, pair: tuple[str, str]
             assert one["relative_difference"] == pytest.approx((one["b"] - one["a"]) / abs(one["a"]))
 
 
-@pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "can-fd-arm-7", "sercos3-servo-8"])
-def test_a_profile_is_the_same_as_itself(run: Run, name: str) -> None:
-    document = answer(run, "diff", name, name, GATE)
-    assert document["same"] is True
-    assert document["changes"] == []
-    assert {one["judgement"] for one in document["figures"]} == {"same"}
-    done = run("diff", name, name)
-    assert done.stdout.startswith(f"{name} (A) fits, {name} (B) fits; every key has the same value.\n")
-
-
 # --- the gate ---------------------------------------------------------------------------------------------
 
 

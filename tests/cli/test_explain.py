@@ -23,15 +23,6 @@ def test_a_figure_is_derived_down_to_its_constants(run: Run) -> None:
     assert "published" in done.stdout
 
 
-def test_options_multiply_as_in_the_commands(run: Run) -> None:
-    changes = ("--set", "bus.nodes=3", "--set", "bus.gap_count=optimal")
-    arguments = ("--period", "1ms", "--period", "600us", *changes, "--timing-model", "both")
-    said = json.loads(run("explain", "paper-4ms", "required_us", *arguments, "--format", "json").stdout)
-    given = json.loads(run("capacity", "paper-4ms", *arguments, "--format", "json").stdout)
-    assert [one["value"] for one in said["derivations"]] == [row["required_us"] for row in given["results"]]
-    assert [one["period_us"] for one in said["derivations"]] == [1000.0, 1000.0, 600.0, 600.0]
-
-
 def test_without_a_figure_what_the_verdict_rests_on_comes_before_the_figures(run: Run) -> None:
     done = run("explain", "paper-4ms")
     assert done.returncode == 0

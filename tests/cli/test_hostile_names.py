@@ -99,11 +99,6 @@ def test_a_baseline_knows_the_name_again(run: Run, folder: Path) -> None:
     (folder / PROFILE).write_bytes((SHIPPED / "paper-1ms.toml").read_bytes())
 
 
-def test_markdown_shows_what_the_name_holds(run: Run, folder: Path) -> None:
-    said = run("diff", PROFILE, OTHER, "--format", "markdown", cwd=folder).stdout
-    assert "`a\\x1b[31m\\x7f\\x9b2J\\u202e\\u2066 \\ufeff\\udcff.toml` (A) fits" in said
-
-
 @pytest.mark.parametrize("beginning", ["=cmd|' /C calc'!A0", "+1", "-1", "@SUM(A1)"])
 @pytest.mark.parametrize("command", [("capacity",), ("plan",)], ids=" ".join)
 def test_no_name_is_a_formula_of_a_spreadsheet(

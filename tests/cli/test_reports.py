@@ -231,30 +231,21 @@ def test_the_smallest_and_the_largest_of_periods_are_reported(run: Run, form: st
 # --- the other commands -----------------------------------------------------------------------------------
 
 
-def test_paper_shows_published_beside_computed(run: Run) -> None:
-    done = run("paper")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "Table I: T1+T2, theory" in done.stdout
-    found = document(run, "paper")
-    assert (found["schema"], found["command"]) == (1, "paper")
-    theory = [one for one in found["figures"] if one["method"] == "eq (15)"]
-    assert len(theory) == 8
-    for one in theory:
-        assert f"{one['computed']:.2f}" == f"{one['published']:.2f}"
-        assert one["residual"] == pytest.approx(one["computed"] - one["published"])
-
-
 def test_evidence_has_the_papers_part_and_what_else_is_known(run: Run) -> None:
     done = run("evidence", "ieee1394")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout in run("evidence").stdout
     assert run("paper").stdout in done.stdout
-    found = document(run, "evidence", "ieee1394")
-    assert (found["kinds"], found["without"]) == (["ieee1394"], [])
-    assert {one["data"] for one in found["figures"]} == {"paper", "dvrk", "ieee1394"}
-    of_paper = [one for one in found["figures"] if one["data"] == "paper"]
-    assert [{**one, "kind": "ieee1394", "data": "paper"} for one in document(run, "paper")["figures"]] == of_paper
-    assert all((one["grade"] is None) == (one["published"] is None) for one in found["figures"])
+    found, paper = document(run, "evidence", "ieee1394")["figures"], document(run, "paper")["figures"]
+    assert {one["data"] for one in found} == {"paper", "dvrk", "ieee1394"}
+    assert [one for one in found if one["data"] == "paper"] == [
+        {**one, "kind": "ieee1394", "data": "paper"} for one in paper
+    ]
+    theory = [one for one in paper if one["method"] == "eq (15)"]
+    assert len(theory) == 8
+    for one in theory:
+        assert f"{one['computed']:.2f}" == f"{one['published']:.2f}"
+        assert one["residual"] == pytest.approx(one["computed"] - one["published"])
     refused = run("evidence", "can-opener")
     assert (refused.returncode, refused.stdout) == (2, "")
     assert refused.stderr.startswith("can-opener: no such kind of bus; there are ieee1394, can")

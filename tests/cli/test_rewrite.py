@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import signal
 import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -56,35 +55,66 @@ def change(request: pytest.FixtureRequest, tmp_path: Path, run: Run) -> Change:
     return Change(CHANGES[request.param], tmp_path / "p.toml")
 
 
-# The file is killed at the worst moments: before the new one is whole, before it takes the name, and just after.
-KILL = """
-import os
-def die(*_args, **_kwargs):
-    os.kill(os.getpid(), 9)
-{patch}
+KILLED = """
+import os, sys
+from itertools import count
+from pathlib import Path
+from busplan.__main__ import main
+
+def child(last):
+    # Killed before the last of some steps that change files; gives whether it had fewer.
+    pid = os.fork()
+    if pid:
+        return os.WIFEXITED(os.waitpid(pid, 0)[1])
+    steps = count(1)
+
+    def step(*_):
+        if next(steps) == last:
+            os.kill(os.getpid(), 9)
+
+    def heard(event, arguments):
+        writes = event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR)
+        if writes or event in ("os.link", "os.rename", "os.remove", "os.truncate"):
+            step()
+
+    synced = os.fsync
+    os.fsync = lambda descriptor: (step(), synced(descriptor))
+    sys.addaudithook(heard)
+    try:
+        main()
+    finally:
+        os._exit(0)
+
+path, sys.argv = Path(sys.argv[1]), ["busplan", *sys.argv[2:]]
+before = path.read_bytes()
+try:
+    main()  # which loads what each child has
+except SystemExit as leaving:
+    assert not leaving.code
+after = path.read_bytes()
+assert after != before
+for number in count(1):
+    path.write_bytes(before)
+    whole = child(number)
+    assert path.read_bytes() in (before, after)
+    if whole:
+        assert path.read_bytes() == after
+        break
+print(number)
 """
-KILLS = {
-    "half-written": """
-from busplan import files
-def half(self, data):
-    os.write(self.fileno(), bytes(data)[: len(data) // 2])
-    die()
-files._Raw.write = half
-""",
-    "not yet on the disk": "os.fsync = die",
-    "not yet renamed": "import pathlib; pathlib.Path.replace = die",
-}
+REPORT = ("check", "other.toml", "--no-circle", "--format", "json", "-o", "report")
 
 
-@pytest.mark.parametrize("moment", KILLS)
-def test_a_kill_while_writing_leaves_the_file_whole(change: Change, run: Run, tmp_path: Path, moment: str) -> None:
-    before = change.path.read_bytes()
-    killed = {"FORK_FIRST": KILL.format(patch=KILLS[moment])}
-    assert run(*change.command, cwd=tmp_path, env=killed).returncode == -signal.SIGKILL
-    assert change.path.read_bytes() == before
-    # What was being written had no name yet, where the system has such files.
-    left = [path.name for path in tmp_path.iterdir() if path.name.startswith(f".{change.path.name}.")]
-    assert len(left) == (0 if hasattr(os, "O_TMPFILE") and moment != "not yet renamed" else 1)
+@pytest.mark.parametrize("command", [*CHANGES.values(), REPORT], ids=[*CHANGES, "report"])
+def test_a_kill_at_any_step_leaves_one_file_or_the_other(run: Run, tmp_path: Path, command: tuple[str, ...]) -> None:
+    for name in ("other.toml", "p.toml"):
+        (tmp_path / name).write_text(profile(), encoding="utf-8")
+    run("check", "paper-4ms", "--no-circle", "--baseline", "b.json", "--update-baseline", cwd=tmp_path)
+    (tmp_path / "report").write_text("old", encoding="utf-8")
+    path = {"check": "b.json"}.get(command[0], "p.toml") if command is not REPORT else "report"
+    done = run(path, *command, python=("-c", KILLED), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout.split()[-1]) > 3  # the file is opened, synced and named
 
 
 def test_mode_and_links_stay(change: Change, tmp_path: Path, run: Run) -> None:

@@ -75,14 +75,6 @@ def test_the_top_rows_have_the_forms_for_people(busplan: Run, tmp_path: Path) ->
     assert {float(value) for value in margins} <= {row["margin_us"] for row in document["rows"]}
 
 
-def test_the_group_that_is_named_varies(busplan: Run, tmp_path: Path) -> None:
-    vary = ["--vary", "cycle.period_us=1000,2000", "--format", "json"]
-    runs = [busplan("sweep", "gantry-24", *vary, *more, cwd=tmp_path) for more in ([], ["--group", "tool"])]
-    documents = [json.loads(run.stdout) for run in runs]
-    assert [document["group"] for document in documents] == ["drives", "tool"]
-    assert [[row["safe_axes"] for row in document["rows"]] for document in documents] == [[29, 54], [28, 48]]
-
-
 def test_circle_tests_add_their_columns_and_processes_change_nothing(run: Run, tmp_path: Path) -> None:
     circle = ("--set", "circle.radius_mm=20", "--set", "circle.feed_mm_per_min=15000", "--format", "json")
     grid = ("sweep", "paper-4ms", "--vary", "cycle.period_us=500,4000", "--circle", *circle)

@@ -97,16 +97,6 @@ def test_every_form_has_the_summary(run: Run, tmp_path: Path) -> None:
         assert parquet(tmp_path / "rows.parquet").read().to_pylist()[0]["failed_share"] == row["failed_share"]
 
 
-def test_seeds_that_draw_nothing_are_said_to(run: Run, tmp_path: Path) -> None:
-    still = ("sweep", "paper-two-node", "--set", "circle.radius_mm=10", "--circle", *SEEDS, "--summary")
-    done = run(*still, "--columns", "failed_share,max_contour_error_std_mm", cwd=tmp_path)
-    assert (
-        "The circle is not judged at 1: no contour tolerance is asked for, or no error source matters." in done.stdout
-    )
-    assert "At 1 point all seeds gave the same circle: a seed draws for delivery.jitter_us and" in done.stdout
-    assert done.stdout.splitlines()[-1].split() == ["standard", "-", "0.000000"]
-
-
 REFUSALS = {
     "--vary delivery.seed=1:9 --summary": "--summary: goes with --circle",
     "--vary bus.nodes=1:9 --circle --summary": "summary=True: is over seeds, and none vary; add delivery.seed",

@@ -77,32 +77,3 @@ def test_what_cannot_be_done_is_said_and_leaves_nothing(
 def test_a_drawing_takes_the_width_of_its_terminal(on_terminal: Callable[..., tuple[int, str]], tmp_path: Path) -> None:
     _, shown = on_terminal("timeline", "paper-4ms", cwd=tmp_path, env={"COLUMNS": "117", "TERM": "dumb"})
     assert {len(line) for line in shown.splitlines() if line.count("|") == 2} == {117}
-
-
-def test_a_cycle_of_groups_with_rates_of_their_own(busplan: Run, tmp_path: Path) -> None:
-    execution = '{ kind = "linear", grade = "measured", base_us = 40.0, per_byte_us = 1.0 }'
-    group = f"nodes = 2, axes = 1, read_bytes = 8, write_bytes = 8, execution = {execution}"
-    profile = f"""\
-schema_version = 1
-name = "arm"
-bus = {{ kind = "can", bit_rate_kbit_s = 1000 }}
-cycle.period_us = 4000.0
-group = [{{ name = "drives", {group} }}, {{ name = "io", every = 3, {group} }}]
-"""
-    (tmp_path / "arm.toml").write_text(profile, encoding="utf-8")
-    fullest, second = (
-        json.loads(busplan("timeline", "arm.toml", *asked, "--format", "json", cwd=tmp_path).stdout)
-        for asked in ((), ("--cycle", "5", "--transaction", "command:2"))
-    )
-    needs_us = 55 + 8 * 135 + 2 * 48, 55 + 4 * 135 + 2 * 48
-    distinct = [
-        {"numbers": [1], "groups": ["drives", "io"], "nodes": 4, "required_us": needs_us[0]},
-        {"numbers": [2, 3], "groups": ["drives"], "nodes": 2, "required_us": needs_us[1]},
-    ]
-    for document, number, us in ((fullest, 1, needs_us[0]), (second, 2, needs_us[1])):
-        assert (document["cycle"], document["common_multiple"]) == (number, 3)
-        assert document["distinct_cycles"] == distinct
-        assert document["required_us"] == document["margins"][0]["required_us"] == us
-        assert document["margin_us"] == 4000 - us
-    (command,) = second["events"]
-    assert command["end_us"] == needs_us[1] - 48
