@@ -7,22 +7,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
+from busplan.buses import kind_named
 from busplan.buses.limits import NODE_LIMIT
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.compare.kinds import compare
-from busplan.questions.fit.network import bus_of, network_of
-from busplan.sections.profile import Profile
+from busplan.questions.fit.network import network_of
 
 KINDS = ("ethercat", "sercos3", "sercos2")
 
 
-def network(kind: str, **changes: Any) -> Profile:
+def network(kind: str, **changes: Any) -> busplan.Profile:
     """The shipped servo network of a kind at 1 ms, whose drives take 100 us and are measured."""
     own = {"cycle.period_us": 1000.0, "node.execution.base_us": 100.0, "node.execution.uncertainty_us": 5.0}
     if kind == "ethercat":
         own["bus.sync_shift"] = 0.0  # a command waits for the next SYNC0, which asks nothing of the node
-    return override(load(f"{kind}-servo-8").profile, own | {key.replace("__", "."): to for key, to in changes.items()})
+    return busplan.load_profile(
+        f"{kind}-servo-8",
+        changes=own | {key.replace("__", "."): to for key, to in changes.items()},
+    )
 
 
 def test_a_node_is_done_once_a_cycle() -> None:
@@ -70,18 +70,19 @@ def test_the_slowest_group_counts() -> None:
             },
         ],
     }
-    one = bus_of(load("sercos3-servo-8").profile).profile_model().model_validate(data)
+    one = kind_named("sercos3").profile_model().model_validate(data)
     assert NODE_LIMIT.shown.period_us(network_of(one)) == pytest.approx(2 * 470 + 4 * 20)
     found = busplan.capacity(one).verdicts[0].deciding
     assert (found.verdict, found.not_shown) == ("not shown to fit", ("node",))
     assert "vague: a node executes for 940.0 +/- 80.0 us of 1000.0 us" in str(busplan.capacity(one))
-    late = override(one, {"group.quick.execution.base_us": 503.0})  # surely late, though the other may take longer
+    # Surely late, though the other may take longer.
+    late = busplan.load_profile(one, changes={"group.quick.execution.base_us": 503.0})
     assert busplan.capacity(late).verdicts[0].deciding.verdict == "does not fit"
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_plan_takes_a_period_in_which_the_nodes_are_done(kind: str) -> None:
-    found = busplan.plan(network(kind, node__execution__base_us=700), circle=False)
+    found = busplan.plan(network(kind, node__execution__base_us=700))
     assert found.recommended is not None
     period_us = float(found.recommended.changes["cycle.period_us"])
     assert period_us >= 1420
@@ -90,7 +91,7 @@ def test_a_plan_takes_a_period_in_which_the_nodes_are_done(kind: str) -> None:
 
 def test_the_smallest_period_of_a_comparison_leaves_the_nodes_their_time() -> None:
     # Once 31.25 us were said for nodes that take 500.
-    found = compare(load("paper-1ms").profile, kinds=KINDS)
+    found = busplan.compare("paper-1ms", buses=KINDS)
     for one in found.compared:
         assert one.smallest.us is not None
-        assert one.smallest.us >= NODE_LIMIT.shown.period_us(network_of(one.profile))
+        assert one.smallest.us >= NODE_LIMIT.shown.period_us(one.network)

@@ -4,8 +4,9 @@ import json
 import subprocess
 import sys
 
+import busplan
 from busplan.buses import kind_names
-from busplan.profile.shipped import load, shipped_names
+from busplan.profile.shipped import shipped_names
 
 # One interpreter, from which each profile has a process of its own.
 PROGRAM = """
@@ -23,7 +24,7 @@ for name in sys.argv[1:]:
 
 
 def test_a_profile_loads_its_own_kind_of_bus_alone() -> None:
-    kind_of = {load(name).profile.bus.kind: name for name in shipped_names()}
+    kind_of = {busplan.load_profile(name).bus.kind: name for name in shipped_names()}
     assert set(kind_of) == set(kind_names())
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, *kind_of.values()], capture_output=True, text=True, check=True

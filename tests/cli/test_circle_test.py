@@ -3,38 +3,21 @@
 import csv
 import json
 import math
-import os
-import re
-import subprocess
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from busplan.errors import BusplanError
-from busplan.files import new_file
-
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
+Run = Callable[..., Any]
 
 QUICK = """
 schema_version = 1
 name = "quick"
-[bus]
-kind = "ieee1394"
-speed = "S400"
-nodes = 2
-[cycle]
-period_us = 2000
-[payload]
-read_bytes = 12
-write_bytes = 12
-[node]
-axes = 4
-[node.execution]
-kind = "linear"
-base_us = 30
-per_byte_us = 0.35
+bus = { kind = "ieee1394", speed = "S400", nodes = 2 }
+cycle.period_us = 2000
+payload = { read_bytes = 12, write_bytes = 12 }
+node = { axes = 4, execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 } }
 [servo]
 position_gain_per_s = 50
 velocity_feedforward = 0
@@ -56,7 +39,7 @@ def profile(tmp_path: Path) -> Path:
 def circle_test(busplan: Run) -> Run:
     """Ask for a circle test, in this process."""
 
-    def call(*arguments: object, cwd: Path) -> "subprocess.CompletedProcess[str]":
+    def call(*arguments: object, cwd: Path) -> Any:
         return busplan("circle-test", *arguments, cwd=cwd)
 
     return call
@@ -71,42 +54,14 @@ def test_json_holds_the_contract(circle_test: Run, profile: Path) -> None:
     assert (document["schema"], document["command"], document["profile"]) == (1, "circle-test", "quick")
     assert [result["period_us"] for result in document["results"]] == [2000, 4000]
     for result in document["results"]:
-        numbers = (
-            "period_us",
-            "feed_mm_per_min",
-            "radius_mm",
-            "duration_s",
-            "setpoints",
-            "steps",
-            "step_us",
-            "mean_contour_error_mm",
-            "max_contour_error_mm",
-            "radial_deviation_min_mm",
-            "radial_deviation_max_mm",
-            "phase_margin_deg",
-            "gain_margin_db",
-            "crossover_hz",
-        )
-        assert all(math.isfinite(result[key]) for key in numbers)
+        numbers = [key for key in result if key.endswith(("_us", "_mm", "_s", "_deg", "_db", "_hz"))]
+        absent = {"circular_deviation_mm", "centre_offset_mm"}
+        assert all(math.isfinite(result[key]) for key in numbers if key not in absent)
         assert len(result["centre_offset_mm"]) == 2
         assert (result["bus_fits"], result["passed"], result["failures"]) == (True, None, [])
         assert (result["path"], result["circular_deviation_mm"], result["settled"]) == ("trapezoid", None, None)
         assert {one["source"] for one in result["contributions"]} == {"velocity_feedforward", "period"}
         assert all(set(one) >= {"source", "max_contour_error_mm", "removed_mm"} for one in result["contributions"])
-
-
-def test_without_contributions_the_key_is_not_there(circle_test: Run, profile: Path) -> None:
-    run = circle_test(profile, "--format", "json", cwd=profile.parent)
-    assert "contributions" not in json.loads(run.stdout)["results"][0]
-
-
-def test_csv_has_the_same_figures_as_json(circle_test: Run, profile: Path) -> None:
-    rows = list(csv.DictReader(circle_test(profile, "--format", "csv", cwd=profile.parent).stdout.splitlines()))
-    (result,) = json.loads(circle_test(profile, "--format", "json", cwd=profile.parent).stdout)["results"]
-    assert len(rows) == 1
-    assert float(rows[0]["max_contour_error_mm"]) == result["max_contour_error_mm"]
-    assert float(rows[0]["centre_offset_x_mm"]) == result["centre_offset_mm"][0]
-    assert (rows[0]["passed"], result["passed"]) == ("", None)
 
 
 def test_a_missed_tolerance_is_exit_1_with_its_size_and_what_to_attack(circle_test: Run, profile: Path) -> None:
@@ -163,36 +118,24 @@ def test_trace_has_every_nth_step_of_each_period(circle_test: Run, profile: Path
         assert float(row["time_us"]) % 10_000 == 0
 
 
-@pytest.mark.parametrize(("name", "magic"), [("c.png", b"\x89PNG"), ("c.svg", b"<svg")])
-def test_plots_in_both_formats(circle_test: Run, profile: Path, name: str, magic: bytes) -> None:
-    run = circle_test(profile, "--plot", name, cwd=profile.parent)
-    assert (run.returncode, run.stderr) == (0, f"wrote {name}\n")
-    assert (profile.parent / name).read_bytes().startswith(magic)
-
-
-def test_the_same_test_draws_the_same_svg(circle_test: Run, profile: Path) -> None:
-    for name in ("a.svg", "b.svg"):
-        circle_test(profile, "--plot", name, cwd=profile.parent)
-    assert (profile.parent / "a.svg").read_bytes() == (profile.parent / "b.svg").read_bytes()
+def test_a_step_that_does_not_divide_the_period_is_a_shorter_one_that_does(circle_test: Run, profile: Path) -> None:
+    periods = ("--period", "50us", "--period", "2050us", "--set", "limits.reserve=0", "--set", "bus.nodes=1")
+    run = circle_test(profile, *periods, "--format", "json", cwd=profile.parent)
+    # In whole nanoseconds, where one is near: 2050 us are 25 of 82 us.
+    assert [result["step_us"] for result in json.loads(run.stdout)["results"]] == [50, 82]
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["--plot", "c.pdf"], "expected a name ending in .svg, .png; for a PDF write .svg: a browser prints it"),
-        (["--plot", "no/where/c.png"], "cannot be written"),
         (["--trace", "no/where/t.csv"], "cannot be written"),
         (["--trace", "."], "cannot be written"),
         (["--every", "5"], "goes with --trace"),
         (["--every", "0", "--trace", "t.csv"], "must be 1 or more"),
         (["--set", "circle.radius_mm=0"], "--set circle.radius_mm=0: must be 0.001 or more"),
-        (["--set", "circle.radius_mm=nan"], "--set circle.radius_mm=nan: "),
-        (["--set", "circle.feed_mm_per_min=inf"], "--set circle.feed_mm_per_min=inf: "),
         (["--set", "circle.feed_mm_per_min=1e6"], "feed_mm_per_min"),
-        (["--set", "circle.feed_mm_per_min=-1"], "--set circle.feed_mm_per_min=-1: must be 0.001 or more"),
         (["--set", "delivery.seed=-1"], "--set delivery.seed=-1: must be 0 or more"),
-        (["--period", "50us"], "quick.toml: servo.step_us = 100.0: longer than the period of 50 us; "),
-        (["--period", "2050us"], "(with --period 2050us)"),
     ],
 )
 def test_bad_input_is_exit_2_with_one_message_and_no_file(
@@ -218,140 +161,25 @@ def test_without_a_circle_the_answer_is_told_and_the_old_plot_stays(circle_test:
     assert len(list(profile.parent.iterdir())) == 2
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("report.md", "### Circle test of `quick`\n"),
-        ("report.html", '<svg xmlns="http://www.w3.org/2000/svg" class="chart"'),
-        ("report.txt", "Figures of the circle test"),
-        ("report.csv", "profile,period_us,feed_mm_per_min,"),
-        ("report.json", '"command": "circle-test"'),
-    ],
-)
-def test_the_report_goes_to_a_file_in_the_form_of_its_name(
-    circle_test: Run, profile: Path, name: str, words: str
-) -> None:
-    (profile.parent / name).write_text("old", encoding="utf-8")
-    run = circle_test(profile, "-o", name, "--trace", "t.csv", "--every", "1000", cwd=profile.parent)
-    assert (run.returncode, run.stdout, run.stderr) == (0, "", f"wrote t.csv\nwrote {name}\n")
-    assert words in (profile.parent / name).read_text(encoding="utf-8")
+def test_the_report_the_trace_and_the_plot_go_to_their_files(circle_test: Run, profile: Path) -> None:
+    files = ("-o", "report.md", "--trace", "t.csv", "--every", "1000", "--plot", "c.svg")
+    run = circle_test(profile, *files, cwd=profile.parent)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "wrote t.csv\nwrote c.svg\nwrote report.md\n")
+    assert "### Circle test of `quick`\n" in (profile.parent / "report.md").read_text(encoding="utf-8")
+    for name, start in (("c.png", b"\x89PNG"), ("c.svg", b"<svg")):
+        assert circle_test(profile, "--plot", name, cwd=profile.parent).stderr == f"wrote {name}\n"
+        assert (profile.parent / name).read_bytes().startswith(start)
 
 
-def test_a_circle_that_fails_is_written_and_exits_1(circle_test: Run, profile: Path) -> None:
-    run = circle_test(profile, "--period", "100us", "-o", "report.md", cwd=profile.parent)
-    assert (run.returncode, run.stdout, run.stderr) == (1, "", "wrote report.md\n")
-    assert "NOT RUN, the cycle does not fit the bus" in (profile.parent / "report.md").read_text(encoding="utf-8")
-
-
-def test_a_report_that_cannot_be_written_is_said_before_the_simulation(
-    circle_test: Run, profile: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def simulated(*_: object, **__: object) -> None:
-        pytest.fail("a simulation")
-
-    monkeypatch.setattr("busplan.questions.circle.roundness.circle_test", simulated)
-    run = circle_test(profile, "-o", "no/where.md", cwd=profile.parent)
-    assert run.returncode == 2
-    assert "no folder" in run.stderr
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["-o", "quick.toml", "--format", "json"], "quick.toml, which is read; give another name"),
-        (["-o", "new.toml", "--format", "json"], ".toml is a profile's name"),
-        (["-o", "t.csv", "--trace", "t.csv"], "--output t.csv and --trace t.csv: the same file"),
-        (["-o", "c.html", "--plot", "c.svg"], "--output c.html and --plot c.svg: the same file"),
-        (["-o", "report.xyz"], "expected a name ending in .txt, .md, .html, .csv, .json"),
-    ],
-)
-def test_a_report_destroys_nothing(circle_test: Run, profile: Path, arguments: list[str], message: str) -> None:
-    (profile.parent / "c.svg").symlink_to("c.html")
-    run = circle_test(profile, *arguments, cwd=profile.parent)
-    assert (run.returncode, run.stdout) == (2, "")
-    assert message in run.stderr
-    assert sorted(path.name for path in profile.parent.iterdir()) == ["c.svg", "quick.toml"]
-    assert profile.read_text(encoding="utf-8") == QUICK
-
-
-def test_trace_and_plot_in_one_file_are_refused(circle_test: Run, profile: Path) -> None:
-    (profile.parent / "link.svg").symlink_to("c.svg")
-    run = circle_test(profile, "--trace", "c.svg", "--plot", "link.svg", cwd=profile.parent)
-    assert run.returncode == 2
-    assert "the same file" in run.stderr
-
-
-@pytest.mark.parametrize("error", [ValueError("mine"), FileNotFoundError("mine"), OSError("mine")])
-def test_an_error_of_the_callers_own_work_stays_its_own(tmp_path: Path, error: Exception) -> None:
-    def work() -> None:
-        with new_file(tmp_path / "f", overwrite=True) as file:
-            file.write(b"half")
-            raise error
-
-    with pytest.raises(type(error), match="mine"):
-        work()
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full disk here")
-def test_a_full_disk_is_said_of_the_file(tmp_path: Path) -> None:
-    def work() -> None:
-        with new_file(tmp_path / "f", overwrite=True) as file:
-            os.dup2(os.open("/dev/full", os.O_WRONLY), file.fileno())
-            file.write(bytes(1 << 20))
-
-    with pytest.raises(BusplanError, match="f: cannot be written: No space"):
-        work()
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_broken_resvg_is_said_before_the_simulation(profile: Path) -> None:
+def test_a_broken_resvg_is_said_before_the_simulation(run: Run, profile: Path) -> None:
     package = profile.parent / "broken" / "resvg_py"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("raise RuntimeError('wrong ABI')", encoding="utf-8")
-    code = "import sys; sys.path.insert(0, 'broken'); from busplan.__main__ import main; main()"
-    run = subprocess.run(
-        [sys.executable, "-c", code, "circle-test", str(profile), "--plot", "c.png"],
-        capture_output=True,
-        text=True,
-        cwd=profile.parent,
-        check=False,
-    )
-    assert run.returncode == 2
-    assert "does not load (RuntimeError: wrong ABI)" in run.stderr
+    broken = ("-c", "import sys; sys.path.insert(0, 'broken'); from busplan.__main__ import main; main()")
+    done = run("circle-test", profile.name, "--plot", "c.png", cwd=profile.parent, python=broken)
+    assert done.returncode == 2
+    assert "does not load (RuntimeError: wrong ABI)" in done.stderr
     assert not (profile.parent / "c.png").exists()
-
-
-def test_rounding_is_shown_as_nothing(circle_test: Run, profile: Path) -> None:
-    # Ideal but for a scale: all errors are on one side, and the other end of the plot is rounding.
-    text = QUICK.replace("velocity_feedforward = 0", "velocity_feedforward = 1") + "[mechanics]\nbacklash_mm = 0.0\n"
-    profile.write_text(text, encoding="utf-8")
-    run = circle_test(profile, cwd=profile.parent)
-    assert not re.search(r"e-\d\d|[+-]0\.0\b", run.stdout)
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written_is_said_before_the_simulation(circle_test: Run, profile: Path) -> None:
-    profile.parent.chmod(0o500)
-    run = circle_test(profile, "--plot", "c.png", cwd=profile.parent)
-    profile.parent.chmod(0o700)
-    assert run.returncode == 2
-    assert "cannot be written" in run.stderr
-
-
-def test_options_override_the_profile(circle_test: Run, profile: Path) -> None:
-    run = circle_test(
-        profile,
-        "--set",
-        "circle.feed_mm_per_min=1500",
-        "--set",
-        "circle.radius_mm=50",
-        "--format",
-        "json",
-        cwd=profile.parent,
-    )
-    (result,) = json.loads(run.stdout)["results"]
-    assert (result["feed_mm_per_min"], result["radius_mm"]) == (1500, 50)
 
 
 def test_plain_python_without_a_compiled_kernel_gives_the_same_document(

@@ -39,6 +39,10 @@ OVER_AN_INPUT = {
     "--output x.csv ": ("report", "paper-4ms", "x.csv", "-o", "x.csv", "--format", "html"),
     "--output x.csv  ": ("timeline", "x.csv", "-o", "x.csv"),
     "--output b.json": ("check", "p.toml", "--baseline", "b.json", "-o", "b.json"),
+    "--output link.csv ": ("diff", "paper-1ms", "x.csv", "-o", "link.csv"),
+    "--output link.csv  ": ("compare", "x.csv", "-o", "link.csv"),
+    "--output link.csv   ": ("explain", "x.csv", "required_us", "-o", "link.csv"),
+    "--output y.csv ": ("calibrate", "x.csv", "y.csv", "-o", "y.csv"),
     "--baseline y.csv": ("check", "y.csv", "--baseline", "y.csv", "--update-baseline"),
 }
 INTO_A_PROFILE = {
@@ -85,8 +89,8 @@ def test_what_is_the_purpose_is_done(run: Callable[..., object], folder: Path) -
     for arguments in (
         update,
         update,
-        ("plan", "p.toml", "--nodes", "3", "--no-circle", "--apply"),
-        ("plan", "p.toml", "--no-circle", "-o", "new.toml"),
+        ("plan", "p.toml", "--nodes", "3", "--apply"),
+        ("plan", "p.toml", "-o", "new.toml"),
         ("sweep", "x.csv", *VARY, "-o", "a.svg", "--format", "csv", "--plot", "b.svg"),
     ):
         assert getattr(run(*arguments, cwd=folder), "returncode", None) == 0

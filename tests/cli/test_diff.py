@@ -1,15 +1,11 @@
 """`busplan diff` as users and gates call it: figures of the other commands, exit codes, revisions, refusals."""
 
-import csv
 import json
 from collections.abc import Callable
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-from busplan.profile.shipped import shipped_names
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]
@@ -52,32 +48,6 @@ def test_every_figure_is_that_of_its_own_command(run: Run, pair: tuple[str, str]
             assert one["relative_difference"] == pytest.approx((one["b"] - one["a"]) / abs(one["a"]))
 
 
-@pytest.mark.parametrize("name", shipped_names())
-def test_a_profile_is_the_same_as_itself(run: Run, name: str) -> None:
-    document = answer(run, "diff", name, name, GATE)
-    assert document["same"] is True
-    assert document["changes"] == []
-    assert {one["judgement"] for one in document["figures"]} == {"same"}
-    done = run("diff", name, name)
-    assert done.stdout.startswith(f"{name} (A) fits, {name} (B) fits; every key has the same value.\n")
-
-
-@pytest.mark.parametrize("model", ["paper", "standard", "both"])
-def test_only_what_is_asked_for_is_shown(run: Run, model: str) -> None:
-    document = answer(run, "diff", "paper-1ms", "paper-optimal-gap", "--timing-model", model)
-    models = {"paper", "standard"} if model == "both" else {model}
-    assert {one["part"] for one in document["figures"]} == {"plan", *models}
-
-
-def test_forms_say_the_same_verdict(run: Run) -> None:
-    pair = ("diff", "paper-optimal-gap", "paper-1ms")
-    text = answer(run, *pair)["text"]
-    assert run(*pair).stdout.startswith(f"{text}\n")
-    title, _, said = run(*pair, "--format", "markdown").stdout.splitlines()[:3]
-    assert title == "### Changes from `paper-optimal-gap` to `paper-1ms`"
-    assert said.replace("\\", "").replace("`", "") == f"**{text}**"
-
-
 # --- the gate ---------------------------------------------------------------------------------------------
 
 
@@ -90,12 +60,6 @@ def test_a_report_exits_0_and_a_gate_1_on_a_regression(run: Run) -> None:
     assert done.stderr.startswith("regression: B is worse in 16 figures: corrected margin, safe nodes, safe axes, ")
     for form in ("json", "markdown", "html", "csv"):
         assert run(*worse, GATE, "--format", form).returncode == 1
-
-
-def test_a_gate_as_a_process(run: Run) -> None:
-    done = run("diff", "paper-optimal-gap", "paper-1ms", GATE, env={})
-    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    assert run("diff", "paper-1ms", "paper-optimal-gap", GATE, env={}).returncode == 0
 
 
 def test_a_regression_under_the_model_that_does_not_decide_counts(run: Run, repository: Path) -> None:
@@ -118,7 +82,6 @@ def test_a_regression_under_the_model_that_does_not_decide_counts(run: Run, repo
         (("--tolerance", "5"), "--tolerance: goes with --fail-on-regression"),
         ((GATE, "--tolerance", "-1"), "--tolerance -1: must be 0 or more, in percent"),
         ((GATE, "--tolerance", "nan"), "--tolerance nan: must be 0 or more, in percent"),
-        ((GATE, "--tolerance", "inf"), "--tolerance inf: must be 0 or more, in percent"),
     ],
 )
 def test_a_tolerance_that_is_none_is_refused(refused: Refused, options: tuple[str, ...], said: str) -> None:
@@ -165,20 +128,5 @@ def test_what_is_wrong_with_either_side_is_said_together(refused: Refused, repos
     assert len(refused("diff", "none.toml", "none.toml", cwd=repository).splitlines()) == 1
 
 
-def test_the_rows_of_csv_are_the_figures_of_json(run: Run) -> None:
-    pair = ("diff", "paper-1ms", "paper-optimal-gap")
-    rows = list(csv.DictReader(StringIO(run(*pair, "--format", "csv").stdout)))
-    figures = answer(run, *pair)["figures"]
-    assert [{key: "" if value is None else cell(value) for key, value in one.items()} for one in figures] == rows
-    assert {row["judgement"] for row in rows} == {"better", "same", "neutral"}
-
-
 def cell(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def test_usage(refused: Refused) -> None:
-    assert refused("diff", "paper-1ms").startswith("busplan diff: missing argument 'B'; ")
-    assert "invalid value for '--format': 'text' is not one of 'table'" in refused(
-        "diff", "paper-1ms", "paper-4ms", "--format", "text"
-    )

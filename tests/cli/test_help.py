@@ -15,8 +15,6 @@ from typer.main import get_command
 
 from busplan.cli import app
 from busplan.cli.lazy import COMMANDS, FAILURES
-from busplan.profile.shipped import shipped_folder
-from busplan.questions.plan.search import MAX_CIRCLES
 
 Run = Callable[..., CompletedProcess[str]]
 
@@ -25,6 +23,7 @@ TOP: Any = ROOT.context_class(ROOT, info_name="busplan", **ROOT.context_settings
 UNIT = re.compile(r"\[(us|ms|s|mm|um|mm/min|mm/s|bytes|axes|nodes|deg|dB|%|1)\]|with its unit")
 OF_MACHINES = tuple(Path(__file__).parents[1] / "questions" / name / "files" for name in ("import_", "measured"))
 """Folders with files of a machine."""
+PROFILES = Path(__file__).parents[2] / "profiles"
 GATE = re.compile(r"[Ee]xits 0 [^.]*\b1\b")
 
 
@@ -63,13 +62,14 @@ EVERY_COMMAND = pytest.mark.parametrize("name", ["", *COMMANDS])
 
 
 @EVERY_COMMAND
-def test_it_begins_with_one_sentence(name: str) -> None:
+def test_it_begins_with_one_sentence_has_an_example_to_copy_and_ends_with_its_exit_codes(name: str) -> None:
+    lines = shown(name, columns=80)
     assert re.fullmatch(r"[A-Z][^.?!]*[.?]", paragraphs(name)[0])
-
-
-@EVERY_COMMAND
-def test_it_says_what_the_exit_codes_mean(name: str) -> None:
-    said = " ".join(" ".join(shown(name, columns=80)).split())
+    assert examples(name)
+    for example in examples(name):
+        assert f"  Example: {example}" in lines
+        assert example.startswith(f"busplan {name}".strip())
+    said = " ".join(" ".join(lines).split())
     if name:
         assert re.search(r"\b[Ee]xits 0\b", said)
         assert said.endswith(FAILURES)
@@ -80,15 +80,6 @@ def test_it_says_what_the_exit_codes_mean(name: str) -> None:
         )
 
 
-@EVERY_COMMAND
-def test_its_example_is_one_line_that_can_be_copied(name: str) -> None:
-    lines = shown(name, columns=80)
-    assert examples(name)
-    for example in examples(name):
-        assert f"  Example: {example}" in lines
-        assert example.startswith(f"busplan {name}".strip())
-
-
 @pytest.mark.parametrize(
     ("name", "example"), [pytest.param(name, one, id=one) for name in ("", *COMMANDS) for one in examples(name)]
 )
@@ -97,7 +88,7 @@ def test_its_example_runs_as_it_stands(shell: Run, name: str, example: str, tmp_
     for before, word in pairwise(words):
         # A profile that a user must have; what follows -o is written.
         if word.endswith(".toml") and before not in {"-o", "--output", ">"}:
-            (tmp_path / word).write_bytes((shipped_folder() / "paper-4ms.toml").read_bytes())
+            (tmp_path / word).write_bytes((PROFILES / "paper-4ms.toml").read_bytes())
         for folder in OF_MACHINES:
             if (folder / word).is_file():
                 (tmp_path / word).write_bytes((folder / word).read_bytes())
@@ -118,19 +109,14 @@ def test_no_line_is_wider_than_the_terminal(name: str) -> None:
         assert len(lines) < 2 * usual
 
 
-def test_the_list_of_commands_has_their_sentences_whole() -> None:
-    said = " ".join(" ".join(shown("", columns=80)).split())
-    for name in COMMANDS:
-        assert f"{name} {paragraphs(name)[0]}" in said
-
-
-def test_commands_stand_in_groups_and_init_comes_first() -> None:
+def test_commands_stand_in_groups_with_their_sentences_whole_and_init_comes_first() -> None:
     lines = shown("", columns=80)
     titles = [lines.index(f"{title}:") for title in ("Design", "Analyse", "Gate", "Learn", "Options")]
     assert titles == sorted(titles)
     assert lines[titles[0] + 1].startswith("  init ")
-    assert not any(line.startswith("Commands") for line in lines)
-    assert sorted(COMMANDS) == sorted(set(COMMANDS))
+    said = " ".join(" ".join(lines).split())
+    for name in COMMANDS:
+        assert f"{name} {paragraphs(name)[0]}" in said
 
 
 @EVERY_COMMAND
@@ -175,8 +161,3 @@ def test_the_shell_offers_each_option_with_help_on_one_line(run: Run, name: str)
         assert len(offers) == len(flags)
         if shell == "fish":
             assert sorted(offer.partition("\t")[0] for offer in offers) == sorted(flags)
-
-
-def test_the_most_circles_of_a_plan_are_those_of_its_search() -> None:
-    (param,) = (one for one in context("plan").command.params if one.name == "max_circles")
-    assert param.default == MAX_CIRCLES

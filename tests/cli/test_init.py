@@ -5,7 +5,6 @@ import os
 import pty
 import re
 import select
-import stat
 import subprocess
 import sys
 import time
@@ -65,13 +64,6 @@ def test_the_sections_that_init_only_suggests_are_of_use_as_they_stand(run: Run,
     assert messages == (["sdo-response", "heartbeat"] if bus == "can" else [])
     done = run("check", "press.toml", "--no-circle", cwd=tmp_path)
     assert (done.returncode, "0 errors" in done.stderr) == (0, True), done.stdout
-
-
-def test_comments_are_in_line_whatever_the_values(run: Run, tmp_path: Path) -> None:
-    run("init", "gantry", "--nodes", 2, "--axes", 2, "--period", "31.25us", cwd=tmp_path)
-    written = (tmp_path / "gantry.toml").read_text(encoding="utf-8")
-    servo = [line for line in written.splitlines() if line.startswith(("step_us = 31.25 ", "loop", "drive_lag_us"))]
-    assert [line.index("#") for line in servo] == [27, 27, 27]
 
 
 def test_a_profile_of_ones_own_is_neutral_and_no_command_stumbles_over_it(run: Run, tmp_path: Path) -> None:
@@ -192,16 +184,11 @@ def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
     assert (data["bus"]["nodes"], data["node"]["axes"], data["payload"]["read_bytes_per_axis"]) == (5, 2, 12)
 
 
-def test_an_input_that_ends_is_no_answer(tmp_path: Path) -> None:
+def test_ctrl_c_at_a_question_is_an_interrupt_and_an_input_that_ends_is_no_answer(tmp_path: Path) -> None:
+    assert answered(tmp_path, b"can\n", b"6\n", b"\x03")[0] == 130
     code, said = answered(tmp_path, b"\x04")
     assert code == 2
     assert "no answer: give --bus, --nodes, --axes, --period, --bytes-per-axis and --host" in said
-    assert files(tmp_path) == {}
-
-
-def test_ctrl_c_at_a_question_is_an_interrupt(tmp_path: Path) -> None:
-    code, _ = answered(tmp_path, b"can\n", b"6\n", b"\x03")
-    assert code == 130
     assert files(tmp_path) == {}
 
 
@@ -248,7 +235,6 @@ def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: P
             "--from nope: no shipped profile; shipped are can-fd-arm-7, can-servo-8, canopen-6, dvrk, ",
         ),
         (("init", "x", "--period", "0us"), "--period 0us: must be between 0.001 and 1e+09 us"),
-        (("init", "x", "--period", "soon"), "--period soon: expected a time with its unit"),
         (("init", "x", "--from", "paper-1ms", "--axes", "8"), "--from: goes without --axes: a copy has the values"),
         (("init", "x", "--bus", "myrinet"), "--bus myrinet: no kind of bus; there are ieee1394, "),
         (("init", "x", "--group", "io:3"), "--group io:3: expected NAME:NODESxAXES or "),
@@ -260,10 +246,7 @@ def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: P
         (("init", "x", "--from", "dvrk", "--group", "a:1x1"), "--from: goes without --group"),
         (("init", "a\nb"), r"'a\nb': no name for a profile; expected 1 to 100 printable characters"),
         (("init", "\x1b[31m"), r"'\x1b[31m': no name for a profile"),
-        (("init", "x" * 101), "'xxx"),
         (("init", "missing/x"), "missing/x.toml: cannot be written: there is no folder /"),
-        (("init", "file/x"), "file/x.toml: cannot be written: Not a directory"),
-        (("init", "/proc/x"), "/proc/x.toml: cannot be written: "),
         (("init", "folder.toml"), "folder.toml: already there"),
         (("init", "folder.toml", "--force"), "folder.toml: cannot be written: Is a directory"),
     ],
@@ -281,28 +264,12 @@ def test_init_refuses_what_it_cannot_write(
     assert list((tmp_path / "folder.toml").iterdir()) == []
 
 
-def test_init_refuses_a_folder_that_is_not_ones_own(refused: Refused, tmp_path: Path) -> None:
-    if os.geteuid() == 0:
-        pytest.skip("root writes everywhere")
-    tmp_path.chmod(0o500)
-    assert refused("init", "x", cwd=tmp_path) == "x.toml: cannot be written: Permission denied"
-
-
-@pytest.mark.parametrize("name", ["", ".", "..", ".toml", "..toml", "sub/", "sub/.", "sub/.toml", "sub//", "/"])
+@pytest.mark.parametrize("name", ["", "..", ".toml", "sub/", "sub/.toml", "/"])
 def test_init_refuses_a_path_without_a_name(refused: Refused, tmp_path: Path, name: str) -> None:
     (tmp_path / "sub").mkdir()
     said = f"{name!r}: no name for a profile; expected a name or a path, as press-line"
     assert refused("init", name, cwd=tmp_path) == said
     assert list(tmp_path.rglob("*")) == [tmp_path / "sub"]
-
-
-@pytest.mark.parametrize(
-    "name", ["größe 日本", "[bold]x[/bold]".replace("/", "|"), 'say "hi"', "-x", "a.b", "$(touch y)"]
-)
-def test_init_keeps_an_unusual_name_as_written(run: Run, tmp_path: Path, name: str) -> None:
-    assert run("init", "--", name, cwd=tmp_path).returncode == 0
-    assert list(files(tmp_path)) == [f"{name}.toml"]
-    assert name_in(tmp_path / f"{name}.toml") == name
 
 
 # --- writing a file ---------------------------------------------------------------------------------------
@@ -320,17 +287,6 @@ def test_a_disk_that_fills_up_leaves_what_was_there(
     monkeypatch.setattr(os, "fsync", no_space)
     with pytest.raises(BusplanError, match="cannot be written: No space left on device"):
         write_file(tmp_path / ("old" if overwrite else "new"), b"new", overwrite=overwrite)
-    assert files(tmp_path) == {"old": b"old"}
-
-
-def test_an_interrupt_while_writing_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(_descriptor: int) -> None:
-        raise KeyboardInterrupt
-
-    (tmp_path / "old").write_bytes(b"old")
-    monkeypatch.setattr(os, "fsync", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        write_file(tmp_path / "old", b"new", overwrite=True)
     assert files(tmp_path) == {"old": b"old"}
 
 
@@ -371,25 +327,6 @@ def test_a_new_file_has_the_permissions_of_any_other(
     assert files(tmp_path) == {"other": b"", "x": b"one"}
 
 
-def test_a_link_stays_a_link_and_its_target_is_written(tmp_path: Path) -> None:
-    (tmp_path / "target").write_bytes(b"old")
-    (tmp_path / "link").symlink_to("target")
-    with pytest.raises(BusplanError, match="already there"):
-        write_file(tmp_path / "link", b"new", overwrite=False)
-    write_file(tmp_path / "link", b"new", overwrite=True)
-    assert (tmp_path / "link").is_symlink()
-    assert (tmp_path / "target").read_bytes() == b"new"
-
-
-@pytest.mark.parametrize("mode", [0o600, 0o640, 0o755])
-def test_a_file_that_is_overwritten_keeps_its_rights(tmp_path: Path, mode: int) -> None:
-    (tmp_path / "x").touch()
-    (tmp_path / "x").chmod(mode)
-    write_file(tmp_path / "x", b"new", overwrite=True)
-    assert files(tmp_path) == {"x": b"new"}
-    assert stat.S_IMODE((tmp_path / "x").stat().st_mode) == mode
-
-
 @pytest.mark.parametrize("name", ["pipe", "link"])
 def test_what_is_no_regular_file_is_not_replaced(tmp_path: Path, name: str) -> None:
     os.mkfifo(tmp_path / "pipe")
@@ -399,10 +336,3 @@ def test_what_is_no_regular_file_is_not_replaced(tmp_path: Path, name: str) -> N
     assert str(caught.value) == f"{tmp_path / name}: cannot be written: is not a regular file"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "pipe"]
     assert (tmp_path / "pipe").is_fifo()
-
-
-def test_a_new_file_has_the_rights_of_any_new_file(tmp_path: Path) -> None:
-    (tmp_path / "usual").touch()
-    write_file(tmp_path / "ours", b"x", overwrite=False)
-    write_file(tmp_path / "ours", b"y", overwrite=True)
-    assert (tmp_path / "ours").stat().st_mode == (tmp_path / "usual").stat().st_mode

@@ -39,11 +39,6 @@ def test_a_topic_is_its_page_as_it_ships(run: Run, topic: str, tmp_path: Path) -
         assert (tmp_path / name).read_text(encoding="utf-8") == page
 
 
-def test_a_pipe_gets_the_same_bytes_whatever_the_environment(run: Run) -> None:
-    environment = {"COLUMNS": "40", "BUSPLAN_FORMAT": "sarif", "FORCE_COLOR": "1", "PYTHONIOENCODING": "ascii"}
-    assert run("manual", "models", env=environment).stdout == run("manual", "models").stdout
-
-
 def test_a_terminal_gets_the_page_set_for_reading_and_no_word_cut_off(
     on_terminal: Callable[..., tuple[int, str]], tmp_path: Path
 ) -> None:
@@ -78,11 +73,6 @@ def test_an_unknown_topic_is_refused_with_the_known_ones(refused: Refused, topic
     known = f"{topic or repr(topic)}: no such topic; there are {', '.join(TOPICS)}"
     assert re.fullmatch(re.escape(known) + "(; did you mean profile\\?)?", said)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_file_that_cannot_be_written_is_said(refused: Refused, tmp_path: Path) -> None:
-    said = refused("manual", "gate", "-o", "no/x.md", cwd=tmp_path)
-    assert said.startswith("no/x.md: cannot be written: there is no folder")
 
 
 @pytest.mark.parametrize(("typed", "offered"), [("busplan man", "manual"), ("busplan manual p", "plan profile python")])

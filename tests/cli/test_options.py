@@ -1,54 +1,51 @@
-"""How the values of options are read: without a process, because they are many."""
+"""How the values of options are read."""
 
-import re
+import csv
+import json
+from collections.abc import Callable
 from fractions import Fraction
-from functools import cache
+from io import StringIO
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.cli.changes import periods_us
-from busplan.cli.options import complete_profile, parse_sizes, time_us, timing_models
-from busplan.errors import BusplanError
-from busplan.profile.shipped import load
-from busplan.sections.profile import Profile
+Run = Callable[..., Any]
+Refused = Callable[..., str]
 
 
-@cache
-def plan() -> Profile:
-    return load("paper-4ms").profile
-
-
-def period_us(text: str) -> float:
-    """What one --period means."""
-    found = periods_us([text], plan())
-    assert found is not None
-    (value_us,) = found
-    return value_us
+def periods_us(run: Run, *texts: str) -> list[float]:
+    """What some --period mean."""
+    given = [word for text in texts for word in ("--period", text)]
+    done = run("capacity", "paper-4ms", "--timing-model", "standard", *given, "--format", "json")
+    assert done.returncode == 0, done
+    return [one["period_us"] for one in json.loads(done.stdout)["results"]]
 
 
 @pytest.mark.parametrize(
     ("text", "value_us"),
     [
         ("4ms", 4000.0),
-        ("250us", 250.0),
         ("0.001s", 1000.0),
-        ("1s", 1e6),
-        ("0.5ms", 500.0),
         (".5ms", 500.0),
         ("5.ms", 5000.0),
-        ("1e3us", 1000.0),
         ("2.5E-1ms", 250.0),
-        ("4 ms", 4000.0),
-        (" 4ms ", 4000.0),
+        (" 4 ms ", 4000.0),
         ("0.0003s", 300.0),
         ("0.0001234s", 123.4),
         ("004ms", 4000.0),
+        ("0.001us", 0.001),
+        ("1000s", 1e9),
     ],
 )
-def test_a_time_is_a_number_with_its_unit(text: str, value_us: float) -> None:
-    assert period_us(text) == value_us
+def test_a_time_is_a_number_with_its_unit(run: Run, text: str, value_us: float) -> None:
+    assert periods_us(run, text) == [value_us]
+
+
+def test_periods_keep_their_order_and_none_means_the_profiles(run: Run) -> None:
+    assert periods_us(run, "4ms,250us", "4ms") == [4000, 250, 4000]
+    assert periods_us(run) == [4000]
 
 
 @given(
@@ -56,157 +53,141 @@ def test_a_time_is_a_number_with_its_unit(text: str, value_us: float) -> None:
     places=st.integers(0, 12),
     unit=st.sampled_from([("us", 1), ("ms", 1000), ("s", 1_000_000)]),
 )
-def test_a_time_is_the_float_nearest_to_what_is_written(digits: int, places: int, unit: tuple[str, int]) -> None:
+def test_a_time_is_the_float_nearest_to_what_is_written(
+    run: Run, refused: Refused, digits: int, places: int, unit: tuple[str, int]
+) -> None:
     text = str(digits).rjust(places + 1, "0")
     written = f"{text[: len(text) - places]}.{text[len(text) - places :]}{unit[0]}"
     exact_us = Fraction(digits * unit[1], 10**places)
     if Fraction(1, 1000) <= exact_us <= 10**9:
-        assert period_us(written) == float(exact_us)
+        assert periods_us(run, written) == [float(exact_us)]
     else:
-        with pytest.raises(BusplanError, match=f"--period {re.escape(written)}, in us "):
-            period_us(written)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        *(
-            "4",
-            "ms",
-            "",
-            " ",
-            "4MS",
-            "4 m s",
-            "-4ms",
-            "+4ms",
-            "4ms4",
-            "1_000us",
-            "0x4ms",
-            "nan",
-            "infms",
-        ),
-        *(
-            "nanus",
-            "4ns",
-            "4µs",
-            "4min",
-            "four ms",
-            "1e1000us",
-            "1e999999999ms",
-            "1e99999999999999999999ms",
-            "1e us",
-            "e3us",
-            ".us",
-            "1..5ms",
-            "4ms\n5ms",
-            "4msec",
-        ),
-    ],
-)
-def test_what_is_no_time_is_refused_with_an_example(text: str) -> None:
-    with pytest.raises(BusplanError) as caught:
-        period_us(text)
-    assert str(caught.value) == f"--period {text}: expected a time with its unit, as 4ms, 250us or 0.001s"
-
-
-@pytest.mark.parametrize("text", ["4ms,", "4,5ms", "4ms,1"])
-def test_several_times_of_which_one_is_none_are_refused_as_they_were_typed(text: str) -> None:
-    with pytest.raises(BusplanError) as caught:
-        period_us(text)
-    assert str(caught.value) == f"--period {text}: expected times with their unit between commas, as 500us,1ms"
-
-
-@pytest.mark.parametrize(
-    ("text", "value_us", "wrong"),
-    [
-        ("0ms", "0.0", "must be 0.001 or more"),
-        ("0.000s", "0.0", "must be 0.001 or more"),
-        ("0e9us", "0.0", "must be 0.001 or more"),
-        ("1e-400us", "0.0", "must be 0.001 or more"),
-        ("0.0009us", "0.0009", "must be 0.001 or more"),
-        ("1001s", "1001000000.0", "must be 1,000,000,000 or less"),
-        ("1e9s", "1000000000000000.0", "must be 1,000,000,000 or less"),
-    ],
-)
-def test_a_time_out_of_the_profiles_range_is_shown_as_written_and_in_us(text: str, value_us: str, wrong: str) -> None:
-    with pytest.raises(BusplanError) as caught:
-        period_us(text)
-    assert str(caught.value) == f"--period {text}, in us {value_us}: {wrong}"
-
-
-def test_the_ends_of_the_range_are_periods() -> None:
-    assert (period_us("0.001us"), period_us("1000s")) == (1e-3, 1e9)
-
-
-def test_periods_keep_their_order_and_none_means_the_profiles() -> None:
-    assert periods_us(["4ms", "250us", "4ms"], plan()) == [4000.0, 250.0, 4000.0]
-    assert periods_us(["4ms,250us", "4ms"], plan()) == [4000.0, 250.0, 4000.0]
-    assert periods_us(None, plan()) is None
-    assert periods_us([], plan()) is None
+        assert refused("capacity", "paper-4ms", "--period", written).startswith(f"--period {written}, in us ")
 
 
 @given(text=st.text(alphabet="0123456789.eE+-umns ", max_size=8))
-def test_any_text_is_a_time_or_refused(text: str) -> None:
-    try:
-        value_us = period_us(text)
-    except BusplanError:
-        return
-    assert 1e-3 <= value_us <= 1e9
-
-
-def test_sizes_stand_between_commas() -> None:
-    assert parse_sizes("4,16,32", option="--payload") == [4, 16, 32]
-    assert parse_sizes(" 4 , 16 ", option="--payload") == [4, 16]
-    assert parse_sizes("1,1", option="--payload") == [1, 1]
-    assert parse_sizes("1000000", option="--payload") == [1_000_000]
-    assert parse_sizes(f"{' ' * 20}4,000004", option="--payload") == [4, 4]
+def test_any_text_is_a_time_or_refused(run: Run, text: str) -> None:
+    done = run("capacity", "paper-4ms", f"--period={text}", "--format", "csv")
+    assert done.returncode == 0 or (done.returncode, done.stderr.startswith(f"--period {text}")) == (2, True)
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        "",
-        ",",
-        "4,",
-        ",4",
-        "4,,5",
-        "0",
-        "4,0",
-        "-4",
-        "+4",
-        "4.0",
-        "4 5",
-        "x",
-        "1e3",
-        "1000001",
-        "0000000000019999999",
-        "9" * 5000,
-        "0" * 5000,
+        *("4", "ms", "", "4MS", "4 m s", "-4ms", "+4ms", "4ms4", "1_000us", "0x4ms", "nanus", "infms", "4ns", "4µs"),
+        *("1e1000us", "1e99999999999999999999ms", "1e us", "e3us", ".us", "1..5ms", "4msec"),
     ],
 )
-def test_what_are_no_sizes_is_refused_with_an_example(text: str) -> None:
-    with pytest.raises(BusplanError) as caught:
-        parse_sizes(text, option="--payload")
-    assert (
-        str(caught.value) == f"--payload {text}: expected payloads of 1 to 1,000,000 bytes between commas, as 4,16,32"
-    )
+def test_what_is_no_time_is_refused_with_an_example(refused: Refused, text: str) -> None:
+    said = f"--period {text}: expected a time with its unit, as 4ms, 250us or 0.001s"
+    assert refused("capacity", "paper-4ms", f"--period={text}") == said
 
 
-def test_both_models_are_paper_first() -> None:
-    profile = load("paper-4ms").profile
-    assert timing_models("both", profile) == ("paper", "standard")
-    assert timing_models("paper", profile) == ("paper",)
-    assert timing_models("standard", profile) == ("standard",)
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ("capacity", "--period", "4ms,"),
+            "--period 4ms,: expected times with their unit between commas, as 500us,1ms",
+        ),
+        (("capacity", "--period", "0.000s"), "--period 0.000s, in us 0.0: must be 0.001 or more"),
+        (("capacity", "--period", "1001s"), "--period 1001s, in us 1001000000.0: must be 1,000,000,000 or less"),
+        (("capacity", "--period", "1e-400us"), "--period 1e-400us, in us 0.0: must be 0.001 or more"),
+        (("timeline", "--from", "1e308s"), "--from 1e308s: is too long; expected a time with its unit, as 4ms, "),
+        (("timeline", "--period", "4"), "--period 4: expected a time with its unit"),
+        (("plan", "--nodes", "0"), "--nodes 0: must be 1 or more"),
+        (("latency", "--set", "bus.nodes=-3"), "--set bus.nodes=-3: must be 1 or more"),
+        (("latency", "--set", "bus.gap_count=best"), "--set bus.gap_count=best: expected a whole number from"),
+        (("latency", "--payload", "1025"), "payload 1025 bytes: outside the execution table of paper-4ms"),
+        *(
+            (("latency", f"--payload={text}"), f"--payload {text}: expected payloads of 1 to 1,000,000 bytes between ")
+            for text in ("", "4,", "4,,5", "0", "-4", "4.0", "4 5", "x", "1e3", "1000001", "9" * 5000, "0" * 5000)
+        ),
+    ],
+    ids=lambda value: " ".join(value)[:40] if isinstance(value, tuple) else None,
+)
+def test_a_wrong_value_is_named_with_its_option(refused: Refused, arguments: tuple[str, ...], said: str) -> None:
+    command, *options = arguments
+    message = refused(command, "paper-4ms", *options)
+    assert message.startswith(said)
+    assert "\n" not in message
 
 
-def test_completion_offers_the_shipped_names_that_begin_so() -> None:
-    assert complete_profile("paper-o") == ["paper-optimal-gap"]
-    assert complete_profile("x") == []
-    assert "paper-4ms" in complete_profile("")
+def test_sizes_stand_between_commas(run: Run) -> None:
+    done = run("latency", "paper-dma", "--payload", f"{' ' * 20}4 , 000016,4", "--format", "json")
+    sizes = [one["payload_bytes"] for one in json.loads(done.stdout)["transactions"]]
+    assert [*dict.fromkeys(sizes)] == [4, 16]
+    assert len(sizes) == 3 * 2 * 2
 
 
-@pytest.mark.parametrize("text", ["1e308s", "1e306ms", "1e309us", "1e999s", f"{'9' * 400}us"])
-def test_a_time_that_no_number_holds_is_refused(text: str) -> None:
-    with pytest.raises(BusplanError) as caught:
-        time_us(text, option="--from")
-    assert str(caught.value) == f"--from {text}: is too long; expected a time with its unit, as 4ms, 250us or 0.001s"
+# --- values that vary -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("spec", "expected"),
+    [
+        ("1:5", "1 2 3 4 5"),
+        ("250, 500 ,1000", "250 500 1000"),
+        ("0.1:0.5:0.1", "0.1 0.2 0.3 0.4 0.5"),
+        ("1:6:2", "1 3 5"),
+        ("5:1:-2", "5 3 1"),
+        ("0.5:2.4", "0.5 1.5"),
+        ("125:1000:*2", "125 250 500 1000"),
+        ("1000:100:*0.5", "1000 500 250 125"),
+        ("0.1:0.2:*1.5", "0.1 0.15"),
+        ("0:1:#5", "0.0 0.25 0.5 0.75 1.0"),
+        ("50:10:#3", "50 30 10"),
+        ("1e3:3e3:1e3", "1000 2000 3000"),
+        ("4.0", "4"),
+        ("7:7:0.5", "7"),
+    ],
+)
+def test_values_that_vary(run: Run, spec: str, expected: str) -> None:
+    vary = f"cycle.nonperiodic_us={spec}"
+    done = run("sweep", "paper-1ms", "--vary", vary, "--timing-model", "standard", "--format", "csv")
+    _, *rows = csv.reader(StringIO(done.stdout))
+    assert [row[0] for row in rows] == expected.split()
+
+
+def test_a_word_that_the_key_takes_is_a_value(run: Run) -> None:
+    done = run("sweep", "paper-1ms", "--vary", "bus.gap_count=63,optimal", "--format", "csv")
+    assert [row["bus.gap_count"] for row in csv.DictReader(StringIO(done.stdout))][::2] == ["63", "optimal"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("bus.nodes", "--vary bus.nodes: expected KEY=VALUES"),
+        ("=1", "expected KEY=VALUES"),
+        ("bus.nodes=", "expected KEY=VALUES"),
+        ("bus.gap_count=63,best", "'best' is not a number"),
+        ("bus.nodes=optimal", "'optimal' is not a number"),
+        ("bus.nodes=nan", "'nan' is not a number"),
+        ("bus.nodes=1e999", "'1e999' is not a number"),
+        ("bus.nodes=1,,2", "'' is not a number"),
+        ("bus.nodes=1:2:3:4", "A:B:STEP"),
+        ("bus.nodes=2:1", "steps of 1 never lead from 2 to 1"),
+        ("bus.nodes=1:2:0", "steps of 0 never lead"),
+        ("bus.nodes=1:2:*0.5", "multiplying by 0.5 never leads"),
+        ("bus.nodes=0:2:*2", "multiplying by 2 never leads from 0"),
+        ("bus.nodes=1:2:*1.00000001", "take a larger factor"),
+        ("bus.nodes=1:2:#1", "a count of 2 or more"),
+        ("bus.nodes=1:1:#3", "are one"),
+        ("bus.nodes=5,6,5.0", "5 is given twice"),
+        ("bus.nodes=0:1:0.0000000000000000000001", "more digits than a number here can hold"),
+        ("bus.nodes=1:1000001", "1:1000001: 1,000,001 values are more than the 1,000,000 points a sweep takes"),
+        ("bus.nodes=0:1:#1000001", "1,000,001 values are more than"),
+        ("bus.nodes=0:9", "bus.nodes 0: must be 1 or more"),
+        ("bus.nodes=99999999999999999999999", "bus.nodes 99999999999999999999999: must be 1,000,000 or less"),
+        ("payload.read_bytes=4:1004:#50", "payload.read_bytes 24.408163265306122: expected a whole number"),
+    ],
+)
+def test_values_that_cannot_vary_are_refused(refused: Refused, text: str, said: str) -> None:
+    message = refused("sweep", "paper-1ms", "--vary", text)
+    assert said in message
+    assert "\n" not in message
+
+
+def test_a_key_varies_once_and_one_does(refused: Refused) -> None:
+    assert "k is varied already" in refused("sweep", "paper-1ms", "--vary", "k=1", "--vary", "k=2")
+    assert refused("sweep", "paper-1ms").startswith("--vary: nothing to vary")

@@ -40,15 +40,11 @@ def edited(old: str, new: str) -> bytes:
 
 
 BAD_FILES: dict[str, tuple[bytes, str]] = {
-    "binary": (b"\x7fELF\x02\x01\x01\x00\x00\xff\xfe\x80", "bad.toml:1:10: not a text file: byte 0xff is not UTF-8"),
-    "nothing but zeros": (bytes(1000), "bad.toml:1:1: not valid TOML: "),
+    "bytes": (b"\x7fELF\x02\x01\x01\x00\x00\xff\xfe\x80", "bad.toml:1:10: not a text file: byte 0xff is not UTF-8"),
     "syntax error": (edited("nodes = 2", "nodes = "), "bad.toml:6:9: not valid TOML: invalid value"),
-    "some other language": (b'{"schema_version": 1}', "bad.toml:1:1: not valid TOML: invalid statement"),
     "wrong type": (edited("nodes = 2", 'nodes = "2"'), 'bad.toml:6:1: bus.nodes = "2": expected a whole number'),
     "nan": (edited("4000", "nan"), "bad.toml:8:1: cycle.period_us = nan: must be finite"),
-    "inf": (edited("4000", "inf"), "bad.toml:8:1: cycle.period_us = inf: must be finite"),
     "negative": (edited("4000", "-1"), "bad.toml:8:1: cycle.period_us = -1: must be 0.001 or more"),
-    "zero period": (edited("4000", "0"), "bad.toml:8:1: cycle.period_us = 0: must be 0.001 or more"),
     "unknown key": (
         edited("axes = 4", "axes = 4\naxis = 4"),
         "bad.toml:14:1: node.axis: unknown key; did you mean axes?",
@@ -71,10 +67,6 @@ BAD_FILES: dict[str, tuple[bytes, str]] = {
         "bad.toml:10:1: payload.read_bytes = 64: is outside the execution table, 4 to 32 bytes",
     ),
     "10 MB of nested brackets": (b"[" * 10_000_000, "bad.toml:1:1: the file is larger than 2,000,000 bytes"),
-    "10 MB of nested brackets, closed": (
-        b"x = " + b"[" * 5_000_000 + b"]" * 5_000_000,
-        "bad.toml:1:1: the file is larger than 2,000,000 bytes",
-    ),
     "nested brackets in a file of the right size": (
         b"x = " + b"[" * 45_000 + b"]" * 45_000,
         "bad.toml:1:105: nested too deeply",
@@ -96,18 +88,15 @@ def test_a_bad_file_gets_one_message_with_its_place(
     assert "\n" not in message
 
 
-@pytest.mark.parametrize("command", ["capacity", "latency"])
-def test_what_is_no_file_is_refused(refused: Refused, tmp_path: Path, command: str) -> None:
-    assert refused(command, "missing.toml", cwd=tmp_path).startswith(
-        "missing.toml: no such file, and no shipped profile"
-    )
-    assert refused(command, ".", cwd=tmp_path) == ".: is a directory; give a file"
+def test_what_is_no_file_is_refused(refused: Refused, tmp_path: Path) -> None:
+    said = refused("capacity", "missing.toml", cwd=tmp_path)
+    assert said.startswith("missing.toml: no such file, and no shipped profile")
+    assert refused("capacity", ".", cwd=tmp_path) == ".: is a directory; give a file"
 
 
-@pytest.mark.parametrize("command", ["capacity", "latency"])
-def test_an_empty_file_is_told_what_a_profile_needs(refused: Refused, tmp_path: Path, command: str) -> None:
+def test_an_empty_file_is_told_what_a_profile_needs(refused: Refused, tmp_path: Path) -> None:
     (tmp_path / "empty.toml").touch()
-    said = refused(command, "empty.toml", cwd=tmp_path).splitlines()
+    said = refused("capacity", "empty.toml", cwd=tmp_path).splitlines()
     assert [line.split(": ")[:2] for line in said] == [
         ["empty.toml:1:1", key] for key in ("schema_version", "name", "bus", "cycle", "payload", "node")
     ]
@@ -143,22 +132,14 @@ def test_a_pipe_that_nobody_writes_is_not_waited_for_below_dev_either(refused: R
         assert refused("capacity", path, env={}) == f"{path}: is a named pipe; give a regular file"
 
 
-def test_a_file_that_is_not_ones_own_is_refused(refused: Refused, tmp_path: Path) -> None:
-    if os.geteuid() == 0:
-        pytest.skip("root reads every file")
-    (tmp_path / "secret.toml").touch(mode=0)
-    assert refused("capacity", "secret.toml", cwd=tmp_path) == "secret.toml: cannot be read: Permission denied"
-
-
 CLOSED = """
 import os, sys
 os.execvp("sh", ["sh", "-c", 'exec "$0" -m busplan "$@" <&-', sys.executable, *sys.argv[1:]])
 """
 
 
-@pytest.mark.parametrize("command", ["capacity", "latency", "circle-test"])
-def test_a_closed_standard_input_is_refused_in_words(refused: Refused, command: str) -> None:
-    assert refused(command, "-", python=("-c", CLOSED)) == "<stdin>: standard input is closed"
+def test_a_closed_standard_input_is_refused_in_words(refused: Refused) -> None:
+    assert refused("capacity", "-", python=("-c", CLOSED)) == "<stdin>: standard input is closed"
 
 
 LITTLE_MEMORY = """

@@ -17,48 +17,24 @@ from busplan.profile.shipped import shipped_names
 Run = Callable[..., Any]
 Refused = Callable[..., str]
 
-NUMBER = (int, float)
-
-# The JSON contract: key to type. A number may be written without a fraction.
-TRANSACTION: dict[str, Any] = {
-    "timing_model": str,
-    "transaction": str,
-    "payload_bytes": int,
-    "hops": int,
-    "arbitration_us": NUMBER,
-    "request_us": NUMBER,
-    "response_us": NUMBER,
-    "acknowledge_us": NUMBER,
-    "execution_us": NUMBER,
-    "latency_us": NUMBER,
-    "request_and_acknowledge_us": NUMBER,
-    "response_and_acknowledge_us": NUMBER,
-    "gaps_us": NUMBER,
+TRANSACTION = {
+    *("arbitration_us", "request_us", "response_us", "acknowledge_us", "execution_us", "latency_us", "gaps_us", "hops"),
+    *("request_and_acknowledge_us", "response_and_acknowledge_us", "payload_bytes"),
 }
-FIGURES: dict[str, Any] = {
-    "timing_model": str,
-    "period_us": NUMBER,
-    "nodes": int,
-    "axes": int,
-    "available_us": NUMBER,
-    "required_us": NUMBER,
-    "time_slice_us": NUMBER,
-    "required_time_slice_us": NUMBER,
-    "read_latency_us": NUMBER,
-    "write_latency_us": NUMBER,
-    "gaps_us": NUMBER,
-    "subaction_gap_us": NUMBER,
-    "arbitration_reset_gap_us": NUMBER,
-    "sync_us": NUMBER,
-    "nonperiodic_us": NUMBER,
-    "utilisation": NUMBER,
-    "margin_us": NUMBER,
-    "nodes_eq11": NUMBER,
-    "max_nodes": int,
-    "max_axes": int,
-    "limited_by": str,
-    "min_period_us": NUMBER,
-    "fits": bool,
+"""Numbers of the JSON contract, of a transaction and of the figures under one timing model."""
+FIGURES = {
+    *(
+        "period_us",
+        "nodes",
+        "axes",
+        "available_us",
+        "required_us",
+        "time_slice_us",
+        "required_time_slice_us",
+        "sync_us",
+    ),
+    *("read_latency_us", "write_latency_us", "gaps_us", "subaction_gap_us", "arbitration_reset_gap_us", "margin_us"),
+    *("sync_us", "nonperiodic_us", "utilisation", "nodes_eq11", "max_nodes", "max_axes", "min_period_us"),
 }
 
 
@@ -71,11 +47,8 @@ def strictly(text: str) -> Any:
     return json.loads(text, parse_constant=no_constant)
 
 
-def check_types(row: dict[str, Any], contract: dict[str, Any]) -> None:
-    for key, kind in contract.items():
-        assert key in row
-        assert isinstance(row[key], kind), key
-        assert isinstance(row[key], bool) == (kind is bool), key
+def check_numbers(row: dict[str, Any], keys: set[str]) -> None:
+    assert {key for key in keys if type(row[key]) not in (int, float)} == set()
 
 
 def document(run: Run, *arguments: str) -> Any:
@@ -113,7 +86,7 @@ def test_latency_as_json_holds_the_contract(run: Run) -> None:
         ("write", "standard"),
     ]
     for one in found["transactions"]:
-        check_types(one, TRANSACTION)
+        check_numbers(one, TRANSACTION)
         assert (one["payload_bytes"], one["hops"]) == (12, 2)
 
 
@@ -130,7 +103,7 @@ def test_phases_add_up_to_the_latency(run: Run) -> None:
     "arguments",
     [
         ("latency", "paper-4ms"),
-        ("latency", "paper-dma", "--payload", "4,5,2048", "--timing", "standard"),
+        ("latency", "paper-dma", "--payload", "4,5,2048", "--timing-model", "standard"),
         ("capacity", "paper-4ms"),
         ("capacity", "paper-1ms", "--period", "100us", "--period", "4ms", "--set", "bus.nodes=63"),
     ],
@@ -142,18 +115,6 @@ def test_csv_has_the_profile_the_keys_and_the_figures_of_json(run: Run, argument
     of_csv = rows(run, *arguments)
     assert [{"profile": arguments[1], **{key: cell(value) for key, value in row.items()}} for row in of_json] == of_csv
     assert list(of_csv[0]) == ["profile", *of_json[0]]
-
-
-def test_payloads_are_reported_in_the_order_they_were_asked_for(run: Run) -> None:
-    found = document(run, "latency", "paper-two-node", "--payload", "16,4,1024", "--timing", "paper")
-    assert [(one["payload_bytes"], one["transaction"]) for one in found["transactions"]] == [
-        (size, kind) for size in (16, 4, 1024) for kind in ("read", "write")
-    ]
-
-
-def test_the_farthest_node_and_the_gap_count_follow_the_options(run: Run) -> None:
-    found = document(run, "latency", "paper-4ms", "--set", "bus.nodes=5", "--set", "bus.gap_count=optimal")
-    assert {(one["nodes"], one["hops"], one["gap_count"]) for one in found["transactions"]} == {(5, 5, 13)}
 
 
 def test_latency_as_a_table_names_the_equation_of_every_row(run: Run) -> None:
@@ -178,7 +139,7 @@ def test_capacity_as_json_holds_the_contract(run: Run) -> None:
     assert (found["schema"], found["command"], found["profile"]) == (1, "capacity", "paper-4ms")
     assert [one["timing_model"] for one in found["results"]] == ["paper", "standard"]
     for one in found["results"]:
-        check_types(one, FIGURES)
+        check_numbers(one, FIGURES)
         assert one["limited_by"] in ("time", "hops", "nodes", "payload")
         assert one["fits"] is True
 
@@ -200,7 +161,7 @@ def test_a_report_exits_0_whatever_its_verdict_is(
     assert set(one["exceeded"]) == set(exceeded.split())
     assert one["fits"] is (not exceeded)
     assert one["limited_by"] == limited_by
-    check_types(one, FIGURES)
+    check_numbers(one, FIGURES)
 
 
 def test_a_payload_over_the_limit_loads_and_leaves_no_node(run: Run) -> None:
@@ -210,76 +171,42 @@ def test_a_payload_over_the_limit_loads_and_leaves_no_node(run: Run) -> None:
     assert (one["max_nodes"], one["max_axes"], one["limited_by"], one["fits"]) == (0, 0, "payload", False)
 
 
-def test_periods_are_reported_in_the_order_they_were_asked_for(run: Run) -> None:
-    periods = ("--period", "4ms", "--period", "250us", "--period", "0.001s", "--period", "4ms")
-    found = document(run, "capacity", "paper-4ms", *periods, "--timing", "standard")
-    assert [one["period_us"] for one in found["results"]] == [4000, 250, 1000, 4000]
-    assert {one["timing_model"] for one in found["results"]} == {"standard"}
-
-
-def test_a_period_replaces_the_profiles(run: Run) -> None:
-    one = document(run, "capacity", "paper-4ms", "--period", "1ms")["results"][0]
-    other = document(run, "capacity", "paper-1ms")["results"][0]
-    assert one == other
-
-
-def test_nodes_and_gap_count_replace_the_profiles(run: Run) -> None:
-    one = document(run, "capacity", "paper-4ms", "--set", "bus.nodes=3", "--set", "bus.gap_count=8")["results"][1]
-    optimal = document(run, "capacity", "paper-4ms", "--set", "bus.nodes=3", "--set", "bus.gap_count=optimal")[
-        "results"
-    ][1]
-    assert (one["nodes"], one["axes"], one["gap_count"]) == (3, 12, 8)
-    assert {key for key in one if one[key] != optimal[key]} <= {
-        *("max_nodes", "max_axes", "limited_by"),
-        *("safe_nodes", "safe_axes", "safe_limited_by"),
-    }
-
-
 def test_what_moves_the_margin_is_asked_for(run: Run) -> None:
-    plain = document(run, "capacity", "paper-4ms")
-    assert not {"sensitivity", "next_bottleneck"} & set(plain["verdicts"][0])
+    (plain,) = verdicts(run, "paper-4ms")
+    assert not {"sensitivity", "next_bottleneck"} & set(plain)
     # Each change is one that an option makes.
-    asked = ("--sensitivity", "--period", "1ms", "--period", "600us", "--set", "bus.gap_count=8", "--timing", "paper")
-    found = document(run, "capacity", "paper-4ms", *asked)
-    for period, verdict in zip(("1ms", "600us"), found["verdicts"], strict=True):
-        rows = {one["change"]: one for one in verdict["sensitivity"]}
-        for change, options in (
-            ("one node more", ("--set", "bus.nodes=3", "--set", "bus.gap_count=8")),
-            ("a bus reset", ("--set", "bus.gap_count=63")),
-            ("host time +10 us", ("--set", "bus.gap_count=8", "--set", "host.transaction_us=10")),
-        ):
-            (other,) = document(run, "capacity", "paper-4ms", "--period", period, *options)["verdicts"]
-            for key in ("margin_corrected_us", "uncertainty_us", "verdict", "gap_count_safe"):
-                assert rows[change][key] == other[key]
-            assert rows[change]["margin_change_us"] == pytest.approx(
-                other["margin_corrected_us"] - verdict["margin_corrected_us"]
-            )
-
-
-def test_what_moves_the_margin_as_a_process(run: Run, tmp_path: Path) -> None:
-    done = run("capacity", "paper-1ms", "--sensitivity", "--set", "bus.gap_count=7", cwd=tmp_path, env={})
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("With --set bus.gap_count=7.\n\npaper-1ms  IEEE 1394, 2 nodes, 8 axes, 1 ms ")
-    assert "\nWhat moves the margin of 296.144 us at 1 ms, by the standard model\n" in done.stdout
-    (reset,) = (line.split() for line in done.stdout.splitlines() if line.startswith("a bus reset") and "->" in line)
+    (verdict,) = verdicts(run, "paper-4ms", "--sensitivity", "--period", "600us", "--set", "bus.gap_count=8")
+    rows = {one["change"]: one for one in verdict["sensitivity"]}
+    for change, *keys in (
+        ("one node more", "bus.nodes=3", "bus.gap_count=8"),
+        ("a bus reset", "bus.gap_count=63"),
+        ("host time +10 us", "bus.gap_count=8", "host.transaction_us=10"),
+    ):
+        (other,) = verdicts(run, "paper-4ms", "--period", "600us", *(f"--set={key}" for key in keys))
+        for key in ("margin_corrected_us", "uncertainty_us", "verdict", "gap_count_safe"):
+            assert rows[change][key] == other[key]
+        difference_us = other["margin_corrected_us"] - verdict["margin_corrected_us"]
+        assert rows[change]["margin_change_us"] == pytest.approx(difference_us)
+    said = run("capacity", "paper-1ms", "--sensitivity", "--set", "bus.gap_count=7").stdout
+    (reset,) = (line.split() for line in said.splitlines() if line.startswith("a bus reset") and "->" in line)
     assert reset[3:] == ["7", "->", "63", "-66.081", "230.064", "fits"]
 
 
 def test_capacity_as_a_table_begins_with_the_verdict(run: Run) -> None:
     done = run("capacity", "paper-4ms")
     assert (done.returncode, done.stderr) == (0, "")
-    assert re.match(
-        r"paper-4ms  IEEE 1394, 2 nodes, 8 axes, 4 ms +FITS\n  \[#+\.+\| +\]\n"
-        r"  used +270 us of the 2000 that the bus may use, 13 %\n  free +1730 us, \+/- 6\n",
-        done.stdout,
-    )
-    whole = run("capacity", "paper-4ms", "--all").stdout
-    assert (
-        "\npaper-4ms at 4 ms: fits. Margin 1730.064 us +/- 6.311 us of 2000.000 us, less a bias of 6.616 us. Largest "
-        "doubt: execution time, 54% of the variance.\nNot included: host time (host.transaction_us), "
-    ) in whole
-    assert "(4)" in whole
+    head, bar, *lines = done.stdout.partition("\n\n")[0].splitlines()
+    assert re.fullmatch(r"paper-4ms  IEEE 1394, 2 nodes, 8 axes, 4 ms +FITS", head)
+    assert re.fullmatch(r"  \[#+\.+\| +\]", bar)
+    answer = {line[2:17].strip(): line[18:] for line in lines}
+    assert answer["used"].startswith("270 us of the 2000 that the bus may use, 13 %")
+    assert answer["free"] == "1730 us, +/- 6"
+    assert answer["room for"] == "11 more nodes"
+    assert answer["not included"] == "host time, the slowest execution"
+    # These lines are the answer in the document, too.
+    assert answer == {one["label"]: one["text"] for one in verdicts(run, "paper-4ms")[0]["lines"]}
     assert "(4)" not in done.stdout
+    assert "(4)" in run("capacity", "paper-4ms", "--all").stdout
 
 
 def test_the_papers_equations_are_said_to_disagree_and_decide_nothing(run: Run) -> None:
@@ -295,9 +222,8 @@ def verdicts(run: Run, *arguments: str) -> Any:
 
 
 @pytest.mark.parametrize("form", ["table", "json", "csv"])
-@pytest.mark.parametrize("period", ["0.001us", "1000s"])
-def test_the_smallest_and_the_largest_of_periods_are_reported(run: Run, form: str, period: str) -> None:
-    done = run("capacity", "paper-4ms", "--period", period, "--format", form)
+def test_the_smallest_and_the_largest_of_periods_are_reported(run: Run, form: str) -> None:
+    done = run("capacity", "paper-4ms", "--period", "0.001us,1000s", "--format", form)
     assert (done.returncode, done.stderr) == (0, "")
     assert not re.search(r"\b(inf|nan)\b", done.stdout, re.IGNORECASE)
 
@@ -305,34 +231,21 @@ def test_the_smallest_and_the_largest_of_periods_are_reported(run: Run, form: st
 # --- the other commands -----------------------------------------------------------------------------------
 
 
-def test_paper_shows_published_beside_computed(run: Run) -> None:
-    done = run("paper")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "Table I: T1+T2, theory" in done.stdout
-    found = document(run, "paper")
-    assert (found["schema"], found["command"]) == (1, "paper")
-    theory = [one for one in found["figures"] if one["method"] == "eq (15)"]
-    assert len(theory) == 8
-    for one in theory:
-        assert f"{one['computed']:.2f}" == f"{one['published']:.2f}"
-        assert one["residual"] == pytest.approx(one["computed"] - one["published"])
-    assert [{key: cell(value) for key, value in one.items()} for one in found["figures"]] == rows(run, "paper")
-
-
 def test_evidence_has_the_papers_part_and_what_else_is_known(run: Run) -> None:
     done = run("evidence", "ieee1394")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout in run("evidence").stdout
     assert run("paper").stdout in done.stdout
-    found = document(run, "evidence", "ieee1394")
-    assert (found["kinds"], found["without"]) == (["ieee1394"], [])
-    assert {one["data"] for one in found["figures"]} == {"paper", "dvrk", "ieee1394"}
-    of_paper = [one for one in found["figures"] if one["data"] == "paper"]
-    assert [{**one, "kind": "ieee1394", "data": "paper"} for one in document(run, "paper")["figures"]] == of_paper
-    assert all((one["grade"] is None) == (one["published"] is None) for one in found["figures"])
-    assert [{key: cell(value) for key, value in one.items()} for one in found["figures"]] == rows(
-        run, "evidence", "ieee1394"
-    )
+    found, paper = document(run, "evidence", "ieee1394")["figures"], document(run, "paper")["figures"]
+    assert {one["data"] for one in found} == {"paper", "dvrk", "ieee1394"}
+    assert [one for one in found if one["data"] == "paper"] == [
+        {**one, "kind": "ieee1394", "data": "paper"} for one in paper
+    ]
+    theory = [one for one in paper if one["method"] == "eq (15)"]
+    assert len(theory) == 8
+    for one in theory:
+        assert f"{one['computed']:.2f}" == f"{one['published']:.2f}"
+        assert one["residual"] == pytest.approx(one["computed"] - one["published"])
     refused = run("evidence", "can-opener")
     assert (refused.returncode, refused.stdout) == (2, "")
     assert refused.stderr.startswith("can-opener: no such kind of bus; there are ieee1394, can")
@@ -345,16 +258,7 @@ def test_profiles_lists_what_every_command_takes_by_name(run: Run) -> None:
     names = [one["name"] for one in found["profiles"]]
     assert names == shipped_names()
     assert re.findall(r"(?m)^([\w-]+): \d+ nodes? at", done.stdout) == names
-    assert [one["name"] for one in rows(run, "profiles")] == names
     assert all(math.isfinite(one["period_us"]) for one in found["profiles"])
-
-
-@pytest.mark.parametrize("name", ["gantry-24", "paper-1ms", "paper-dma", "paper-optimal-gap", "paper-two-node"])
-def test_every_shipped_profile_has_both_reports(run: Run, name: str) -> None:
-    for command in ("latency", "capacity"):
-        done = run(command, name)
-        assert (done.returncode, done.stderr) == (0, "")
-        assert name in done.stdout
 
 
 def test_version_and_help_go_to_stdout(run: Run) -> None:
@@ -369,32 +273,24 @@ def test_version_and_help_go_to_stdout(run: Run) -> None:
         assert "Exit codes: 0 done, 1 the plan fails, 2 could not" in " ".join(done.stdout.split())
 
 
-@pytest.mark.parametrize("command", ["latency", "capacity", "paper", "profiles", "init"])
-def test_every_command_has_its_own_help_with_an_example(run: Run, command: str) -> None:
-    done = run(command, "--help")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert f"Usage: busplan {command}" in done.stdout
-    assert f"Example: busplan {command}" in done.stdout
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         ((), "Usage: busplan [OPTIONS] COMMAND"),
         (("nope",), "nope: no such command; `busplan --help` lists them"),
         (("capcity", "paper-4ms"), "capcity: no such command; did you mean capacity?"),
-        (("--nope",), "busplan: no such option: --nope; `busplan --help` says more"),
         (("capacity", "paper-4ms", "--perod", "1ms"), "no such option: --perod (Possible options: --period)"),
         (("capacity", "paper-4ms", "--period"), "option '--period' requires an argument"),
         (("capacity",), "busplan capacity: missing argument 'PROFILE'; `busplan capacity --help` says more"),
         (("rule", "bp30"), "bp30: no such rule; did you mean BP301? `busplan rule` lists them"),
-        (("rule", "sintax"), "sintax: no such rule; did you mean syntax?"),
         (("manual", "plam"), "; did you mean plan?"),
         (("capacity", "gantry"), "; did you mean gantry-24?"),
-        (("plan", "paper-4ms", "--axes", "0"), "invalid value for '--axes': must be greater than or equal to 1"),
         (("capacity", "paper-4ms", "paper-1ms"), "unexpected extra argument"),
         (("plan", "paper-4ms", "--nodes", "two"), "invalid value for '--nodes': must be a valid integer"),
-        (("capacity", "paper-4ms", "--timing", "neither"), "--timing neither: no timing model of bus.kind ieee1394"),
+        (
+            ("capacity", "paper-4ms", "--timing-model", "neither"),
+            "timing_model 'neither': expected 'paper' or 'standard'",
+        ),
         (
             ("latency", "paper-4ms", "--format", "xml"),
             "invalid value for '--format': 'xml' is not one of 'table', 'markdown'",
@@ -425,43 +321,6 @@ def test_a_file_whose_ending_is_left_out_is_asked_for(refused: Refused, tmp_path
     assert "did you mean" not in refused("capacity", "rail", cwd=tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("capacity", "paper-4ms", "--period", "4"), "--period 4: expected a time with its unit"),
-        (
-            ("capacity", "paper-4ms", "--period", "4ms", "--period", "0us"),
-            "--period 0us, in us 0.0: must be 0.001 or more",
-        ),
-        (("plan", "paper-4ms", "--nodes", "0"), "--nodes 0: must be 1 or more"),
-        (("latency", "paper-4ms", "--set", "bus.nodes=-3"), "--set bus.nodes=-3: must be 1 or more"),
-        (
-            ("capacity", "paper-4ms", "--set", "bus.gap_count=64"),
-            "--set bus.gap_count=64: expected a whole number from",
-        ),
-        (
-            ("latency", "paper-4ms", "--set", "bus.gap_count=best"),
-            "--set bus.gap_count=best: expected a whole number from",
-        ),
-        (
-            ("latency", "paper-4ms", "--payload", "4;8"),
-            "--payload 4;8: expected payloads of 1 to 1,000,000 bytes between",
-        ),
-        (("latency", "paper-4ms", "--payload", "1025"), "payload 1025 bytes: outside the execution table of paper-4ms"),
-        (
-            ("capacity", "paper-4ms", "--period", "1e9s"),
-            "--period 1e9s, in us 1000000000000000.0: must be 1,000,000,000",
-        ),
-        (("capacity", "paper-4ms", "--period", "1e-320us"), "--period 1e-320us, in us 1e-320: must be 0.001 or more"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
-)
-def test_a_wrong_value_is_named_with_its_option(refused: Refused, arguments: tuple[str, ...], said: str) -> None:
-    message = refused(*arguments)
-    assert message.startswith(said)
-    assert "\n" not in message
-
-
 def test_two_wrong_options_are_told_at_once(refused: Refused) -> None:
     said = refused("capacity", "paper-4ms", "--set", "bus.nodes=0", "--set", "bus.gap_count=64").splitlines()
     assert sorted(line.partition(":")[0] for line in said) == ["--set bus.gap_count=64", "--set bus.nodes=0"]
@@ -481,13 +340,6 @@ node = {{ axes = 4, execution = {{ kind = "linear", base_us = 30, per_byte_us = 
 """
 
 
-def test_a_profile_comes_from_standard_input(run: Run) -> None:
-    for command in ("capacity", "latency"):
-        done = run(command, "-", "--format", "json", stdin=profile_text())
-        assert (done.returncode, done.stderr) == (0, "")
-        assert strictly(done.stdout)["profile"] == "mine"
-
-
 def test_a_profile_comes_from_a_file_with_the_same_answer(run: Run, tmp_path: Path) -> None:
     (tmp_path / "größe x.toml").write_text(profile_text(), encoding="utf-8")
     done = run("capacity", "größe x.toml", cwd=tmp_path)
@@ -495,26 +347,14 @@ def test_a_profile_comes_from_a_file_with_the_same_answer(run: Run, tmp_path: Pa
     assert done.stdout == run("capacity", "-", stdin=profile_text()).stdout
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "[bold]x[/]",
-        "[/]",
-        "[link=file:///etc]x[/link]",
-        ":smile:",
-        "a \"b\" 'c'",
-        "größe 日本 \U0001f600",
-        "a,b;c",
-        "%s {0}",
-        "\\n",
-    ],
-)
-def test_a_name_is_shown_as_written_in_every_form(run: Run, name: str) -> None:
+NAMES = ["[bold]x[/] [/] :smile:", "[link=file:///etc]x[/link]", "a \"b\" 'c' größe 日本 \U0001f600", "%s {0} \\n"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_is_shown_as_written(run: Run, name: str) -> None:
     text = profile_text(name=json.dumps(name, ensure_ascii=False))
     for command in ("capacity", "latency"):
-        table = run(command, "-", stdin=text)
-        assert (table.returncode, table.stderr) == (0, "")
-        assert name in table.stdout
-    found = run("capacity", "-", "--format", "json", stdin=text)
-    assert strictly(found.stdout)["profile"] == name
-    assert name in strictly(found.stdout)["verdicts"][0]["text"]
+        assert name in run(command, "-", stdin=text).stdout
+    found = strictly(run("capacity", "-", "--format", "json", stdin=text).stdout)
+    assert found["profile"] == name
+    assert name in found["verdicts"][0]["text"]

@@ -8,23 +8,20 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fcntl import LOCK_EX, flock
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 
 from busplan import files
 from busplan.cli import rewrite
 
-if TYPE_CHECKING:
-    from subprocess import CompletedProcess
-
-Run = Callable[..., "CompletedProcess[str]"]
+Run = Callable[..., Any]
 Refused = Callable[..., str]
 
 SHIPPED = Path(__file__).parents[2] / "profiles"
 TABLE = str(SHIPPED / "table-1.csv")
 CHANGES = {
-    "plan": ("plan", "p.toml", "--nodes", "4", "--no-circle", "--apply"),
+    "plan": ("plan", "p.toml", "--nodes", "4", "--apply"),
     "calibrate": ("calibrate", "p.toml", TABLE, "--apply"),
     "baseline": ("check", "other.toml", "--no-circle", "--baseline", "b.json", "--update-baseline"),
 }
@@ -56,6 +53,68 @@ def change(request: pytest.FixtureRequest, tmp_path: Path, run: Run) -> Change:
         return Change(CHANGES[request.param], tmp_path / "b.json")
     (tmp_path / "p.toml").write_text(text, encoding="utf-8")
     return Change(CHANGES[request.param], tmp_path / "p.toml")
+
+
+KILLED = """
+import os, sys
+from itertools import count
+from pathlib import Path
+from busplan.__main__ import main
+
+def child(last):
+    # Killed before the last of some steps that change files; gives whether it had fewer.
+    pid = os.fork()
+    if pid:
+        return os.WIFEXITED(os.waitpid(pid, 0)[1])
+    steps = count(1)
+
+    def step(*_):
+        if next(steps) == last:
+            os.kill(os.getpid(), 9)
+
+    def heard(event, arguments):
+        writes = event == "open" and isinstance(arguments[2], int) and arguments[2] & (os.O_WRONLY | os.O_RDWR)
+        if writes or event in ("os.link", "os.rename", "os.remove", "os.truncate"):
+            step()
+
+    synced = os.fsync
+    os.fsync = lambda descriptor: (step(), synced(descriptor))
+    sys.addaudithook(heard)
+    try:
+        main()
+    finally:
+        os._exit(0)
+
+path, sys.argv = Path(sys.argv[1]), ["busplan", *sys.argv[2:]]
+before = path.read_bytes()
+try:
+    main()  # which loads what each child has
+except SystemExit as leaving:
+    assert not leaving.code
+after = path.read_bytes()
+assert after != before
+for number in count(1):
+    path.write_bytes(before)
+    whole = child(number)
+    assert path.read_bytes() in (before, after)
+    if whole:
+        assert path.read_bytes() == after
+        break
+print(number)
+"""
+REPORT = ("check", "other.toml", "--no-circle", "--format", "json", "-o", "report")
+
+
+@pytest.mark.parametrize("command", [*CHANGES.values(), REPORT], ids=[*CHANGES, "report"])
+def test_a_kill_at_any_step_leaves_one_file_or_the_other(run: Run, tmp_path: Path, command: tuple[str, ...]) -> None:
+    for name in ("other.toml", "p.toml"):
+        (tmp_path / name).write_text(profile(), encoding="utf-8")
+    run("check", "paper-4ms", "--no-circle", "--baseline", "b.json", "--update-baseline", cwd=tmp_path)
+    (tmp_path / "report").write_text("old", encoding="utf-8")
+    path = {"check": "b.json"}.get(command[0], "p.toml") if command is not REPORT else "report"
+    done = run(path, *command, python=("-c", KILLED), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout.split()[-1]) > 3  # the file is opened, synced and named
 
 
 def test_mode_and_links_stay(change: Change, tmp_path: Path, run: Run) -> None:

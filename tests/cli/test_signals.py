@@ -4,7 +4,6 @@ import csv
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -175,17 +174,6 @@ def many_files(folder: Path) -> tuple[str, ...]:
     return "check", ".", "--jobs", "2"
 
 
-def test_a_check_that_is_interrupted_ends_its_workers(running: Start, folder: Path) -> None:
-    with running(*many_files(folder)) as process:
-        assert until(lambda: len(workers_of(process.pid)) == 2)
-        started = workers_of(process.pid)
-        os.kill(process.pid, signal.SIGINT)
-        ended, document, said = process.end()
-    assert (ended, document) == (130, "")
-    assert "Traceback" not in said
-    assert not any(map(alive, started))
-
-
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 def test_any_command_ends_with_the_code_of_its_signal(running: Start, folder: Path, name: str) -> None:
     with running("init", "x", first="os.fsync = lambda _: time.sleep(30)") as process:
@@ -209,15 +197,3 @@ def test_a_worker_that_is_killed_is_said(running: Start, folder: Path, name: str
     assert "busplan itself failed" not in said
     assert not any(map(alive, started))
     assert not (folder / "c.csv").exists()
-
-
-def test_a_worker_ends_in_the_middle_of_its_work(tmp_path: Path) -> None:
-    waiting = "import time; from busplan.cli.workers import workers\n"
-    waiting += "with workers(1) as crew:\n    crew.submit(time.sleep, 60).result()"
-    with subprocess.Popen([sys.executable, "-c", waiting], cwd=tmp_path, text=True) as process:
-        assert until(lambda: workers_of(process.pid))
-        started = workers_of(process.pid)
-        time.sleep(0.2)
-        process.kill()
-        process.wait()
-    assert until(lambda: not any(map(alive, started)))

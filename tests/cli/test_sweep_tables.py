@@ -2,10 +2,7 @@
 
 import csv
 import json
-import os
 import statistics
-import subprocess
-import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,7 +10,7 @@ from typing import Any
 
 import pytest
 
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
+Run = Callable[..., Any]
 Refused = Callable[..., str]
 LOSSY = ("sweep", "paper-4ms", "--set", "circle.radius_mm=20", "--set", "delivery.loss_probability=0.001", "--circle")
 SEEDS = ("--vary", "delivery.seed=1:12", "--jobs", "1")
@@ -100,19 +97,9 @@ def test_every_form_has_the_summary(run: Run, tmp_path: Path) -> None:
         assert parquet(tmp_path / "rows.parquet").read().to_pylist()[0]["failed_share"] == row["failed_share"]
 
 
-def test_seeds_that_draw_nothing_are_said_to(run: Run, tmp_path: Path) -> None:
-    still = ("sweep", "paper-two-node", "--set", "circle.radius_mm=10", "--circle", *SEEDS, "--summary")
-    done = run(*still, "--columns", "failed_share,max_contour_error_std_mm", cwd=tmp_path)
-    assert (
-        "The circle is not judged at 1: no contour tolerance is asked for, or no error source matters." in done.stdout
-    )
-    assert "At 1 point all seeds gave the same circle: a seed draws for delivery.jitter_us and" in done.stdout
-    assert done.stdout.splitlines()[-1].split() == ["standard", "-", "0.000000"]
-
-
 REFUSALS = {
     "--vary delivery.seed=1:9 --summary": "--summary: goes with --circle",
-    "--vary bus.nodes=1:9 --circle --summary": "--summary: is over seeds, and none vary; add delivery.seed",
+    "--vary bus.nodes=1:9 --circle --summary": "summary=True: is over seeds, and none vary; add delivery.seed",
     "--vary delivery.seed=1:9 --vary bus.nodes=1:200 --circle --summary": "200 points with 9 seeds each are",
     "--vary delivery.seed=1:9 --circle --summary --columns passed": "--columns passed: no such column",
     "--vary delivery.seed=1:9 --circle --summary --plot x.svg": "none varies but the seed",
@@ -128,12 +115,8 @@ def test_refusals(refused: Refused, line: str, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_terminal_gets_no_parquet(tmp_path: Path) -> None:
+def test_a_terminal_gets_no_parquet(on_terminal: Callable[..., tuple[int, str]], tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
-    ours, theirs = os.openpty()
-    call = [sys.executable, "-m", "busplan", "sweep", "paper-4ms", "--vary", "bus.nodes=1:2", "--format", "parquet"]
-    done = subprocess.run(call, stdout=theirs, stderr=subprocess.PIPE, cwd=tmp_path, check=False, text=True)
-    os.close(theirs)
-    os.close(ours)
-    assert done.returncode == 2
-    assert "--format parquet: is not text for a terminal; give -o FILE.parquet, or use a pipe" in done.stderr
+    sweep = ("sweep", "paper-4ms", "--vary", "bus.nodes=1:2", "--format", "parquet")
+    code, shown = on_terminal(*sweep, cwd=tmp_path, env={"COLUMNS": "200"})
+    assert (code, shown) == (2, "--format parquet: is not text for a terminal; give -o FILE.parquet, or use a pipe\n")

@@ -8,14 +8,8 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.errors import PlacedError
-from busplan.profile.shipped import load
-from busplan.profile.toml import decode, override, validate
-from busplan.questions.explain import explain
-from busplan.questions.fit.figures import capacity, figures
+from busplan.profile.toml import decode, validate
 from busplan.questions.fit.network import network_of
-from busplan.questions.latency.figures import latency
-from busplan.questions.plan.planning import plan
-from busplan.sections.profile import Profile
 
 TEXT = """schema_version = 1
 name = "gantry"
@@ -36,7 +30,7 @@ axes = 4
 LINE = 'kind = "linear"\nbase_us = 20\nper_byte_us = 0.1'
 
 
-def profile(payload: str, execution: str = LINE) -> Profile:
+def profile(payload: str, execution: str = LINE) -> busplan.Profile:
     return validate(decode(TEXT.format(payload=payload, execution=execution).encode(), name="gantry.toml"))
 
 
@@ -46,8 +40,13 @@ def refused(payload: str, execution: str = LINE) -> list[str]:
     return list(caught.value.problems)
 
 
-def figures_of(one: Profile) -> Any:
-    return capacity(one).results, latency(one).transactions
+def figures_of(one: busplan.Profile) -> Any:
+    return busplan.capacity(one).results, busplan.latency(one).transactions
+
+
+def standard(one: busplan.Profile) -> Any:
+    (figures,) = busplan.capacity(one, timing_model="standard").results
+    return figures
 
 
 @given(fixed=st.integers(0, 60), per_axis=st.integers(1, 30), axes=st.integers(1, 12))
@@ -57,14 +56,14 @@ def test_what_each_axis_adds_is_as_if_it_stood_in_the_payload(fixed: int, per_ax
         added += f"\nread_bytes = {fixed}\nwrite_bytes = {fixed}"
     size = fixed + per_axis * axes
     alike = (profile(added), profile(f"read_bytes = {size}\nwrite_bytes = {size}"))
-    first, second = (override(one, {"node.axes": axes}) for one in alike)
+    first, second = (busplan.load_profile(one, changes={"node.axes": axes}) for one in alike)
     assert figures_of(first) == figures_of(second)
 
 
 def test_the_packet_limit_follows_the_axes() -> None:
     own = profile("read_bytes = 12\nwrite_bytes = 8\nwrite_bytes_per_axis = 20")
     # S400 carries 2,048 bytes: 8 + 102 x 20 is the last that fits.
-    last, over = (figures(override(own, {"node.axes": axes}), model="standard") for axes in (102, 103))
+    last, over = (standard(busplan.load_profile(own, changes={"node.axes": axes})) for axes in (102, 103))
     assert "payload" not in last.exceeded
     assert "payload" in over.exceeded
 
@@ -88,32 +87,37 @@ def test_a_table_must_hold_what_all_axes_make() -> None:
 def test_a_sweep_over_the_axes_is_what_each_profile_gives() -> None:
     own = profile("read_bytes = 4\nread_bytes_per_axis = 8\nwrite_bytes_per_axis = 6")
     swept = busplan.sweep(own, vary={"node.axes": range(1, 7)}, timing_model="standard")["required_us"].tolist()
-    assert swept == [figures(override(own, {"node.axes": n}), model="standard").required_us for n in range(1, 7)]
+    assert swept == [standard(busplan.load_profile(own, changes={"node.axes": n})).required_us for n in range(1, 7)]
     assert len(set(swept)) == 6
 
 
 def test_explain_starts_from_the_payload_of_an_axis() -> None:
     own = profile("read_bytes_per_axis = 8\nwrite_bytes = 12")
-    (one,) = explain(own, "required_us").derivations
+    (one,) = busplan.explain(own, "required_us").derivations
     names = {given.name for given in one.inputs}
     assert {"payload.read_bytes_per_axis", "payload.write_bytes", "node.axes"} <= names
     assert "payload.read_bytes" not in names
     assert "node.axes" not in {
-        given.name for given in explain(load("paper-4ms").profile, "required_us").derivations[0].inputs
+        given.name for given in busplan.explain(busplan.load_profile("paper-4ms"), "required_us").derivations[0].inputs
     }
 
 
-def test_a_plan_leaves_a_payload_alone_that_follows_the_axes() -> None:
-    own = profile("read_bytes_per_axis = 8\nwrite_bytes_per_axis = 8")
-    (why,) = [one.reason for one in plan(own).impossible if one.title == "largest payload"]
-    assert why == "the payload follows the axes of a node"
-    assert not any("payload" in key for option in plan(own).options for key in option.changes)
+def test_a_plan_cuts_what_each_axis_adds() -> None:
+    own = profile("read_bytes_per_axis = 100\nwrite_bytes = 400")
+    short = busplan.load_profile(own, changes={"cycle.period_us": 800.0})
+    assert busplan.capacity(short).verdict == "not shown to fit"
+    # 80 bytes for each of four axes are the other 320.
+    found = busplan.plan(short, free=["payload"]).recommended_changes
+    assert found == {"payload.read_bytes_per_axis": 80, "payload.write_bytes": 320}
+    assert busplan.capacity(busplan.load_profile(short, changes=found)).verdict == "fits"
+    more = {"payload.read_bytes_per_axis": 81, "payload.write_bytes": 324}
+    assert busplan.capacity(busplan.load_profile(short, changes=more)).verdict == "not shown to fit"
 
 
 def test_another_payload_in_latency_is_the_whole_of_it() -> None:
     own = profile("read_bytes_per_axis = 8\nwrite_bytes_per_axis = 8")
     group = network_of(own).groups[0]
     assert (group.read_bytes, group.write_bytes) == (32, 32)
-    asked = latency(own, payloads_bytes=[12]).transactions
-    plain = latency(profile("read_bytes = 12\nwrite_bytes = 12")).transactions
+    asked = busplan.latency(own, payload_bytes=[12]).transactions
+    plain = busplan.latency(profile("read_bytes = 12\nwrite_bytes = 12")).transactions
     assert asked == plain

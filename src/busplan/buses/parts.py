@@ -54,8 +54,6 @@ class Key(NamedTuple):
     """Short form in a table of plans: a format of the value."""
     chooses: bool = False
     """Whether its word selects a formula, so that a derivation has it among its inputs."""
-    warned_at: Sourced | None = None
-    """Constant that a warning compares it with."""
     role: KeyRole | None = None
     """Part of the machine that it stands for, where other kinds have a key for it, too."""
 
@@ -271,8 +269,6 @@ class PayloadRange(NamedTuple):
 
     step_bytes: int
     most_bytes: int
-    bound: str
-    """Part of the bus that bounds the largest payload."""
     carrier: str = "a packet"
     """Carrier that holds no more."""
 

@@ -10,7 +10,7 @@ import typer
 
 from busplan.buses import kind_called, kind_named, kind_names
 from busplan.cli.options import complete_profile, option, time_us
-from busplan.cli.output import say
+from busplan.cli.output import message_width, say
 from busplan.errors import BusplanError
 from busplan.files import write_file
 
@@ -264,9 +264,10 @@ def _asked(words: str, default: _Answer) -> _Answer:
 
 
 def _card(text: str) -> list[str]:
-    """The card of a new profile, in lines."""
+    """The card of a new profile, in lines as wide as the terminal."""
+    from busplan.forms.terminal import block_lines
     from busplan.profile.toml import decode, validate
     from busplan.questions.capacity import capacity
 
-    report = str(capacity(validate(decode(text.encode(), name="profile"))))
-    return report.partition("\n\n")[0].splitlines()
+    card, *_ = capacity(validate(decode(text.encode(), name="profile"))).report().blocks
+    return [line.text for line in block_lines([card], width=message_width())]

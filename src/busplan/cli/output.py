@@ -1,7 +1,6 @@
 """All output: documents to stdout, messages to stderr."""
 
 import os
-import re
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -33,18 +32,23 @@ def say(*messages: str) -> None:
 
 
 def _fitting(message: str) -> list[str]:
-    """Lines of a message: on a terminal it breaks at words, and the words of a card's line stand below each other."""
-    if not sys.stderr.isatty():
+    """Lines of a message, which breaks at words on a terminal."""
+    width = message_width()
+    if width is None or len(message) <= width:
         return [message]
-    from shutil import get_terminal_size
     from textwrap import wrap
 
-    label = re.match(r" +\S.*?  +| *", message)
-    hang = " " * (label.end() if label else 0)
-    width = get_terminal_size().columns
-    if len(message) <= width:
-        return [message]
+    hang = " " * (len(message) - len(message.lstrip()))
     return wrap(message, width, subsequent_indent=hang, break_long_words=False, break_on_hyphens=False)
+
+
+def message_width() -> int | None:
+    """Width of the terminal that shows messages, in columns; None without one."""
+    if not sys.stderr.isatty():
+        return None
+    from shutil import get_terminal_size
+
+    return get_terminal_size().columns
 
 
 def emit_text(text: str) -> None:

@@ -11,7 +11,7 @@ from busplan.cli.answering import answer, report_with
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument, option
-from busplan.cli.output import PlanFailsError, emit_document, say
+from busplan.cli.output import PlanFailsError, emit_document, message_width, say
 from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.errors import BusplanError
 from busplan.files import NewFile, new_file
@@ -198,4 +198,4 @@ def _say_report(changes: KeyChanges, report: "Report") -> None:
     """Write the report to standard error: standard output has the profile."""
     from busplan.forms.terminal import block_lines
 
-    say(*(line.text for line in block_lines(report_with(changes, report).blocks)))
+    say(*(line.text for line in block_lines(report_with(changes, report).blocks, width=message_width())))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO, Final, Literal, NamedTupl
 
 import typer
 
-from busplan.cli.answering import give, report_with
+from busplan.cli.answering import give
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
@@ -223,7 +223,7 @@ def _write(answer: "SweepAnswer", form: SweepForm, rows: _Rows, file: BinaryIO |
                 (emit_document if file is None else file.write)(piece)
         case _:
             top = answer.report(columns=rows.columns, top=rows.top, sort_by=rows.sort_by, ascending=rows.ascending)
-            report = report_with(changes, top)._replace(is_whole=rows.is_whole)
+            report = top._replace(blocks=(*changes_sentences(changes), *top.blocks), is_whole=rows.is_whole)
             if file is None:
                 give(report, form)
                 return

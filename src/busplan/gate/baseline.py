@@ -68,7 +68,7 @@ def figures_of(subject: Subject) -> dict[str, float]:
                 figures[f"{capacity.timing_model}.group.{group.name}.{name}"] = getattr(group, name)
         if not subject.profile.has_cycle:
             for figure in _of_all(capacity.kind):
-                figures[f"{capacity.timing_model}.{figure.key}"] = getattr(capacity, figure.key)
+                figures[f"{capacity.timing_model}.{figure.key}"] = capacity.values()[figure.key]
     return {name: value for name, value in figures.items() if value is not None}
 
 

@@ -61,11 +61,11 @@ def test_the_card_says_what_it_rests_on_in_every_form(run: Run, plan_file: Path,
     assert "bus.bit_rate_kbit_s: measure it first" in said
 
 
-def test_so_does_the_text_of_json(run: Run, plan_file: Path) -> None:
+def test_so_do_the_lines_of_json(run: Run, plan_file: Path) -> None:
     document = json.loads(run("capacity", plan_file.name, "--format", "json", cwd=plan_file.parent).stdout)
-    text = document["verdicts"][0]["text"]
-    assert "Rests on priority queues: assumed; no repeated frames." in text
-    assert "Assumed: bus.bit_rate_kbit_s, which carries " in text
+    lines = document["verdicts"][0]["lines"]
+    assert {"label": "rests on", "text": "priority queues: assumed; no repeated frames"} in lines
+    assert {"label": "assumed", "text": "bus.bit_rate_kbit_s: measure it first"} in lines
 
 
 def test_an_assumed_bit_rate_warns_where_it_stands(run: Run, plan_file: Path) -> None:

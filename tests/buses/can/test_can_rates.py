@@ -16,8 +16,6 @@ from busplan.buses.can.streams import streams
 from busplan.buses.can.traffic import traffic_of_profile
 from busplan.elementwise import plain
 from busplan.profile.conversion import converted
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
 from busplan.profile.write import profile_text
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import with_unchecked
@@ -61,7 +59,7 @@ def cycle(own: Profile, model: str = WORST) -> CanCycle:
 
 def responses(own: Profile) -> dict[str, float | None]:
     answers = busplan.latency(own, timing_model=[WORST]).transactions
-    return {f"{answer.group} {answer.transaction}".strip(): answer.worst_response_us for answer in answers}
+    return {f"{answer.group} {answer.transaction}".strip(): answer.phases["worst_response_us"] for answer in answers}
 
 
 @pytest.mark.parametrize("rates", [(1, 1, 1), (1, 4, 2), (3, 4, 6), (2, 2, 2), (5, 1, 240)])
@@ -90,8 +88,8 @@ def test_every_cycle_is_what_it_was_without_the_key() -> None:
 
 
 def test_nodes_that_are_alike_may_all_be_slow() -> None:
-    own = override(load("can-servo-8").profile, {"payload.every": 3})
-    assert plain(cycle(own).load) < plain(cycle(override(own, {"payload.every": 1})).load)
+    own = busplan.load_profile("can-servo-8", changes={"payload.every": 3})
+    assert plain(cycle(own).load) < plain(cycle(busplan.load_profile(own, changes={"payload.every": 1})).load)
 
 
 def test_slow_pdos_go_before_a_message_less_often() -> None:
@@ -102,10 +100,12 @@ def test_slow_pdos_go_before_a_message_less_often() -> None:
         messages=(message("long", 0x700),),
         bit_rate_kbit_s=125,
     )
-    slower = override(own, {"cycle.period_us": 9000.0, "limits.max_load": 0.95})
+    slower = busplan.load_profile(own, changes={"cycle.period_us": 9000.0, "limits.max_load": 0.95})
     each = {stream.label: stream for stream in streams(traffic_of_profile(slower), is_stuffed=True)}
     assert each["io feedback"].period_us == 4 * each["drives feedback"].period_us == 36_000
-    slow, fast = (responses(override(slower, {"group.io.every": every}))["long"] for every in (4, 1))
+    slow, fast = (
+        responses(busplan.load_profile(slower, changes={"group.io.every": every}))["long"] for every in (4, 1)
+    )
     assert slow is not None
     # The message meets each PDO of a late cycle and of the next; those of io once.
     drives_us, io_us, sync_us, own_us = 4 * 1080, 2 * 760, 440, 1080
@@ -114,14 +114,15 @@ def test_slow_pdos_go_before_a_message_less_often() -> None:
 
 
 def test_more_nodes_fit_where_they_are_seldom_due() -> None:
-    own = override(mixed(every=4), {"limits.max_load": 0.5})
+    own = busplan.load_profile(mixed(every=4), changes={"limits.max_load": 0.5})
     for every, fits in ((4, True), (1, False)):
-        found = busplan.capacity(override(own, {"group.io.every": every})).results[0]
+        found = busplan.capacity(busplan.load_profile(own, changes={"group.io.every": every})).results[0]
         assert ("load" not in found.exceeded) is fits
     most = next(
         nodes
         for nodes in range(1, 40)
-        if busplan.capacity(override(own, {"group.io.nodes": nodes + 1})).results[0].verdict != "fits"
+        if busplan.capacity(busplan.load_profile(own, changes={"group.io.nodes": nodes + 1})).results[0].verdict
+        != "fits"
     )
     assert {each.name: each.safe_nodes for each in busplan.capacity(own).results[0].groups}["io"] == most
 
@@ -133,7 +134,7 @@ def test_no_cycle_lasts_longer_than_the_fullest() -> None:
     drives = group("drives", 1, size=1)
     slow = group("io", 1, size=1, axes=0, every=2, feedback_identifier=0x7F0, command_identifier=0x7F1)
     own, alone = (machine(*groups, messages=(own_message,)) for groups in ((drives, slow), (drives,)))
-    fullest_us = plain(cycle(override(own, {"group.io.every": 1})).required_us)
+    fullest_us = plain(cycle(busplan.load_profile(own, changes={"group.io.every": 1})).required_us)
     assert fullest_us == 55 + 2 * 41 + 4 * 65 + 135
     # By its deadline alone it could block twice, and the two missing PDOs of one byte are shorter.
     assert plain(cycle(alone).required_us) == fullest_us - 2 * 65 + 135
@@ -145,7 +146,7 @@ def test_no_cycle_lasts_longer_than_the_fullest() -> None:
 def test_a_loop_waits_for_the_cycle_in_which_its_commands_are_due() -> None:
     loops = {}
     for pipeline in (0, 1, 4, 5):
-        own = override(mixed(every=4), {"bus.pipeline_cycles": pipeline})
+        own = busplan.load_profile(mixed(every=4), changes={"bus.pipeline_cycles": pipeline})
         loops[pipeline] = responses(own)["loop"]
     cycle_us = loops[0]
     assert cycle_us is not None
@@ -154,7 +155,7 @@ def test_a_loop_waits_for_the_cycle_in_which_its_commands_are_due() -> None:
 
 def test_the_circle_needs_a_set_point_in_every_cycle() -> None:
     assert busplan.circle_test(mixed(every=4)).results[0].max_contour_error_mm is not None
-    own = override(mixed(), {"group.drives.every": 2})
+    own = busplan.load_profile(mixed(), changes={"group.drives.every": 2})
     with pytest.raises(busplan.BusplanError, match=r"group\.drives\.every = 2: the circle test has a set-point in"):
         busplan.circle_test(own)
 
@@ -183,7 +184,7 @@ def test_arrays_of_points_give_what_each_point_gives() -> None:
     told = {key: np.broadcast_to(each, shape) for key, each in answers(together).items()}
     for place in np.ndindex(shape):
         at = {key: np.broadcast_to(values, shape)[place].item() for key, values in keys.items()}
-        expected = answers(network_of(override(own, at)))
+        expected = answers(network_of(busplan.load_profile(own, changes=at)))
         assert {key: each[place] for key, each in told.items()} == pytest.approx(expected), at
 
 

@@ -13,21 +13,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
+from busplan.buses import kind_named
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.kind import packets_of
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.fit.certainty import cycle_of
-from busplan.questions.fit.figures import figures
+from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.loop_delays import loop_delays_us
-from busplan.questions.fit.network import bus_of, model_names, network_of
-from busplan.questions.latency.figures import latency
-from busplan.sections.profile import Profile
+from busplan.questions.fit.network import network_of
 
-DVRK = load("dvrk").profile
+DVRK = busplan.load_profile("dvrk")
 ROUNDING_US = 1e-6
 CYCLES = 3
 
@@ -42,12 +38,26 @@ def _simulation() -> ModuleType:
     return module
 
 
-BUS = _simulation()
+SIMULATED = _simulation()
+BUS = kind_named("ieee1394")
 
 
-def required_us(profile: Profile, **changes: object) -> float:
-    changed = override(profile, {key.replace("__", "."): value for key, value in changes.items()})
-    return figures(changed, model="standard").required_us
+def standard(profile: busplan.Profile) -> CapacityFigures:
+    """Figures by the standard's timing model."""
+    (figures,) = busplan.capacity(profile, timing_model="standard").results
+    return figures
+
+
+def required_us(profile: busplan.Profile, **changes: object) -> float:
+    changed = busplan.load_profile(profile, changes={key.replace("__", "."): value for key, value in changes.items()})
+    return standard(changed).required_us
+
+
+def cycle_of(profile: busplan.Profile) -> BroadcastCycle:
+    """Its cycle by the standard's timing model."""
+    cycle = BUS.cycle(network_of(profile), model="standard")
+    assert isinstance(cycle, BroadcastCycle)
+    return cycle
 
 
 # --- by hand ----------------------------------------------------------------------------------------------
@@ -83,10 +93,11 @@ def test_the_kit_by_hand_with_both_kinds_of_request() -> None:
 def test_with_firmware_up_to_rev_7_each_board_has_a_time_of_its_own() -> None:
     # JHU FireWire.v: 256 N + 150 clocks of 49.152 MHz behind N others; the kit's 128 bytes take longer than 256.
     timed: dict[str, object] = {"cycle.broadcast_request": "timed"}
-    assert required_us(override(DVRK, timed)) == required_us(DVRK, cycle__broadcast_request="isochronous")
+    assert required_us(busplan.load_profile(DVRK, changes=timed)) == required_us(
+        DVRK, cycle__broadcast_request="isochronous"
+    )
     small = {**timed, **{f"group.{name}.read_bytes": 4 for name in ("full", "partial")}}
-    cycle = cycle_of(override(DVRK, small), model="standard")
-    assert isinstance(cycle, BroadcastCycle)
+    cycle = cycle_of(busplan.load_profile(DVRK, changes=small))
     sent_us = WAY_US + 1.63 + data_us(32)
     assert sent_us < 256 / 49.152
     assert plain(cycle.boards_us) == pytest.approx((150 + 7 * 256) / 49.152 + sent_us, rel=1e-12)
@@ -96,10 +107,9 @@ def test_the_hub_is_read_no_earlier_than_the_software_does() -> None:
     # Four bytes of data: 3.052 + 8 (1.323 + 1.63 + 1.323 + 0.651) = 42.5 us, and the host waits 10 + 5 * 8 = 50 us.
     small: dict[str, object] = {"cycle.broadcast_request": "isochronous"}
     small |= {f"group.{name}.read_bytes": 4 for name in ("full", "partial")}
-    profile = override(DVRK, small)
+    profile = busplan.load_profile(DVRK, changes=small)
     boards_us = 150 / 49.152 + 8 * (WAY_US + 1.63 + data_us(32))
-    cycle = cycle_of(profile, model="standard")
-    assert isinstance(cycle, BroadcastCycle)
+    cycle = cycle_of(profile)
     assert plain(cycle.late_us) == pytest.approx(50 - boards_us)
     assert plain(cycle.late_us) > RESET_US
     hub_us = ARBITRATION_US + data_us(20) + ACKNOWLEDGE_US + data_us(24 + 8 * 8 + 4) + ACKNOWLEDGE_US
@@ -114,20 +124,23 @@ def test_the_hosts_own_time_overlaps_the_gaps_three_times() -> None:
 
 
 def test_latency_of_the_data_and_of_a_command() -> None:
-    read, write, *_ = latency(DVRK).transactions
+    read, write, *_ = busplan.latency(DVRK).transactions
     assert (read.transaction, read.payload_bytes, write.payload_bytes) == ("read", 128, 20)
     boards_us = 8 * (SUB_US + ARBITRATION_US + data_us(28 + 128))
-    assert read.latency_us == pytest.approx(QUERY_US + boards_us + RESET_US + HUB_US)
-    assert (read.query_us, read.boards_us, read.hub_wait_us) == pytest.approx((QUERY_US, boards_us, RESET_US))
-    assert write.latency_us == pytest.approx(WRITE_US)
-    assert (read.response_bytes, write.request_bytes) == (24 + 8 * 132 + 4, 24 + 8 * 24)
-    one = figures(DVRK, model="standard")
-    assert one.read_transaction_us + one.write_transaction_us == pytest.approx(one.required_us)
+    assert read.phases["latency_us"] == pytest.approx(QUERY_US + boards_us + RESET_US + HUB_US)
+    assert (read.phases["query_us"], read.phases["boards_us"], read.phases["hub_wait_us"]) == pytest.approx(
+        (QUERY_US, boards_us, RESET_US)
+    )
+    assert write.phases["latency_us"] == pytest.approx(WRITE_US)
+    assert (read.phases["response_bytes"], write.phases["request_bytes"]) == (24 + 8 * 132 + 4, 24 + 8 * 24)
+    one = standard(DVRK)
+    transactions_us = [one.own[f"{kind}_transaction_us"] for kind in ("read", "write")]
+    assert sum(us for us in transactions_us if isinstance(us, float)) == pytest.approx(one.required_us)
 
 
 def test_bias_and_doubt_count_each_packet_as_half_a_transaction() -> None:
     by_request = {
-        request: figures(override(DVRK, {"cycle.broadcast_request": request}), model="standard")
+        request: standard(busplan.load_profile(DVRK, changes={"cycle.broadcast_request": request}))
         for request in ("priority", "isochronous")
     }
     mean_us, gap_term_us = 0.827025, 2 * (63 - 21) / 98.304
@@ -140,7 +153,7 @@ def test_bias_and_doubt_count_each_packet_as_half_a_transaction() -> None:
 
 
 @st.composite
-def buses(draw: st.DrawFn) -> tuple[Profile, dict[str, Any]]:
+def buses(draw: st.DrawFn) -> tuple[busplan.Profile, dict[str, Any]]:
     nodes = draw(st.integers(1, 16))
     sizes = {f"{kind}_bytes": draw(st.integers(1, 120)) for kind in ("read", "write")}
     request = draw(st.sampled_from(["isochronous", "priority", "timed"]))
@@ -170,22 +183,22 @@ def buses(draw: st.DrawFn) -> tuple[Profile, dict[str, Any]]:
     )
     hub = draw(st.sampled_from([1, nodes]))
     scene = {
-        "nodes": tuple(BUS.Node(hub, sizes["read_bytes"], sizes["write_bytes"]) for _ in range(nodes)),
+        "nodes": tuple(SIMULATED.Node(hub, sizes["read_bytes"], sizes["write_bytes"]) for _ in range(nodes)),
         "hops": nodes,
         "gap_count": gap_count,
         "host_us": host_us,
         "first_start_us": first_start_us,
     }
     slot_us = 256 / 49.152 if request == "timed" else 0.0
-    return profile, {"scene": BUS.Scene(**scene), "isochronous": request != "priority", "slot_us": slot_us}
+    return profile, {"scene": SIMULATED.Scene(**scene), "isochronous": request != "priority", "slot_us": slot_us}
 
 
 @given(drawn=buses())
-def test_no_simulated_cycle_takes_longer_than_the_closed_form(drawn: tuple[Profile, dict[str, Any]]) -> None:
+def test_no_simulated_cycle_takes_longer_than_the_closed_form(drawn: tuple[busplan.Profile, dict[str, Any]]) -> None:
     profile, bus = drawn
-    run = BUS.simulate_broadcasts(**bus, cycles=CYCLES)
+    run = SIMULATED.simulate_broadcasts(**bus, cycles=CYCLES)
     longest_us = max(after - before for before, after in pairwise(run.starts_us))
-    closed_us = figures(profile, model="standard").required_us
+    closed_us = standard(profile).required_us
     assert longest_us <= closed_us + ROUNDING_US
     scene = bus["scene"]
     # Below gap count 8 the first node's 150 clocks end the fairness interval, and the host has its turn earlier.
@@ -209,8 +222,8 @@ def test_no_simulated_cycle_takes_longer_than_the_closed_form(drawn: tuple[Profi
     ],
 )
 def test_its_limits_are_its_own(changes: dict[str, object], limits: tuple[str, ...]) -> None:
-    changed = override(DVRK, changes)
-    assert tuple(one.key for one in bus_of(changed).broken(network_of(changed))) == limits
+    changed = busplan.load_profile(DVRK, changes=changes)
+    assert tuple(one.key for one in BUS.broken(network_of(changed))) == limits
 
 
 def test_a_broken_limit_is_said_by_verdict_and_gate(tmp_path: Path, run: Callable[..., Any]) -> None:
@@ -227,28 +240,29 @@ def test_a_broken_limit_is_said_by_verdict_and_gate(tmp_path: Path, run: Callabl
 
 def test_no_execution_time_and_no_answer_of_a_node_plays_a_part() -> None:
     slow: dict[str, object] = {f"group.{name}.execution.base_us": 500.0 for name in ("full", "partial")}
-    assert required_us(override(DVRK, slow)) == required_us(DVRK)
-    assert not bus_of(DVRK).has_execution(network_of(DVRK))
+    assert required_us(busplan.load_profile(DVRK, changes=slow)) == required_us(DVRK)
+    assert not BUS.has_execution(network_of(DVRK))
     with pytest.raises(BusplanError, match="so none can be found"):
         packets_of(network_of(DVRK), "full", "standard", "read", 4)
 
 
 def test_the_paper_cannot_express_it() -> None:
-    plainest = override(
-        load("paper-4ms").profile, {"cycle.schedule": "broadcast", "cycle.broadcast_request": "isochronous"}
+    plainest = busplan.load_profile(
+        "paper-4ms",
+        changes={"cycle.schedule": "broadcast", "cycle.broadcast_request": "isochronous"},
     )
-    assert bus_of(plainest).cannot_express(network_of(plainest), model="paper") == ("cycle.schedule",)
-    assert model_names(plainest) == ("standard",)
+    assert BUS.cannot_express(network_of(plainest), model="paper") == ("cycle.schedule",)
+    assert [one.timing_model for one in busplan.capacity(plainest).results] == ["standard"]
 
 
 def test_own_hops_are_not_charged_for_what_goes_to_all() -> None:
     assert required_us(DVRK, bus__charge_hops="own") == required_us(DVRK)
-    assert bus_of(DVRK).way_charged(network_of(DVRK)) == "every packet at the hops of the farthest"
+    assert BUS.way_charged(network_of(DVRK)) == "every packet at the hops of the farthest"
 
 
 def test_a_command_arrives_at_all_nodes_at_once() -> None:
-    host = override(DVRK, {"servo.loop": "host", "servo.update": "on_arrival"})
-    x_us, y_us = loop_delays_us(host)
+    host = busplan.load_profile(DVRK, changes={"servo.loop": "host", "servo.update": "on_arrival"})
+    x_us, y_us = loop_delays_us(network_of(host))
     boards_us = 8 * (SUB_US + ARBITRATION_US + data_us(28 + 128))
     before_us = QUERY_US + boards_us + RESET_US + HUB_US + RESET_US
     assert x_us == y_us == pytest.approx(before_us + WRITE_US - ACKNOWLEDGE_US)
@@ -257,7 +271,7 @@ def test_a_command_arrives_at_all_nodes_at_once() -> None:
 def test_the_kit_is_that_of_its_sources() -> None:
     assert (network_of(DVRK).nodes, network_of(DVRK).axes) == (8, 28)  # TePRA 2014, abstract
     # mechatronics-software, BasePort.cpp, Rev 8 with QLA: 33 quadlets a board, and one of timing behind all.
-    assert latency(DVRK).transactions[0].response_bytes == 24 + 4 * (8 * 33 + 1)
+    assert busplan.latency(DVRK).transactions[0].phases["response_bytes"] == 24 + 4 * (8 * 33 + 1)
     assert {group.write_bytes for group in network_of(DVRK).groups} == {4 * 5}
 
 

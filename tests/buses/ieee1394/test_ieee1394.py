@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import busplan
 from busplan.buses import kind_named
 from busplan.buses.ieee1394 import constants as ieee1394
 from busplan.elementwise import plain
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
 from busplan.questions.evidence.rows import sections_of
 from busplan.questions.fit.loop_delays import loop_delays_us
+from busplan.questions.fit.network import network_of
 from busplan.sourced import Sourced
 
 
@@ -71,12 +71,12 @@ def test_published_machines_fit_their_periods() -> None:
 
 
 def test_a_command_that_is_executed_beside_the_bus_counts_as_it_is_executed() -> None:
-    bench = load("paper-two-node").profile
+    bench = busplan.load_profile("paper-two-node")
     host = {"servo.loop": "host", "cycle.period_us": 1000.0, "servo.step_us": 100.0}
 
     def delay_us(update: str, **changes: object) -> float:
         own = {**host, "servo.update": update, **{key.replace("__", "."): one for key, one in changes.items()}}
-        return max(loop_delays_us(override(bench, own)))
+        return max(loop_delays_us(network_of(busplan.load_profile(bench, changes=own))))
 
     assert delay_us("next_sync") == delay_us("next_sync", node__write_response="unified") == 1000
     # A unified write is acknowledged at once, and the node takes 36.8 us for it then.

@@ -11,8 +11,6 @@ from busplan.buses.published import parts_tested
 from busplan.buses.sercos2.section import Sercos2Profile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
 from busplan.profile.write import profile_text
 from busplan.questions.evidence.rows import sections_of
 from busplan.questions.fit.inputs import given
@@ -34,7 +32,9 @@ MDT_BITS = 16 + 8 * (3 + 3 * 8) + 8 * (3 + 3 * 8) // 5
 
 def profile(**changes: Any) -> Profile:
     """That profile with other values by dotted key, __ for the dot."""
-    return override(Sercos2Profile.model_validate(DATA), {key.replace("__", "."): one for key, one in changes.items()})
+    return busplan.load_profile(
+        Sercos2Profile.model_validate(DATA), changes={key.replace("__", "."): one for key, one in changes.items()}
+    )
 
 
 def terms(one: Profile, model: str = "worst-stuffing") -> dict[str, float]:
@@ -65,8 +65,8 @@ def test_the_gap_is_in_the_uncertainty() -> None:
 def test_delays_are_those_by_hand() -> None:
     found = {one.transaction: one for one in busplan.latency(profile(), timing_model=["worst-stuffing"]).transactions}
     until_at_us = MST_BITS / 4 + 12 + 3 * AT_BITS / 4 + 14
-    assert found["feedback"].delay_us == 49 + until_at_us
-    assert found["command"].delay_us == 44 + until_at_us + 12 + MDT_BITS / 4
+    assert found["feedback"].phases["delay_us"] == 49 + until_at_us
+    assert found["command"].phases["delay_us"] == 44 + until_at_us + 12 + MDT_BITS / 4
 
 
 def test_a_gap_must_be_given_and_the_message_says_why(tmp_path: Path) -> None:
@@ -95,7 +95,9 @@ def test_a_gap_is_assumed_whoever_gives_it() -> None:
     ],
 )
 def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[str, ...]) -> None:
-    (found,) = busplan.capacity(override(profile(), changes), timing_model=["worst-stuffing"]).results
+    (found,) = busplan.capacity(
+        busplan.load_profile(profile(), changes=changes), timing_model=["worst-stuffing"]
+    ).results
     assert found.exceeded == exceeded
 
 
@@ -110,7 +112,7 @@ def test_no_published_figure_tests_it_and_evidence_says_so() -> None:
 
 def test_the_gap_of_the_evidence_fills_the_period() -> None:
     (section,) = sections_of(kind_named("sercos2"), "sercos2")
-    base = load("sercos2-servo-8").profile
+    base = busplan.load_profile("sercos2-servo-8")
     changes = {"bus.nodes": 6, "payload.read_bytes": 4, "payload.write_bytes": 4, "cycle.period_us": 500.0}
     assert len(section.comparisons) == 3
     for one in section.comparisons:
@@ -120,5 +122,7 @@ def test_the_gap_of_the_evidence_fills_the_period() -> None:
             "bus.at_gap_us": one.computed,
             "bus.at_start_us": 12.0 if rate < 8 else 4.0,
         }
-        (found,) = busplan.capacity(override(base, {**changes, **own}), timing_model=["worst-stuffing"]).results
+        (found,) = busplan.capacity(
+            busplan.load_profile(base, changes={**changes, **own}), timing_model=["worst-stuffing"]
+        ).results
         assert found.required_us == pytest.approx(500.0)

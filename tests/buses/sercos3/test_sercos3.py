@@ -8,8 +8,6 @@ import busplan
 from busplan.buses import kind_named
 from busplan.buses.sercos3.section import Sercos3Profile
 from busplan.elementwise import plain
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
 from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
@@ -31,7 +29,9 @@ HEADER_US, MASTER_US, CHANNELS_US = 28 * 0.08, 2.56, 32 * 0.4
 
 def profile(**changes: Any) -> Profile:
     """That profile with other values by dotted key, __ for the dot."""
-    return override(Sercos3Profile.model_validate(DATA), {key.replace("__", "."): one for key, one in changes.items()})
+    return busplan.load_profile(
+        Sercos3Profile.model_validate(DATA), changes={key.replace("__", "."): one for key, one in changes.items()}
+    )
 
 
 def terms(one: Profile, model: str = "window") -> dict[str, float]:
@@ -104,7 +104,7 @@ def test_its_uncertainty_is_that_of_the_published_ranges(method: str) -> None:
     one = profile(bus__timing_method=method, bus__nodes=3)
 
     def required_us(key: str, value: float) -> float:
-        (found,) = busplan.capacity(override(one, {key: value}), timing_model=["window"]).results
+        (found,) = busplan.capacity(busplan.load_profile(one, changes={key: value}), timing_model=["window"]).results
         return float(found.required_us)
 
     def swing_us(key: str, value: float, share: float) -> float:
@@ -120,7 +120,9 @@ def test_its_uncertainty_is_that_of_the_published_ranges(method: str) -> None:
     )
     (found,) = busplan.capacity(one, timing_model=["window"]).results
     assert found.uncertainty_us == pytest.approx(2 * sum(us**2 for us in parts_us) ** 0.5)
-    (measured,) = busplan.capacity(override(one, {"bus.ring_grade": "measured"}), timing_model=["window"]).results
+    (measured,) = busplan.capacity(
+        busplan.load_profile(one, changes={"bus.ring_grade": "measured"}), timing_model=["window"]
+    ).results
     assert (measured.uncertainty_us, measured.bias_us) == (None, None)
 
 
@@ -147,28 +149,28 @@ def test_connection_control_comes_with_v1_1_and_hot_plug_fields_in_all_telegrams
     ],
 )
 def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[str, ...]) -> None:
-    (found,) = busplan.capacity(override(profile(), changes), timing_model=["window"]).results
+    (found,) = busplan.capacity(busplan.load_profile(profile(), changes=changes), timing_model=["window"]).results
     assert found.exceeded == exceeded
     assert (found.verdict == "does not fit") == bool(exceeded)
 
 
 def test_delays_are_those_by_hand() -> None:
     found = {one.transaction: one for one in busplan.latency(profile(), timing_model=["window"]).transactions}
-    assert found["feedback"].delay_us == pytest.approx(50 + AT_US + RING_US)
+    assert found["feedback"].phases["delay_us"] == pytest.approx(50 + AT_US + RING_US)
     # CoSeMa: commands are valid at t3 = MDT - header + ring, counted from the end of the first header.
     t3_us = MDT_US - HEADER_US + RING_US
-    assert found["command"].delay_us == pytest.approx(46 + MASTER_US + t3_us)
-    assert (found["feedback"].before_us, found["command"].before_us) == pytest.approx((0.0, 0.32))
+    assert found["command"].phases["delay_us"] == pytest.approx(46 + MASTER_US + t3_us)
+    assert (found["feedback"].phases["before_us"], found["command"].phases["before_us"]) == pytest.approx((0.0, 0.32))
     (alone, command) = busplan.latency(profile(), timing_model=["telegrams"]).transactions
-    assert alone.delay_us == pytest.approx(50 + AT_US)
-    assert command.delay_us == pytest.approx(46 + MDT_US)
+    assert alone.phases["delay_us"] == pytest.approx(50 + AT_US)
+    assert command.phases["delay_us"] == pytest.approx(46 + MDT_US)
 
 
 def test_a_slow_master_delays_its_commands_and_a_quick_one_never_hurries_them() -> None:
     def before_us(master_delay_us: float) -> float:
         changed = profile(bus__master_delay_us=master_delay_us)
         (_, command) = busplan.latency(changed, timing_model=["window"]).transactions
-        return float(command.before_us)
+        return command.phases["before_us"] or 0.0
 
     assert before_us(50.0) == pytest.approx(50.0 - HEADER_US)
     assert before_us(0.0) == 0.0
@@ -177,10 +179,11 @@ def test_a_slow_master_delays_its_commands_and_a_quick_one_never_hurries_them() 
 def delay_us(update: str, **changes: Any) -> float:
     """Delay of a loop on the host of the shipped profile at 1 ms, of both axes alike."""
     own = {"servo.loop": "host", "servo.update": update, "cycle.period_us": 1000.0, "cycle.nonperiodic_us": 0}
-    one = override(
-        load("sercos3-servo-8").profile, {**own, **{key.replace("__", "."): to for key, to in changes.items()}}
+    one = busplan.load_profile(
+        "sercos3-servo-8",
+        changes={**own, **{key.replace("__", "."): to for key, to in changes.items()}},
     )
-    x_us, y_us = loop_delays_us(one)
+    x_us, y_us = loop_delays_us(network_of(one))
     assert x_us == y_us
     return x_us
 

@@ -139,7 +139,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         """Whole bytes up to four frames."""
         largest = min(pdos.most_bytes for pdos in traffic_of(network).pdos)
         each = min((plain(group.axes) for group in network.groups if group.said.payload.pdo_per == "axis"), default=1)
-        return PayloadRange(1, largest * max(int(each), 1), "PDOs", carrier="four frames")
+        return PayloadRange(1, largest * max(int(each), 1), carrier="four frames")
 
     def setpoints_every(self, network: Network) -> tuple[str, int]:
         """Those of the group with axes whose PDOs go most often."""

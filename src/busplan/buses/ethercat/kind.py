@@ -143,7 +143,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     def payloads(self, network: Network) -> PayloadRange:
         """Whole bytes up to those of a frame."""
         each = 1 if layout(network) == SHARED else 2
-        return PayloadRange(1, int(room_bytes(datagrams(network)) / each), "frame", carrier="a frame")
+        return PayloadRange(1, int(room_bytes(datagrams(network)) / each), carrier="a frame")
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
         """Say that the last byte passes all devices."""

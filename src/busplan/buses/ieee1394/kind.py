@@ -148,7 +148,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "bus.max_hops": Key(meaning="rewired as a tree", short="tree of {} hops"),
         "bus.speed": Key(meaning="if all nodes can", short="speed {}"),
         "bus.gap_count": Key(short="gap count {}"),
-        "bus.cable_length_m": Key(default=REFERENCE_CABLE_M, warned_at=REFERENCE_CABLE_M, role="cable"),
+        "bus.cable_length_m": Key(default=REFERENCE_CABLE_M, role="cable"),
         "cycle.slice_ratio": Key(default=SLICE_RATIO),
         "cycle.schedule": Key(meaning="if the firmware of all nodes can", short="schedule {}"),
         "cycle.sync.ping_us": Key("ping", PING_US),
@@ -230,7 +230,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     def payloads(self, network: Network) -> PayloadRange:
         """Whole quadlets up to the largest packet of the speed."""
         speed = network.profile.bus.speed
-        return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), "speed", carrier=speed)
+        return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), carrier=speed)
 
     def way_charged(self, network: Network) -> str:
         """Say whose hops each node is charged."""

@@ -102,7 +102,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         "bus.at_start_us": Key("t_1,min"),
         "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
         _METHOD: Key(meaning="a setting of the master", short="method {}"),
-        "cycle.nonperiodic_us": Key(warned_at=LEAST_UCC_US),
         "node.execution.worst_extra_us": Key("T_extra"),
     }
     evidence_data = ("sercos3",)
@@ -131,9 +130,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     def payloads(self, network: Network) -> PayloadRange:
         """Whole words that four telegrams carry for all devices, no more than one carries for a device."""
         share = int(MOST_TELEGRAMS * MOST_BYTES) // int(plain(network.nodes))
-        return PayloadRange(
-            int(WORD_BYTES), min(share, int(MOST_BYTES - CONNECTION_BYTES)), "telegrams", carrier="four telegrams"
-        )
+        return PayloadRange(int(WORD_BYTES), min(share, int(MOST_BYTES - CONNECTION_BYTES)), carrier="four telegrams")
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
         """Say what each device is charged."""

@@ -148,10 +148,7 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
         largest = max(figures.terms, key=lambda term: plain(term.us))
         us = _us(plain(largest.us), figures.uncertainty_us)
         yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
-    parts = uncertainty_parts(figures)
-    if parts and parts[0]["share"]:
-        share = f"{parts[0]['share']:.0%}".replace("%", " %")
-        yield "largest doubt", Sentence((f"{parts[0]['label']}, {share} of the variance",))
+    yield from _doubts(verdict)
     for assumption in verdict.assumptions:
         them = "it" if len(assumption.keys) == 1 else "them"
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
@@ -170,6 +167,19 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
         keys = ", ".join(f"{key} = {value}" for key, value in bus.safety.after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
     yield from (("beware", Sentence((warning,), "warns")) for warning in verdict.warnings)
+
+
+def _doubts(verdict: Verdict) -> Iterator[_Line]:
+    """The largest part of the uncertainty, and that no bias is known."""
+    figures, network = verdict.deciding, verdict.network
+    parts = uncertainty_parts(figures)
+    if parts and parts[0]["share"]:
+        share = f"{parts[0]['share']:.0%}".replace("%", " %")
+        yield "largest doubt", Sentence((f"{parts[0]['label']}, {share} of the variance",))
+    if network.groups and figures.bias_us is None:
+        (error,) = (model.error for model in network.bus.timing_models if model.name == figures.timing_model)
+        uncertainty = ", no uncertainty given" if figures.uncertainty_us is None else ""
+        yield "bias", Sentence((f"none corrected{uncertainty}: {error}",))
 
 
 def _tested(verdict: Verdict) -> str:
