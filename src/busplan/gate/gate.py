@@ -135,6 +135,8 @@ class FileResult(NamedTuple):
     """Keys for a baseline; None as the figures are empty."""
     fit: Fit | None = None
     """How the cycle fits; None if the profile cannot be read."""
+    circle_not_run: bool = False
+    """If True, the profile asks for a circle test, which was not asked for."""
 
     @property
     def status(self) -> Status:
@@ -241,7 +243,8 @@ def check_document(
     findings = [*(_said(placed, subject) for placed in left), *of_comments]
     deciding = subject.deciding
     fit = Fit(deciding.verdict, deciding.margin_corrected_us, deciding.uncertainty_us)
-    result = _result(document, profile.name, findings)._replace(fit=fit)
+    not_run = profile.asks_for_circle and not with_circle
+    result = _result(document, profile.name, findings)._replace(fit=fit, circle_not_run=not_run)
     return result._replace(figures=figures_of(subject), keys=keys_of(profile)) if record else result
 
 

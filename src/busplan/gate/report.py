@@ -19,6 +19,7 @@ class Summary(NamedTuple):
     files: int
     errors: int
     warnings: int
+    circles_not_run: int = 0
 
 
 class Located(NamedTuple):
@@ -44,9 +45,10 @@ class CheckReport(NamedTuple):
 
     @property
     def summary(self) -> Summary:
-        """Number of files, errors and warnings."""
+        """Number of files, errors, warnings, and circle tests that were not run."""
         severities = [finding.severity for file in self.files for finding in file.findings]
-        return Summary(len(self.files), severities.count("error"), severities.count("warning"))
+        not_run = sum(file.circle_not_run for file in self.files)
+        return Summary(len(self.files), severities.count("error"), severities.count("warning"), not_run)
 
     @property
     def failed(self) -> bool:
@@ -107,6 +109,9 @@ def summary_sentence(report: CheckReport) -> Sentence:
     )
     if failed:
         summary = joined(summary, sentence("{} could not be checked", count_value(failed)), by="; ")
+    if counts.circles_not_run:
+        words = f"{{}} {nouns(counts.circles_not_run, 'circle test')} not run"
+        summary = joined(summary, sentence(words, count_value(counts.circles_not_run, "circles_not_run")), by="; ")
     if report.others:
         words = f"skipped {{}} {nouns(report.others, 'file')} without a schema_version"
         summary = joined(summary, sentence(words, count_value(report.others)), by="; ")
