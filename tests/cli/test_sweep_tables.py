@@ -99,7 +99,7 @@ def test_every_form_has_the_summary(run: Run, tmp_path: Path) -> None:
 
 REFUSALS = {
     "--vary delivery.seed=1:9 --summary": "--summary: goes with --circle",
-    "--vary bus.nodes=1:9 --circle --summary": "summary=True: is over seeds, and none vary; add delivery.seed",
+    "--vary bus.nodes=1:9 --circle --summary": "summary: is over seeds, and none vary; add delivery.seed",
     "--vary delivery.seed=1:9 --vary bus.nodes=1:200 --circle --summary": "200 points with 9 seeds each are",
     "--vary delivery.seed=1:9 --circle --summary --columns passed": "--columns passed: no such column",
     "--vary delivery.seed=1:9 --circle --summary --plot x.svg": "none varies but the seed",

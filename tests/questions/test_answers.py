@@ -151,7 +151,7 @@ def test_a_note_stands_behind_the_title_of_a_picture() -> None:
         ({"x": {"bus.nodes": 3}}, "x bus.nodes 3: expected several values"),
         ({"x": {"bus.nodes": "1:x"}}, "x bus.nodes=1:x: 'x' is not a number"),
         ({"x": {"bus.nodes": range(1, 90)}}, "x bus.nodes: 89 values; a map shows up to 64 of a key"),
-        ({"x": {"circle.radius_mm": [9]}}, "add circle=True to run circle tests"),
+        ({"x": {"circle.radius_mm": [9]}}, "add circle to run circle tests"),
     ],
 )
 def test_a_map_of_nonsense_is_refused(arguments: dict[str, Any], message: str) -> None:

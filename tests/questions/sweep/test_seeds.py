@@ -92,7 +92,7 @@ def test_the_seed_leaves_the_grid_wherever_it_stands() -> None:
         assert (list(grid.axes), found.tolist()) == (["cycle.period_us"], seeds.tolist())
     alone, _ = without_seed(Grid({"delivery.seed": seeds}))
     assert (alone.points, [chunk.shape for chunk in alone.chunks(7)], [*alone.each_point()]) == (1, [()], [{}])
-    with pytest.raises(BusplanError, match=r"summary=True: is over seeds, and none vary"):
+    with pytest.raises(BusplanError, match=r"summary: is over seeds, and none vary"):
         without_seed(Grid({"cycle.period_us": periods}))
 
 

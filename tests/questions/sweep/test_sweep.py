@@ -189,7 +189,7 @@ def test_what_no_profile_could_have_is_refused_in_the_profiles_own_words(make: M
             {"limits.min_spare_nodes": [1]},
             "vary limits.min_spare_nodes: no figure of capacity depends on it",
         ),
-        ({"servo.drive_lag_us": [1]}, "add circle=True to run circle tests"),
+        ({"servo.drive_lag_us": [1]}, "add circle to run circle tests"),
         (
             {"bus.gap_count": [63, "optimal"], "bus.cable_length_m": [4.5, 6.0]},
             "cable_length_m is 6",

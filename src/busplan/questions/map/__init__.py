@@ -103,5 +103,5 @@ def _direction(profile: Profile, along: Along | None, *, name: str, with_circle:
         key,
         axis_values(profile, key, values, name=name),
         option=name,
-        circle_option=None if with_circle else "circle=True",
+        circle_option=None if with_circle else "circle",
     )

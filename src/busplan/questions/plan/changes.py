@@ -1,9 +1,8 @@
 """What a plan may change, in the order of its cost; one thing at a time, until every constraint holds."""
 
 from bisect import bisect_left
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from decimal import ROUND_CEILING, Context, Decimal
-from functools import partial
 from itertools import product
 from math import ceil, inf
 from typing import Final, NamedTuple, TypeAlias
@@ -40,9 +39,6 @@ class Freedom(NamedTuple):
     label: str
     cost: Cost
     keys: tuple[str, ...]
-    values: Callable[[Network, Collection[str]], Iterator[Changes]]
-    """Values of a network, beside keys that must stay: the least change first; where none is enough, what helps most
-    is among them."""
 
 
 class Step(NamedTuple):
@@ -59,20 +55,19 @@ class Step(NamedTuple):
 def freedoms(network: Network) -> tuple[Freedom, ...]:
     """Everything that may be changed in a network, the cheapest first."""
     own = [
-        Freedom(setting.name, setting.label, setting.cost, setting.keys, partial(_of_bus, setting.name))
-        for setting in network.bus.settings(network)
+        Freedom(setting.name, setting.label, setting.cost, setting.keys) for setting in network.bus.settings(network)
     ]
     if network.groups:
         sections = [f"group.{group.name}" for group in network.profile.group] or ["payload"]
         payloads = tuple(f"{section}.{key}" for section in sections for key in _PAYLOADS)
         own += (
-            Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,), _ratios),
-            Freedom("payload", "payload", Cost.PAYLOAD, payloads, _payloads),
-            Freedom("period", "period", Cost.PERIOD, (PERIOD,), _periods),
+            Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,)),
+            Freedom("payload", "payload", Cost.PAYLOAD, payloads),
+            Freedom("period", "period", Cost.PERIOD, (PERIOD,)),
         )
         if network.is_uniform:
             # Where nodes differ, nobody but the user knows which can go.
-            own.append(Freedom("nodes", "nodes", Cost.NODES, (NODES,), _fewer_nodes))
+            own.append(Freedom("nodes", "nodes", Cost.NODES, (NODES,)))
     return tuple(sorted(own, key=lambda freedom: freedom.cost))
 
 
@@ -143,7 +138,7 @@ def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str]
             break
         now = _with(network, changes)
         nearest, needs = None, list(steps[-1].unmet)
-        for change in freedom.values(now, kept):
+        for change in _values(freedom, now, kept):
             if set(change) & set(kept) or (after := _with_one(now, change)) is None:
                 continue
             still = unmet(after)
@@ -194,13 +189,30 @@ def _lack(needs: Sequence[Need], network: Network | None) -> tuple[int, float]:
     return periods_us.count(inf), max((us for us in periods_us if us < inf), default=0.0)
 
 
-def _of_bus(name: str, network: Network, _kept: Collection[str]) -> Iterator[Changes]:
+def _values(freedom: Freedom, network: Network, kept: Collection[str]) -> Iterator[Changes]:
+    """Values of a network, the least change first, beside keys that must stay.
+
+    Where none is enough, what helps most is among them.
+    """
+    match freedom.name:
+        case "slice_ratio":
+            return _ratios(network)
+        case "payload":
+            return _payloads(network, kept)
+        case "period":
+            return _periods(network)
+        case "nodes":
+            return _fewer_nodes(network)
+    return _of_bus(freedom.name, network)
+
+
+def _of_bus(name: str, network: Network) -> Iterator[Changes]:
     """Values of a setting of the bus, safe for all nodes that [limits] asks for."""
     largest = max((network, *(room.network for room in rooms(network))), key=lambda each: float(plain(each.nodes)))
     return (values for setting in network.bus.settings(largest) if setting.name == name for values in setting.values)
 
 
-def _ratios(network: Network, _kept: Collection[str]) -> Iterator[Changes]:
+def _ratios(network: Network) -> Iterator[Changes]:
     """The smallest slice ratio that gives the time that is needed, and no more than is advised."""
     own, period_us = float(plain(network.slice_ratio)), float(plain(network.period_us))
     slice_us = max((need.slice_us for need in unmet(network) if need.slice_us < inf), default=0.0)
@@ -246,7 +258,7 @@ def _cut(alike: AlikeNodes, kind: TransactionKind) -> tuple[str, int]:
     return (key, axes) if axes and key.endswith("_per_axis") else (key.removesuffix("_per_axis"), 1)
 
 
-def _periods(network: Network, _kept: Collection[str]) -> Iterator[Changes]:
+def _periods(network: Network) -> Iterator[Changes]:
     """The period nearest to the own one at which all constraints hold: rounded up, or the next that the bus allows."""
     least = smallest_period(network)
     if least.us is None:
@@ -271,7 +283,7 @@ def rounded_up(us: float) -> float:
     return float(context.create_decimal(Decimal(us * (1 - FIT_ROUNDING))))
 
 
-def _fewer_nodes(network: Network, _kept: Collection[str]) -> Iterator[Changes]:
+def _fewer_nodes(network: Network) -> Iterator[Changes]:
     """The most nodes, fewer than now, with which all constraints hold; no constraint is eased by nodes."""
     counts = range(int(plain(network.nodes)) - 1, 0, -1)
     place = bisect_left(counts, x=True, key=lambda nodes: _holds(network, {NODES: nodes}))

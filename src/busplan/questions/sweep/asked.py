@@ -114,7 +114,7 @@ def checked_sweep(
         No such group; as `axis_values`, `checked_grid`, `without_seed`, `grid_models` and `require_few`.
     """
     if summary and not circle:
-        raise BusplanError("summary=True: goes with circle=True")
+        raise BusplanError("summary: goes with circle")
     profile = network.profile
     names = [own.name for own in profile.group]
     if group is not None and group not in names:

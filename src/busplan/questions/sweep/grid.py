@@ -118,7 +118,7 @@ def checked_grid(profile: Profile, axes: Mapping[str, Array], *, with_circle: bo
         A key that is unknown, not a number, or without effect here; a value that the profile's schema refuses; too
         many points.
     """
-    require_keys(profile, axes, option="vary", circle_option=None if with_circle else "circle=True")
+    require_keys(profile, axes, option="vary", circle_option=None if with_circle else "circle")
     samples = {key: _samples(axis) for key, axis in axes.items()}
     first: dict[str, object] = {key: values[0] for key, values in samples.items()}
     override(profile, first)

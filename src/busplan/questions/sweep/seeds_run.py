@@ -85,7 +85,7 @@ def without_seed(grid: Grid) -> tuple[Grid, Array]:
         No seed varies.
     """
     if SEED not in grid.axes:
-        raise BusplanError(f"summary=True: is over seeds, and none vary; add {SEED} and its values, as {SEED}=1:1000")
+        raise BusplanError(f"summary: is over seeds, and none vary; add {SEED} and its values, as {SEED}=1:1000")
     return Grid({key: axis for key, axis in grid.axes.items() if key != SEED}), grid.axes[SEED]
 
 
