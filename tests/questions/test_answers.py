@@ -101,7 +101,8 @@ HEADLINES = {
     "safe nodes, safe axes, period with enough time and 12 more.>",
     "explain": "<ExplainAnswer: margin_us of paper-1ms at 1 ms, paper model: 292.8825 us>",
     "explain all": "<ExplainAnswer: paper-1ms: 31 assumptions behind its verdict>",
-    "calibrate": "<CalibrateAnswer: paper-1ms: T_exec is the median at each payload, of 8 measurements at 8 payloads, table-1.csv.>",
+    "calibrate": "<CalibrateAnswer: paper-1ms: T_exec is the median at each payload, of 8 measurements at 8 payloads, "
+    "table-1.csv.>",
     "report": "<ReportAnswer: paper-1ms: fits>",
 }
 
