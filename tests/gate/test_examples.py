@@ -15,6 +15,7 @@ import pytest
 
 from busplan.errors import PlacedError
 from busplan.gate.baseline import MODELS, read_baseline
+from busplan.gate.circle import MOST_STEPS
 from busplan.gate.finding import finding_line
 from busplan.gate.gate import FileResult, check_document, unreadable
 from busplan.gate.recording import Recording
@@ -252,12 +253,12 @@ def test_a_check_runs_a_circle_of_so_many_steps_and_none_longer() -> None:
         "[circle]\nradius_mm = 15.915\nfeed_mm_per_min = 6000\nramp_periods = 0\n"
     )
 
-    def not_run(text: str, **steps: int) -> list[str]:
-        found = check_document(decode(text.encode(), name="x.toml"), **steps)
+    def not_run(text: str, circle_steps: int = MOST_STEPS) -> list[str]:
+        found = check_document(decode(text.encode(), name="x.toml"), circle_steps=circle_steps)
         return [one.message for one in found.findings if one.code == "BP204"]
 
-    assert not_run(text, circle_steps=10_000) == []
-    assert ["10,000 steps, more than 9,999: not run" in one for one in not_run(text, circle_steps=9_999)] == [True]
+    assert not_run(text, 10_000) == []
+    assert ["10,000 steps, more than 9,999: not run" in one for one in not_run(text, 9_999)] == [True]
     # Of itself it runs ten million.
     long = text.replace("15.915", "15.92").replace("step_us = 100", "step_us = 0.1")
     assert ["10,010,000 steps, more than 10,000,000: not run" in one for one in not_run(long)] == [True]
