@@ -94,7 +94,8 @@ def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
     found = busplan.map_(profile)
     assert (found.x.key, found.y.key) == (AXES, PERIOD)
     assert found.own is not None
-    assert (found.own.x, found.own.y) == (profile.bus.nodes * profile.node.axes, profile.cycle.period_us)
+    (nodes,) = profile.alike_nodes
+    assert (found.own.x, found.own.y) == (nodes.nodes * nodes.node.axes, profile.cycle.period_us)
     assert max(len(found.x.values), len(found.y.values)) <= 24
     assert list(found.y.values) == sorted(set(found.y.values))
     assert not found.not_drawn
