@@ -164,7 +164,7 @@ def _drawn_us(profile: busplan.Profile) -> NDArray[np.float64]:
     own: Any = profile
     cycle = network.bus.cycle(network, model="standard")
     halves = profile.alike_nodes[0].nodes * (3 if own.node.write_response == "unified" else 4) + own.cycle.retries
-    gap_term_us = 2 * (63 - cycle.figures()["gap_count"]) / 98.304
+    gap_term_us = 2 * (63 - float(cycle.figures()["gap_count"])) / 98.304
     normal = random.standard_normal
     uniform = random.uniform(-1, 1, draws)
     host, phy_us = own.host, own.bus.phy_delay_us
