@@ -62,6 +62,11 @@ class Sourced(float):
         number.name = meaning
         return number
 
+    def __getnewargs_ex__(self) -> tuple[tuple[float], dict[str, str]]:
+        # Pickle and copy make the number as any caller must, and then set its slots.
+        words = {"unit": self.unit, "grade": self.grade, "source": self.source, "meaning": self.meaning}
+        return (float(self),), words
+
 
 def constants(namespace: Mapping[str, object]) -> Mapping[str, Sourced]:
     """List the sourced numbers of a module by name, and set their `name`.

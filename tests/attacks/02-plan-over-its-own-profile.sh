@@ -3,6 +3,6 @@
 # says: p\.toml
 cp p.toml before
 ln -s p.toml link.toml
-busplan plan p.toml --no-circle -o link.toml --force
+busplan plan p.toml -o link.toml --force
 code=$?
 cmp p.toml before && exit $code

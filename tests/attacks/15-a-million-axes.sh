@@ -26,4 +26,4 @@ per_byte_us = 0.1
 worst_extra_us = 1e9
 TOML
 busplan compare axes.toml > compared.txt && grep -q "shown to fit on 0 of 5" compared.txt || exit 3
-busplan plan axes.toml --no-circle --free period,payload,nodes > planned.txt
+busplan plan axes.toml --free period,payload,nodes > planned.txt

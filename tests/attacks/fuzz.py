@@ -40,6 +40,7 @@ from busplan.profile.kinds import profile_schema
 from busplan.profile.starter import Machine, machine_text, shared_out
 from busplan.profile.toml import decode, validate
 from busplan.questions.fit.circle_refusal import path_steps
+from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
 
 Data = dict[str, Any]
@@ -51,7 +52,7 @@ HANG_S: Final = 10.0
 """Of processor time, so that a busy machine makes no hang."""
 CIRCLES_HANG_S: Final = 120.0
 """The same of a call that asks for circles: each takes a while."""
-ASKS_FOR_CIRCLES: Final = frozenset({"circle-test", "--circle", "--circle-steps", "--max-circles"})
+ASKS_FOR_CIRCLES: Final = frozenset({"circle-test", "--circle", "--circle-steps"})
 MOST_MB: Final = 300.0
 MOST_BYTES: Final = 4 << 30
 """Of the whole run, so that a call that takes them fails, and not the machine."""
@@ -244,7 +245,7 @@ def is_valid(data: Data) -> bool:
 def has_short_circle(text: str) -> bool:
     """Whether a circle of a profile takes no time to speak of, or cannot be run."""
     try:
-        return path_steps(validate(decode(text.encode(), name=FILE))) < SHORT_STEPS
+        return path_steps(network_of(validate(decode(text.encode(), name=FILE)))) < SHORT_STEPS
     except BusplanError:
         return True
 
@@ -370,8 +371,6 @@ NEEDED: Final[Mapping[str, Callable[[random.Random], tuple[str, ...]]]] = {
 FIGURES: Final = ("required_us", "margin_us", "uncertainty_us", "arbitration", "latency.nodes", "verdict")
 CIRCLES: Final[Mapping[str, tuple[str, ...]]] = {
     "check": ("--circle-steps", "20000"),
-    "plan": ("--max-circles", "2"),
-    "compare": ("--circle",),
     "map": ("--circle", "--jobs", "1", "--x", "cycle.period_us=100,1000", "--y", "cycle.slice_ratio=0.5,1"),
     "sweep": ("--circle", "--jobs", "1"),
 }
@@ -449,14 +448,14 @@ def no_number(text: str) -> float:
 # --- one story ------------------------------------------------------------------------------------------------------
 
 TOLD: Final = (
-    *("verdict", "fits", "exceeded", "circle_refused_by", "margin_corrected_us", "uncertainty_us"),
+    *("verdict", "fits", "exceeded", "margin_corrected_us", "uncertainty_us"),
     *("required_us", "available_us", "safe_nodes", "safe_axes", "safe_limited_by"),
 )
 """What every answer that tells it tells alike."""
 TELLERS: Final[Mapping[tuple[str, ...], Callable[[Any], Data]]] = {
     ("capacity",): lambda said: said["verdicts"][0],
     ("timeline",): lambda said: said if said["verdict"] is not None else {},
-    ("plan", "--no-circle"): lambda said: said["options"][0],
+    ("plan",): lambda said: said["options"][0],
     ("report", "--no-circle"): lambda said: said["profiles"][0]["answers"]["capacity"]["verdicts"][0],
     ("map", "--x", "cycle.slice_ratio={ratio}", "--y", "limits.reserve={reserve}"): lambda said: said["design"],
     ("sweep", "--vary", "cycle.slice_ratio={ratio}"): lambda said: deciding(said["rows"]),
@@ -500,16 +499,16 @@ def disagreements(profile: Profile) -> Iterator[tuple[tuple[str, ...], str]]:
 
 def unlike(name: str, said: Data, own: Data) -> Iterator[str]:
     """What a gate or a plan says that does not go with the capacity."""
-    is_well = own["verdict"] == "fits" and not own["circle_refused_by"] and not own["missed_limits"]
-    if name == "plan" and said["passes"] and not is_well:
-        yield f"passes, and capacity is {own['verdict']}, {own['circle_refused_by']}, {own['missed_limits']}"
+    is_well = own["verdict"] == "fits" and not own["missed_limits"]
+    if name == "plan" and said["held_by"] is None and not is_well:
+        yield f"is held by {said['held_by']}, and capacity is {own['verdict']}, {own['missed_limits']}"
     if name != "check":
         return
     keys = {code: {one["key"] for one in said["findings"] if one["code"] == code} for code in GATE_CODES}
     if not is_well and said["status"] == "ok":
-        yield f"has no finding, and capacity is {own['verdict']}, {own['circle_refused_by']}, {own['missed_limits']}"
-    if bool(keys.pop("BP203")) != bool(own["circle_refused_by"]):
-        yield f"has {said['findings']}, and capacity {own['circle_refused_by']}"
+        yield f"has no finding, and capacity is {own['verdict']}, {own['missed_limits']}"
+    if keys.pop("BP203") and call("circle-test", FILE).code != 2:
+        yield f"has {said['findings']}, and the circle test runs"
     if own["verdict"] == "fits" and set().union(*keys.values()) != set(own["missed_limits"]):
         yield f"has {keys}, and capacity {own['missed_limits']}"
 
@@ -518,13 +517,12 @@ def otherwise_in_forms(profile: Profile, own: Data) -> Iterator[str]:
     """What capacity says otherwise as CSV, as text and in Python than as JSON."""
     rows = csv.DictReader(StringIO(call("capacity", FILE, "--format", "csv").out.decode(), newline=""))
     row = next(one for one in rows if one["verdict"])
-    for key in ("verdict", "safe_limited_by", "circle_refused_by"):
+    for key in ("verdict", "safe_limited_by"):
         if row[key] != (own[key] if isinstance(own[key], str) else " ".join(own[key] or ())):
             yield f"{key} {row[key]} as CSV, and {own[key]} as JSON"
     text = call("capacity", FILE, "--format", "table").out.decode()
-    is_refused = "\n  circle          cannot be run: " in text
-    if own["verdict"].upper() not in text.partition("\n  [")[0] or is_refused != bool(own["circle_refused_by"]):
-        yield f"{text[:300]} as text, and {own['verdict']}, {own['circle_refused_by']} as JSON"
+    if own["verdict"].upper() not in text.partition("\n  [")[0]:
+        yield f"{text[:300]} as text, and {own['verdict']} as JSON"
     figures = busplan.capacity(profile).verdicts[0].deciding
     for key in TOLD:
         value = getattr(figures, key)

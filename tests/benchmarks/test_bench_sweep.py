@@ -20,6 +20,7 @@ from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.buses.ieee1394.table_1 import residual
 from busplan.profile.toml import override
 from busplan.questions.fit.figures import figures
+from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Chunk, Grid
 from busplan.questions.sweep.table import CHUNK_POINTS, figure_table
 
@@ -160,7 +161,7 @@ def seconds(run: Callable[[], object]) -> float:
 def scalar_loop(grid: Grid) -> None:
     """The scalar path for points spread over the grid."""
     for changes in islice(grid.each_point(), 0, None, max(1, grid.points // SCALAR_POINTS)):
-        variant = override(PROFILE, changes)
+        variant = network_of(override(PROFILE, changes))
         for model in MODELS:
             figures(variant, model=model)
 
@@ -171,7 +172,7 @@ def test_sweep_of_a_million_points(benchmark: Any, name: str, size: Callable[[in
     assert grid.points > 3 * CHUNK_POINTS
 
     def run() -> dict[str, Any]:
-        return figure_table(PROFILE, grid, timing_models=MODELS)
+        return figure_table(network_of(PROFILE), grid, timing_models=MODELS)
 
     # The hand-written one is the same mathematics.
     table, (chunk, written) = run(), next(all_by_hand(grid))

@@ -300,6 +300,10 @@ def test_version_and_help_go_to_stdout(run: Run) -> None:
             "busplan latency: no such option: --period; --set cycle.period_us=... changes it for this run",
         ),
         (
+            ("capacity", "paper-4ms", "--timing", "paper"),
+            "no such option: --timing (Possible options: --timing-model); ",
+        ),
+        (
             ("circle-test", "paper-4ms", "--feed", "9"),
             "no such option: --feed; --set circle.feed_mm_per_min=... changes",
         ),

@@ -54,9 +54,7 @@ PICTURE = Drawing("A map", (Panel(GRID),), has_characters=True)
 
 
 def answer(*blocks: Block) -> Report:
-    return Report(
-        Sentence(("An answer for ", Code("p"))), lambda: blocks, lambda: {"margin_us": 3.96912}, lambda: [{"a": 1}]
-    )
+    return Report(Sentence(("An answer for ", Code("p"))), blocks, {"margin_us": 3.96912}, [{"a": 1}])
 
 
 def one_of_each(text: str = "text") -> Sequence[Block]:
@@ -319,7 +317,7 @@ def test_a_figure_is_not_written_in_a_unit_that_it_does_not_convert_to() -> None
 @pytest.mark.parametrize("caption", ["Reads take <most>, 3 us", "Reads take <most>, 3 us."])
 def test_markdown_says_a_chart_that_it_cannot_draw(caption: str) -> None:
     chart = Chart(PICTURE._replace(has_characters=False), Sentence((caption,)), Sentence(("The dot is the start.",)))
-    report = Report(Sentence(("x",)), lambda: (chart,), dict)
+    report = Report(Sentence(("x",)), (chart,), {})
     assert render(report, "markdown") == "### x\n\nReads take \\<most\\>, 3 us.\n"
 
 

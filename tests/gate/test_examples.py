@@ -15,15 +15,12 @@ import pytest
 
 from busplan.errors import PlacedError
 from busplan.gate.baseline import MODELS, read_baseline
+from busplan.gate.circle import MOST_STEPS
 from busplan.gate.finding import finding_line
 from busplan.gate.gate import FileResult, check_document, unreadable
 from busplan.gate.recording import Recording
 from busplan.gate.rules import all_rules
-from busplan.profile.toml import decode, override
-from busplan.questions.circle.figures import CircleTest
-from busplan.questions.circle.roundness import circle_test
-from busplan.questions.fit.circle_refusal import path_steps
-from busplan.sections.profile import Profile
+from busplan.profile.toml import decode
 
 EXAMPLES = Path(__file__).parent / "examples"
 MESSAGES = Path(__file__).parent / "messages.txt"
@@ -248,25 +245,23 @@ def test_a_plan_that_lacks_its_reserve_alone_contradicts_no_equation() -> None:
     assert "BP102" not in {one.code for one in found.findings}
 
 
-@pytest.mark.parametrize(("radius_mm", "is_run"), [(15.915, True), (15.92, False)])
-def test_a_check_runs_a_circle_of_ten_million_steps_and_none_longer(
-    monkeypatch: pytest.MonkeyPatch, radius_mm: float, is_run: bool
-) -> None:
-    # 2 pi r at 100 mm/s is 1 s: 1,000 periods of 10,000 steps, or one period more.
+def test_a_check_runs_a_circle_of_so_many_steps_and_none_longer() -> None:
+    # 2 pi r at 100 mm/s is 1 s: 1,000 periods of 1 ms, or with the larger radius one period more.
     text = (EXAMPLES / "BP204" / "valid.toml").read_text(encoding="utf-8").partition("[servo]")[0]
     text = text.replace("period_us = 4000", "period_us = 1000") + (
-        "[servo]\nposition_gain_per_s = 50\nstep_us = 0.1\n"
-        f"[circle]\nradius_mm = {radius_mm}\nfeed_mm_per_min = 6000\nramp_periods = 0\n"
+        "[servo]\nposition_gain_per_s = 50\nstep_us = 100\n"
+        "[circle]\nradius_mm = 15.915\nfeed_mm_per_min = 6000\nramp_periods = 0\n"
     )
-    ran = []
 
-    def simulated(profile: Profile) -> CircleTest:
-        ran.append(path_steps(profile))
-        return circle_test(override(profile, {"servo.step_us": 1000.0}))
+    def not_run(text: str, circle_steps: int = MOST_STEPS) -> list[str]:
+        found = check_document(decode(text.encode(), name="x.toml"), circle_steps=circle_steps)
+        return [one.message for one in found.findings if one.code == "BP204"]
 
-    monkeypatch.setattr("busplan.questions.circle.roundness.circle_test", simulated)
-    found = {one.code for one in check_document(decode(text.encode(), name="x.toml")).findings}
-    assert (ran, "BP204" in found) == (([10_000_000], False) if is_run else ([], True))
+    assert not_run(text, 10_000) == []
+    assert ["10,000 steps, more than 9,999: not run" in one for one in not_run(text, 9_999)] == [True]
+    # Of itself it runs ten million.
+    long = text.replace("15.915", "15.92").replace("step_us = 100", "step_us = 0.1")
+    assert ["10,010,000 steps, more than 10,000,000: not run" in one for one in not_run(long)] == [True]
 
 
 if __name__ == "__main__":

@@ -120,11 +120,11 @@ def test_the_answer_says_findings_failures_and_what_they_add_up_to(mixed: CheckR
         "gone.toml: no such file",
         "checked 3 profiles: 2 errors, 1 warning; 1 could not be checked",
     ]
-    states = [block.state for block in answer.blocks() if isinstance(block, Sentence)]
+    states = [block.state for block in answer.blocks if isinstance(block, Sentence)]
     assert states == ["warns", "fails", "fails", "fails", "fails"]
     clean = check_report(report(checked(CLEAN)))
-    assert [block.state for block in clean.blocks() if isinstance(block, Sentence)] == ["passes"]
-    *_, warned = check_report(report(checked(WARNS))).blocks()
+    assert [block.state for block in clean.blocks if isinstance(block, Sentence)] == ["passes"]
+    *_, warned = check_report(report(checked(WARNS))).blocks
     assert isinstance(warned, Sentence)
     assert warned.state == "warns"
 

@@ -29,13 +29,13 @@ EVERY: dict[str, Callable[[str], Answer]] = {
     "report --no-circle": lambda profile: busplan.report(profile, circle=False),
 }
 OPTIONS: dict[str, Callable[[], Answer]] = {
-    "latency paper-4ms --payload 4,16 --timing standard": lambda: busplan.latency(
+    "latency paper-4ms --payload 4,16 --timing-model standard": lambda: busplan.latency(
         "paper-4ms", payload_bytes=[4, 16], timing_model=["standard"]
     ),
     "latency paper-4ms --set bus.nodes=5 --set bus.gap_count=optimal": lambda: busplan.latency(
         busplan.load_profile("paper-4ms", changes={"bus.nodes": 5, "bus.gap_count": "optimal"})
     ),
-    "capacity paper-1ms --period 600us --period 0.25ms --timing paper": lambda: busplan.capacity(
+    "capacity paper-1ms --period 600us --period 0.25ms --timing-model paper": lambda: busplan.capacity(
         "paper-1ms", period_us=[600, 250], timing_model="paper"
     ),
     "circle-test paper-1ms --set circle.radius_mm=20 --period 1ms --period 100us --contributions": lambda: (
@@ -45,30 +45,28 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
             contributions=True,
         )
     ),
-    "plan paper-1ms --nodes 6 --period 500us --set bus.gap_count=63 --max-circles 2": lambda: busplan.plan(
-        "paper-1ms", nodes=6, period_us=500, gap_count=63, max_circles=2
+    "plan paper-1ms --nodes 6 --period 500us --set bus.gap_count=63": lambda: busplan.plan(
+        "paper-1ms", nodes=6, period_us=500, gap_count=63
     ),
-    "plan paper-1ms --axes 15 --set limits.reserve=0.125 --free responses,gap_count --no-circle": lambda: busplan.plan(
-        "paper-1ms", axes=15, reserve=0.125, free=["gap_count", "responses"], circle=False
+    "plan paper-1ms --axes 15 --set limits.reserve=0.125 --free responses,gap_count": lambda: busplan.plan(
+        "paper-1ms", axes=15, reserve=0.125, free=["gap_count", "responses"]
     ),
-    "plan paper-1ms --axes 9 --set node.axes=3 --set bus.speed=S200 --no-circle": lambda: busplan.plan(
-        "paper-1ms", axes=9, wanted={"node.axes": 3, "bus.speed": "S200"}, circle=False
+    "plan paper-1ms --axes 9 --set node.axes=3 --set bus.speed=S200": lambda: busplan.plan(
+        "paper-1ms", axes=9, wanted={"node.axes": 3, "bus.speed": "S200"}
     ),
-    "timeline paper-1ms --timing standard --from 50us --to 0.1ms": lambda: busplan.timeline(
+    "timeline paper-1ms --timing-model standard --from 50us --to 0.1ms": lambda: busplan.timeline(
         "paper-1ms", timing_model="standard", from_us=50, to_us=100
     ),
     "map paper-1ms --x axes=4:16:4 --y bus.gap_count=7,63,optimal": lambda: busplan.map_(
         "paper-1ms", x={"axes": range(4, 17, 4)}, y={"bus.gap_count": [7, 63, "optimal"]}
     ),
-    "compare can-servo-8 --buses can,ieee1394 --circle": lambda: busplan.compare(
-        "can-servo-8", buses=["can", "ieee1394"], circle=True
-    ),
+    "compare can-servo-8 --buses can,ieee1394": lambda: busplan.compare("can-servo-8", buses=["can", "ieee1394"]),
     "compare paper-1ms --buses can --set bus.nodes=3": lambda: busplan.compare(
         busplan.load_profile("paper-1ms", changes={"bus.nodes": 3}), buses="can"
     ),
     "timeline paper-1ms --transaction write:2": lambda: busplan.timeline("paper-1ms", transaction=("write", 2)),
     "check paper-4ms nowhere.toml --no-circle": lambda: busplan.check(["paper-4ms", "nowhere.toml"], circle=False),
-    "sweep paper-4ms --vary cycle.period_us=125:1000:*2 --timing paper": lambda: busplan.sweep(
+    "sweep paper-4ms --vary cycle.period_us=125:1000:*2 --timing-model paper": lambda: busplan.sweep(
         "paper-4ms", vary={"cycle.period_us": "125:1000:*2"}, timing_model="paper"
     ),
     "sweep paper-4ms --vary circle.radius_mm=10,20 --vary cycle.period_us=200,4000 --circle --jobs 1": lambda: (

@@ -76,7 +76,7 @@ def test_what_simulates_nothing_loads_no_numpy() -> None:
         "latency('paper-4ms')",
         "capacity('paper-4ms', sensitivity=True)",
         "timeline('paper-4ms')",
-        "plan('paper-4ms', circle=False)",
+        "plan('paper-4ms')",
         "check('paper-4ms', circle=False)",
         "diff('paper-4ms', 'paper-dma')",
         "compare('paper-4ms')",

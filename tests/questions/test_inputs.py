@@ -153,7 +153,6 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "unknown freedom": (lambda: busplan.plan("paper-4ms", free=["speed"]), "free speed: there is nothing of that name"),
     "no reserve": (lambda: busplan.plan("paper-4ms", reserve=1), "limits.reserve 1.0: must be 0.99 or less"),
-    "no circles": (lambda: busplan.plan("paper-4ms", max_circles=0), "max_circles 0: expected a whole number from 1"),
     "a window of nothing": (
         lambda: busplan.timeline("paper-4ms", from_us=50, to_us=20),
         "the window from 50 us to 20 us shows nothing: the cycle runs from 0 to 2000 us",

@@ -111,7 +111,7 @@ def test_a_page_is_text_and_is_saved_in_the_form_of_its_ending(tmp_path: Path) -
     for ending, text in ((".html", html), (".txt", f"{page}\n"), (".json", page.to_json())):
         page.save(tmp_path / f"page{ending}")
         assert (tmp_path / f"page{ending}").read_text(encoding="utf-8") == text
-    assert [one.verdict.deciding.verdict for one in page.answers] == ["fits", "fits"]
+    assert [one.verdict.deciding.verdict for one in page.profiles] == ["fits", "fits"]
 
 
 def test_every_row_of_a_sweep_is_saved(tmp_path: Path) -> None:
@@ -125,9 +125,9 @@ def test_every_row_of_a_sweep_is_saved(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({}, "busplan latency sercos2-servo-8 --format json"),
-        ({"bus.nodes": 3}, "busplan latency sercos2-servo-8 --set bus.nodes=3 --format json"),
-        ({"name": "mine"}, "busplan latency mine.toml --format json"),
+        ({}, "busplan latency sercos2-servo-8"),
+        ({"bus.nodes": 3}, "busplan latency sercos2-servo-8 --set bus.nodes=3"),
+        ({"name": "mine"}, "busplan latency mine.toml"),
     ],
 )
 def test_the_commands_of_a_page_give_its_profile(changes: dict[str, object], words: str) -> None:
@@ -140,7 +140,7 @@ def test_the_commands_of_a_page_give_the_origin_that_is_said() -> None:
     changes = KeyChanges(parse_set(["bus.nodes=3"]))
     page = str(busplan.report(profile, circle=False, origins=[("line 1.toml", changes)]))
     assert page.startswith("sercos2-servo-8\nWith --set bus.nodes=3.\n")
-    assert "$ busplan latency 'line 1.toml' --set bus.nodes=3 --format json\n" in page
+    assert "$ busplan latency 'line 1.toml' --set bus.nodes=3\n" in page
 
 
 def test_a_difference_calls_its_sides_as_it_is_told() -> None:

@@ -11,7 +11,7 @@ from busplan.questions.diff import KeyDifference
 from busplan.questions.explain.derivation import Step
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.map.trade_off import Cell
-from busplan.questions.plan.options import Option
+from busplan.questions.plan import Option
 
 
 def test_the_types_are_seen_through_the_lazy_names() -> None:
@@ -23,9 +23,9 @@ def test_the_types_are_seen_through_the_lazy_names() -> None:
         assert_type(busplan.capacity("paper-4ms").results[0].max_axes, int | None)
         assert_type(busplan.capacity("paper-4ms").results[0].binding_term, str)
         assert_type(busplan.capacity("paper-4ms").to_dict(), dict[str, Any])
-        assert_type(busplan.latency("paper-4ms").transactions[0].phases.latency_us, Any)
+        assert_type(busplan.latency("paper-4ms").transactions[0].phases["latency_us"], float | None)
         assert_type(busplan.timeline("paper-4ms").events[0].start_us, float)
-        assert_type(busplan.plan("paper-4ms", circle=False).recommended, Option | None)
+        assert_type(busplan.plan("paper-4ms").recommended, Option | None)
         assert_type(busplan.check("paper-4ms", circle=False).findings, tuple[Located, ...])
         assert_type(busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})["max_axes"], NDArray[Any])
         assert_type(busplan.map_("paper-4ms").own, Cell | None)

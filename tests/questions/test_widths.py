@@ -6,60 +6,30 @@ from functools import cache
 
 import pytest
 
+import busplan
 from busplan.forms.blocks import Block, Chart, Report, Sentence, Table, TableColumn, TableRow
 from busplan.forms.terminal import block_lines, text
-from busplan.profile.shipped import load
-from busplan.questions.capacity.report import capacity_report
-from busplan.questions.capacity.sensitivity import sensitivities
-from busplan.questions.capacity.sensitivity_report import sensitivity_report
-from busplan.questions.capacity.verdict import verdicts
-from busplan.questions.circle.report import circle_report
-from busplan.questions.circle.roundness import circle_test
-from busplan.questions.compare.kinds import compare
-from busplan.questions.compare.report import compare_report
-from busplan.questions.diff import diff
-from busplan.questions.explain import explain
-from busplan.questions.fit.figures import capacity
-from busplan.questions.latency.figures import latency
-from busplan.questions.latency.report import latency_report
-from busplan.questions.plan.planning import plan
-from busplan.questions.plan.report import plan_report
-from busplan.questions.sweep import sweep
-from busplan.questions.timeline.events import schedule
-from busplan.questions.timeline.report import timeline_report
-from busplan.sections.profile import Profile
+from busplan.questions.base.answer import Answer
 
 FIGURE = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
 # One of each class of bus, the one of IEEE 1394 with the longest name, and one of groups.
 PROFILES = ("paper-optimal-gap", "gantry-24", "can-servo-8", "can-fd-arm-7", "ethercat-servo-8", "sercos3-servo-8")
 
 
-def swept(profile: Profile) -> Report:
-    return sweep(profile, vary={"cycle.period_us": (500, 1000, 4000), "limits.reserve": (0, 0.25)}).report()
-
-
-def several(profile: Profile) -> Report:
-    found = capacity(profile, periods_us=[200.0, 500.0, 1000.0, 4000.0])
-    return capacity_report(found, verdicts(found))
-
-
-def moved(profile: Profile) -> Report:
-    found = capacity(profile)
-    return sensitivity_report(found, verdicts(found), sensitivities(found))
-
-
-ANSWERS: dict[str, Callable[[Profile], Report]] = {
-    "capacity": several,
-    "capacity --sensitivity": moved,
-    "latency": lambda profile: latency_report(latency(profile)),
-    "plan": lambda profile: plan_report(plan(profile)),
-    "explain": lambda profile: explain(profile).report(),
-    "explain margin_us": lambda profile: explain(profile, "margin_us").report(),
-    "circle-test": lambda profile: circle_report(circle_test(profile)._replace(with_contributions=True)),
-    "diff": lambda profile: diff("paper-dma", profile, arguments=("a.toml", "b.toml")).report(),
-    "timeline": lambda profile: timeline_report(schedule(profile)),
-    "sweep": swept,
-    "compare": lambda profile: compare_report(compare(profile, with_circle=True)),
+ANSWERS: dict[str, Callable[[str], Answer]] = {
+    "capacity": lambda profile: busplan.capacity(profile, period_us=[200, 500, 1000, 4000]),
+    "capacity --sensitivity": lambda profile: busplan.capacity(profile, sensitivity=True),
+    "latency": busplan.latency,
+    "plan": busplan.plan,
+    "explain": busplan.explain,
+    "explain margin_us": lambda profile: busplan.explain(profile, "margin_us"),
+    "circle-test": lambda profile: busplan.circle_test(profile, contributions=True),
+    "diff": lambda profile: busplan.diff("paper-dma", profile, arguments=("a.toml", "b.toml")),
+    "timeline": busplan.timeline,
+    "sweep": lambda profile: busplan.sweep(
+        profile, vary={"cycle.period_us": (500, 1000, 4000), "limits.reserve": (0, 0.25)}
+    ),
+    "compare": busplan.compare,
 }
 
 
@@ -71,9 +41,7 @@ ASKED = [
 
 @cache
 def answer(name: str, profile: str) -> Report:
-    report = ANSWERS[name](load(profile).profile)
-    blocks = tuple(report.blocks())
-    return report._replace(blocks=lambda: blocks)
+    return ANSWERS[name](profile).report()
 
 
 def figures(lines: Iterator[str] | list[str]) -> set[str]:
@@ -82,7 +50,7 @@ def figures(lines: Iterator[str] | list[str]) -> set[str]:
 
 def words_of(report: Report) -> list[Block]:
     """Its blocks without drawings: they have the width's own scale."""
-    return [block for block in report.blocks() if not isinstance(block, Chart)]
+    return [block for block in report.blocks if not isinstance(block, Chart)]
 
 
 @pytest.mark.parametrize(("name", "profile"), ASKED)

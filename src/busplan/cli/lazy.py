@@ -35,7 +35,9 @@ def _usage_in_our_form(command: str, *, takes_set: bool = False) -> Iterator[Non
     except TyperException as error:
         words = error.format_message().rstrip(".").replace("Value error, ", "").replace("Input should", "must")
         unknown = re.search(r"option: --([a-z-]+)", words) if takes_set else None
-        key = _key_named(unknown[1].replace("-", "_")) if unknown else None
+        # The beginning of an option of the command is more likely meant as that option.
+        is_begun = unknown is not None and f" --{unknown[1]}-" in words
+        key = _key_named(unknown[1].replace("-", "_")) if unknown and not is_begun else None
         hint = f"`{command} --help` says more"
         if key:
             words, hint = words.partition(" (")[0], f"--set {key}=... changes it for this run"

@@ -6,8 +6,6 @@ import pytest
 
 import busplan
 from busplan.forms.charts import Curves
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
 from busplan.questions.compare import CompareAnswer
 
 EACH = pytest.mark.parametrize("name", ["can-servo-8", "dvrk", "gantry-24", "paper-1ms"])
@@ -59,7 +57,7 @@ def test_this_machine_is_a_line_across_and_one_up() -> None:
 
 def test_a_machine_that_no_bus_carries_is_drawn() -> None:
     # Inputs of 40 bytes are over the four frames of a PDO, and no axis has one of its own for them.
-    inputs = override(load("gantry-24").profile, {"cycle.period_us": 1.0, "group.io.read_bytes": 40})
+    inputs = busplan.load_profile("gantry-24", changes={"cycle.period_us": 1.0, "group.io.read_bytes": 40})
     (curve,) = plot_of(busplan.compare(inputs, buses="can")).curves
     assert (curve.points, curve.entry.words) == ((), "CAN: none")
     assert busplan.compare(inputs, buses="can").svg()

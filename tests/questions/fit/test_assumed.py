@@ -1,25 +1,23 @@
-"""What carries much of a verdict and is assumed: said by the verdict, by rule BP112 and first on the page."""
+"""What carries much of a verdict and is assumed: said by the verdict, and by rule BP112."""
 
 import pytest
 
 import busplan
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.fit.assumed import heavy_assumptions
-from busplan.questions.fit.figures import figures
-from busplan.questions.fit.network import bus_of
-from busplan.sections.profile import Profile
-
-_SAID = "The execution time behind these figures is assumed."
 
 
-def heavy(profile: Profile) -> dict[tuple[str, ...], str]:
-    found = figures(profile, model=bus_of(profile).deciding_model)
-    return {one.keys: one.carries for one in heavy_assumptions(found, profile)}
+def heavy(profile: busplan.Profile) -> dict[tuple[str, ...], str]:
+    (verdict,) = busplan.capacity(profile).verdicts
+    return {one.keys: one.carries for one in verdict.assumptions}
 
 
-def said(profile: Profile) -> str:
-    return str(busplan.capacity(profile).to_dict()["verdicts"][0]["text"])
+def said(profile: busplan.Profile) -> list[str]:
+    lines = busplan.capacity(profile).to_dict()["verdicts"][0]["lines"]
+    return [line["text"] for line in lines if line["label"] == "assumed"]
+
+
+def warned(profile: busplan.Profile) -> list[str]:
+    (file,) = busplan.check(profile, circle=False).files
+    return [finding.message for finding in file.findings if finding.code == "BP112"]
 
 
 # Shares of the variance: of the largest doubt; of the time 40 of 104.290 us, 244.600 of 420.448 us, and less than
@@ -36,52 +34,47 @@ def said(profile: Profile) -> str:
         ),
     ],
 )
-def test_a_verdict_says_the_assumptions_that_carry_it_with_their_shares(
-    name: str, keys: list[str], carries: str
-) -> None:
-    profile = load(name).profile
+def test_a_verdict_names_the_assumptions_that_carry_it(name: str, keys: list[str], carries: str) -> None:
+    profile = busplan.load_profile(name)
     assert heavy(profile) == {tuple(keys): carries}
     *before, last = keys
-    names = f"{', '.join(before)} and {last}" if before else last
-    text = said(profile)
-    assert f"Assumed: {names}, which {carries}." in text
-    assert _SAID not in text
+    names, them = (f"{', '.join(before)} and {last}", "them") if before else (last, "it")
+    assert said(profile) == [f"{names}: measure {them} first"]
+    messages = warned(profile)
+    assert len(messages) == len(keys)
+    assert all(carries in message for message in messages)
 
 
 def test_an_assumed_bit_rate_carries_what_goes_without_it() -> None:
     # All of 2950 us but the executions, 400.
-    profile = load("can-servo-8").profile
-    carried = {
+    profile = busplan.load_profile("can-servo-8")
+    assert heavy(profile) == {
         ("node.execution",): "carries 100% of the variance",
         ("bus.bit_rate_kbit_s",): "carries 86% of the required time",
     }
-    assert heavy(profile) == carried
-    words = "; ".join(f"{keys[0]}, which {carries}" for keys, carries in carried.items())
-    assert f"Assumed: {words}." in said(profile)
+    assert said(profile) == ["node.execution: measure it first", "bus.bit_rate_kbit_s: measure it first"]
 
 
 def test_execution_times_of_some_groups_have_their_part_of_the_common_doubt() -> None:
     slow = {"group.drives.execution.grade": "measured", "group.tool.execution.base_us": 100}
-    profile = override(load("gantry-24").profile, slow)
+    profile = busplan.load_profile("gantry-24", changes=slow)
     ((keys, carries),) = heavy(profile).items()
     assert keys == ("group.tool.execution", "group.io.execution")
-    none: dict[str, object] = {
-        f"group.{one}.execution.{key}": 0 for one in ("tool", "io") for key in ("base_us", "per_byte_us")
-    }
-    both, all_of_it = (figures(one, model="standard") for one in (override(profile, none), profile))
-    left_us, whole_us = (next(d.us for d in one.doubts if d.key == "group.execution") for one in (both, all_of_it))
-    variance = sum(one.us**2 for one in all_of_it.doubts)
-    assert f" {whole_us * (whole_us - left_us) / variance:.0%} of the variance" in carries
+    none = {f"group.{one}.execution.{key}": 0 for one in ("tool", "io") for key in ("base_us", "per_byte_us")}
+    without, whole = (
+        busplan.capacity(one).verdicts[0].deciding.doubts
+        for one in (busplan.load_profile(profile, changes=none), profile)
+    )
+    left_us, all_us = (next(one.us for one in each if one.key == "group.execution") for each in (without, whole))
+    share = all_us * (all_us - left_us) / sum(one.us**2 for one in whole)
+    assert f" {share:.0%} of the variance" in carries
 
 
 def test_what_is_known_or_carries_little_is_not_said() -> None:
-    measured = override(load("ethercat-servo-8").profile, {"bus.master_grade": "measured", "bus.master_us": 1})
-    assert "bus.master_us" not in said(measured)
-    light = override(
-        load("paper-two-node").profile,
-        {"node.execution": {"kind": "linear", "base_us": 0.1, "per_byte_us": 0, "grade": "assumed"}},
-    )
-    assert heavy(light) == {}
-    assert _SAID in said(light)
-    assert "BP112" not in str(busplan.check(light).to_dict())
-    assert "BP112" in str(busplan.check(override(light, {"node.execution.base_us": 30})).to_dict())
+    known = {"bus.master_grade": "measured", "bus.master_us": 1}
+    measured = busplan.load_profile("ethercat-servo-8", changes=known)
+    assert "bus.master_us" not in str(busplan.capacity(measured))
+    small = {"kind": "linear", "base_us": 0.1, "per_byte_us": 0, "grade": "assumed"}
+    light = busplan.load_profile("paper-two-node", changes={"node.execution": small})
+    assert (heavy(light), warned(light)) == ({}, [])
+    assert warned(busplan.load_profile(light, changes={"node.execution.base_us": 30}))

@@ -1,7 +1,7 @@
 """Groups of unlike nodes: equal ones are a uniform bus, unlike ones add up, and each is counted for itself."""
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import fsum
 from typing import Any
 
@@ -10,32 +10,38 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.ieee1394.constants import PHY_DELAY_HALF_WIDTH_US
-from busplan.buses.ieee1394.section import Ieee1394Profile
-from busplan.elementwise import plain, value_of
+from busplan.buses import kind_named
+from busplan.buses.cycle import BusCycle
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.gate.gate import check_document
 from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load
-from busplan.profile.toml import decode, override, validate
+from busplan.profile.toml import decode, validate
 from busplan.profile.write import profile_text
-from busplan.questions.explain import explain
-from busplan.questions.fit.certainty import certainty, cycle_of, fits_in
-from busplan.questions.fit.figures import COUNTS, figures
-from busplan.questions.fit.loop_delays import loop_delays_us
-from busplan.questions.fit.network import bus_of, model_names, network_of
-from busplan.questions.plan.constraints import nodes_for_axes, rooms
-from busplan.questions.plan.planning import plan
-from busplan.sections.profile import Profile
+from busplan.questions.fit.figures import COUNTS, CapacityFigures, capacity_figures
+from busplan.questions.fit.network import model_names, network_of
 
-GANTRY = load("gantry-24").profile
+GANTRY = busplan.load_profile("gantry-24")
 
 
-def profile_of(data: dict[str, Any]) -> Profile:
-    return Ieee1394Profile.model_validate(data)
+def changed(profile: busplan.Profile, changes: Mapping[str, object]) -> busplan.Profile:
+    return busplan.load_profile(profile, changes=changes)
 
 
-def in_groups(profile: Profile, parts: list[int]) -> Profile:
+def figures(profile: busplan.Profile, model: str = "standard") -> CapacityFigures:
+    return capacity_figures(network_of(profile), model=model)
+
+
+def cycle_of(profile: busplan.Profile, model: str = "standard") -> BusCycle:
+    network = network_of(profile)
+    return network.bus.cycle(network, model=model)
+
+
+def profile_of(data: dict[str, Any]) -> busplan.Profile:
+    return kind_named("ieee1394").profile_model().model_validate(data)
+
+
+def in_groups(profile: busplan.Profile, parts: list[int]) -> busplan.Profile:
     """The same nodes in groups of these sizes."""
     data = profile.model_dump(exclude_unset=True)
     node, payload = data.pop("node"), data.pop("payload")
@@ -75,7 +81,7 @@ def groups(draw: st.DrawFn, name: str) -> dict[str, Any]:
 
 
 @st.composite
-def grouped(draw: st.DrawFn) -> Profile:
+def grouped(draw: st.DrawFn) -> busplan.Profile:
     """Random profiles with one to three groups, in a chain or a tree, with each way to charge hops."""
     tree = draw(st.booleans())
     each = [draw(groups(name)) for name in "abc"[: draw(st.integers(1, 3))]]
@@ -113,20 +119,20 @@ def grouped(draw: st.DrawFn) -> Profile:
 
 @given(data=st.data(), parts=st.lists(st.integers(1, 20), min_size=1, max_size=4), own=st.booleans())
 def test_equal_neighbours_are_the_uniform_bus_to_the_bit(
-    data: st.DataObject, parts: list[int], own: bool, any_profile: st.SearchStrategy[Profile]
+    data: st.DataObject, parts: list[int], own: bool, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     drawn = data.draw(any_profile)
-    profile = override(
+    profile = changed(
         drawn, {"bus.nodes": sum(parts), **({"bus.charge_hops": "own"} if own and not drawn.bus.max_hops else {})}
     )
     split = in_groups(profile, parts)
-    assert model_names(split) == model_names(profile)
-    for model in model_names(profile):
-        one, other = figures(profile, model=model), figures(split, model=model)
+    assert model_names(network_of(split)) == model_names(network_of(profile))
+    for model in model_names(network_of(profile)):
+        one, other = figures(profile, model), figures(split, model)
         assert other.terms == one.terms
         whole = {key: value for key, value in one.by_key().items() if key not in {*COUNTS, "nodes_eq11"}}
         assert {key: other.by_key()[key] for key in whole} == whole
-        assert list(cycle_of(split, model=model).events()) == list(cycle_of(profile, model=model).events())
+        assert list(cycle_of(split, model).events()) == list(cycle_of(profile, model).events())
         for nodes, group in zip(parts, other.groups, strict=True):
             # The others are there already; a bus that is too full with one node more of any carries none.
             for key in ("max_nodes", "safe_nodes"):
@@ -151,9 +157,9 @@ def test_equal_groups_that_are_no_neighbours_stay_apart() -> None:
 
 
 @given(profile=grouped())
-def test_events_add_up_to_the_terms(profile: Profile) -> None:
-    for model in model_names(profile):
-        cycle = cycle_of(profile, model=model)
+def test_events_add_up_to_the_terms(profile: busplan.Profile) -> None:
+    for model in model_names(network_of(profile)):
+        cycle = cycle_of(profile, model)
         of_events: dict[str, list[float]] = defaultdict(list)
         for event in cycle.events():
             of_events[event.term].append(plain(event.us))
@@ -163,67 +169,46 @@ def test_events_add_up_to_the_terms(profile: Profile) -> None:
 
 
 @given(profile=grouped())
-def test_each_group_is_counted_as_a_brute_search_counts_it(profile: Profile) -> None:
+def test_each_group_is_counted_as_a_brute_search_counts_it(profile: busplan.Profile) -> None:
     """One node more at a time, the others as they are, each a profile of its own."""
-    model = bus_of(profile).deciding_model
-    for one in figures(profile, model=model).groups:
-        for key, fits in (("max_nodes", _fits), ("safe_nodes", _is_shown)):
-            most = getattr(one, key)
-            counts = {most, most + 1} - {0}
-            found = {nodes: fits(override(profile, {f"group.{one.name}.nodes": nodes})) for nodes in counts}
-            assert found == {nodes: nodes <= most for nodes in counts}, (one.name, key)
-        assert (one.max_axes, one.safe_axes) == tuple(
-            axes_of(profile, one.name) * (nodes or 0) for nodes in (one.max_nodes, one.safe_nodes)
-        )
-
-
-def axes_of(profile: Profile, name: str) -> int:
-    return next(one.axes for one in profile.group if one.name == name)
-
-
-def _fits(profile: Profile) -> bool:
-    cycle = cycle_of(profile, model=bus_of(profile).deciding_model)
-    given_us = plain(cycle.network.period_us) * plain(cycle.network.slice_ratio)
-    return not bus_of(profile).broken(network_of(profile)) and bool(fits_in(cycle.required_us, available_us=given_us))
-
-
-def _is_shown(profile: Profile) -> bool:
-    cycle = cycle_of(profile, model=bus_of(profile).deciding_model)
-    given_us = plain(cycle.network.period_us) * plain(cycle.network.slice_ratio)
-    needed_us = certainty(cycle).safe_required_us
-    safe = bus_of(profile).is_safe(cycle.network)
-    return safe and not bus_of(profile).broken(network_of(profile)) and bool(fits_in(needed_us, available_us=given_us))
+    for one in figures(profile).groups:
+        axes = next(group.axes for group in profile.group if group.name == one.name)
+        assert (one.max_axes, one.safe_axes) == (axes * one.max_nodes, axes * (one.safe_nodes or 0))
+        for most, key in ((one.max_nodes, "fits"), (one.safe_nodes or 0, "is_shown")):
+            for nodes in {most, most + 1} - {0}:
+                tried = figures(changed(profile, {f"group.{one.name}.nodes": nodes}))
+                fits = {"fits": tried.fits, "is_shown": tried.verdict == "fits" and tried.safe}
+                assert fits[key] == (nodes <= most), (one.name, key)
 
 
 @given(profile=grouped())
-def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: Profile) -> None:
-    own, farthest = (override(profile, {"bus.charge_hops": word}) for word in ("own", "farthest"))
-    pairs = zip(cycle_of(own, model="standard").terms, cycle_of(farthest, model="standard").terms, strict=True)
+def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: busplan.Profile) -> None:
+    own, farthest = (changed(profile, {"bus.charge_hops": word}) for word in ("own", "farthest"))
+    pairs = zip(cycle_of(own).terms, cycle_of(farthest).terms, strict=True)
     for one, other in pairs:
         assert plain(one.us) <= plain(other.us) + 1e-9, one.key
 
 
 @given(profile=grouped())
-def test_a_derivation_gives_the_figures(profile: Profile) -> None:
-    network = network_of(profile)
-    for model in model_names(network):
-        known = figures(network, model=model).values()
+def test_a_derivation_gives_the_figures(profile: busplan.Profile) -> None:
+    for model in model_names(network_of(profile)):
+        known = figures(profile, model).values()
         for key in ("required_us", "margin_us", "read_latency_us", "axes"):
             if known[key] is not None:
-                (one,) = explain(profile, key, timing_model=model).derivations
+                (one,) = busplan.explain(profile, key, timing_model=model).derivations
                 assert one.value == known[key]
 
 
 @settings(max_examples=12)
 @given(profile=grouped(), nodes=st.lists(st.integers(1, 20), min_size=2, max_size=4, unique=True))
-def test_a_sweep_gives_what_each_profile_gives(profile: Profile, nodes: list[int]) -> None:
+def test_a_sweep_gives_what_each_profile_gives(profile: busplan.Profile, nodes: list[int]) -> None:
     name = profile.group[-1].name
     vary = {f"group.{name}.nodes": nodes, f"group.{profile.group[0].name}.axes": [1, 2]}
     answer = busplan.sweep(profile, vary=vary)
     models, rows = answer.sweep.timing_models, answer.to_dict()["rows"]
     assert len(rows) == len(nodes) * 2 * len(models)
     for row in rows:
-        alone = figures(override(profile, {key: row[key] for key in vary}), model=row["timing_model"])
+        alone = figures(changed(profile, {key: row[key] for key in vary}), row["timing_model"])
         own = {f"group.{one.name}.{key}": getattr(one, key) for one in alone.groups for key in COUNTS}
         # Those of the whole are of the group that varies.
         whole = {key: value for key, value in alone.by_key().items() if key not in COUNTS}
@@ -233,19 +218,20 @@ def test_a_sweep_gives_what_each_profile_gives(profile: Profile, nodes: list[int
 
 def test_the_figures_of_the_gantry_by_hand() -> None:
     """Execution: 4 nodes of 40 B twice, one of 36 and 32 B, one read of 8 B; 0.1 us a byte."""
-    (term,) = (one for one in cycle_of(GANTRY, model="standard").terms if one.name == "execution")
+    (term,) = (one for one in cycle_of(GANTRY).terms if one.name == "execution")
     assert term.us == pytest.approx(4 * 2 * (20 + 4.0) + (20 + 3.6) + (20 + 3.2) + (5 + 0.8))
-    found = figures(GANTRY, model="standard")
-    assert (found.nodes, found.axes, found.hops) == (6, 24, 6)
+    found = figures(GANTRY)
+    assert (found.nodes, found.axes, found.own["hops"]) == (6, 24, 6)
 
 
 def test_set_points_of_the_circle_arrive_at_nodes_with_axes() -> None:
     """x is on the first node that has axes, y on the last."""
-    changes: dict[str, object] = {"servo.loop": "host", "servo.update": "on_arrival"}
-    data = override(GANTRY, changes).model_dump(exclude_unset=True)
-    last_y = loop_delays_us(profile_of(data))[1]
+    data = changed(GANTRY, {"servo.loop": "host", "servo.update": "on_arrival"}).model_dump(exclude_unset=True)
+    before = busplan.circle_test(profile_of(data)).results[0]
     data["group"] = [*data["group"][:-1], {**data["group"][-1], "axes": 1}]
-    assert loop_delays_us(profile_of(data))[1] > last_y
+    after = busplan.circle_test(profile_of(data)).results[0]
+    assert after.delay_x_us == before.delay_x_us
+    assert after.delay_y_us > before.delay_y_us
 
 
 # --- what a profile may say -------------------------------------------------------------------------------
@@ -292,13 +278,13 @@ def test_a_tree_charges_the_hops_of_its_groups() -> None:
     for axes in ("axes = 5", "axes = 4", "axes = 0"):
         text = text.replace(axes, f"{axes}\nhops = 2", 1)
     tree = validate(decode(text.encode(), name="x.toml"))
-    phases = cycle_of(tree, model="standard").latencies()
+    phases = cycle_of(tree).latencies()
     assert {one.phases["hops"] for one in phases} == {2}
-    assert cycle_of(tree, model="standard").figures()["hops"] == 3
+    assert cycle_of(tree).figures()["hops"] == 3
 
 
 @given(profile=grouped())
-def test_a_written_profile_reads_to_the_same(profile: Profile) -> None:
+def test_a_written_profile_reads_to_the_same(profile: busplan.Profile) -> None:
     assert validate(decode(profile_text(profile).encode(), name="x")) == profile
     assert dotted_keys(profile)["group"].value == [one.name for one in profile.group]
 
@@ -314,13 +300,13 @@ def test_a_written_profile_reads_to_the_same(profile: Profile) -> None:
 )
 def test_a_change_of_a_group_is_checked_as_the_file(changes: dict[str, object], said: str) -> None:
     with pytest.raises(BusplanError, match=said.replace("[", r"\[").replace("]", r"\]")):
-        override(GANTRY, changes)
+        changed(GANTRY, changes)
 
 
-def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., Profile]) -> None:
+def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., busplan.Profile]) -> None:
     data = GANTRY.model_dump(exclude_unset=True)
     with pytest.raises(BusplanError, match=r"bus\.nodes: each"):
-        override(make(), {"group": data["group"]})
+        changed(make(), {"group": data["group"]})
 
 
 # --- what to set ------------------------------------------------------------------------------------------
@@ -338,14 +324,12 @@ def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., Profile]) ->
         },
     ),
 )
-def test_what_a_plan_writes_for_groups_passes_the_gate(profile: Profile, limits: dict[str, object]) -> None:
-    found = plan(override(profile, limits))
-    if found.recommended is None:
-        assert found.binding is not None
+def test_what_a_plan_writes_for_groups_passes_the_gate(profile: busplan.Profile, limits: dict[str, object]) -> None:
+    best = busplan.plan(changed(profile, limits)).recommended
+    if best is None:
         return
-    text = profile_text(found.recommended.profile).encode()
-    checked = check_document(decode(text, name="new.toml"), with_circle=False, record=False).findings
-    assert [one.message for one in checked if one.severity == "error"] == []
+    (file,) = busplan.check(best.profile, circle=False).files
+    assert [one.message for one in file.findings if one.severity == "error"] == []
 
 
 def test_a_plan_names_what_it_cannot_ask_of_groups() -> None:
@@ -353,27 +337,29 @@ def test_a_plan_names_what_it_cannot_ask_of_groups() -> None:
         BusplanError,
         match=r"axes 30: the nodes of gantry-24 differ; .*: set group\.drives\.nodes=6, or set group\.tool\.nodes=3$",
     ):
-        nodes_for_axes(GANTRY, 30)
+        busplan.plan(GANTRY, axes=30)
     with pytest.raises(BusplanError, match="nodes: there is nothing of that name to free"):
-        plan(GANTRY, free=["nodes"])
-    assert plan(GANTRY).recommended is not None
-    found = plan(GANTRY, wanted={"group.drives.nodes": 9}, free=["payload", "period"])
-    assert found.recommended is not None
-    assert set(found.recommended.changes) == {"cycle.period_us"} | {
+        busplan.plan(GANTRY, free=["nodes"])
+
+
+def test_a_plan_sets_the_payload_of_each_group_before_the_period() -> None:
+    found = busplan.plan(GANTRY, wanted={"group.drives.nodes": 9}, free=["payload", "period"]).recommended_changes
+    assert found is not None
+    assert set(found) <= {"cycle.period_us", "group.drives.nodes"} | {
         f"group.{key}_bytes_per_axis" for key in ("drives.read", "drives.write", "tool.read", "tool.write")
     }
+    assert busplan.capacity(changed(GANTRY, found | {"group.drives.nodes": 9})).verdict == "fits"
 
 
-def test_a_plan_keeps_room_in_each_group() -> None:
-    asked = override(GANTRY, {"limits.min_spare_nodes": 2, "limits.min_spare_axes": 7})
-    found = {(room.key.removeprefix("limits."), room.words): room.network.nodes for room in rooms(asked)}
-    assert found == {
-        ("min_spare_nodes", "6 nodes of drives"): 8,
-        ("min_spare_axes", "6 nodes of drives"): 8,  # 7 axes are on two nodes of five
-        ("min_spare_nodes", "3 nodes of tool"): 8,
-        ("min_spare_axes", "3 nodes of tool"): 8,
-        ("min_spare_nodes", "3 nodes of io"): 8,  # and none has axes
-    }
+@pytest.mark.parametrize("key", ["min_spare_nodes", "min_spare_axes"])
+def test_room_is_asked_for_in_each_group(key: str) -> None:
+    # 7 axes are on two nodes of drives, which have five, and on two of tool, which have four.
+    asked = changed(GANTRY, {f"limits.{key}": 2 if key == "min_spare_nodes" else 7})
+    assert [missed for missed, _ in busplan.capacity(asked).verdicts[0].missed_limits] == [f"limits.{key}"]
+    best = busplan.plan(asked).recommended
+    assert best is not None
+    for name, nodes in (("drives", 6), ("tool", 3), ("io", 3)):
+        assert busplan.capacity(changed(best.profile, {f"group.{name}.nodes": nodes})).verdict == "fits"
 
 
 # --- each node's own way ----------------------------------------------------------------------------------
@@ -383,13 +369,13 @@ def test_a_plan_keeps_room_in_each_group() -> None:
     ("kind", "root", "steps"), [("request_data", None, 1), ("arbitration", None, 0), ("arbitration", "host", 1)]
 )
 def test_each_node_is_drawn_at_its_own_hops(
-    make: Callable[..., Profile], kind: str, root: str | None, steps: int
+    make: Callable[..., busplan.Profile], kind: str, root: str | None, steps: int
 ) -> None:
     """Arbitration goes to the root, which may lie at the end of the chain."""
     profile = make(bus__nodes=4, bus__charge_hops="own", bus__root=root)
     hop_us = 0.023 + 14 / 98.304
     first_us: dict[int, float] = {}
-    for event in cycle_of(profile, model="standard").events():
+    for event in cycle_of(profile).events():
         if event.kind == kind and event.transaction == "read" and event.node is not None:
             first_us.setdefault(event.node, plain(event.us))
     assert list(first_us) == [1, 2, 3, 4]
@@ -399,15 +385,15 @@ def test_each_node_is_drawn_at_its_own_hops(
 
 @pytest.mark.parametrize(("root", "parts"), [("host", 12), (None, 8)])
 def test_the_doubt_of_phys_is_that_of_each_nodes_own_way(
-    make: Callable[..., Profile], root: str | None, parts: int
+    make: Callable[..., busplan.Profile], root: str | None, parts: int
 ) -> None:
     """Three nodes: 1 + 2 + 3 hops instead of 3 * 3, for the six parts of a read's and of a write's packets.
 
     Two of the six arbitrate, and do so over the own way only where the host is the root.
     """
     own, farthest = (
-        next(doubt for doubt in cycle_of(one, model="standard").doubts() if doubt.key == "bus.phy_delay_us")
+        next(doubt for doubt in cycle_of(one).doubts() if doubt.key == "bus.phy_delay_us")
         for one in (make(bus__nodes=3, bus__charge_hops="own", bus__root=root), make(bus__nodes=3))
     )
-    each_us = float(PHY_DELAY_HALF_WIDTH_US) / 3**0.5
+    each_us = 0.020 / 3**0.5
     assert farthest.us - own.us == pytest.approx(parts * (9 - 6) * each_us, rel=1e-9)

@@ -1,25 +1,19 @@
-"""The most nodes within some limits: against a count, over arrays, and only when somebody asks."""
+"""The most nodes within some limits: against a count, and over arrays."""
 
-import pickle
 from collections.abc import Callable
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import busplan
 from busplan.buses.network import Network
 from busplan.buses.parts import Limit
 from busplan.elementwise import Number, choose, rounded_up
-from busplan.gate.gate import check_document
-from busplan.profile.shipped import load
-from busplan.profile.toml import decode, validate
-from busplan.questions.fit import figures as analysis
-from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.fit.node_limit import most_nodes
 
-NETWORK = network_of(load("paper-4ms").profile)
+NETWORK = network_of(busplan.load_profile("paper-4ms"))
 FORMS: dict[str, Callable[[Number], Number]] = {
     "line": lambda nodes: nodes,
     "square": lambda nodes: nodes * nodes,
@@ -67,27 +61,3 @@ def test_an_array_is_answered_as_each_of_its_points(asked: list[tuple[str, int, 
     for name in ("nodes", "limit"):
         whole = np.broadcast_to(np.asarray(getattr(together, name)), points.shape)
         assert whole.tolist() == [[getattr(one, name) for one in row] for row in alone]
-
-
-def test_the_largest_and_the_safe_number_are_computed_apart_when_they_are_asked_for(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def refuse(*_: object, **__: object) -> tuple[int, str]:
-        raise AssertionError("nobody asked")
-
-    profile = load("paper-4ms").profile
-    with monkeypatch.context() as patch:
-        patch.setattr(analysis, "largest_nodes", refuse)
-        patch.setattr(analysis, "safe_nodes", refuse)
-        found = figures(profile, model="standard")
-        copy = pickle.loads(pickle.dumps(found))
-        # Its gap count is wasteful, and a comment suppresses what the rule would say of it.
-        text = load("paper-4ms").document.text
-        assert not check_document(decode(text.encode(), name="x.toml"), with_circle=False, record=False).findings
-    with monkeypatch.context() as patch:
-        patch.setattr(analysis, "largest_nodes", refuse)
-        assert (found.safe_nodes, found.safe_axes, found.safe_limited_by) == (13, 52, "time")
-    with monkeypatch.context() as patch:
-        patch.setattr(analysis, "safe_nodes", refuse)
-        assert (copy.max_nodes, copy.max_axes, copy.limited_by) == (13, 52, "time")
-    assert copy == found == figures(validate(decode(text.encode(), name="x.toml")), model="standard")

@@ -1,7 +1,6 @@
 """Every cell of a map is what `capacity` says of its setting; what cannot exist is no cell."""
 
 import re
-from collections.abc import Callable
 from itertools import islice, product
 from typing import Any
 
@@ -9,22 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.errors import BusplanError
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.circle.roundness import circle_test
-from busplan.questions.fit.certainty import TIME
-from busplan.questions.fit.figures import figures
-from busplan.questions.fit.network import bus_of, network_of
-from busplan.questions.map.direction import AXES, MOST_VALUES, PERIOD, Direction, checked_direction
-from busplan.questions.map.trade_off import Cell, NotDrawn, TradeOff, trade_off
-from busplan.questions.sweep.grid import axis_of
+import busplan
+from busplan.questions.map.trade_off import Cell, NotDrawn
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
-from busplan.sections.profile import Profile
 
-Make = Callable[..., Profile]
-
-PAPER = load("paper-4ms").profile
+AXES, PERIOD, TIME = "axes", "cycle.period_us", "time"
+PAPER = busplan.load_profile("paper-4ms")
 VALUES: dict[str, st.SearchStrategy[Any]] = {
     AXES: st.integers(0, 90),
     PERIOD: st.one_of(st.floats(1.0, 20_000.0), st.integers(0, 9)),
@@ -39,21 +28,21 @@ VALUES: dict[str, st.SearchStrategy[Any]] = {
 }
 
 
-def at(profile: Profile, changes: dict[str, Any]) -> Profile | None:
+def at(profile: busplan.Profile, changes: dict[str, Any]) -> busplan.Profile | None:
     """The profile with other values, a number of axes among them; None if there is none."""
     axes = changes.pop(AXES, None)
     try:
-        found = override(profile, dict(changes))
+        found = busplan.load_profile(profile, changes=changes)
         if axes is None:
             return found
         (alike,) = found.alike_nodes
         nodes, rest = divmod(axes, alike.node.axes)
-        return None if rest else override(found, {"bus.nodes": nodes})
-    except BusplanError:
+        return None if rest else busplan.load_profile(found, changes={"bus.nodes": nodes})
+    except busplan.BusplanError:
         return None
 
 
-def assert_cells_are_those_of_capacity(found: TradeOff, *, step: int = 1) -> None:
+def assert_cells_are_those_of_capacity(found: busplan.MapAnswer, *, step: int = 1) -> None:
     """Each cell, or one in so many."""
     columns = len(found.x.values)
     assert [len(row) for row in found.rows] == [columns] * len(found.y.values)
@@ -66,7 +55,7 @@ def assert_cells_are_those_of_capacity(found: TradeOff, *, step: int = 1) -> Non
             assert cell.reason
             continue
         assert isinstance(cell, Cell), cell
-        one = figures(wanted, model=bus_of(wanted).deciding_model)
+        (one,) = busplan.capacity(wanted, timing_model="standard").results
         assert (cell.nodes, cell.axes, cell.verdict, cell.is_safe) == (one.nodes, one.axes, one.verdict, one.safe)
         assert repr(cell.margin_corrected_us) == repr(one.margin_corrected_us)
         assert repr(cell.uncertainty_us) == repr(one.uncertainty_us)
@@ -83,16 +72,14 @@ def assert_cells_are_those_of_capacity(found: TradeOff, *, step: int = 1) -> Non
 
 
 @given(data=st.data())
-def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
+def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]) -> None:
     profile = data.draw(any_profile)
     pairs = st.lists(st.sampled_from(sorted(VALUES)), min_size=2, max_size=2, unique=True)
     keys = data.draw(pairs.filter(lambda two: set(two) != {AXES, "bus.nodes"}))
-    x, y = (
-        Direction(key, tuple(data.draw(st.lists(VALUES[key], min_size=1, max_size=4, unique=True)))) for key in keys
-    )
+    x, y = ({key: data.draw(st.lists(VALUES[key], min_size=1, max_size=4, unique=True))} for key in keys)
     try:
-        found = trade_off(profile, x=x, y=y)
-    except BusplanError as error:
+        found = busplan.map_(profile, x=x, y=y)
+    except busplan.BusplanError as error:
         assert str(error).startswith("no setting of this map can exist: ")  # noqa: PT017 - others are failures
         return
     assert_cells_are_those_of_capacity(found)
@@ -101,13 +88,14 @@ def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.S
 @settings(max_examples=12)
 @given(data=st.data())
 def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
-    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
-    found = trade_off(profile)
+    found = busplan.map_(profile)
     assert (found.x.key, found.y.key) == (AXES, PERIOD)
     assert found.own is not None
-    assert (found.own.x, found.own.y) == (network_of(profile).axes, profile.cycle.period_us)
+    (nodes,) = profile.alike_nodes
+    assert (found.own.x, found.own.y) == (nodes.nodes * nodes.node.axes, profile.cycle.period_us)
     assert max(len(found.x.values), len(found.y.values)) <= 24
     assert list(found.y.values) == sorted(set(found.y.values))
     assert not found.not_drawn
@@ -119,7 +107,7 @@ def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
 
 @pytest.mark.parametrize("name", ["paper-4ms", "paper-1ms", "paper-dma", "paper-optimal-gap", "paper-two-node"])
 def test_the_edge_of_what_fits_is_in_the_picture(name: str) -> None:
-    found = trade_off(load(name).profile)
+    found = busplan.map_(busplan.load_profile(name))
     assert {cell.state for cell in found.cells} >= {"fits", "not shown to fit", "does not fit"}
     assert {cell.state for cell in found.cells if cell.y == found.profile.cycle.period_us} >= {"fits", "does not fit"}
     assert found.regions[0].state == "fits"
@@ -133,36 +121,35 @@ def test_the_edge_of_what_fits_is_in_the_picture(name: str) -> None:
         ({"bus.nodes": 900, "bus.max_hops": 3}, {"fits", "not shown to fit", "does not fit"}),
         ({"bus.nodes": 1_000_000}, {"fits", "does not fit"}),
         ({"cycle.period_us": MIN_STEP_US}, {"fits", "does not fit"}),
-        # A circle of 20 minutes in ramps is too short for its feed.
-        ({"cycle.period_us": MAX_TIME_US}, {"fits", "circle cannot be run", "not shown to fit", "does not fit"}),
-        ({"cycle.slice_ratio": 1e-6}, {"circle cannot be run", "does not fit"}),
+        ({"cycle.period_us": MAX_TIME_US}, {"fits", "not shown to fit", "does not fit"}),
+        ({"cycle.slice_ratio": 1e-6}, {"fits", "does not fit"}),
         ({"cycle.nonperiodic_us": MAX_TIME_US}, {"does not fit"}),
         ({"limits.reserve": 0.99}, {"fits", "not shown to fit"}),
     ],
 )
 def test_a_strange_design_has_a_map_with_its_edge_too(changes: dict[str, object], states: set[str]) -> None:
-    found = trade_off(override(PAPER, changes))
+    found = busplan.map_(busplan.load_profile(PAPER, changes=changes))
     assert found.own is not None
     assert {cell.state for cell in found.cells} == states
     assert max(len(found.x.values), len(found.y.values)) <= 24
 
 
 def test_a_number_of_axes_that_no_nodes_have_is_not_drawn() -> None:
-    found = trade_off(PAPER, x=Direction(AXES, tuple(range(1, 9))), y=Direction("node.axes", (2, 3, 4)))
+    found = busplan.map_(PAPER, x={AXES: range(1, 9)}, y={"node.axes": (2, 3, 4)})
     drawn = [[isinstance(cell, Cell) for cell in row] for row in found.rows]
     assert drawn == [[axes % each == 0 for axes in range(1, 9)] for each in (2, 3, 4)]
     assert found.not_drawn[0].reason == "axes = 1: no whole number of nodes, with 2 axes each"
-    turned = trade_off(PAPER, x=found.y, y=found.x)
+    turned = busplan.map_(PAPER, x={"node.axes": (2, 3, 4)}, y={AXES: range(1, 9)})
     assert [[isinstance(cell, Cell) for cell in row] for row in turned.rows] == [
         list(one) for one in zip(*drawn, strict=True)
     ]
 
 
-GANTRY = load("gantry-24").profile
+GANTRY = busplan.load_profile("gantry-24")
 
 
 def test_of_unlike_nodes_the_axes_are_by_the_group_that_has_the_most() -> None:
-    found = trade_off(GANTRY)
+    found = busplan.map_(GANTRY)
     assert found.own is not None
     assert (found.own.x, found.own.y, found.own.nodes) == (24, 1000, 6)
     # Four axes of the tool beside five of each drive.
@@ -170,37 +157,37 @@ def test_of_unlike_nodes_the_axes_are_by_the_group_that_has_the_most() -> None:
     assert {cell.state for cell in found.cells} == {"fits", "not shown to fit", "does not fit"}
     for cell in found.cells[::7]:
         changes: dict[str, object] = {"group.drives.nodes": (int(cell.x) - 4) // 5, PERIOD: cell.y}
-        one = figures(override(GANTRY, changes), model="standard")
+        (one,) = busplan.capacity(busplan.load_profile(GANTRY, changes=changes), timing_model="standard").results
         assert (cell.axes, cell.verdict, cell.margin_corrected_us) == (one.axes, one.verdict, one.margin_corrected_us)
 
 
 def test_groups_are_directions_too() -> None:
-    found = trade_off(GANTRY, x=Direction(AXES, (8, 9, 18, 24)), y=Direction("group.tool.axes", (3, 4)))
+    found = busplan.map_(GANTRY, x={AXES: (8, 9, 18, 24)}, y={"group.tool.axes": (3, 4)})
     assert [[isinstance(cell, Cell) for cell in row] for row in found.rows] == [
         [True, False, True, False],
         [False, True, False, True],
     ]
     assert found.not_drawn[0].reason == "axes = 9: no whole number of nodes, with 5 axes each beside 3 others"
     assert found.own_place == (1, 3)
-    with pytest.raises(BusplanError, match=r"both vary group\.drives\.nodes"):
-        trade_off(GANTRY, x=Direction(AXES, (24,)), y=Direction("group.drives.nodes", (1, 2)))
-    with pytest.raises(BusplanError, match=r"--x bus\.nodes: "):
-        checked_direction(GANTRY, "bus.nodes", axis_of([1]), option="--x")
+    with pytest.raises(busplan.BusplanError, match=r"both vary group\.drives\.nodes"):
+        busplan.map_(GANTRY, x={AXES: (24,)}, y={"group.drives.nodes": (1, 2)})
+    with pytest.raises(busplan.BusplanError, match=r"x bus\.nodes: "):
+        busplan.map_(GANTRY, x={"bus.nodes": [1]})
 
 
 def test_nodes_without_axes_are_counted_themselves() -> None:
     sizes = {f"group.{name}.{kind}_bytes": 8 for name in ("drives", "tool") for kind in ("read", "write")}
-    still = override(GANTRY, {"group.drives.axes": 0, "group.tool.axes": 0, **sizes})
-    found = trade_off(still)
+    still = busplan.load_profile(GANTRY, changes={"group.drives.axes": 0, "group.tool.axes": 0, **sizes})
+    found = busplan.map_(still)
     assert (found.x.key, found.y.key) == ("group.drives.nodes", PERIOD)
     assert found.own is not None
-    with pytest.raises(BusplanError, match="axes = 5: no whole number of nodes, with 0 axes each"):
-        trade_off(still, x=Direction(AXES, (5,)))
+    with pytest.raises(busplan.BusplanError, match="axes = 5: no whole number of nodes, with 0 axes each"):
+        busplan.map_(still, x={AXES: (5,)})
 
 
 def test_a_combination_that_the_schema_refuses_is_not_drawn() -> None:
-    x, y = Direction("bus.gap_count", (63, 64, "optimal")), Direction("bus.cable_length_m", (4.5, 9.0))
-    found = trade_off(PAPER, x=x, y=y)
+    x, y = {"bus.gap_count": (63, 64, "optimal")}, {"bus.cable_length_m": (4.5, 9.0)}
+    found = busplan.map_(PAPER, x=x, y=y)
     assert [[isinstance(cell, Cell) for cell in row] for row in found.rows] == [
         [True, False, True],
         [True, False, False],
@@ -210,66 +197,66 @@ def test_a_combination_that_the_schema_refuses_is_not_drawn() -> None:
 
 
 def test_one_key_alone_chooses_the_other() -> None:
-    assert trade_off(PAPER, x=Direction(PERIOD, (1000,))).y.key == AXES
-    assert trade_off(PAPER, y=Direction("bus.nodes", (1, 2))).x.key == PERIOD
-    assert trade_off(PAPER, y=Direction("bus.gap_count", (63,))).x.key == AXES
-    assert trade_off(PAPER, x=Direction("bus.nodes", (1, 2))).y.key == PERIOD
+    assert busplan.map_(PAPER, x={PERIOD: (1000,)}).y.key == AXES
+    assert busplan.map_(PAPER, y={"bus.nodes": (1, 2)}).x.key == PERIOD
+    assert busplan.map_(PAPER, y={"bus.gap_count": (63,)}).x.key == AXES
+    assert busplan.map_(PAPER, x={"bus.nodes": (1, 2)}).y.key == PERIOD
 
 
 def test_a_design_with_other_values_is_not_on_its_map() -> None:
-    found = trade_off(PAPER, x=Direction("bus.gap_count", (7, 10)))
+    found = busplan.map_(PAPER, x={"bus.gap_count": (7, 10)})
     assert (found.own, found.own_place) == (None, None)
-    assert trade_off(PAPER, x=Direction("bus.gap_count", (7, 63))).own_place == (11, 1)
+    beside = busplan.map_(PAPER, x={"bus.gap_count": (7, 63)})
+    assert beside.own_place == (beside.y.values.index(4000), 1)
 
 
 @pytest.mark.parametrize(
     ("x", "y", "message"),
     [
-        (Direction(AXES, (8,)), Direction("bus.nodes", (2,)), "x = axes and y = bus.nodes both vary bus.nodes"),
-        (Direction(PERIOD, (8,)), Direction(PERIOD, (9,)), "both vary cycle.period_us; give two keys"),
-        (Direction(AXES, (1, 2, 3)), None, "no setting of this map can exist: axes = 1: no whole number of nodes"),
-        (Direction(AXES, (0,)), None, "no setting of this map can exist: axes = 0: no whole number of nodes"),
-        (Direction("bus.gap_count", (64,)), None, "no setting of this map can exist: bus.gap_count 64"),
+        ({AXES: (8,)}, {"bus.nodes": (2,)}, "x = axes and y = bus.nodes both vary bus.nodes"),
+        ({PERIOD: (8,)}, {PERIOD: (9,)}, "both vary cycle.period_us; give two keys"),
+        ({AXES: (1, 2, 3)}, None, "no setting of this map can exist: axes = 1: no whole number of nodes"),
+        ({AXES: (0,)}, None, "no setting of this map can exist: axes = 0: no whole number of nodes"),
+        ({"bus.gap_count": (64,)}, None, "no setting of this map can exist: bus.gap_count 64"),
     ],
 )
-def test_a_map_of_nothing_is_refused(x: Direction, y: Direction | None, message: str) -> None:
-    with pytest.raises(BusplanError, match=re.escape(message)):
-        trade_off(PAPER, x=x, y=y)
+def test_a_map_of_nothing_is_refused(x: dict[str, Any], y: dict[str, Any] | None, message: str) -> None:
+    with pytest.raises(busplan.BusplanError, match=re.escape(message)):
+        busplan.map_(PAPER, x=x, y=y)
 
 
 def test_a_direction_is_sorted_and_has_no_more_values_than_gap_counts() -> None:
-    assert checked_direction(PAPER, PERIOD, axis_of([500.0, 0.5, 4000]), option="--y").values == (0.5, 500, 4000)
-    assert checked_direction(PAPER, "bus.speed", axis_of(["S400", "S100"]), option="--x").values == ("S400", "S100")
-    assert len(checked_direction(PAPER, "bus.gap_count", axis_of(range(64)), option="--x").values) == MOST_VALUES
-    with pytest.raises(BusplanError, match=re.escape("--x bus.nodes: 65 values; a map shows up to 64 of a key")):
-        checked_direction(PAPER, "bus.nodes", axis_of(range(1, 66)), option="--x")
-    with pytest.raises(
-        BusplanError, match=re.escape("--x bus.node: no such key of this profile; did you mean bus.nodes?")
+    assert busplan.map_(PAPER, y={PERIOD: [500.0, 0.5, 4000]}).y.values == (0.5, 500, 4000)
+    assert busplan.map_(PAPER, x={"bus.speed": ["S400", "S100"]}).x.values == ("S400", "S100")
+    assert len(busplan.map_(PAPER, x={"bus.gap_count": range(64)}, y={PERIOD: [4000]}).x.values) == 64
+    for x, message in (
+        ({"bus.nodes": range(1, 66)}, "x bus.nodes: 65 values; a map shows up to 64 of a key"),
+        ({"bus.node": [1]}, "x bus.node: no such key of this profile; did you mean bus.nodes?"),
+        ({"circle.radius_mm": [1]}, "add circle=True to run circle tests"),
     ):
-        checked_direction(PAPER, "bus.node", axis_of([1]), option="--x")
-    with pytest.raises(BusplanError, match=re.escape("add --circle to run circle tests")):
-        checked_direction(PAPER, "circle.radius_mm", axis_of([1]), option="--x", circle_option="--circle")
+        with pytest.raises(busplan.BusplanError, match=re.escape(message)):
+            busplan.map_(PAPER, x=x)
 
 
 # --- circles ----------------------------------------------------------------------------------------------
 
 ROUND = {"circle.radius_mm": 20, "circle.ramp_periods": 5, "circle.feed_mm_per_min": 4000}
-SMALL = override(PAPER, {**ROUND, "tolerance": {"mean_contour_error_mm": 0.0118}})
+SMALL = busplan.load_profile(PAPER, changes={**ROUND, "tolerance": {"mean_contour_error_mm": 0.0118}})
 """A circle that passes from some period on: at 2 ms the mean error is 0.01192 mm, at 4 ms 0.01171 mm."""
 
 
 def test_circles_are_run_where_the_bus_fits_and_nowhere_else() -> None:
-    x, y = Direction("bus.nodes", (1, 2, 3, 17)), Direction(PERIOD, (500, 1000, 4000))
+    x, y = {"bus.nodes": (1, 2, 3, 17)}, {PERIOD: (500, 1000, 4000)}
     done: list[tuple[int, int]] = []
-    plain = trade_off(SMALL, x=x, y=y)
-    found = trade_off(SMALL, x=x, y=y, with_circle=True, progress=lambda *counts: done.append(counts))
+    plain = busplan.map_(SMALL, x=x, y=y)
+    found = busplan.map_(SMALL, x=x, y=y, circle=True, progress=lambda *counts: done.append(counts))
     assert {cell.state for cell in found.cells} == {"fits", "circle fails", "does not fit"}
     for cell, before in zip(found.cells, plain.cells, strict=True):
         if before.state != "fits":
             assert cell == before
             continue
         changes: dict[str, object] = {"bus.nodes": cell.x, PERIOD: cell.y}
-        (result,) = circle_test(override(SMALL, changes), explain=False).results
+        (result,) = busplan.circle_test(busplan.load_profile(SMALL, changes=changes)).results
         assert cell.circle_passed == result.passed
         assert cell.state == ("fits" if result.passed else "circle fails")
         assert cell.limited_by == tuple(failure.name for failure in result.failures)
@@ -278,22 +265,24 @@ def test_circles_are_run_where_the_bus_fits_and_nowhere_else() -> None:
 
 
 def test_what_no_tolerance_judges_and_what_cannot_be_simulated_is_said() -> None:
-    free = override(SMALL, {"tolerance": {}})
-    y = Direction(PERIOD, (4000, 4001))
-    found = trade_off(free, x=Direction("bus.nodes", (2,)), y=y, with_circle=True)
+    y = {"circle.feed_mm_per_min": (4000, 500_000)}
+    free = busplan.load_profile(SMALL, changes={"tolerance": {}})
+    found = busplan.map_(free, x={"bus.nodes": (2,)}, y=y, circle=True)
     assert [cell.state for cell in found.cells] == ["circle not judged", "circle cannot be run"]
-    assert [cell.limited_by for cell in found.cells] == [(), ("servo.step_us",)]
-    judged = trade_off(SMALL, x=Direction("bus.nodes", (2,)), y=y, with_circle=True)
+    assert [cell.limited_by for cell in found.cells] == [(), ("circle.feed_mm_per_min",)]
+    judged = busplan.map_(SMALL, x={"bus.nodes": (2,)}, y=y, circle=True)
     assert [cell.circle_passed is None for cell in judged.cells] == [False, True]
 
 
-def test_default_periods_of_circles_are_multiples_of_the_step() -> None:
-    found = trade_off(override(SMALL, {"servo.step_us": 500}), x=Direction("bus.nodes", (60,)), with_circle=True)
-    assert found.y.values
-    assert all(isinstance(one, float) and one % 500 == 0 for one in found.y.values)
+def test_a_step_that_does_not_divide_a_period_is_the_longest_that_does() -> None:
+    y = {PERIOD: (4000, 4001)}
+    found = busplan.map_(SMALL, x={"bus.nodes": (2,)}, y=y, circle=True)
+    changes = {"bus.nodes": 2, PERIOD: 4001}
+    (result,) = busplan.circle_test(busplan.load_profile(SMALL, changes=changes)).results
+    assert [cell.circle_passed for cell in found.cells] == [True, result.passed]
 
 
 def test_too_many_circles_are_refused_before_any_is_run() -> None:
-    y = Direction(PERIOD, tuple(range(8000, 14400, 100)))
-    with pytest.raises(BusplanError, match="1,024 settings fit, and a map runs up to 1,000 circle tests"):
-        trade_off(SMALL, x=Direction("bus.nodes", tuple(range(1, 21))), y=y, with_circle=True)
+    y = {PERIOD: range(8000, 14400, 100)}
+    with pytest.raises(busplan.BusplanError, match="1,024 settings fit, and a map runs up to 1,000 circle tests"):
+        busplan.map_(SMALL, x={"bus.nodes": range(1, 21)}, y=y, circle=True)

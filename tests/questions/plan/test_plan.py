@@ -97,7 +97,7 @@ def single_changes(profile: Profile, name: str) -> Iterator[dict[str, Any]]:
                 if cut:
                     yield cut
         case "nodes":
-            yield from ({"bus.nodes": nodes} for nodes in range(profile.bus.nodes - 1, 0, -1))
+            yield from ({"bus.nodes": nodes} for nodes in range(profile.alike_nodes[0].nodes - 1, 0, -1))
 
 
 @pytest.mark.parametrize("name", ["slice_ratio", "period", "payload", "nodes"])
@@ -237,7 +237,7 @@ def test_capacity_and_check_advise_what_plan_finds(
         assert (verdict.change, verdict.no_change) == (None, "")
     elif verdict.change is not None:
         more = override(profile, {"bus.nodes": verdict.change.nodes, **dict(verdict.change.changes)})
-        assert verdict.change.nodes == profile.bus.nodes + 1
+        assert verdict.change.nodes == profile.alike_nodes[0].nodes + 1
         assert errors_of(override(more, {"limits.min_spare_nodes": 0, "limits.min_spare_axes": 0})) == []
 
 

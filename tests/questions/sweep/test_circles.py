@@ -13,7 +13,6 @@ import pytest
 import busplan
 from busplan.cli.workers import workers
 from busplan.errors import WorkerLostError
-from busplan.questions.sweep.circles import CIRCLE_COLUMNS, chunk_tests
 
 Make = Callable[..., busplan.Profile]
 
@@ -63,7 +62,6 @@ def test_a_sweep_is_the_same_on_every_executor() -> None:
 
     alone, summary, shuffled = document(None), document(None, summary=True), Shuffled(7)
     assert alone.count('"passed"') == 12 * 2
-    assert all(name in alone for name in CIRCLE_COLUMNS)
     with ThreadPoolExecutor(3) as threads, workers(1) as own:
         for executor in (shuffled, threads, own):
             assert document(executor) == alone
@@ -82,21 +80,22 @@ def test_progress_counts_the_tests() -> None:
     assert done == [(8, 8)]
 
 
-def test_the_first_point_that_cannot_be_run_is_named_before_any_is() -> None:
+@pytest.mark.parametrize("name", ["paper-4ms", "paper-two-node"])
+def test_the_first_point_that_cannot_be_run_is_named_before_any_is(name: str) -> None:
     executor = Shuffled(1)
     with pytest.raises(busplan.BusplanError) as caught:
         busplan.sweep(
-            "paper-4ms", vary={"cycle.period_us": range(1000, 2001)}, circle=True, force=True, executor=executor
+            name, vary={"circle.feed_mm_per_min": [1000.0, 500_000.0, 600_000.0]}, circle=True, executor=executor
         )
-    assert str(caught.value).startswith("at cycle.period_us = 1001: servo.step_us")
+    assert str(caught.value).startswith("at circle.feed_mm_per_min = 500000: circle.feed_mm_per_min")
     assert not executor.order
 
 
-def test_a_circle_that_the_profile_does_not_ask_for_is_refused_too() -> None:
-    still = busplan.load_profile("paper-two-node")
-    assert not still.asks_for_circle
-    with pytest.raises(busplan.BusplanError, match=r"^at cycle\.period_us = 1001: servo\.step_us"):
-        busplan.sweep(still, vary={"cycle.period_us": [1000, 1001]}, circle=True)
+def test_a_step_that_does_not_divide_a_period_is_the_longest_that_does() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": [4000, 4001]}, timing_model="standard", circle=True)
+    for period_us, error_mm in zip((4000, 4001), answer["mean_contour_error_mm"], strict=True):
+        own = busplan.load_profile("paper-4ms", changes={"cycle.period_us": period_us})
+        assert error_mm == busplan.circle_test(own).results[0].mean_contour_error_mm
 
 
 @pytest.mark.parametrize(
@@ -110,15 +109,6 @@ def test_a_circle_that_the_profile_does_not_ask_for_is_refused_too() -> None:
 def test_refusals(options: dict[str, Any], words: str) -> None:
     with pytest.raises(busplan.BusplanError, match=words):
         busplan.sweep("paper-1ms", vary={"bus.nodes": [1]}, **options)
-
-
-def test_a_chunk_is_about_a_second_of_work_and_a_few_tests_are_shared_out() -> None:
-    for each_s in [1e-3, 0.06, 0.4, 20.0]:
-        for number in [1, 10, 1000, 10**7]:
-            size = chunk_tests(number, time_s=number * each_s)
-            assert size == 1 or number / size >= 64
-            if number == 10**7 and each_s < 3:
-                assert 0.3 <= size * each_s <= 3
 
 
 @pytest.fixture

@@ -7,12 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.errors import BusplanError
-from busplan.profile.shipped import load
-from busplan.questions.sweep.asked import column_figures
+import busplan
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS
-from busplan.questions.sweep.grid import Array, Grid
-from busplan.questions.sweep.seeds_run import SUMMARY_COLUMNS, summaries, without_seed
+from busplan.questions.sweep.grid import Array
+from busplan.questions.sweep.seeds_run import SUMMARY_COLUMNS, summaries
 
 LENGTHS = st.floats(1e-6, 10.0)
 
@@ -85,19 +83,14 @@ def test_what_any_seed_lacks_is_missing() -> None:
 
 
 def test_the_seed_leaves_the_grid_wherever_it_stands() -> None:
-    seeds, periods = np.arange(1, 10), np.array([1000, 4000])
-    for key in ("delivery.seed", "cycle.period_us"):
-        axes = {"delivery.seed": seeds, "cycle.period_us": periods}
-        grid, found = without_seed(Grid({key: axes.pop(key), **axes}))
-        assert (list(grid.axes), found.tolist()) == (["cycle.period_us"], seeds.tolist())
-    alone, _ = without_seed(Grid({"delivery.seed": seeds}))
-    assert (alone.points, [chunk.shape for chunk in alone.chunks(7)], [*alone.each_point()]) == (1, [()], [{}])
-    with pytest.raises(BusplanError, match=r"summary: is over seeds, and none vary"):
-        without_seed(Grid({"cycle.period_us": periods}))
-
-
-def test_every_column_has_its_figure_with_its_unit() -> None:
-    figures = column_figures(load("paper-4ms").profile)
-    units = {name: figures[name].unit for name in SUMMARY_COLUMNS}
-    assert {unit for name, unit in units.items() if "contour_error" in name or "deviation_" in name} == {"mm"}
-    assert units["phase_margin_p95_deg"] == "deg"
+    seeds, gains = {"delivery.seed": range(1, 4)}, {"servo.position_gain_per_s": [50.0, 60.0]}
+    own = busplan.load_profile("paper-4ms", changes={"circle.radius_mm": 10.0, "delivery.jitter_us": 50.0})
+    first = busplan.sweep(own, vary={**seeds, **gains}, circle=True, summary=True)
+    last = busplan.sweep(own, vary={**gains, **seeds}, circle=True, summary=True)
+    assert "delivery.seed" not in first.columns
+    assert (first.to_dict()["points"], first.to_dict()["seeds"]) == (2, 3)
+    assert first.to_json() == last.to_json()
+    alone = busplan.sweep(own, vary=seeds, circle=True, summary=True).to_dict()
+    assert (alone["points"], alone["varied"], alone["rows"][0]["seeds"]) == (1, {}, 3)
+    with pytest.raises(busplan.BusplanError, match=r"summary: is over seeds, and none vary"):
+        busplan.sweep(own, vary=gains, circle=True, summary=True)

@@ -1,11 +1,8 @@
-"""Every row of a sweep is what `capacity` gives for its point; grids come in order and in pieces."""
+"""Every row of a sweep is what `capacity` gives for its point; a grid in pieces is the same table."""
 
 import re
 from collections.abc import Callable, Mapping
-from itertools import product
-from math import prod
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -13,14 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.errors import BusplanError
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.fit.certainty import cycle_of
-from busplan.questions.fit.figures import figures
-from busplan.questions.fit.network import model_names
-from busplan.questions.sweep import checked_sweep, computed
-from busplan.questions.sweep.grid import Grid
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
@@ -64,29 +53,15 @@ WORDS = {
 
 
 def assert_rows_are_those_of_capacity(
-    profile: Profile,
-    vary: Mapping[str, Any],
-    *,
-    chunk_points: int,
-    model: str | None = None,
-    circle: bool = False,
+    profile: Profile, vary: Mapping[str, Any], *, timing_model: str | None = None
 ) -> None:
-    asked = checked_sweep(
-        profile,
-        vary,
-        timing_models=None if model is None else [model],
-        group=None,
-        circle=circle,
-        summary=False,
-        force=False,
-    )
-    with patch("busplan.questions.sweep.table.CHUNK_POINTS", chunk_points):
-        rows = iter(computed(asked._replace(circle=False)).to_dict()["rows"])
-    for changes in asked.grid.each_point():
-        variant = override(profile, changes)
-        for name in asked.timing_models:
-            expected = {**changes, **figures(variant, model=name).by_key()}
-            row = next(rows)
+    answer = busplan.sweep(profile, vary=vary, timing_model=timing_model)
+    models = answer.to_dict()["timing_models"]
+    rows = iter(answer.to_dict()["rows"])
+    for changes in answer.sweep.grid.each_point():
+        point = busplan.load_profile(profile, changes=changes)
+        for found in busplan.capacity(point, timing_model=models).results:
+            expected, row = {**changes, **found.by_key()}, next(rows)
             # Bit for bit: they are the same operations in the same order. As text, so that 4 is not 4.0.
             assert {key: repr(row[key]) for key in expected} == {key: repr(one) for key, one in expected.items()}
     assert not list(rows)
@@ -100,34 +75,12 @@ def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile
     if profile.bus.isochronous_us:
         del strategies["bus.cycle_master"]
     if data.draw(st.booleans()):
-        changes: dict[str, object] = {"node.execution": TABLE, "payload.read_bytes": 4, "payload.write_bytes": 40}
-        profile = override(profile, changes)
+        changes = {"node.execution": TABLE, "payload.read_bytes": 4, "payload.write_bytes": 40}
+        profile = busplan.load_profile(profile, changes=changes)
         strategies = {key: one for key, one in strategies.items() if not key.startswith("node.execution")}
     keys = data.draw(st.lists(st.sampled_from(sorted(strategies)), min_size=1, max_size=4, unique=True))
     vary = {key: data.draw(st.lists(strategies[key], min_size=1, max_size=4, unique=True)) for key in keys}
-    assert_rows_are_those_of_capacity(profile, vary, chunk_points=data.draw(st.integers(1, 40)))
-
-
-@pytest.mark.parametrize(
-    ("name", "key", "values"),
-    [
-        ("paper-4ms", "circle.feed_mm_per_min", (1000.0, 500_000.0)),
-        ("can-servo-8", "bus.bit_rate_kbit_s", (500.0, 1000.0)),  # the bus adds jitter of its own
-        ("sercos3-servo-8", "bus.master_jitter_us", (1.0, 400.0)),
-        ("ethercat-servo-8", "bus.nodes", (2, 8)),
-    ],
-)
-def test_a_circle_is_refused_at_the_points_where_capacity_refuses_it(
-    name: str, key: str, values: tuple[float, ...]
-) -> None:
-    # Steps that divide a period and others; jitter that the period has room for, with that of the bus or without.
-    vary = {
-        "cycle.period_us": (1000.0, 1003.0, 8000.0),
-        "servo.step_us": (25.0, 300.0),
-        "delivery.jitter_us": (0.0, 460.0, 3900.0, 4100.0),
-        key: values,
-    }
-    assert_rows_are_those_of_capacity(load(name).profile, vary, chunk_points=14, circle=True)
+    assert_rows_are_those_of_capacity(profile, vary)
 
 
 @given(data=st.data(), nodes=st.integers(1, 20))
@@ -135,9 +88,9 @@ def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
     data: st.DataObject, nodes: int, any_profile: st.SearchStrategy[Profile]
 ) -> None:
     profile = data.draw(any_profile)
-    model = data.draw(st.sampled_from(model_names(profile)))
-    ratio = profile.cycle.slice_ratio
-    exact_us = float(cycle_of(profile, model=model, nodes=nodes).required_us) / ratio
+    figures = busplan.capacity(busplan.load_profile(profile, changes={"bus.nodes": nodes})).results
+    one = data.draw(st.sampled_from(figures))
+    exact_us, model = one.required_us / profile.cycle.slice_ratio, one.timing_model
     around = (
         exact_us,
         exact_us * (1 + 1e-12),
@@ -150,23 +103,23 @@ def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
         "bus.nodes": [nodes],
         "bus.gap_count": [profile.bus.gap_count],
     }
-    assert_rows_are_those_of_capacity(profile, vary, chunk_points=4, model=model)
+    assert_rows_are_those_of_capacity(profile, vary, timing_model=model)
 
 
-@given(
-    sizes=st.lists(st.integers(1, 5), min_size=1, max_size=4),
-    most=st.integers(1, 60),
-)
-def test_chunks_cover_the_grid_in_row_major_order(sizes: list[int], most: int) -> None:
-    grid = Grid({f"key{number}": np.arange(size) for number, size in enumerate(sizes)})
-    points: list[tuple[int, ...]] = []
-    for chunk in grid.chunks(most):
-        assert prod(chunk.shape) <= most
-        columns = [np.broadcast_to(own, chunk.shape).ravel().tolist() for own in chunk.values.values()]
-        points += zip(*columns, strict=True)
-    assert points == list(product(*(range(size) for size in sizes)))
-    assert [tuple(point.values()) for point in grid.each_point()] == points
-    assert grid.points == prod(sizes)
+def test_a_grid_that_is_computed_in_pieces_is_one_table() -> None:
+    # More points than are computed at once, before and behind the key that is cut; each line alone is in one piece.
+    lines = {"cycle.nonperiodic_us": np.linspace(0, 1900, 9000)}
+    gaps, nodes = [63, "optimal"], (1, 3, 17)
+    whole = busplan.sweep(
+        "paper-4ms", vary={"bus.gap_count": gaps, **lines, "bus.nodes": nodes}, timing_model="standard"
+    ).to_pandas()
+    for gap in gaps:
+        for number in nodes:
+            here = whole[(whole["bus.gap_count"] == str(gap)) & (whole["bus.nodes"] == number)]
+            own = busplan.load_profile("paper-4ms", changes={"bus.gap_count": gap, "bus.nodes": number})
+            alone = busplan.sweep(own, vary=lines, timing_model="standard").to_pandas()
+            for name in alone:
+                assert here[name].tolist() == alone[name].tolist(), name
 
 
 def test_what_no_profile_could_have_is_refused_in_the_profiles_own_words(make: Make) -> None:
@@ -197,16 +150,16 @@ def test_what_no_profile_could_have_is_refused_in_the_profiles_own_words(make: M
         ({"cycle.period_us": range(1, 5000), "bus.nodes": range(1, 5000)}, "vary less"),
     ]
     for vary, message in cases:
-        profile = override(make(), {"node.execution": TABLE})
-        with pytest.raises(BusplanError, match=re.escape(message)):
+        profile = busplan.load_profile(make(), changes={"node.execution": TABLE})
+        with pytest.raises(busplan.BusplanError, match=re.escape(message)):
             busplan.sweep(profile, vary=vary)
 
 
 def test_a_table_is_read_at_its_points_between_them_and_at_both_ends(make: Make) -> None:
-    changes: dict[str, object] = {"node.execution": TABLE, "payload.read_bytes": 4, "payload.write_bytes": 4}
-    profile = override(make(), changes)
+    changes = {"node.execution": TABLE, "payload.read_bytes": 4, "payload.write_bytes": 4}
+    profile = busplan.load_profile(make(), changes=changes)
     vary = {"payload.read_bytes": (4, 5, 15, 16, 17, 32, 33, 34, 2499, 2500), "payload.write_bytes": (2500, 4)}
-    assert_rows_are_those_of_capacity(profile, vary, chunk_points=20)
+    assert_rows_are_those_of_capacity(profile, vary)
 
 
 def test_of_equal_terms_the_first_binds_as_in_capacity(make: Make) -> None:
@@ -215,7 +168,7 @@ def test_of_equal_terms_the_first_binds_as_in_capacity(make: Make) -> None:
     vary = {"cycle.nonperiodic_us": (199, 200, 201)}
     binding = busplan.sweep(profile, vary=vary, timing_model="paper")["binding_term"]
     assert binding.tolist() == ["execution", "execution", "nonperiodic"]
-    assert_rows_are_those_of_capacity(profile, vary, chunk_points=3)
+    assert_rows_are_those_of_capacity(profile, vary)
 
 
 # --- groups -----------------------------------------------------------------------------------------------
@@ -223,7 +176,7 @@ def test_of_equal_terms_the_first_binds_as_in_capacity(make: Make) -> None:
 
 @pytest.mark.parametrize("name", ["dvrk", "gantry-24"])
 def test_a_machine_of_groups_has_numbers_of_the_largest_group_or_of_the_one_that_is_named(name: str) -> None:
-    profile = load(name).profile
+    profile = busplan.load_profile(name)
     by_name = {group.name: group for group in profile.group}
     largest = max(by_name.values(), key=lambda group: group.nodes * group.axes)
     vary = {f"group.{profile.group[-1].name}.nodes": (1, 2), "cycle.period_us": (100, 500, 1000, 2000)}
@@ -243,7 +196,8 @@ def test_a_machine_of_groups_has_numbers_of_the_largest_group_or_of_the_one_that
             # So many fit, or are shown to, and one more does not or is not.
             for number in (most, most + 1, safe, safe + 1):
                 if number:
-                    one = figures(override(profile, {**changes, key: number}), model="standard")
+                    own = busplan.load_profile(profile, changes={**changes, key: number})
+                    (one,) = busplan.capacity(own, timing_model="standard").results
                     assert (one.fits, one.verdict == "fits" and one.safe) == (number <= most, number <= safe)
                     assert number != most or row["max_axes"] == one.axes
                     assert number != safe or row["safe_axes"] == one.axes
@@ -255,10 +209,10 @@ def test_a_group_that_is_not_there_and_keys_that_each_group_has_are_named() -> N
         ("paper-4ms", {"group": "arms"}, "group arms: paper-4ms has no groups"),
     ]
     for name, options, message in cases:
-        with pytest.raises(BusplanError, match=re.escape(message)):
+        with pytest.raises(busplan.BusplanError, match=re.escape(message)):
             busplan.sweep(name, vary={"cycle.period_us": [500]}, **options)
     for key, own in (("payload.read_bytes", "read_bytes"), ("node.axes", "axes"), ("bus.nodes", "nodes")):
-        with pytest.raises(BusplanError) as caught:
+        with pytest.raises(busplan.BusplanError) as caught:
             busplan.sweep("dvrk", vary={key: [4]})
         assert str(caught.value) == (
             f"vary {key}: each group of dvrk has its own; give group.full.{own} or group.partial.{own}"
