@@ -24,7 +24,7 @@ from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut
 from busplan.buses.cycle import Run as EventRun
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
 from busplan.buses.network import Network
-from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.parts import Bound, Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, rounded_up
 from busplan.sections.base import Section
@@ -128,8 +128,7 @@ class Ring(Bus):
         Limit(
             "nodes",
             "{value:.0f} stations are over the {most:.0f} of a ring",
-            lambda network: network.nodes,
-            lambda _network: MOST_STATIONS,
+            Bound(lambda network: network.nodes, lambda _network: MOST_STATIONS),
             way_out="a second ring has room",
         ),
     )
@@ -353,7 +352,7 @@ def ring_with(limits: tuple[Limit, ...]) -> Bus:
 
 def limit_of(value: Callable[[Network], Number], most: Callable[[Network], Number], key: str = "own") -> Limit:
     """A limit of any form."""
-    return Limit(key, "{value} over {most}", value, most)
+    return Limit(key, "{value} over {most}", Bound(value, most))
 
 
 @pytest.mark.parametrize(

@@ -119,4 +119,4 @@ def test_a_terminal_gets_no_parquet(on_terminal: Callable[..., tuple[int, str]],
     pytest.importorskip("pyarrow")
     sweep = ("sweep", "paper-4ms", "--vary", "bus.nodes=1:2", "--format", "parquet")
     code, shown = on_terminal(*sweep, cwd=tmp_path, env={"COLUMNS": "200"})
-    assert (code, shown) == (2, "--format parquet: is not text for a terminal; give -o FILE.parquet, or use a pipe\n")
+    assert (code, shown) == (2, "--format parquet: is not for a terminal; give -o FILE.parquet, or use a pipe\n")

@@ -144,7 +144,7 @@ def test_no_bytes_go_to_a_terminal(on_terminal: Callable[..., tuple[int, str]], 
     code, shown = on_terminal("timeline", "paper-4ms", "--format", "png", cwd=tmp_path)
     assert (code, shown) == (
         2,
-        "--format png: is not text for a terminal; give -o FILE.png, or use a pipe\n",
+        "--format png: is not for a terminal; give -o FILE.png, or use a pipe\n",
     )
 
 

@@ -298,7 +298,7 @@ def test_a_file_that_is_no_baseline_is_refused_with_its_name(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("count", "words"), [(1, "0.toml"), (3, "0.toml, 1.toml, 2.toml"), (4, "0.toml, 1.toml, 2.toml, 1 more")]
+    ("count", "words"), [(1, "0.toml"), (3, "0.toml, 1.toml, 2.toml"), (4, "0.toml, 1.toml, 2.toml and 1 more")]
 )
 def test_three_files_are_named_and_the_others_counted(count: int, words: str) -> None:
     said = Baseline({}, MODELS).unmatched([f"{number}.toml" for number in range(count)], checked=())

@@ -147,7 +147,7 @@ def test_json_holds_the_contract(mixed: CheckReport) -> None:
     document = json.loads(render(mixed, file_format="json"))
     assert list(document) == ["schema", "command", "files", "summary"]
     assert (document["schema"], document["command"]) == (1, "check")
-    assert document["summary"] == {"files": 4, "errors": 2, "warnings": 1}
+    assert document["summary"] == {"files": 4, "errors": 2, "warnings": 1, "circles_not_run": 0}
     assert [(one["path"], one["profile"], one["status"]) for one in document["files"]] == [
         ("p/clean.toml", "example", "ok"),
         ("p/fails.toml", "example", "findings"),

@@ -239,7 +239,7 @@ def test_severities_decide_what_fails() -> None:
     assert report("BP110").has_findings("warning")
     assert not report("BP110").has_findings("error")
     assert report("BP110", "BP101").has_findings("error")
-    assert report("BP110", "BP101", "BP102").summary == (1, 1, 2)
+    assert report("BP110", "BP101", "BP102").summary == (1, 1, 2, 0)
 
 
 def test_every_rule_of_the_bus_has_a_check() -> None:

@@ -186,7 +186,7 @@ def test_groups_follow_each_other_and_may_have_identifiers_of_their_own() -> Non
         ),
         (
             {"bus.nodes": 257, "payload.read_bytes": 32},
-            "frames of feedback PDOs share the identifier 0x281, and 2 more",
+            "frames of feedback PDOs share the identifier 0x281 and 2 more",
         ),
     ],
 )

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 
 import pytest
+from busplan.questions.capacity.sentences import verdict_sentences
 
 from busplan.forms import render
 from busplan.forms.blocks import Report
@@ -16,7 +17,6 @@ from busplan.printable import to_json
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.questions.capacity.report import capacity_document, capacity_records, capacity_report
-from busplan.questions.capacity.sentences import verdict_sentences
 from busplan.questions.capacity.verdict import verdicts
 from busplan.questions.fit.figures import capacity
 from busplan.questions.latency.figures import latency

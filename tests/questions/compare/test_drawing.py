@@ -28,7 +28,7 @@ def test_every_point_that_carries_axes_is_drawn_and_says_its_figures(name: str) 
     for machine, curve in zip(compared(name).compared, plot.curves, strict=True):
         assert curve.points == tuple((point.period_us, point.axes) for point in machine.curve if point.axes)
         assert len(curve.words) == len(curve.points)
-        assert all(f"{axes} ax" in words for (_, axes), words in zip(curve.points, curve.words, strict=True))
+        assert all(f"{axes:,} ax" in words for (_, axes), words in zip(curve.points, curve.words, strict=True))
 
 
 @EACH

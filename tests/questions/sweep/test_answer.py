@@ -244,7 +244,7 @@ def test_what_makes_no_sweep_is_refused() -> None:
         (
             {"servo.drive_lag_us": [1]},
             {},
-            "vary servo.drive_lag_us: no figure of capacity depends on it; add circle=True",
+            "vary servo.drive_lag_us: no figure of capacity depends on it; add circle",
         ),
         ({"cycle.period_us": range(1, 1002)}, {"circle": True}, "that are run without force=True"),
         (

@@ -34,7 +34,7 @@ def _all_late(traffic: Traffic) -> str:
     late = sorted(_late_streams(traffic), key=lambda pair: -pair[1] / pair[0].deadline_us)
     endless = [stream.name for stream, us in late if us == inf]
     if endless:
-        return f"no worst-case response time: {first_of(endless, 1)}"
+        return f"{first_of(endless, 1)} ha{'s' if len(endless) == 1 else 've'} no worst-case response time"
     return first_of(
         [
             f"the worst-case response time of {stream.name} is {us:g} us, over its {stream.deadline_us:g} us"

@@ -6,6 +6,7 @@ A gap count below the table fits, but is not safe.
 from collections.abc import Iterator
 from functools import partial
 from itertools import product
+from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
 from busplan.buses.ieee1394.broadcast import hub_block_bytes, write_block_bytes
@@ -71,7 +72,10 @@ LIMITS: Final = (
     Limit(
         "broadcasting nodes",
         "{value:.0f} nodes are over the {most:.0f} that a hub collects data of",
-        Bound(lambda network: network.nodes if is_broadcast(network) else 0, lambda _network: MAX_BROADCAST_NODES),
+        Bound(
+            lambda network: network.nodes if is_broadcast(network) else 0,
+            lambda network: MAX_BROADCAST_NODES if is_broadcast(network) else inf,
+        ),
         way_out=_ONE_BY_ONE,
     ),
     Limit(
