@@ -137,7 +137,7 @@ class Bus(ABC):
         return ()
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - a kind may have none
-        """Warnings that hold whatever the verdict, at each of some numbers of nodes."""
+        """Warnings in words, which hold whatever the verdict, at each of some numbers of nodes."""
         return []
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:

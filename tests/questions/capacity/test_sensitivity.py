@@ -1,25 +1,25 @@
 """What moves the margin: each row is the capacity of the profile with that change written in."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.profile.shipped import load, shipped_names
-from busplan.profile.toml import override
-from busplan.questions.capacity.sensitivity import Effect, next_bottleneck, sensitivities, sensitivity, standing
-from busplan.questions.fit.certainty import certainty, cycle_of
-from busplan.questions.fit.figures import capacity, figures
-from busplan.questions.fit.network import bus_of, network_of
-from busplan.sections.profile import Profile
+import busplan
+from busplan.profile.shipped import shipped_names
+from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, sensitivity_of, standing
+from busplan.questions.fit.certainty import certainty, deciding_cycle
+from busplan.questions.fit.figures import FitFigures
+from busplan.questions.fit.figures import figures as figures_of
+from busplan.questions.fit.network import network_of
 
-Maker = Callable[..., Profile]
+Maker = Callable[..., busplan.Profile]
 TABLE = {"kind": "table", "payload_bytes": [4, 12, 14], "time_us": [30.0, 34.0, 40.0]}
 
 
-def with_longer_execution(profile: Profile) -> dict[str, Any]:
+def with_longer_execution(profile: busplan.Profile) -> dict[str, Any]:
     execution: Any = profile.alike_nodes[0].node.execution
     if execution.kind == "table":
         return {"node.execution.time_us": [1.1 * us for us in execution.time_us]}
@@ -29,7 +29,7 @@ def with_longer_execution(profile: Profile) -> dict[str, Any]:
     }
 
 
-WRITTEN: dict[str, Callable[[Profile], dict[str, Any]]] = {
+WRITTEN: dict[str, Callable[[busplan.Profile], dict[str, Any]]] = {
     "execution time +10%": with_longer_execution,
     "one node more": lambda one: {"bus.nodes": one.alike_nodes[0].nodes + 1},
     "one axis more per node": lambda one: {"node.axes": one.alike_nodes[0].node.axes + 1},
@@ -44,23 +44,35 @@ WRITTEN: dict[str, Callable[[Profile], dict[str, Any]]] = {
 """Each change as a user would write it into the file."""
 
 
-def effects(profile: Profile) -> dict[str, Effect]:
-    return {one.change: one for one in sensitivity(profile).effects}
+def changed(profile: busplan.Profile, changes: Mapping[str, object]) -> busplan.Profile:
+    return busplan.load_profile(profile, changes=changes)
+
+
+def figures(profile: busplan.Profile) -> FitFigures:
+    return figures_of(network_of(profile), model="standard")
+
+
+def effects(profile: busplan.Profile) -> dict[str, Effect]:
+    return {one.change: one for one in sensitivity_of(network_of(profile)).effects}
+
+
+def next_bottleneck(profile: busplan.Profile) -> NextBottleneck:
+    return sensitivity_of(network_of(profile)).next_bottleneck
 
 
 @given(data=st.data(), per_axis=st.sampled_from([None, 1, 8]), reserve=st.sampled_from([0.0, 0.2]))
 def test_each_row_is_the_capacity_of_the_profile_with_that_change(
-    data: st.DataObject, per_axis: int | None, reserve: float, any_profile: st.SearchStrategy[Profile]
+    data: st.DataObject, per_axis: int | None, reserve: float, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
-    changes: dict[str, object] = {"payload.read_bytes_per_axis": per_axis, "limits.reserve": reserve}
-    profile = override(data.draw(any_profile), changes)
-    before, found = figures(profile, model="standard"), effects(profile)
+    changes = {"payload.read_bytes_per_axis": per_axis, "limits.reserve": reserve}
+    profile = changed(data.draw(any_profile), changes)
+    before, found = figures(profile), effects(profile)
     assert set(found) == set(WRITTEN)
     for change, one in found.items():
         if change == "one hop more" and profile.bus.max_hops is None:
             assert (one.margin_change_us, one.then) == (None, None)
             continue
-        after = figures(override(profile, WRITTEN[change](profile)), model="standard")
+        after = figures(changed(profile, WRITTEN[change](profile)))
         assert one.then is not None
         assert one.then.margin_corrected_us == pytest.approx(after.margin_corrected_us, rel=1e-9, abs=1e-6)
         assert one.then.uncertainty_us == pytest.approx(after.uncertainty_us, rel=1e-9, abs=1e-6)
@@ -72,18 +84,18 @@ def test_each_row_is_the_capacity_of_the_profile_with_that_change(
 
 @given(data=st.data())
 def test_where_a_network_stands_is_what_its_capacity_says(
-    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
-    one, now = figures(profile, model="standard"), standing(network_of(profile))
+    one, now = figures(profile), standing(network_of(profile))
     assert now == tuple(getattr(one, key) for key in now._fields)
 
 
 @given(data=st.data())
 def test_the_largest_effect_comes_first_and_what_cannot_be_made_last(
-    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
-    found = sensitivity(data.draw(any_profile)).effects
+    found = sensitivity_of(network_of(data.draw(any_profile))).effects
     sizes = [-1.0 if one.margin_change_us is None else abs(one.margin_change_us) for one in found]
     assert sizes == sorted(sizes, reverse=True)
     assert all(one.note for one in found if one.then is None)
@@ -92,7 +104,7 @@ def test_the_largest_effect_comes_first_and_what_cannot_be_made_last(
 def test_what_adds_to_the_margin_has_its_place_by_its_size(make: Maker) -> None:
     # Table I has such a fall between 4 and 16 bytes, of 0.1 us.
     falling = {"kind": "table", "payload_bytes": [4, 8], "time_us": [200.0, 100.0]}
-    found = sensitivity(make(node__execution=falling, payload__read_bytes=4, payload__write_bytes=4)).effects
+    found = [*effects(make(node__execution=falling, payload__read_bytes=4, payload__write_bytes=4)).values()]
     assert [one.change for one in found[:3]] == ["one node more", "payload +4 bytes", "execution time +10%"]
     assert [(one.margin_change_us or 0) > 0 for one in found[:3]] == [False, True, False]
 
@@ -122,8 +134,8 @@ def test_a_payload_outside_the_table_is_not_known(make: Maker) -> None:
     axis = effects(make(**data, payload__read_bytes_per_axis=3))["one axis more per node"]
     assert (axis.then, axis.note) == (None, "not known: 17 bytes is outside the execution table, 4 to 14 bytes")
     # Between its points it is as known as before.
-    known = override(make(node__execution=TABLE), {"payload.read_bytes": 4, "payload.write_bytes": 8})
-    after = figures(override(known, {"payload.read_bytes": 8, "payload.write_bytes": 12}), model="standard")
+    known = changed(make(node__execution=TABLE), {"payload.read_bytes": 4, "payload.write_bytes": 8})
+    after = figures(changed(known, {"payload.read_bytes": 8, "payload.write_bytes": 12}))
     then = effects(known)["payload +4 bytes"].then
     assert then is not None
     assert then.margin_corrected_us == after.margin_corrected_us
@@ -159,8 +171,8 @@ def test_a_change_that_the_profile_refuses_is_said_so(make: Maker) -> None:
 
 
 def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
-    gantry = load("gantry-24").profile
-    rows, now = effects(gantry), figures(gantry, model="standard")
+    gantry = busplan.load_profile("gantry-24")
+    rows, now = effects(gantry), figures(gantry)
     for one in gantry.group:
         for change, key, more in (
             (f"one node more in {one.name}", "nodes", one.nodes + 1),
@@ -168,7 +180,7 @@ def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
         ):
             row = rows[change]
             assert (row.key, row.before, row.after) == (f"group.{one.name}.{key}", more - 1, more)
-            then = figures(override(gantry, {row.key: more}), model="standard")
+            then = figures(changed(gantry, {row.key: more}))
             assert row.then is not None
             assert row.then.margin_corrected_us == then.margin_corrected_us
             assert now.margin_corrected_us is not None
@@ -178,7 +190,7 @@ def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
 
 
 def test_each_period_has_its_margins_and_the_same_changes_of_them(make: Maker) -> None:
-    one, other = sensitivities(capacity(make(bus__nodes=9), periods_us=[4000.0, 2000.0]))
+    one, other = busplan.capacity(make(bus__nodes=9), period_us=[4000.0, 2000.0], sensitivity=True).sensitivities
     changes = [[effect.margin_change_us for effect in found.effects] for found in (one, other)]
     assert changes[0] == pytest.approx(changes[1], nan_ok=False, abs=1e-9)
     assert one.now.margin_corrected_us == pytest.approx(other.now.margin_corrected_us + 1000)
@@ -190,21 +202,21 @@ def test_each_period_has_its_margins_and_the_same_changes_of_them(make: Maker) -
 
 @pytest.mark.parametrize("name", shipped_names())
 def test_without_execution_the_cycle_is_that_of_nodes_that_need_no_time(name: str) -> None:
-    profile = load(name).profile
+    profile = busplan.load_profile(name)
     found = next_bottleneck(profile)
     execution = {"kind": "linear", "base_us": 0, "per_byte_us": 0, "grade": "derived"}
-    idle: dict[str, object] = {one.node_key("execution"): execution for one in profile.alike_nodes}
-    without = cycle_of(override(profile, idle), model="standard")
+    idle = {one.node_key("execution"): execution for one in profile.alike_nodes}
+    without = deciding_cycle(network_of(changed(profile, idle)))
     largest = max(without.terms, key=lambda term: float(term.us))
     if found.binding_term.name == "execution":
         assert found.is_gone
         assert found.next_binding_term == largest
         assert found.next_margin_corrected_us == certainty(without).margin_corrected_us
     elif found.is_gone:  # a key takes the term away: of every kind the first, of this kind the others
-        own = bus_of(profile)
-        removals: list[dict[str, object]] = [{"cycle.nonperiodic_us": 0}]
+        own = network_of(profile).bus
+        removals: list[Mapping[str, object]] = [{"cycle.nonperiodic_us": 0}]
         removals += [{**one} for one in own.term_removals]
-        cycles = [cycle_of(override(profile, one), model=own.deciding_model) for one in removals]
+        cycles = [deciding_cycle(network_of(changed(profile, one))) for one in removals]
         assert found.next_margin_corrected_us in [certainty(one).margin_corrected_us for one in cycles]
     else:
         assert found.next_margin_corrected_us is None
@@ -212,7 +224,7 @@ def test_without_execution_the_cycle_is_that_of_nodes_that_need_no_time(name: st
 
 def test_less_execution_leaves_the_bus_idle_for_longer() -> None:
     # The bench of Table I: 73.6 us of execution gone make 10.5 us of margin.
-    profile = load("paper-two-node").profile
+    profile = busplan.load_profile("paper-two-node")
     found, now = next_bottleneck(profile), standing(network_of(profile))
     assert found.binding_term.us == pytest.approx(73.6)
     assert (found.next_margin_corrected_us or 0) - now.margin_corrected_us == pytest.approx(10.51, abs=0.005)
@@ -236,15 +248,15 @@ def test_a_term_goes_with_its_cause(make: Maker, changes: dict[str, Any], bindin
 
 @given(data=st.data())
 def test_without_the_limit_the_next_one_keeps_one_node_more_off(
-    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
-    (found,), bus = next_bottleneck(profile).limits, bus_of(profile)
+    (found,) = next_bottleneck(profile).limits
 
     def is_kept(nodes: int) -> bool:
-        one = figures(override(profile, {"bus.nodes": nodes}), model="standard")
-        network = network_of(override(profile, {"bus.nodes": nodes}))
-        broken = {limit.key for limit in bus.limits if limit.is_broken(network)}
+        with_them = changed(profile, {"bus.nodes": nodes})
+        one, network = figures(with_them), network_of(with_them)
+        broken = {limit.key for limit in network.bus.limits if limit.is_broken(network)}
         late = (one.safe_required_us or 0) > one.available_us * (1 + 1e-12)
         return not (broken | ({"time"} if late else set())) - {found.limited_by}
 
@@ -257,9 +269,9 @@ def test_without_the_limit_the_next_one_keeps_one_node_more_off(
 def test_a_change_that_moves_no_margin_says_what_it_takes_from_other_limits() -> None:
     def of_execution(base_us: float) -> Effect:
         execution = {"base_us": base_us, "per_byte_us": 0.0, "uncertainty_us": 0.0, "worst_extra_us": 0.0}
-        changes: dict[str, object] = {f"node.execution.{key}": value for key, value in execution.items()}
-        profile = override(load("ethercat-servo-8").profile, changes)
-        return next(effect for effect in sensitivity(profile).effects if effect.key == "execution_us")
+        changes = {f"node.execution.{key}": value for key, value in execution.items()}
+        profile = changed(busplan.load_profile("ethercat-servo-8"), changes)
+        return next(effect for effect in effects(profile).values() if effect.key == "execution_us")
 
     exact = of_execution(100.0)
     assert exact.margin_change_us == 0

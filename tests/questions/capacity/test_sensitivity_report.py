@@ -1,4 +1,4 @@
-"""What moves the margin: from results to answers."""
+"""What moves the margin: the table, the bars and the sentences of the answer."""
 
 import csv
 import io
@@ -7,103 +7,111 @@ from collections.abc import Callable
 
 import pytest
 
+import busplan
 from busplan.forms import render
 from busplan.forms.blocks import Report
-from busplan.printable import to_json
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.capacity.report import capacity_document
-from busplan.questions.capacity.sensitivity import sensitivities, sensitivity
-from busplan.questions.capacity.sensitivity_report import sensitivity_document, sensitivity_report
-from busplan.questions.capacity.verdict import verdicts
-from busplan.questions.fit.figures import capacity
-from busplan.sections.profile import Profile
+from busplan.forms.charts import Lanes
 
 
-@pytest.fixture
-def profile() -> Profile:
-    return load("paper-1ms").profile
+def paper(**changes: object) -> busplan.Profile:
+    """paper-1ms with new values by key, with __ for the dot."""
+    return busplan.load_profile("paper-1ms", changes={key.replace("__", "."): value for key, value in changes.items()})
 
 
-def made(profile: Profile, *periods_us: float) -> Report:
-    result = capacity(profile, periods_us=periods_us or None)
-    return sensitivity_report(result, verdicts(result), sensitivities(result))
+def said(profile: busplan.Profile) -> str:
+    text = str(busplan.capacity(profile, sensitivity=True))
+    return text[text.index("What moves the margin") :]
 
 
-def lines(profile: Profile) -> list[str]:
-    text = render(made(profile), "table")
-    return text[text.index("What moves the margin") :].splitlines()
+def bars(profile: busplan.Profile) -> Lanes | None:
+    panels = busplan.capacity(profile, sensitivity=True).drawing().panels
+    if not panels:
+        return None
+    assert isinstance(panels[0].plot, Lanes)
+    return panels[0].plot
 
 
 @pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8"])
-def test_a_figure_stands_at_its_place_at_every_period(
+def test_every_figure_of_the_blocks_stands_in_the_document(
     name: str, values_of_the_document: Callable[[Report], int]
 ) -> None:
-    one = load(name).profile
-    assert values_of_the_document(made(one, 4000.0, 300.0)) > 100
-    nodes = one.alike_nodes[0]
-    tree: dict[str, object] = {"bus.max_hops": 3, "bus.charge_hops": "farthest"} if one.bus.kind == "ieee1394" else {}
-    assert values_of_the_document(made(override(one, {**tree, nodes.payload_key("write"): 16}))) > 60
+    own = busplan.load_profile(name)
+    assert values_of_the_document(busplan.capacity(own, period_us=[4000.0, 300.0], sensitivity=True).report()) > 100
+    tree = {"bus.max_hops": 3, "bus.charge_hops": "farthest"} if own.bus.kind == "ieee1394" else {}
+    other = busplan.load_profile(own, changes={**tree, own.alike_nodes[0].payload_key("write"): 16})
+    assert values_of_the_document(busplan.capacity(other, sensitivity=True).report()) > 60
 
 
-def test_the_document_is_that_of_capacity_with_two_keys_more(profile: Profile) -> None:
-    result = capacity(profile, periods_us=[1000.0, 500.0])
-    plain, found = capacity_document(result, verdicts(result)), sensitivities(result)
-    whole = json.loads(to_json(sensitivity_document(result, verdicts(result), found)))
-    for verdict, one in zip(whole["verdicts"], found, strict=True):
+def test_the_document_is_that_of_capacity_with_two_keys_more() -> None:
+    plain = busplan.capacity("paper-1ms", period_us=[1000.0, 500.0])
+    answer = busplan.capacity("paper-1ms", period_us=[1000.0, 500.0], sensitivity=True)
+    whole = json.loads(answer.to_json())
+    for verdict, found in zip(whole["verdicts"], answer.sensitivities, strict=True):
         rows, following = verdict.pop("sensitivity"), verdict.pop("next_bottleneck")
-        assert [row["margin_change_us"] for row in rows] == [effect.margin_change_us for effect in one.effects]
-        assert [row["note"] for row in rows] == [effect.note or None for effect in one.effects]
-        assert following["next_safe_nodes"] == one.next_bottleneck.limits[0].next_safe_nodes
+        assert [row["margin_change_us"] for row in rows] == [effect.margin_change_us for effect in found.effects]
+        assert [row["note"] for row in rows] == [effect.note or None for effect in found.effects]
+        assert following["next_safe_nodes"] == found.next_bottleneck.limits[0].next_safe_nodes
         assert following["text"].startswith("Next bottleneck: without execution, now 146.933 us, the largest term is ")
-    assert whole == json.loads(to_json(plain))
+    assert whole == json.loads(plain.to_json())
 
 
-def test_a_csv_row_is_a_change_at_a_period(profile: Profile) -> None:
-    rows = list(csv.DictReader(io.StringIO(render(made(profile, 1000.0, 500.0), "csv"))))
-    found = sensitivity(profile).effects
-    assert len(rows) == 2 * len(found)
-    assert [row["change"] for row in rows[: len(found)]] == [one.change for one in found]
+def test_a_csv_row_is_a_change_at_a_period() -> None:
+    answer = busplan.capacity("paper-1ms", period_us=[1000.0, 500.0], sensitivity=True)
+    rows = list(csv.DictReader(io.StringIO(render(answer.report(), "csv"))))
+    changes = [effect.change for effect in answer.sensitivities[0].effects]
+    assert len(rows) == 2 * len(changes)
+    assert [row["change"] for row in rows[: len(changes)]] == changes
     assert {row["period_us"] for row in rows} == {"1000.0", "500.0"}
     assert (rows[0]["profile"], rows[0]["timing_model"], rows[0]["key"]) == ("paper-1ms", "standard", "bus.nodes")
-    assert (rows[-1]["change"], rows[-1]["margin_change_us"], rows[-1]["verdict"]) == ("one hop more", "", "")
+    last = rows[len(changes) - 1]
+    assert (last["change"], last["margin_change_us"], last["verdict"]) == ("one hop more", "", "")
 
 
-def test_it_says_what_moves_the_margin_most_and_what_is_lost(profile: Profile) -> None:
-    text = "\n".join(lines(profile))
+def test_it_says_what_moves_the_margin_most_and_what_is_lost() -> None:
+    text = said(paper())
     assert "One node more moves the margin most, by -128.100 us to 101.964 us. The cycle is shown to fit after" in text
     assert "A bus reset: it is set so already." in text
     assert "One hop more: in a chain the hops follow the nodes." in text
-    narrow = "\n".join(lines(override(profile, {"cycle.period_us": 700})))
-    assert "The cycle is no longer shown to fit after one node more." in narrow
-    over = "\n".join(lines(override(profile, {"cycle.period_us": 400})))
+    assert "The cycle is no longer shown to fit after one node more." in said(paper(cycle__period_us=700))
+    over = said(paper(cycle__period_us=400))
     assert "no longer" not in over
     assert "is shown to fit after" not in over
     # A gap count that is safe for two hops is not for three.
-    tight = "\n".join(lines(override(profile, {"bus.gap_count": 7})))
+    tight = said(paper(bus__gap_count=7))
     assert "Its gap count is unsafe after one node more." in tight
     assert "fits, unsafe gap count" in tight
-    many = "\n".join(lines(override(profile, {"bus.nodes": 16, "cycle.period_us": 10000})))
-    assert "does not fit, hops" in many
+    assert "does not fit, hops" in said(paper(bus__nodes=16, cycle__period_us=10000))
 
 
 def test_where_nothing_takes_the_largest_term_away_it_says_what_comes_behind() -> None:
-    text = "\n".join(lines(load("paper-dma").profile))
+    text = said(busplan.load_profile("paper-dma"))
     assert "Next bottleneck: after idle, 84.188 us, which no key takes away, comes execution, 42.400 us;" in text
 
 
-def test_the_table_is_no_wider_than_a_terminal(profile: Profile) -> None:
-    table = lines(override(profile, {"bus.gap_count": "optimal"}))
-    assert max(len(line) for line in table if not line.startswith("Next bottleneck")) <= 130
-    rows = [line for line in table if "->" in line or "---" in line]
-    assert max(map(len, rows)) <= 80
+def test_the_table_is_no_wider_than_a_terminal() -> None:
+    table = said(paper(bus__gap_count="optimal")).splitlines()
+    assert max(len(line) for line in table if "->" in line or "---" in line) <= 80
 
 
-@pytest.mark.parametrize("form", ["markdown", "html", "json", "csv", "table"])
-def test_every_form_has_it(profile: Profile, form: str) -> None:
-    text = render(made(profile), form)  # type: ignore[arg-type]
-    assert "one node more" in text
-    assert ("Next bottleneck" in text) == (form != "csv")
-    assert ("moves the margin most" in text) == (form in ("markdown", "html", "table"))
-    assert ("NaN" in text, "Infinity" in text) == (False, False)
-    assert ("<svg" in text) == (form == "html")
+@pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "ethercat-servo-8", "sercos2-servo-8"])
+def test_a_bar_reaches_from_zero_to_its_figure_on_one_scale(name: str) -> None:
+    profile = busplan.load_profile(name)
+    (found,) = busplan.capacity(profile, sensitivity=True).sensitivities
+    made = {effect.change: effect.margin_change_us for effect in found.effects if effect.margin_change_us is not None}
+    plot = bars(profile)
+    assert plot is not None
+    assert [lane.label for lane in plot.lanes] == list(made)
+    for us, lane in zip(made.values(), plot.lanes, strict=True):
+        assert [(span.start, span.end) for span in lane.spans] == ([(min(us, 0), max(us, 0))] if us else [])
+        assert lane.note == f"{us:+.3f} us".replace("+0.000", "0.000")
+    assert (plot.across.low, plot.across.high) == (min(0, *made.values()), max(0, *made.values()))
+    assert plot.guides[0].x == 0
+
+
+@pytest.mark.parametrize(("period_us", "left_us"), [(1000, None), (700, 80.064), (500, None)])
+def test_the_end_of_the_margin_is_drawn_where_a_bar_reaches_it(period_us: float, left_us: float | None) -> None:
+    # One node more takes 128.100 us; at 500 us there is no margin.
+    plot = bars(paper(cycle__period_us=period_us))
+    assert plot is not None
+    ends = [guide.x for guide in plot.guides if guide.entry.words]
+    assert ends == ([] if left_us is None else [pytest.approx(-left_us, abs=1e-3)])

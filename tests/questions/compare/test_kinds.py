@@ -258,3 +258,10 @@ def test_the_own_kind_comes_first() -> None:
     found = busplan.compare("can-servo-8")
     assert [one.is_own for one in found.compared] == [True] + [False] * (len(kind_names()) - 1)
     assert {one.figures.kind for one in found.compared} == set(kind_names())
+
+
+def test_the_smallest_period_is_of_the_bus_and_not_of_what_a_gate_asks() -> None:
+    # A gate that asks for 6 spare nodes asks for a longer period.
+    own = busplan.compare("paper-4ms", buses=BOTH)
+    gated = busplan.compare(changed("paper-4ms", limits__min_spare_nodes=6), buses=BOTH)
+    assert [one.smallest.us for one in gated.compared] == [one.smallest.us for one in own.compared]

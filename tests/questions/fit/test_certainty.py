@@ -162,9 +162,9 @@ def _drawn_us(profile: busplan.Profile) -> NDArray[np.float64]:
     network = network_of(profile)
     (group,) = network.groups
     own: Any = profile
-    cycle = network.bus.cycle(network, model="standard")
+    cycle: Any = network.bus.cycle(network, model="standard")
     halves = profile.alike_nodes[0].nodes * (3 if own.node.write_response == "unified" else 4) + own.cycle.retries
-    gap_term_us = 2 * (63 - float(cycle.figures()["gap_count"])) / 98.304
+    gap_term_us = 2 * (63 - cycle.figures()["gap_count"]) / 98.304
     normal = random.standard_normal
     uniform = random.uniform(-1, 1, draws)
     host, phy_us = own.host, own.bus.phy_delay_us

@@ -1,6 +1,5 @@
 """The picture of a sweep: choices are categories, colours part at zero, units and words are there."""
 
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -10,124 +9,120 @@ import pytest
 import busplan
 from busplan.forms.charts import Curves, Drawing, Grid, legend
 from busplan.forms.picture import INKS
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.fit.network import network_of
-from busplan.questions.sweep.grid import Array, axis_of
-from busplan.questions.sweep.panels import sweep_drawing
-from busplan.questions.sweep.plot import FigureData
-from busplan.questions.sweep.plotted import Plotted, caption, key_label, plot_scale, plotted_figure
 
-PAPER = load("paper-4ms").profile
 MODELS = ("paper", "standard")
+TOO_FAST_AND_NOT = {"cycle.period_us": [100.0, 2000.0, 4000.0], "circle.radius_mm": [10.0]}
+"""At 100 us the cycle does not fit, so that it has no circle."""
 
 
-def values(given: Sequence[Any] | range) -> Array:
-    return axis_of(list(given))
+def swept(**vary: Any) -> busplan.SweepAnswer:
+    values = {key.replace("__", "."): given for key, given in vary.items()}
+    return busplan.sweep("paper-4ms", vary=values, timing_model=MODELS)
 
 
-def plotted(figure: str | None, profile: Any = PAPER, **vary: Any) -> Plotted:
-    own = {key.replace("__", "."): one for key, one in vary.items()}
-    answer = busplan.sweep(profile, vary=own, timing_model=MODELS)
-    return FigureData(answer.sweep, answer.table, figure=figure).plotted()
+def drawn(figure: str | None, **vary: Any) -> Drawing:
+    return swept(**vary).drawing(figure=figure)
 
 
-def drawn(one: Plotted) -> Drawing:
-    return sweep_drawing(one, title="x")
-
-
-def curves(one: Plotted) -> Curves:
-    (panel,) = drawn(one).panels
+def curves(drawing: Drawing) -> Curves:
+    (panel,) = drawing.panels
     assert isinstance(panel.plot, Curves)
     return panel.plot
 
 
-def grids(one: Plotted) -> list[Grid]:
-    return [panel.plot for panel in drawn(one).panels if isinstance(panel.plot, Grid)]
+def grids(drawing: Drawing) -> list[Grid]:
+    return [panel.plot for panel in drawing.panels if isinstance(panel.plot, Grid)]
 
 
-def words(one: Plotted) -> list[str]:
-    return [entry.words for entry in legend(drawn(one).panels)]
+def words(drawing: Drawing) -> list[str]:
+    return [entry.words for entry in legend(drawing.panels)]
 
 
-@pytest.mark.parametrize("given", [(63, "optimal"), ("optimal",), (63, 7)])
-def test_words_and_numbers_among_them_are_categories(given: Any) -> None:
-    scale = plot_scale(PAPER, "bus.gap_count", values(given), as_cells=False)
-    assert scale.places.tolist() == list(range(len(given)))
-    assert scale.labels == tuple(map(str, given))
-    assert scale.own == (scale.labels.index("63") if "63" in scale.labels else None)
+def labels(plot: Curves) -> list[str]:
+    return [tick.label for tick in plot.across.ticks]
 
 
-def test_no_line_joins_choices_and_a_line_joins_numbers() -> None:
-    plot = curves(plotted("margin_us", bus__gap_count=(5, 63, "optimal")))
+@pytest.mark.parametrize("given", [(63, "optimal"), ("optimal",), (63, 7), (5, 63, "optimal")])
+def test_no_line_joins_choices_and_a_line_joins_numbers(given: Any) -> None:
+    plot = curves(drawn("margin_us", bus__gap_count=given))
     assert not any(curve.has_line for curve in plot.curves)
     assert all(curve.has_dots for curve in plot.curves)
-    assert [tick.label for tick in plot.across.ticks] == ["5", "63", "optimal"]
-    assert all(curve.has_line for curve in curves(plotted("margin_us", bus__nodes=range(1, 7))).curves)
+    assert labels(plot) == list(map(str, given))
+    assert all(curve.has_line for curve in curves(drawn("margin_us", bus__nodes=range(1, 7))).curves)
 
 
 def test_points_stand_at_their_values_and_this_design_at_its_own() -> None:
-    one = plotted("margin_us", cycle__period_us=(250, 500, 1000, 4000))
-    plot = curves(one)
+    periods_us = (250, 500, 1000, 4000)
+    answer = swept(cycle__period_us=periods_us)
+    plot = curves(answer.drawing(figure="margin_us"))
     assert [curve.entry.words for curve in plot.curves] == ["paper model", "standard model"]
     assert len({curve.entry.mark for curve in plot.curves}) == 2
-    for curve, panel in zip(plot.curves, one.panels, strict=True):
-        assert curve.points == tuple(zip((250, 500, 1000, 4000), panel.values, strict=True))
+    for curve, margins_us in zip(plot.curves, answer["margin_us"].reshape(4, 2).T, strict=True):
+        assert curve.points == tuple(zip(periods_us, margins_us, strict=True))
     assert {guide.entry.words: (guide.x, guide.y) for guide in plot.guides} == {
         "margin of 0": (None, 0.0),
         "this design": (4000.0, None),
     }
 
 
-def test_a_curve_has_a_gap_where_a_value_is_missing() -> None:
-    one = plotted("margin_us", bus__nodes=range(1, 7))
-    one.panels[0].values[2] = float("nan")
-    missing = [number for number, (_, y) in enumerate(curves(one).curves[0].points) if y is None]
-    assert missing == [2]
+def test_a_curve_has_a_gap_and_a_map_a_blank_where_a_value_is_missing() -> None:
+    answer = busplan.sweep("paper-4ms", vary=TOO_FAST_AND_NOT, circle=True, timing_model="standard")
+    (curve,) = curves(answer.drawing(figure="max_contour_error_mm")).curves
+    assert [y is None for _, y in curve.points] == [True, False, False]
+    both = {**TOO_FAST_AND_NOT, "circle.radius_mm": [10.0, 20.0]}
+    drawing = busplan.sweep("paper-4ms", vary=both, circle=True, timing_model="standard").drawing(
+        figure="max_contour_error_mm"
+    )
+    (grid,) = grids(drawing)
+    assert [[cell is None for cell in row] for row in grid.rows] == [[True] * 2, [False] * 2, [False] * 2]
+    assert "blank: no value" in words(drawing)
 
 
 @pytest.mark.parametrize("nodes", [(2,), range(1, 4), range(1, 7), range(1, 40)])
 def test_whole_numbers_have_whole_ticks(nodes: Any) -> None:
-    plot = curves(plotted("max_nodes", bus__nodes=nodes))
+    plot = curves(drawn("max_nodes", bus__nodes=nodes))
     assert all(tick.label.lstrip("-").isdigit() for tick in (*plot.up.ticks, *plot.across.ticks))
 
 
 def test_many_points_are_a_curve_without_marks() -> None:
-    (curve, _) = curves(plotted("margin_us", cycle__nonperiodic_us=range(250))).curves
+    (curve, _) = curves(drawn("margin_us", cycle__nonperiodic_us=range(250))).curves
     assert (len(curve.points), curve.has_dots) == (250, False)
 
 
 def test_uneven_numbers_are_equal_cells_and_a_true_scale_of_a_curve() -> None:
-    periods = values([250, 500, 1000, 4000])
-    assert plot_scale(PAPER, "cycle.period_us", periods, as_cells=True).labels == ("250", "500", "1000", "4000")
-    curve = plot_scale(PAPER, "cycle.period_us", periods, as_cells=False)
-    assert (curve.labels, curve.places.tolist(), curve.own) == ((), [250, 500, 1000, 4000], 4000)
-    assert plot_scale(PAPER, "cycle.period_us", values([4000, 250]), as_cells=False).labels == ("4000", "250")
-    assert plot_scale(PAPER, "cycle.period_us", values([250, 500]), as_cells=False).own is None
+    periods_us = [250, 500, 1000, 4000]
+    (grid, _) = grids(drawn("margin_us", bus__nodes=(1, 2), cycle__period_us=periods_us))
+    assert [tick.label for tick in grid.across.ticks] == list(map(str, periods_us))
+    curve = curves(drawn("margin_us", cycle__period_us=periods_us))
+    assert (curve.across.low, curve.across.high) == (250, 4000)
+    # Values that do not ascend stand as they are given.
+    assert labels(curves(drawn("margin_us", cycle__period_us=[4000, 250]))) == ["4000", "250"]
 
 
 def test_colours_of_a_margin_are_red_below_zero_and_blue_from_it_on() -> None:
-    one = plotted("margin_us", bus__gap_count=(7, 63), cycle__period_us=range(250, 1001, 50))
-    for grid, panel in zip(grids(one), one.panels, strict=True):
+    answer = swept(bus__gap_count=(7, 63), cycle__period_us=range(250, 1001, 50))
+    margins_us = answer["margin_us"].reshape(2, 16, 2)
+    for number, grid in enumerate(grids(answer.drawing(figure="margin_us"))):
         looks = sorted(
             (value, cell.ink)
-            for values, row in zip(panel.values, grid.rows, strict=True)
+            for values, row in zip(margins_us[:, :, number], grid.rows, strict=True)
             for value, cell in zip(values, row, strict=True)
             if cell
         )
+        assert looks[0][0] < 0 < looks[-1][0]
         assert all(ink.startswith("above" if value >= 0 else "below") for value, ink in looks)
         # Farther from zero is stronger, on either side.
         for side in ([ink for value, ink in looks if value < 0][::-1], [ink for value, ink in looks if value >= 0]):
             assert side == sorted(side)
     # Without a margin below zero, none looks like one.
-    (grid, _) = grids(plotted("margin_us", bus__nodes=(1, 2), cycle__period_us=(2000, 4000)))
+    (grid, _) = grids(drawn("margin_us", bus__nodes=(1, 2), cycle__period_us=(2000, 4000)))
     assert all(cell.ink.startswith("above") for row in grid.rows for cell in row if cell)
 
 
-@pytest.mark.parametrize("figure", ["margin_us", "max_axes", "utilisation"])
-def test_each_colour_is_explained_by_the_values_that_it_stands_for(figure: str) -> None:
-    one = plotted(figure, bus__nodes=range(1, 9), cycle__period_us=range(250, 8001, 250))
-    (grid, *_) = grids(one)
+@pytest.mark.parametrize(("figure", "factor"), [("margin_us", 1), ("max_axes", 1), ("utilisation", 100)])
+def test_each_colour_is_explained_by_the_values_that_it_stands_for(figure: str, factor: float) -> None:
+    answer = swept(bus__nodes=range(1, 9), cycle__period_us=range(250, 8001, 250))
+    (grid, *_) = grids(answer.drawing(figure=figure))
     ranges = {
         entry.ink: tuple(map(float, entry.words.removesuffix(" us").removesuffix("%").split(" to ")))
         for entry in grid.legend
@@ -136,102 +131,93 @@ def test_each_colour_is_explained_by_the_values_that_it_stands_for(figure: str) 
     assert len(ranges) > 3
     ends = sorted(ranges.values())
     for (_, end), (start, _) in pairwise(ends):
-        assert start - end in ((1.0,) if one.figure.sort == "count" else (0.0,))
-    for row, cells in zip(one.panels[0].values, grid.rows, strict=True):
-        for value, cell in zip(row, cells, strict=True):
-            low, high = ranges[cell.ink]  # type: ignore[union-attr]
-            assert low - abs(low) * 1e-3 <= value <= high + abs(high) * 1e-3
-
-
-def test_a_missing_value_is_blank() -> None:
-    one = plotted("margin_us", bus__gap_count=(7, 63), cycle__period_us=(250, 500, 1000))
-    one.panels[0].values[1, 1] = float("nan")
-    (grid, _) = grids(one)
-    assert [[cell is None for cell in row] for row in grid.rows] == [[False] * 3, [False, True, False]]
-    assert "blank: no value" in words(one)
+        assert start - end in ((1.0,) if figure == "max_axes" else (0.0,))
+    values = factor * answer[figure].reshape(8, 32, 2)[:, :, 0]
+    for value, cell in zip(values.ravel(), (cell for row in grid.rows for cell in row), strict=True):
+        assert cell is not None
+        low, high = ranges[cell.ink]
+        assert low - abs(low) * 1e-3 <= value <= high + abs(high) * 1e-3
 
 
 def test_the_line_and_the_grey_are_of_the_verdict() -> None:
     # At 540 us the margin is above zero, and less than its uncertainty.
-    one = plotted("margin_corrected_us", bus__nodes=(2, 3), cycle__period_us=(500, 540, 4000))
-    (panel,), (grid,) = one.panels, grids(one)
-    assert (panel.values[0] >= 0).tolist() == [False, True, True]
+    answer = swept(bus__nodes=(2, 3), cycle__period_us=(500, 540, 4000))
+    drawing = answer.drawing(figure="margin_corrected_us")
+    (grid,) = grids(drawing)
+    assert (answer["margin_corrected_us"][1:6:2] >= 0).tolist() == [False, True, True]
     assert [cell.is_inside for cell in grid.rows[0] if cell] == [False, False, True]
-    assert words(one)[-2:] == ["edge of what is shown to fit", "this design"]
-    (shade,) = curves(plotted("safe_axes", cycle__period_us=(500, 540, 4000))).shades
+    assert words(drawing)[-2:] == ["edge of what is shown to fit", "this design"]
+    (shade,) = curves(drawn("safe_axes", cycle__period_us=(500, 540, 4000))).shades
     assert (shade.entry.words, shade.low, shade.high) == ("not shown to fit", 500, (540 + 4000) / 2)
 
 
 def test_a_figure_that_does_not_vary_gives_way_to_the_margin() -> None:
     # Whatever number of nodes there is, as many axes would fit.
-    assert plotted(None, bus__nodes=(1, 2)).figure.key == "margin_corrected_us"
-    assert plotted(None, cycle__period_us=(500, 4000)).figure.key == "safe_axes"
+    assert curves(drawn(None, bus__nodes=(1, 2))).up.label == "corrected margin, us"
+    assert curves(drawn(None, cycle__period_us=(500, 4000))).up.label == "safe axes"
 
 
 def test_a_map_of_one_value_is_a_sentence() -> None:
-    one = plotted("max_nodes", bus__nodes=(1, 2), cycle__period_us=(500, 501))
-    assert grids(one) == []
-    assert [panel.title for panel in drawn(one).panels] == ["paper model: 2 at every setting"]
-    assert drawn(one).words[0].startswith("Most nodes by the standard model: 1 at every setting.")
+    drawing = drawn("max_nodes", bus__nodes=(1, 2), cycle__period_us=(500, 501))
+    assert grids(drawing) == []
+    assert [panel.title for panel in drawing.panels] == ["paper model: 2 at every setting"]
+    assert drawing.words[0].startswith("Most nodes by the standard model: 1 at every setting.")
 
 
 def test_unsafe_settings_and_this_design_are_marked() -> None:
-    one = plotted("margin_us", bus__gap_count=(5, 7, 63), cycle__period_us=(250, 4000))
-    for grid in grids(one):
+    drawing = drawn("margin_us", bus__gap_count=(5, 7, 63), cycle__period_us=(250, 4000))
+    for grid in grids(drawing):
         assert [[cell.mark for cell in row if cell] for row in grid.rows] == [["!", "!"], ["", ""], ["", ""]]
         assert grid.own == (4000, 2)
-    assert {"unsafe gap count", "this design"} < set(words(one))
-    (shade,) = curves(plotted("margin_us", bus__gap_count=(5, 9, 63))).shades
+    assert {"unsafe gap count", "this design"} < set(words(drawing))
+    (shade,) = curves(drawn("margin_us", bus__gap_count=(5, 9, 63))).shades
     assert (shade.entry.words, shade.low, shade.high) == ("unsafe gap count", 5, 7)
 
 
-def test_the_largest_map_is_a_small_picture() -> None:
-    one = plotted("margin_us", bus__nodes=(1, 2), cycle__period_us=(250, 500))
-    up, across = (scale._replace(places=np.arange(500.0), own=None) for scale in one.scales)
-    values = np.add.outer(np.arange(500.0), np.arange(500.0)) - 400
-    panel = one.panels[0]._replace(values=values, unsafe=values > 500, fits=values > 0)
-    (grid,) = grids(one._replace(scales=(up, across), panels=(panel,)))
-    assert len({id(cell) for row in grid.rows for cell in row}) < 100
-
-
-def test_a_sweep_over_three_keys_has_no_picture() -> None:
-    answer = busplan.sweep(
-        "paper-1ms", vary={key: [1, 2] for key in ("bus.nodes", "node.axes", "cycle.nonperiodic_us")}
-    )
-    assert answer._repr_svg_() is None
+def test_what_has_no_picture_says_why() -> None:
+    three = {key: [1, 2] for key in ("bus.nodes", "node.axes", "cycle.nonperiodic_us")}
+    many = {"cycle.nonperiodic_us": np.linspace(0, 1000, 250_001)}
+    for vary, message in (
+        (three, "draws one or two keys, and bus.nodes, node.axes, cycle.nonperiodic_us vary"),
+        (many, "250,001 points; a figure shows at most 250,000"),
+    ):
+        answer = busplan.sweep("paper-1ms", vary=vary, timing_model="standard")
+        assert answer._repr_svg_() is None
+        with pytest.raises(busplan.BusplanError, match=message):
+            answer.drawing()
 
 
 def test_another_design_is_not_marked_as_this_one() -> None:
-    one = plotted("margin_us", bus__nodes=range(1, 9), cycle__period_us=(1000,))
-    assert [scale.own for scale in one.scales] == [None]
-    assert "this design" not in caption(one)
+    drawing = drawn("margin_us", bus__nodes=range(1, 9), cycle__period_us=(1000,))
+    assert "this design" not in (*words(drawing), drawing.words[0])
+    assert "this design has" not in drawing.words[0]
+    assert drawing.title.endswith("; period T_s, us: 1000")
 
 
 @pytest.mark.parametrize(
-    ("key", "label"),
+    ("name", "key", "label"),
     [
-        ("cycle.period_us", "period T_s, us"),
-        ("bus.nodes", "nodes N"),
-        ("bus.gap_count", "gap count"),
-        ("bus.slice_ratio", "bus slice ratio"),
-        ("node.axes", "node axes"),
-        ("payload.read_bytes", "payload read, bytes"),
-        ("servo.position_gain_per_s", "servo position gain per s"),
-        ("circle.feed_mm_per_min", "circle feed, mm/min"),
-        ("group.gantry.nodes", "group gantry nodes"),
+        ("paper-4ms", "cycle.period_us", "period T_s, us"),
+        ("paper-4ms", "bus.nodes", "nodes N"),
+        ("paper-4ms", "bus.gap_count", "gap count"),
+        ("paper-4ms", "node.axes", "node axes"),
+        ("paper-4ms", "payload.read_bytes", "payload read, bytes"),
+        ("gantry-24", "group.tool.nodes", "group tool nodes"),
     ],
 )
-def test_keys_are_said_in_words_with_their_unit(key: str, label: str) -> None:
-    assert key_label(PAPER, key) == label
+def test_keys_are_said_in_words_with_their_unit(name: str, key: str, label: str) -> None:
+    answer = busplan.sweep(name, vary={key: [8, 9]})
+    assert curves(answer.drawing(figure="margin_us")).across.label == label
 
 
 def test_figures_are_drawn_in_the_unit_of_their_label() -> None:
-    assert plotted_figure(network_of(PAPER), "margin_us")[1] == 1
-    one = plotted("utilisation", bus__nodes=(1, 2))
-    assert one.label == "utilisation, %"
-    assert one.panels[0].values.tolist() == pytest.approx([100 * 102.955 / 2000, 10.356], abs=0.001)
-    figure, factor = plotted_figure(network_of(PAPER), "max_contour_error_mm")
-    assert (figure.column, factor) == ("um", 1000)
+    plot = curves(drawn("utilisation", bus__nodes=(1, 2)))
+    assert plot.up.label == "utilisation, %"
+    assert [y for _, y in plot.curves[0].points] == pytest.approx([100 * 102.955 / 2000, 10.356], abs=0.001)
+    circle = busplan.sweep("paper-4ms", vary=TOO_FAST_AND_NOT, circle=True, timing_model="standard")
+    plot = curves(circle.drawing(figure="max_contour_error_mm"))
+    assert plot.up.label.endswith(", um")
+    assert plot.curves[0].points[2][1] == pytest.approx(1000 * circle["max_contour_error_mm"][2])
 
 
 @pytest.mark.parametrize(
@@ -271,13 +257,11 @@ def test_figures_are_drawn_in_the_unit_of_their_label() -> None:
     ],
 )
 def test_the_caption_says_what_to_see(figure: str, vary: dict[str, Any], said: str) -> None:
-    assert caption(plotted(figure, **vary)) == said
+    assert drawn(figure, **vary).words == (said,)
 
 
 def test_a_figure_that_no_model_has_is_said() -> None:
-    quiet = override(PAPER, {"bus.nodes": 2})
-    one = plotted("margin_us", quiet, bus__nodes=(1, 2))
-    empty = one._replace(panels=())
-    assert caption(empty) == "No timing model gives margin here."
-    assert drawn(empty).words == ("No timing model gives margin here.",)
-    assert drawn(empty).panels == ()
+    answer = busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0, 20.0]}, circle=True)
+    drawing = answer.drawing(figure="circular_deviation_mm")
+    assert drawing.words == ("No timing model gives circular deviation G here.",)
+    assert drawing.panels == ()

@@ -8,7 +8,7 @@ import pytest
 import busplan
 from busplan.buses import kind_named, kind_names
 from busplan.forms.picture import INKS
-from busplan.profile.shipped import load, shipped_names
+from busplan.profile.shipped import shipped_names
 
 TO_NODES, FROM_NODES = {"request", "out"}, {"response", "in"}
 
@@ -30,7 +30,7 @@ def test_a_term_has_the_colour_of_its_events(name: str) -> None:
     bus = kind_named(name)
     kinds = defaultdict(set)
     for profile in shipped_names():
-        if load(profile).profile.bus.kind == name:
+        if busplan.load_profile(profile).bus.kind == name:
             for event in busplan.timeline(profile).cycle_events:
                 kinds[event.term].add(bus.event_kind(event.kind))
     for term in bus.figures.terms:

@@ -2,52 +2,53 @@
 
 import re
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
+import busplan
 from busplan.buses import kind_named
 from busplan.buses.parts import IDLE
-from busplan.forms import html, markdown, terminal
-from busplan.forms.blocks import Report, ShownValue
+from busplan.forms import markdown, terminal
+from busplan.forms.blocks import Report, Sentence, ShownValue, Table
 from busplan.forms.charts import Lane, Lanes, legend
 from busplan.forms.numbers import sentence_text
-from busplan.forms.scale import ticks
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.fit.figures import capacity
-from busplan.questions.timeline.events import Schedule, schedule, totals, zoom
-from busplan.questions.timeline.report import (
-    headline,
-    timeline_chart,
-    timeline_document,
-    timeline_records,
-    timeline_report,
-    totals_table,
-)
 
 ValuesIn = Callable[[object], Iterator[ShownValue]]
 
 HOSTILE = '<b>$x_1$ & %%{init: {"theme":"dark"}}%%; ]]> "q" # end: </svg>機械'
 
 
-def plan(**changes: object) -> Schedule:
-    return schedule(override(load("paper-4ms").profile, {key.replace("__", "."): v for key, v in changes.items()}))
+def profile(**changes: object) -> busplan.Profile:
+    return busplan.load_profile("paper-4ms", changes={key.replace("__", "."): v for key, v in changes.items()})
 
 
-def drawn(one: Schedule, width: int | None = None) -> list[str]:
-    return terminal.text(timeline_report(one), width=width).splitlines()
+def plan(**changes: object) -> busplan.TimelineAnswer:
+    return busplan.timeline(profile(**changes))
 
 
-def lanes(one: Schedule, number: int = 1) -> Lanes:
+def window(**asked: Any) -> busplan.TimelineAnswer:
+    return busplan.timeline("paper-4ms", **asked)
+
+
+def drawn(one: busplan.TimelineAnswer, width: int | None = None) -> list[str]:
+    return terminal.text(one.report(), width=width).splitlines()
+
+
+def headline(one: busplan.TimelineAnswer) -> Sentence:
+    said = one.report().blocks[0]
+    assert isinstance(said, Sentence)
+    return said
+
+
+def lanes(one: busplan.TimelineAnswer, number: int = 1) -> Lanes:
     """Lanes of the period (0) or of the window (1)."""
-    plot = timeline_chart(one).drawing.panels[number].plot
+    plot = one.drawing().panels[number].plot
     assert isinstance(plot, Lanes)
     return plot
 
 
-def lane(one: Schedule, label: str, number: int = 0) -> Lane:
+def lane(one: busplan.TimelineAnswer, label: str, number: int = 0) -> Lane:
     (found,) = (lane for lane in lanes(one, number).lanes if lane.label == label)
     return found
 
@@ -128,7 +129,7 @@ def test_an_overrun_is_said_and_seen() -> None:
     assert beyond.words == "beyond the slice, 57.117 us: 150.000 to 207.117 us"
     assert [line.partition("|")[0].strip() for line in lines].count("over") == 2
     assert {guide.x for guide in (*lanes(one, 0).guides, *lanes(one, 1).guides)} == {150.0}
-    document = timeline_document(one)
+    document = one.to_dict()
     assert (document["fits"], document["exceeded"]) == (False, ["time"])
     assert document["margin_us"] < 0
     assert "beyond" not in "\n".join(drawn(plan()))
@@ -137,11 +138,9 @@ def test_an_overrun_is_said_and_seen() -> None:
 @pytest.mark.parametrize("period_us", [4000.0, 550.0, 500.0, 300.0, 250.0, 100.0])
 def test_the_period_is_whole_with_its_slice_and_both_margins(period_us: float) -> None:
     one = plan(cycle__period_us=period_us)
-    found = {each.timing_model: each for each in capacity(one.profile).results}
-    assert [each["margin_us"] for each in timeline_document(one)["margins"]] == [
-        each.margin_us for each in found.values()
-    ]
-    lines = drawn(one)[1 if one.figures.circle_refused_by else 0 :]
+    found = {each.timing_model: each for each in busplan.capacity(one.profile).results}
+    assert [each["margin_us"] for each in one.to_dict()["margins"]] == [each.margin_us for each in found.values()]
+    lines = drawn(one)
     end_us = max(period_us, *(each.required_us for each in found.values()))
     assert lines[4].startswith(f"The period of {period_us:.3f} us")
     assert (lanes(one, 0).across.low, lanes(one, 0).across.high) == (0, end_us)
@@ -163,59 +162,59 @@ def test_the_period_is_whole_with_its_slice_and_both_margins(period_us: float) -
 def test_an_unsafe_gap_count_is_warned_of() -> None:
     one = plan(bus__gap_count=5)
     assert any("gap count 5 is unsafe" in line for line in drawn(one))
-    assert "gap count 5 is unsafe" in timeline_document(one)["warnings"][0]
+    assert "gap count 5 is unsafe" in one.to_dict()["warnings"][0]
 
 
 def test_a_single_transaction_is_drawn_event_by_event() -> None:
-    lines = drawn(zoom(plan(), transaction=("write", 2)))
+    lines = drawn(window(transaction=("write", 2)))
     assert any(line.startswith("The write of node 2, 155.438 to 207.117 us") for line in lines)
     assert re.search(r"^node execution +36\.733 us \| +=+ +\|$", "\n".join(lines), re.MULTILINE)
     assert row(lines, "window").strip() == "^^"
-    short = drawn(zoom(plan(), from_us=10.0, to_us=10.001))
+    short = drawn(window(from_us=10.0, to_us=10.001))
     assert row(short, "window").strip() == "^"
 
 
 @pytest.mark.parametrize(
     "one",
-    [plan(), plan(cycle__period_us=300.0), zoom(plan(), from_us=100.0, to_us=180.0), plan(bus__nodes=16)],
+    [plan(), plan(cycle__period_us=300.0), window(from_us=100.0, to_us=180.0), plan(bus__nodes=16)],
     ids=["whole", "overrun", "window", "many"],
 )
-def test_bars_are_the_events_in_the_lanes_of_their_nodes(one: Schedule) -> None:
+def test_bars_are_the_events_in_the_lanes_of_their_nodes(one: busplan.TimelineAnswer) -> None:
     bars = [span for each in lanes(one).lanes for span in each.spans if "execution" in span.words]
     executions = [event for event in one.events if event.kind == "execution"]
     assert sorted((bar.start, bar.end) for bar in bars) == [(event.start_us, event.end_us) for event in executions]
     assert (lanes(one).across.low, lanes(one).across.high) == (one.from_us, one.used_us if one.is_whole else one.to_us)
-    explained = {entry.words for entry in legend(timeline_chart(one).drawing.panels)}
+    explained = {entry.words for entry in legend(one.drawing().panels)}
     assert {kind_named("ieee1394").event_kind(event.kind).label for event in one.events} - {"idle"} <= explained
 
 
 def test_documents_hold_the_schedules_own_numbers() -> None:
-    one = zoom(plan(), to_us=50.0)
-    document = timeline_document(one)
+    one = window(to_us=50.0)
+    document = one.to_dict()
     assert [(row["start_us"], row["end_us"]) for row in document["events"]] == [one[1:] for one in spans(one)]
     assert document["required_us"] == one.figures.required_us
-    assert [row["share"] for row in document["totals"]] == [part.share for part in totals(one)]
-    assert {row["profile"] for row in timeline_records(one)} == {"paper-4ms"}
+    assert [row["share"] for row in document["totals"]] == [part.share for part in one.totals]
+    assert {row["profile"] for row in one.report().records or ()} == {"paper-4ms"}
 
 
 @pytest.mark.parametrize(
     "one",
-    [plan(), plan(cycle__period_us=300.0), zoom(plan(), from_us=100.0, to_us=180.0), plan(bus__gap_count=5)],
+    [plan(), plan(cycle__period_us=300.0), window(from_us=100.0, to_us=180.0), plan(bus__gap_count=5)],
     ids=["whole", "overrun", "window", "unsafe"],
 )
 def test_figures_of_the_answer_stand_in_its_document(
-    one: Schedule, values_of_the_document: Callable[[Report], int], values_in: ValuesIn
+    one: busplan.TimelineAnswer, values_of_the_document: Callable[[Report], int], values_in: ValuesIn
 ) -> None:
     short = not one.figures.fits
     head = {"period_us", "required_us", "available_us"} if short else {"period_us", "margin_us", "available_us"}
-    assert values_of_the_document(timeline_report(one)) == 3 * len(totals(one))
+    assert values_of_the_document(one.report()) == 3 * len(one.totals)
     assert head <= {value.key for value in values_in(headline(one))}
 
 
 def test_the_table_says_what_takes_how_much_of_what() -> None:
-    window = zoom(plan(), from_us=100.0, to_us=180.0)
-    captions = [totals_table(one).caption for one in (plan(), window, plan(cycle__period_us=300.0))]
-    assert [sentence_text(one) for one in captions if one] == [
+    answers = (plan(), window(from_us=100.0, to_us=180.0), plan(cycle__period_us=300.0))
+    tables = [block for one in answers for block in one.report().blocks if isinstance(block, Table)]
+    assert [sentence_text(table.caption) for table in tables if table.caption] == [
         "What takes the slice, 2000.000 us",
         "What takes the window, 80.000 us",
         "What takes the cycle, 207.117 us",
@@ -225,11 +224,11 @@ def test_the_table_says_what_takes_how_much_of_what() -> None:
 
 
 def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
-    report = timeline_report(plan(name=HOSTILE))
-    text = markdown.text(report)
+    answer = plan(name=HOSTILE)
+    text = markdown.text(answer.report())
     assert "```text\nThe period of 4000.000 us" in text
     assert "| arbitration | " in text
-    page = html.page(report)
+    page = answer.html
     assert page.count('<svg xmlns="http://www.w3.org/2000/svg" class="chart"') == 1
     assert '<data value="8">8</data>' in page
     assert HOSTILE not in page
@@ -237,29 +236,17 @@ def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
 
 def test_a_page_of_many_events_says_that_a_bar_is_a_transaction() -> None:
     many = plan(bus__nodes=62, bus__max_hops=3)
-    words = timeline_chart(many).legend
-    assert words is not None
-    assert sentence_text(words) == "A bar is a whole transaction."
+    assert "A bar is a whole transaction." in many.html
     assert [span.words.split(",")[0] for span in lane(many, "node 9", 1).spans] == ["read of node 9", "write of node 9"]
-    assert timeline_chart(plan()).legend is None
+    assert "A bar is a whole transaction." not in plan().html
 
 
-def spans(one: Schedule) -> list[tuple[str, float, float]]:
+def spans(one: busplan.TimelineAnswer) -> list[tuple[str, float, float]]:
     return [(event.kind, event.start_us, event.end_us) for event in one.events]
 
 
 def test_bus_lane_comes_first_and_nodes_in_their_turn() -> None:
     one = plan(bus__nodes=12)
     assert [each.label for each in lanes(one).lanes] == ["bus", *(f"node {number}" for number in range(1, 13))]
-    each = zoom(one, transaction=("write", 11))
+    each = busplan.timeline(one.profile, transaction=("write", 11))
     assert [span.words.split(":")[0] for lane in lanes(each).lanes for span in lane.spans] == ["write of node 11"] * 9
-
-
-@given(start=st.floats(0.0, 1e6), width=st.floats(1e-3, 1e6), most=st.integers(1, 12))
-def test_ticks_are_round_inside_the_window_and_few(start: float, width: float, most: int) -> None:
-    end = start + width
-    marks = ticks(start, end, most=most)
-    assert len(marks) <= most
-    assert all(start - width * 1e-6 <= mark.at <= end + width * 1e-6 for mark in marks)
-    assert len({mark.label for mark in marks}) == len(marks)
-    assert all(float(mark.label) == pytest.approx(mark.at, abs=width * 1e-6) for mark in marks)

@@ -254,15 +254,15 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             if not self.is_safe(asked):
                 hops, given = hops_of(asked), gap_count_of(asked)
                 warnings.append(
-                    f"Warning: gap count {given} is unsafe for {plural(int(plain(hops)), 'hop')} "
+                    f"gap count {given} is unsafe for {plural(int(plain(hops)), 'hop')} "
                     f"({plural(int(plain(asked.nodes)), 'node')}); "
-                    f"the smallest safe one is {safe_gap_count(hops)}{limit}."
+                    f"the smallest safe one is {safe_gap_count(hops)}{limit}"
                 )
                 break
         if not bus.cable_is_standard:
             warnings.append(
-                f"Warning: cables of {bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m that the "
-                "gap-count table holds for."
+                f"cables of {bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m that the "
+                "gap-count table holds for"
             )
         return warnings
 

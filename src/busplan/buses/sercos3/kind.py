@@ -147,7 +147,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         if not 0 < given_us < LEAST_UCC_US:
             return []
         why = f"the master opens no channel for other frames of less than {LEAST_UCC_US:g} us"
-        return [f"Warning: cycle.nonperiodic_us = {given_us:g}: {why}."]
+        return [f"cycle.nonperiodic_us = {given_us:g}: {why}"]
 
 
 BUS: Final = Sercos3()

@@ -6,7 +6,7 @@ from typing import Final
 
 from busplan.buses.published import parts_tested
 from busplan.elementwise import FIT_ROUNDING, plain
-from busplan.english import listed, plural
+from busplan.english import listed, nouns, plural
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
 from busplan.forms.numbers import period, sentence_text
 from busplan.questions.capacity.verdict import Verdict
@@ -44,6 +44,7 @@ def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
     ]
     if not is_brief:
         lines += _rests_on(verdict)
+    lines += _but(verdict)
     return Card(subject, _word(verdict), _gauge(verdict), tuple(lines))
 
 
@@ -124,7 +125,11 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
     figures = verdict.deciding
     if verdict.all_well and verdict.has_room:
         spare = {count.name: (count.safe_nodes or 0) - count.nodes for count in figures.counts}
-        rooms = (f"{number} more {f'of {name}' if name else 'nodes'}" for name, number in spare.items() if number > 0)
+        rooms = (
+            f"{number} more {f'of {name}' if name else nouns(number, 'node')}"
+            for name, number in spare.items()
+            if number > 0
+        )
         yield "room for", Sentence((listed([*rooms], "or"),))
         return
     if verdict.all_well and verdict.network.groups:
@@ -157,14 +162,20 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
     if verdict.premises:
         yield "rests on", Sentence(("; ".join(verdict.premises),))
     yield "checked against", Sentence((_tested(verdict),))
-    for other in verdict.contradicting:
-        needed = f"{_us(other.required_us, figures.uncertainty_us)} us needed of {_us(other.available_us, None)}"
-        yield f"{other.timing_model} model", Sentence((f"says otherwise, {needed}, but does not decide",), "warns")
     for model in bus.timing_models:
         if missing := bus.cannot_express(network, model=model.name):
             yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
+
+
+def _but(verdict: Verdict) -> Iterator[_Line]:
+    """What speaks against the verdict at its period: another model, a bus reset, a warning."""
+    for other in verdict.contradicting:
+        needed_us = _us(other.required_us, verdict.deciding.uncertainty_us)
+        needed = f"{needed_us} us needed of {_us(other.available_us, None)}"
+        yield f"{other.timing_model} model", Sentence((f"says otherwise, {needed}, but does not decide",), "warns")
     if verdict.after_reset is not None:
-        keys = ", ".join(f"{key} = {value}" for key, value in bus.safety.after_reset.items())
+        after_reset = verdict.network.bus.safety.after_reset
+        keys = ", ".join(f"{key} = {value}" for key, value in after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
     yield from (("beware", Sentence((warning,), "warns")) for warning in verdict.warnings)
 

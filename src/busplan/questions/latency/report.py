@@ -7,7 +7,7 @@ from operator import itemgetter
 from typing import Final
 
 from busplan.buses.figure import Figure
-from busplan.elementwise import plain, within
+from busplan.elementwise import within
 from busplan.forms.blocks import (
     Block,
     Code,
@@ -44,7 +44,7 @@ def _blocks(result: LatencyResult) -> Iterator[Block]:
     yield from not_applicable(network)
     yield from execution_sentence(network, of_latency=True)
     yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result))
-    yield from warning_sentences(network, nodes=int(plain(network.nodes)), most=0)
+    yield from warning_sentences(network)
 
 
 def latency_tables(result: LatencyResult) -> Iterator[Table]:

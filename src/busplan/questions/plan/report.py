@@ -133,7 +133,7 @@ def _goal(plan: PlanAnswer) -> tuple[Part, ...]:
 
 def _warnings(plan: PlanAnswer) -> Iterator[Sentence]:
     network = plan.goal if plan.recommended is None else plan.recommended.network
-    yield from warning_sentences(network, nodes=int(plain(network.nodes)), most=0)
+    yield from warning_sentences(network)
     yield from reset_sentence(plan.after_reset, network)
 
 

@@ -39,7 +39,7 @@ from busplan.questions.timeline.drawing import (
 )
 from busplan.questions.timeline.events import EVENTS, SHARE, TOTAL, Schedule, Total, totals
 from busplan.questions.words.documents import document
-from busplan.questions.words.sentences import safety_record, story, warnings
+from busplan.questions.words.sentences import safety_record, story, warning_sentences
 
 _TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
 
@@ -57,7 +57,7 @@ def timeline_report(schedule: Schedule) -> Report:
 def _blocks(schedule: Schedule) -> Iterator[Block]:
     """Whether the cycle fits, the cycle to scale, and the total of each kind of event."""
     yield headline(schedule)
-    yield from (Sentence((words,), "warns") for words in _warnings(schedule))
+    yield from warning_sentences(schedule.network)
     yield margins_sentence(schedule)
     yield from (Sentence((words,)) for words in CommonMultiple(schedule).sentences())
     yield timeline_chart(schedule)
@@ -141,10 +141,6 @@ def _total_row(schedule: Schedule, total: Total) -> TableRow:
     return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 
-def _warnings(schedule: Schedule) -> list[str]:
-    return warnings(schedule.network, nodes=schedule.figures.nodes, most=0)
-
-
 def _facts(schedule: Schedule) -> JsonDocument:
     """The document without events: the cycle that is drawn, the verdict, the cycles that differ, and the window."""
     figures, common = schedule.figures, CommonMultiple(schedule)
@@ -167,7 +163,7 @@ def _facts(schedule: Schedule) -> JsonDocument:
         fits=figures.fits,
         verdict=figures.verdict,
         **safety_record(figures, schedule.network),
-        warnings=_warnings(schedule),
+        warnings=schedule.network.bus.warnings(schedule.network, nodes=[figures.nodes]),
         from_us=schedule.from_us,
         to_us=schedule.to_us,
     )

@@ -7,6 +7,7 @@ from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, 
 from busplan.buses.network import Network
 from busplan.buses.parts import Value as BusValue
 from busplan.buses.published import parts_tested
+from busplan.elementwise import plain
 from busplan.forms.blocks import Part, Record, Sentence, ShownValue, attribute_value, joined, sentence
 from busplan.profile.write import value_text
 from busplan.questions.fit.certainty import TIME, limits_behind
@@ -59,24 +60,10 @@ def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
     return ('"', shown, '"') if quotes and isinstance(value, str) else (shown,)
 
 
-def warnings(network: Network, *, nodes: int, most: int) -> list[str]:
-    """Warnings, whatever the verdict.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    nodes
-        Nodes on the bus [1].
-    most
-        Largest number of nodes in the report [1]; 0 if it has none.
-    """
-    return network.bus.warnings(network, nodes=[number for number in (nodes, most) if number])
-
-
-def warning_sentences(network: Network, *, nodes: int, most: int) -> Iterator[Sentence]:
-    """Warnings as sentences; see `warnings`."""
-    return (Sentence((words,), "warns") for words in warnings(network, nodes=nodes, most=most))
+def warning_sentences(network: Network) -> Iterator[Sentence]:
+    """Warnings of a network's own number of nodes, whatever the verdict."""
+    warnings = network.bus.warnings(network, nodes=[int(plain(network.nodes))])
+    return (Sentence((f"Warning: {words}.",), "warns") for words in warnings)
 
 
 def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterator[Sentence]:
