@@ -31,9 +31,7 @@ def test_payloads_go_to_read_and_write_alike(make: Make) -> None:
 
 
 def test_the_farthest_node_of_a_chain_is_as_many_hops_away_as_there_are_nodes(make: Make) -> None:
-    chain, tree = (
-        busplan.latency(make(bus__nodes=5, bus__max_hops=hops)).transactions[0].phases for hops in (None, 2)
-    )
+    chain, tree = (busplan.latency(make(bus__nodes=5, bus__max_hops=hops)).transactions[0].phases for hops in (None, 2))
     assert (chain["hops"], tree["hops"]) == (5, 2)
     assert (chain["latency_us"] or 0) > (tree["latency_us"] or 0) > 0
 
