@@ -1,18 +1,13 @@
 """The picture of a circle test: magnified alike, in units that can be read, with its verdict and its tolerances."""
 
 from functools import cache
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import pytest
 
 import busplan
 from busplan.forms.charts import Curves, Dial, Drawing, Lanes, Panel, legend
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.circle import CircleTestAnswer
-from busplan.questions.circle.contour import ContourProfile
-from busplan.questions.circle.drawing import dial, largest_mm, magnified
 
 SMALL = {"circle.radius_mm": 25.0, "circle.ramp_periods": 20}
 TURN = {**SMALL, "circle.path": "iso230-4"}
@@ -30,8 +25,8 @@ Plot = TypeVar("Plot", Curves, Dial, Lanes)
 @cache
 def run(
     *changes: tuple[str, object], periods_us: tuple[float, ...] = (4000.0,), ranked: bool = False
-) -> CircleTestAnswer:
-    profile = override(load("paper-4ms").profile, dict(changes))
+) -> busplan.CircleTestAnswer:
+    profile = busplan.load_profile("paper-4ms", changes=dict(changes))
     return busplan.circle_test(profile, period_us=list(periods_us), contributions=ranked)
 
 
@@ -142,16 +137,22 @@ def test_the_measured_part_is_shaded_and_apart_from_the_rest(changes: dict[str, 
 def test_a_verdict_is_a_word_and_a_colour(passed: bool | None, word: str, tone: str) -> None:
     test = run(*SMALL.items())
     (result,) = test.results
-    (head,) = heads(CircleTestAnswer(*test._replace(results=(result._replace(passed=passed),))).drawing())
+    (head,) = heads(test._replace(results=(result._replace(passed=passed),)).drawing())
     assert head.title == f"{word}: 4 ms, 2500 mm/min, r 25 mm"
     assert head.tone == tone
 
 
 @pytest.mark.parametrize(("limit_mm", "rings"), [(0.025, 2), (0.010, 2), (1.0, 0)])
 def test_the_tolerance_is_drawn_unless_it_lies_far_outside(limit_mm: float, rings: int) -> None:
-    drawing = run(*SMALL.items(), ("tolerance.max_contour_error_mm", limit_mm)).drawing()
+    test = run(*SMALL.items(), ("tolerance.max_contour_error_mm", limit_mm))
+    drawing, (result,) = test.drawing(), test.results
     (circle,), (plot,) = plots(drawing, Dial), plots(drawing, Curves)
-    assert sum(entry.ink == "tolerance" for _, entry in circle.rings) == rings
+    radii = sorted(radius for radius, entry in circle.rings if entry.ink == "tolerance")
+    assert len(radii) == rings
+    # The circle is magnified as its tolerance is.
+    radial_mm = max(abs(result.radial_deviation_min_mm or 0.0), abs(result.radial_deviation_max_mm or 0.0))
+    for radius, sign in zip(radii, (-1, 1), strict=False):
+        assert (radius - 1) / farthest(circle) == pytest.approx(sign * limit_mm / radial_mm)
     drawn_um = sorted(guide.y or 0.0 for guide in plot.guides if guide.entry.ink == "tolerance")
     assert drawn_um == pytest.approx([-limit_mm * 1e3, limit_mm * 1e3][:rings])
     assert f"(limit {limit_mm * 1e3:g} um)" in " ".join(panel.title for panel in drawing.panels)
@@ -190,46 +191,3 @@ def test_the_words_name_grade_and_periods_that_are_not_drawn() -> None:
         *("paper-4ms", "circle test, servo values: 6 assumed, 4 calibrated, 2 published"),
         "not drawn, for the bus does not carry it: 100 us",
     )
-
-
-# --- the magnified circle
-
-
-def profile(*errors_mm: float) -> ContourProfile:
-    return ContourProfile(tuple(min(error, 0.0) for error in errors_mm), tuple(max(error, 0.0) for error in errors_mm))
-
-
-def test_a_circle_is_drawn_as_far_out_as_its_error() -> None:
-    scale = magnified(0.01, tolerance_mm=0.02)
-    assert scale is not None
-    assert (scale.largest_mm, scale.ring_um, scale.tolerance_mm) == (0.02, 10.0, 0.02)
-    assert scale.times(100.0) == pytest.approx(0.25 / 0.02 * 100)
-    drawn = dial(profile(0.01, -0.01, 0.0), scale, "ccw")
-    assert drawn.outer == pytest.approx((1.125, 1, 1))
-    assert drawn.inner == pytest.approx((1, 0.875, 1))
-    assert [radius for radius, entry in drawn.rings if entry.ink == "tolerance"] == pytest.approx([0.75, 1.25])
-
-
-@pytest.mark.parametrize("error_mm", [0.0, 1e-12])
-def test_no_error_is_no_drawing(error_mm: float) -> None:
-    assert magnified(largest_mm(profile(error_mm)), tolerance_mm=0.01) is None
-
-
-def test_a_tolerance_far_outside_flattens_nothing() -> None:
-    scale = magnified(0.001, tolerance_mm=0.1)
-    assert scale is not None
-    assert (scale.largest_mm, scale.tolerance_mm) == (0.001, None)
-
-
-@pytest.mark.parametrize("error_mm", [0.0011, 0.0039, 0.0041, 0.0099, 2e-5])
-def test_no_ring_lies_where_the_angles_stand(error_mm: float) -> None:
-    scale = magnified(error_mm, tolerance_mm=None)
-    assert scale is not None
-    radii = [radius for radius, entry in dial(profile(error_mm), scale, "ccw").rings if entry.ink == "ring"]
-    assert len(radii) >= 4
-    assert max(radii) <= 1.25 + 1e-9
-
-
-def test_a_tiny_error_has_rings_in_a_tiny_unit() -> None:
-    scale: Any = magnified(2e-5, tolerance_mm=None)
-    assert dial(profile(2e-5), scale, "ccw").words == ("10 nm", "a ring")

@@ -1,74 +1,68 @@
 """The answer of `busplan circle-test`: sentences, tables, drawing and data of the same figures."""
 
+import csv
+import io
 import json
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Literal
+from typing import Literal, TypeVar
 
 import pytest
 
 import busplan
 from busplan.forms import render
-from busplan.forms.blocks import Bar, Chart, Report, Sentence, ShownValue, Table
+from busplan.forms.blocks import Bar, Block, Chart, Report, Sentence, ShownValue, Table
 from busplan.forms.numbers import figure_text, sentence_text
-from busplan.printable import to_json
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
-from busplan.questions.circle.contour import TRACE_COLUMNS, trace_records
-from busplan.questions.circle.failures import Failure, Stated
-from busplan.questions.circle.figures import CircleTest
-from busplan.questions.circle.report import (
-    circle_document,
-    circle_records,
-    circle_report,
-    circle_sentences,
-    circle_table,
-    contributions_table,
-    servo_sentence,
-    verdict_words,
-)
-from busplan.questions.circle.roundness import circle_test
 
 ValuesIn = Callable[[object], Iterator[ShownValue]]
 
 SMALL = {"circle.radius_mm": 25.0, "circle.ramp_periods": 20}
 TIGHT = {**SMALL, "tolerance.max_contour_error_mm": 0.001, "tolerance.mean_contour_error_mm": 0.0005}
-MINE = load("paper-4ms").profile.model_copy(update={"name": "mine"})
 UNSTABLE = {**SMALL, "servo.position_gain_per_s": 1e5}
+Of = TypeVar("Of", bound=Block)
 
 
 @cache
 def circle_of(
     *changes: tuple[str, object], periods_us: tuple[float, ...] = (4000.0,), ranked: bool = True
-) -> CircleTest:
-    profile = override(load("paper-4ms").profile, dict(changes))
-    return circle_test(profile, periods_us=periods_us, with_contributions=ranked)
+) -> busplan.CircleTestAnswer:
+    profile = busplan.load_profile("paper-4ms", changes={"name": "mine", **dict(changes)})
+    return busplan.circle_test(profile, period_us=periods_us, contributions=ranked)
 
 
-def small(*, ranked: bool = True, **changes: object) -> CircleTest:
+def small(*, ranked: bool = True, **changes: object) -> busplan.CircleTestAnswer:
     given = {key.replace("__", "."): value for key, value in changes.items()}
     return circle_of(*{**SMALL, **given}.items(), ranked=ranked)
 
 
-def texts(test: CircleTest, *, with_contributions: bool = True) -> list[str]:
-    blocks = circle_report(test._replace(with_contributions=with_contributions)).blocks()
-    return [sentence_text(block) for block in blocks if isinstance(block, Sentence)]
+def uncached(**changes: object) -> busplan.CircleTestAnswer:
+    """As `small`, with whole sections of the profile among the changes."""
+    given = {key.replace("__", "."): value for key, value in changes.items()}
+    return busplan.circle_test(busplan.load_profile("paper-4ms", changes={"name": "mine", **SMALL, **given}))
 
 
-@pytest.mark.parametrize("with_contributions", [True, False])
+def blocks(test: busplan.CircleTestAnswer, kind: type[Of]) -> list[Of]:
+    return [block for block in test.report().blocks if isinstance(block, kind)]
+
+
+def texts(test: busplan.CircleTestAnswer) -> list[str]:
+    return [sentence_text(said) for said in blocks(test, Sentence)]
+
+
+@pytest.mark.parametrize("ranked", [True, False])
 @pytest.mark.parametrize("changes", [SMALL, TIGHT, UNSTABLE])
 def test_every_figure_stands_in_its_place(
-    changes: dict[str, object], with_contributions: bool, values_of_the_document: Callable[[Report], int]
+    changes: dict[str, object], ranked: bool, values_of_the_document: Callable[[Report], int]
 ) -> None:
-    test = circle_of(*changes.items(), periods_us=(4000.0, 2000.0, 100.0), ranked=with_contributions)
-    assert values_of_the_document(circle_report(test._replace(with_contributions=with_contributions))) > 3 * 18
+    test = circle_of(*changes.items(), periods_us=(4000.0, 2000.0, 100.0), ranked=ranked)
+    assert values_of_the_document(test.report()) > 3 * 18
 
 
 @pytest.mark.parametrize("form", ["table", "markdown", "html"])
 def test_each_period_has_a_column(form: str, values_in: ValuesIn) -> None:
     test = circle_of(*SMALL.items(), periods_us=(4000.0, 2000.0, 100.0))
-    table = circle_table(test.results)
+    table = blocks(test, Table)[0]
     assert [column.heading for column in table.columns] == ["figure", "eq", "unit", "4 ms", "2 ms", "100 us"]
     rows = {str(row.cells[0]): row.cells for row in table.rows}
     for cells in rows.values():
@@ -78,19 +72,20 @@ def test_each_period_has_a_column(form: str, values_in: ValuesIn) -> None:
     # What was not simulated is a dash; only what fails is set apart.
     assert [figure_text(cell) for cell in rows["circular deviation G"] if isinstance(cell, ShownValue)][2] == "-"
     assert [value for value in values_in(table) if value.state == "fails"] == [rows["passed"][-1]]
-    assert "nan" not in render(circle_report(test._replace(with_contributions=True)), form).lower()  # type: ignore[arg-type]
+    assert "nan" not in render(test.report(), form).lower()  # type: ignore[arg-type]
 
 
 def test_the_table_has_every_figure_of_the_answer_that_a_reader_asks_for(values_in: ValuesIn) -> None:
-    shown = {value.key for value in values_in(circle_table(small().results))}
-    record = circle_document(small()._replace(with_contributions=False))["results"][0]
+    test = small(ranked=False)
+    shown = {value.key for value in values_in(blocks(test, Table)[0])}
+    record = test.to_dict()["results"][0]
     assert {key for key in record if key not in shown} == {
         *("steps", "timing_model", "bus_fits", "verdict", "required_us", "available_us", "servo_grade"),
         *("centre_offset_mm", "constant_speed_deg", "failures", "settled", "ideal_drive", "sources_matter"),
         *("update", "delay_us", "delay_x_us", "delay_y_us", "jitter_us"),
     }
     host = circle_of(*SMALL.items(), ("servo.loop", "host"))
-    assert {value.key for value in values_in(circle_table(host.results))} == shown | {"update", "delay_us"}
+    assert {value.key for value in values_in(blocks(host, Table)[0])} == shown | {"update", "delay_us"}
 
 
 # --- sentences --------------------------------------------------------------------------------------------------
@@ -102,7 +97,7 @@ def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None
     (result,) = test.results
     assert (result.passed, result.sources_matter, result.failures) == (None, False, ())
     assert test.passed is None
-    said = next(circle_sentences(test.profile, result))
+    said = blocks(test, Sentence)[0]
     assert sentence_text(said) == (
         "ethercat-servo-8 at 1 ms and 3000 mm/min: no error source of this profile matters; circular deviation G "
         "below 0.1 um, which says nothing of how round a machine is."
@@ -117,21 +112,17 @@ def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None
     assert test.to_dict()["results"][0]["passed"] is None
     assert test.to_dict()["results"][0]["sources_matter"] is False
     assert ">NO SOURCE MATTERS: 1 ms, " in test.svg()
-    compared = render(busplan.compare("ethercat-servo-8", circle=True).report(), "table")
-    assert "NO SOURCE MATTERS" in compared
     # It is no failure, and without a tolerance the largest error says the same.
     assert busplan.check("ethercat-servo-8").passed
     ideal = busplan.circle_test("dvrk")
-    assert "largest contour error below 0.1 um" in sentence_text(
-        next(circle_sentences(ideal.profile, ideal.results[0]))
-    )
+    assert "largest contour error below 0.1 um" in texts(ideal)[0]
     # A tolerance that is broken fails, however small the error.
     tight = busplan.load_profile("ethercat-servo-8", changes={"tolerance.circular_deviation_mm": 1e-10})
     assert busplan.circle_test(tight).passed is False
 
 
 def test_a_circle_that_holds_says_so() -> None:
-    said, margins = circle_sentences(MINE, small().results[0])
+    said, margins = blocks(small(ranked=False), Sentence)[:2]
     assert sentence_text(said) == "mine at 4 ms and 2500 mm/min: the circle holds every tolerance."
     assert said.state == "passes"
     assert sentence_text(margins) == (
@@ -141,105 +132,79 @@ def test_a_circle_that_holds_says_so() -> None:
 
 
 def test_a_margin_that_the_profile_asks_for_is_no_default() -> None:
-    asking = override(MINE, {"tolerance.min_phase_margin_deg": 40.0})
-    _, margins = circle_sentences(asking, small().results[0])
-    assert "a phase margin of 40 deg or more and a gain margin of 6 dB (default)" in sentence_text(margins)
+    asking = small(tolerance__min_phase_margin_deg=40.0)
+    assert "a phase margin of 40 deg or more and a gain margin of 6 dB (default)" in texts(asking)[1]
 
 
 @pytest.mark.parametrize(
-    ("g_mm", "measure"),
+    ("path", "measure", "key"),
     [
-        (0.0005, "circular deviation G 0.500 um; no tolerance set: tolerance.circular_deviation_mm"),
+        ("iso230-4", "circular deviation G", "circular_deviation_mm"),
         # A trapezoid has no G.
-        (None, "largest contour error 0.700 um; no tolerance set: tolerance.max_contour_error_mm"),
+        ("trapezoid", "largest contour error", "max_contour_error_mm"),
     ],
 )
-def test_a_circle_without_a_tolerance_leads_with_its_figure(g_mm: float | None, measure: str) -> None:
-    result = small().results[0]._replace(passed=None, circular_deviation_mm=g_mm, max_contour_error_mm=0.0007)
-    said, _ = circle_sentences(MINE, result)
-    assert sentence_text(said) == f"mine at 4 ms and 2500 mm/min: {measure}."
-    assert (said.state, verdict_words(result).text) == ("warns", "NOT JUDGED")
+def test_a_circle_without_a_tolerance_leads_with_its_figure(path: str, measure: str, key: str) -> None:
+    test = uncached(tolerance={}, circle__path=path)
+    (result,) = test.results
+    said = blocks(test, Sentence)[0]
+    um = f"{getattr(result, key) * 1e3:.3f}"
+    assert sentence_text(said) == (
+        f"mine at 4 ms and 2500 mm/min: {measure} {um} um; no tolerance set: tolerance.{key}."
+    )
+    assert said.state == "warns"
+    assert ">NOT JUDGED: 4 ms, " in test.svg()
 
 
 def test_a_circle_that_the_bus_does_not_carry_is_not_run() -> None:
-    (result,) = circle_of(*SMALL.items(), periods_us=(100.0,)).results
-    (said,) = circle_sentences(MINE, result)
+    test = circle_of(*SMALL.items(), periods_us=(100.0,))
+    said = blocks(test, Sentence)[0]
     assert sentence_text(said).startswith("mine at 100 us and 2500 mm/min: NOT RUN, the cycle does not fit the bus: ")
     assert said.state == "fails"
+    assert not [text for text in texts(test) if "servo values" in text]
 
 
 def test_a_circle_that_fails_says_by_how_much_and_what_to_attack(values_in: ValuesIn) -> None:
-    result = circle_of(*TIGHT.items()).results[0]
-    failed, attack = circle_sentences(MINE, result)
+    test = circle_of(*TIGHT.items())
+    (result,) = test.results
+    failed, attack = blocks(test, Sentence)[:2]
     text = ", and ".join(failure.text for failure in result.failures)
     assert sentence_text(failed) == f"mine at 4 ms and 2500 mm/min: FAILED, {text}."
     assert failed.state == "fails"
     assert {value.key for value in values_in(failed) if getattr(result, value.key, None) == value.value} == {
         *("period_us", "feed_mm_per_min", "mean_contour_error_mm", "max_contour_error_mm"),
     }
-    contributions = result.contributions or ()
-    best = min(range(len(contributions)), key=lambda number: contributions[number].mean_contour_error_mm)
-    source = contributions[best].source.replace("_", " ")
+    best = min(result.contributions or (), key=lambda one: one.mean_contour_error_mm)
+    source = best.source.replace("_", " ")
     assert sentence_text(attack).startswith(f"Attack {source} first: without it the mean contour error is ")
-    assert next(values_in(attack)).value == contributions[best].mean_contour_error_mm
+    assert next(values_in(attack)).value == best.mean_contour_error_mm
 
 
 def test_what_no_single_source_explains_is_said() -> None:
-    result = circle_of(*TIGHT.items()).results[0]._replace(contributions=())
-    _, said = circle_sentences(MINE, result)
-    assert sentence_text(said) == "No single error source of the profile explains the mean contour error."
+    test = circle_of(*TIGHT.items())
+    none = test._replace(results=(test.results[0]._replace(contributions=()),))
+    assert "No single error source of the profile explains the mean contour error." in texts(none)
+    assert "The profile has no error source that could be removed." in texts(none)
 
 
-@pytest.mark.parametrize(
-    "failure",
-    [
-        Failure("required_us", 205.917, 50.0),
-        Failure("stability", None, None),
-        Failure("circle_not_followed", 17.0, 360.0),
-        Failure("min_phase_margin_deg", 20.125, 30.0),
-        Failure("min_gain_margin_db", 2.0, 6.5),
-        Failure("mean_contour_error_mm", 0.00456, 0.003),
-        Failure("min_phase_margin_deg", 20.125, 30.0, is_default=True, more=" (and why)"),
-        Failure("not_settled", None, 60.0),
-        Failure("circular_deviation_mm", None, 0.03),
-        Failure("circular_deviation_mm", 0.0264, 0.0),
-        Failure("nodes", 70.0, 62.0, "70 nodes are too many"),
-    ],
-)
-def test_a_sentence_writes_a_failure_as_its_text_does(failure: Failure, values_in: ValuesIn) -> None:
-    result = small().results[0]._replace(passed=False, failures=(failure,))
-    first = next(circle_sentences(MINE, result))
-    assert sentence_text(first).endswith(f": FAILED, {failure.text}.")
-    numbers = [part for part in failure.parts() if isinstance(part, Stated)]
-    assert len([*values_in(first)]) == 2 + len(numbers)
-    # No number of the failure stands in the words between; a word to set may have digits.
-    assert not failure.said or numbers == []
-    words = [re.sub('"[^"]*"', "", part) for part in failure.parts() if isinstance(part, str)]
-    assert failure.said or not re.search("[0-9]", "".join(words))
-
-
-def test_how_the_servo_values_are_known_is_said_once_and_only_with_figures() -> None:
-    (mixed,) = servo_sentence(MINE, small().results[0])
+def test_how_the_servo_values_are_known_is_said_once() -> None:
+    both = circle_of(*SMALL.items(), periods_us=(100.0, 4000.0, 2000.0))
+    (mixed,) = (said for said in blocks(both, Sentence) if "servo values" in sentence_text(said))
     assert (sentence_text(mixed), mixed.state) == (
         "The servo values that the profile gives are 6 assumed, 4 calibrated, 2 published.",
         "warns",
     )
-    measured = override(MINE, {"servo": {"drive_lag_us": 7500.0, "grade": "measured"}})
-    (known,) = servo_sentence(measured, small().results[0]._replace(servo_grade="measured"))
-    assert (sentence_text(known), known.state) == ("The servo values that the profile gives are measured.", "neutral")
-    (ideal,) = servo_sentence(MINE, small().results[0]._replace(ideal_drive=True))
-    assert sentence_text(ideal) == "The profile has no [servo]: an ideal drive was simulated."
-    both = circle_of(*SMALL.items(), periods_us=(100.0, 4000.0, 2000.0))
-    assert len([text for text in texts(both) if "servo values" in text]) == 1
-    assert not [text for text in texts(circle_of(*SMALL.items(), periods_us=(100.0,))) if "servo values" in text]
+    measured = uncached(servo={"drive_lag_us": 7500.0, "grade": "measured"})
+    assert "The servo values that the profile gives are measured." in texts(measured)
+    assert "The profile has no [servo]: an ideal drive was simulated." in texts(busplan.circle_test("dvrk"))
 
 
 # --- sources ----------------------------------------------------------------------------------------------------
 
 
 def test_sources_are_ranked_with_bars_of_one_scale_beside_their_figures() -> None:
-    result = small().results[0]
-    table = contributions_table(result)
+    (result,) = small().results
+    _, table = blocks(small(), Table)
     bars = [cell for row in table.rows for cell in row.cells if isinstance(cell, Bar)]
     takes = [row.cells[2] for row in table.rows]
     assert [bar.value for bar in bars] == takes
@@ -250,34 +215,27 @@ def test_sources_are_ranked_with_bars_of_one_scale_beside_their_figures() -> Non
 
 
 def test_sources_that_take_nothing_have_no_bar() -> None:
-    result = small().results[0]
+    (result,) = small().results
     nothing = tuple(one._replace(removed_mm=0.0) for one in result.contributions or ())
-    report = circle_report(
-        small()._replace(results=(result._replace(contributions=nothing),))._replace(with_contributions=True)
-    )
-    assert "takes" in render(report, "html")
-    table = contributions_table(result._replace(contributions=nothing))
+    _, table = blocks(small()._replace(results=(result._replace(contributions=nothing),)), Table)
+    assert table.rows
     assert not [cell for row in table.rows for cell in row.cells if isinstance(cell, Bar)]
 
 
 def test_sources_stand_only_where_they_were_asked_for() -> None:
     test = circle_of(*TIGHT.items(), ranked=False)
     assert test.results[0].contributions
-    blocks = circle_report(test._replace(with_contributions=False)).blocks()
-    assert len([block for block in blocks if isinstance(block, Table)]) == 1
-    assert "contributions" not in circle_document(test._replace(with_contributions=False))["results"][0]
-    without = small()._replace(results=(small().results[0]._replace(contributions=()),))
-    assert "The profile has no error source that could be removed." in texts(without)
+    assert len(blocks(test, Table)) == 1
+    assert "contributions" not in test.to_dict()["results"][0]
 
 
 # --- drawing ----------------------------------------------------------------------------------------------------
 
 
-def chart_of(test: CircleTest) -> Chart:
-    (chart,) = (
-        block for block in circle_report(test._replace(with_contributions=False)).blocks() if isinstance(block, Chart)
-    )
-    return chart
+def legend_of(test: busplan.CircleTestAnswer) -> str:
+    (chart,) = blocks(test, Chart)
+    assert chart.legend is not None
+    return sentence_text(chart.legend)
 
 
 @pytest.mark.parametrize(
@@ -288,35 +246,23 @@ def chart_of(test: CircleTest) -> Chart:
     ],
 )
 def test_a_page_has_the_magnified_circle_and_how_to_read_it(tolerance_mm: float, words: str) -> None:
-    test = small(tolerance__max_contour_error_mm=tolerance_mm)
-    legend = chart_of(test).legend
-    assert legend is not None
-    assert re.match(r"Magnified \d+ times; [\d.]+ um from ring to ring, the nominal", sentence_text(legend))
-    assert "; the dot is the start of the turn, the arrow its direction; " in sentence_text(legend)
-    assert sentence_text(legend).endswith(words)
-    report = circle_report(test._replace(with_contributions=False))
-    page = render(report, "html")
-    assert page.count('<figure class="round">') == page.count('class="band first"') == 1
-    assert "from ring to ring" in page
-    text = render(report, "table")
-    assert "ring" not in text
+    test = small(ranked=False, tolerance__max_contour_error_mm=tolerance_mm)
+    legend = legend_of(test)
+    assert re.match(r"Magnified \d+ times; [\d.]+ um from ring to ring, the nominal", legend)
+    assert "; the dot is the start of the turn, the arrow its direction; " in legend
+    assert legend.endswith(words)
+    assert test.html.count('<figure class="round">') == test.html.count('class="band first"') == 1
+    assert "from ring to ring" in test.html
+    assert "ring" not in str(test)
 
 
 def test_without_a_tolerance_the_legend_says_so() -> None:
-    profile = load("paper-4ms").profile
-    bare = profile.model_copy(update={"tolerance": profile.tolerance.model_copy(update={"max_contour_error_mm": None})})
-    legend = chart_of(small()._replace(profile=bare)).legend
-    assert legend is not None
-    assert sentence_text(legend).endswith("; the profile has no tolerance of the largest contour error.")
+    assert legend_of(uncached(tolerance={})).endswith("; the profile has no tolerance of the largest contour error.")
 
 
 def test_what_was_not_simulated_or_did_not_go_round_has_no_drawing() -> None:
     for test in (circle_of(*SMALL.items(), periods_us=(100.0,)), circle_of(*UNSTABLE.items())):
-        assert not [
-            block
-            for block in circle_report(test._replace(with_contributions=True)).blocks()
-            if isinstance(block, Chart)
-        ]
+        assert blocks(test, Chart) == []
 
 
 # --- data -------------------------------------------------------------------------------------------------------
@@ -324,21 +270,20 @@ def test_what_was_not_simulated_or_did_not_go_round_has_no_drawing() -> None:
 
 def test_documents_hold_the_results_own_numbers() -> None:
     test = circle_of(*TIGHT.items(), periods_us=(4000.0, 100.0))
-    document = json.loads(to_json(circle_document(test._replace(with_contributions=True))))
-    for record, result in zip(document["results"], test.results, strict=True):
+    for record, result in zip(json.loads(test.to_json())["results"], test.results, strict=True):
         assert record["max_contour_error_mm"] == result.max_contour_error_mm
         assert record["failures"] == [failure.document() for failure in result.failures]
         assert (record["contributions"] is None) == (result.contributions is None)
-    flat = circle_records(test._replace(with_contributions=True))
-    assert flat[0]["centre_offset_x_mm"] == (test.results[0].centre_offset_mm or (None,))[0]
+    flat, _ = csv.DictReader(io.StringIO(render(test.report(), "csv")))
+    assert flat["centre_offset_x_mm"] == str((test.results[0].centre_offset_mm or (None,))[0] or "")
     removed = {one.source: one.removed_mm for one in test.results[0].contributions or ()}
-    assert {key: value for key, value in flat[0].items() if key.startswith("removed_")} == {
+    assert {key: float(value) for key, value in flat.items() if key.startswith("removed_")} == {
         f"removed_{source}_mm": value for source, value in sorted(removed.items())
     }
 
 
-def test_a_trace_has_the_columns_that_it_says() -> None:
+def test_a_trace_has_the_periods_that_were_simulated() -> None:
     test = circle_of(*SMALL.items(), periods_us=(100.0, 4000.0))
-    rows = list(trace_records(test, every=1000))
-    assert {tuple(row) for row in rows} == {TRACE_COLUMNS}
-    assert {row["period_us"] for row in rows} == {4000.0}
+    rows = list(csv.DictReader(io.StringIO("".join(test.trace_csv(every=1000)))))
+    assert {float(row["period_us"]) for row in rows} == {4000.0}
+    assert len(rows) == test.results[1].steps // 1000

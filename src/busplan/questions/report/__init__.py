@@ -50,6 +50,8 @@ class ReportedProfile:
     verdict: Verdict
     sections: tuple[Section, ...]
     """Its answers, that of `capacity` first."""
+    missing: tuple[str, ...]
+    """Why an answer is not among them that its reader expects."""
 
     @property
     def network(self) -> Network:
@@ -163,6 +165,7 @@ def _reported(
 
     bus = capacity(profile, sensitivity=profile.has_cycle)
     more = ("--sensitivity",) if profile.has_cycle else ()
+    missing: list[str] = []
 
     def sections() -> Iterator[Section]:
         yield Section("capacity", "Every figure of the cycle", command("capacity", *more), bus.report())
@@ -173,25 +176,35 @@ def _reported(
         if profile.has_cycle:
             try:
                 events = timeline(profile).report()
-            except BusplanError:
-                pass  # more nodes than can be laid out
+            except BusplanError as error:  # more nodes than can be laid out
+                missing.append(f"The cycle is not drawn: {error}.")
             else:
                 yield Section("timeline", "The cycle to scale", command("timeline"), events)
-        if _has_circle(profile, circle):
-            test = circle_test(profile, contributions=True, progress=progress).report()
-            yield Section("circle", "The circle", command("circle-test", "--contributions"), test)
+        if _asks_for_circle(profile, circle):
+            if refused := _circle_refused(profile):
+                missing.append(f"The circle test cannot be run: {refused}.")
+            else:
+                test = circle_test(profile, contributions=True, progress=progress).report()
+                yield Section("circle", "The circle", command("circle-test", "--contributions"), test)
         yield Section("explain", "What it rests on", command("explain", takes_period=False), explain(profile).report())
 
-    return ReportedProfile(argument, changes, bus.verdicts[0], tuple(sections()))
+    answers = tuple(sections())
+    return ReportedProfile(argument, changes, bus.verdicts[0], answers, tuple(missing))
 
 
 def _without_period(changes: KeyChanges) -> KeyChanges:
     return KeyChanges(tuple(change for change in changes.each if change.option != "--period"))
 
 
-def _has_circle(profile: Profile, circle: bool | None) -> bool:
-    """Whether a circle is on the page: one that can be run, asked for, or with measured servo values."""
-    if not profile.asks_for_circle or circle is False:
-        return False
-    is_measured = profile.servo.grades_given[0] == "measured"
-    return (circle is True or is_measured) and not refusals(network_of(profile))
+def _asks_for_circle(profile: Profile, circle: bool | None) -> bool:
+    """Whether a circle belongs on the page: asked for, or with measured servo values."""
+    if circle is None:
+        return profile.asks_for_circle and profile.servo.grades_given[0] == "measured"
+    return circle
+
+
+def _circle_refused(profile: Profile) -> str:
+    """Reasons that no circle can be run; empty if one can."""
+    if not profile.asks_for_circle:
+        return "the profile has no section for it"
+    return "; ".join(cause.message for cause in refusals(network_of(profile)))

@@ -67,6 +67,7 @@ def _document(profiles: "Sequence[ReportedProfile]") -> JsonDocument:
             {
                 "profile": each.network.profile.name,
                 "answers": {section.key: dict(section.report.document) for section in each.sections},
+                "missing": list(each.missing),
             }
             for each in profiles
         ],
@@ -88,6 +89,7 @@ def _chapter(reported: "ReportedProfile") -> Iterator[Block]:
     if description.strip():
         yield Sentence((" ".join(description.split()),))
     yield card(reported.verdict)
+    yield from (Sentence((words,), "warns") for words in reported.missing)
     trade_off = reported.section("map")
     if trade_off is not None:
         yield from (block for block in trade_off.report.blocks if isinstance(block, Chart))
