@@ -121,7 +121,7 @@ def test_a_circle_that_the_bus_is_not_shown_to_carry_is_simulated_and_fails(smal
     [
         ({"bus.nodes": 63, "bus.max_hops": 2, "cycle.period_us": 100_000}, "nodes"),
         ({"bus.nodes": 17, "cycle.period_us": 100_000}, "hops"),
-        ({"payload.write_bytes": 3000, "cycle.period_us": 100_000}, "payload_bytes"),
+        ({"payload.write_bytes": 3000, "cycle.period_us": 100_000}, "payload"),
     ],
 )
 def test_limits_of_the_standard_fail_by_name(small: busplan.Profile, changes: dict[str, object], name: str) -> None:
@@ -585,7 +585,7 @@ def test_a_failure_without_a_value_is_null_and_says_why() -> None:
     assert "null" in test.to_json()
     late = {one["name"]: one for one in result["failures"]}
     assert late["deadline"]["value"] is None
-    assert late["deadline"]["text"] == "sdo-request and 2 more messages have no worst-case response time"
+    assert late["deadline"]["text"] == "sdo-request and 2 more have no worst-case response time"
     assert late["required_us"]["value"] == 2950.0
 
 
