@@ -90,7 +90,7 @@ else:
 
     def __getattr__(name: str) -> object:
         if name not in __all__:
-            did_you_mean = import_module("busplan.nearest").did_you_mean
+            did_you_mean = import_module("busplan.english").did_you_mean
             words = filter(None, (f"module {__name__!r} has no attribute {name!r}", did_you_mean(name, __all__)))
             raise AttributeError("; ".join(words))
         # `circle_test` and `CircleTestAnswer` are in module `circle`, `map_` and `MapAnswer` in `map`.

@@ -36,9 +36,9 @@ from busplan.buses import kind_names
 from busplan.cli import run
 from busplan.cli.lazy import LazyCommands
 from busplan.errors import BusplanError
+from busplan.profile.document import decode, validate
 from busplan.profile.kinds import profile_schema
 from busplan.profile.starter import Machine, machine_text, shared_out
-from busplan.profile.toml import decode, validate
 from busplan.questions.fit.circle_refusal import path_steps
 from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile

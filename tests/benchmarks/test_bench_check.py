@@ -14,7 +14,7 @@ from time import perf_counter
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from busplan.profile.shipped import shipped_folder
+from busplan.profile.sources import shipped_folder
 
 FILES = 1000
 ROUNDS = 3

@@ -17,8 +17,8 @@ import pytest
 
 import busplan
 from busplan.buses.ieee1394.section import Ieee1394Profile
-from busplan.buses.ieee1394.table_1 import residual
-from busplan.profile.toml import override
+from busplan.buses.ieee1394.transactions import residual
+from busplan.profile.document import override
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Chunk, Grid

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from busplan.profile.shipped import load, locate
+from busplan.profile.sources import load, locate
 
 Run = Callable[..., Any]
 

@@ -518,8 +518,8 @@ def test_a_terminal_has_the_full_form_and_a_pipe_one_line_a_finding(
     monkeypatch.setenv("COLUMNS", "80")
     plain = busplan("check", "p/fails.toml", cwd=folder)
     assert plain.stdout == busplan("check", "p/fails.toml", "--format", "concise", cwd=folder).stdout
-    monkeypatch.setattr("busplan.cli.check.is_terminal", lambda: True)
-    monkeypatch.setattr("busplan.cli.check.is_styled", lambda: True)
+    monkeypatch.setattr("busplan.cli.gate.is_terminal", lambda: True)
+    monkeypatch.setattr("busplan.cli.gate.is_styled", lambda: True)
     shown = busplan("check", "p/fails.toml", cwd=folder)
     assert shown.returncode == 1
     lines = re.sub(r"\x1b\[[0-9;]*m", "", shown.stdout).splitlines()

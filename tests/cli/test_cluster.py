@@ -125,7 +125,7 @@ def test_a_worker_that_is_killed_loses_nothing(
 
 OTHERS = """
 import sys
-import busplan.cli.cluster as cluster
+import busplan.cli.workers as cluster
 from busplan.__main__ import main
 
 def run(address):

@@ -23,8 +23,18 @@ from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut
 from busplan.buses.cycle import Run as EventRun
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.limits import (
+    Bound,
+    Cost,
+    EventKind,
+    Limit,
+    PayloadRange,
+    Perturbation,
+    Setting,
+    Starter,
+    TimingModel,
+)
 from busplan.buses.network import Network
-from busplan.buses.parts import Bound, Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, rounded_up
 from busplan.sections.base import Section

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from busplan import __version__
-from busplan.profile.shipped import shipped_names
+from busplan.profile.sources import shipped_names
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from busplan.cli.lazy import COMMANDS
-from busplan.profile.shipped import locate
+from busplan.profile.sources import locate
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]

@@ -13,15 +13,14 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import busplan
-from busplan.forms.characters import drawing_lines
 from busplan.forms.charts import (
-    Cell,
+    ChartCell,
+    ChartGrid,
     Curve,
     Curves,
     Dial,
     Drawing,
     Entry,
-    Grid,
     Guide,
     Lane,
     Lanes,
@@ -35,6 +34,7 @@ from busplan.forms.charts import (
     numbers,
 )
 from busplan.forms.svg import content, inline
+from busplan.forms.terminal import drawing_lines
 
 SVG = "{http://www.w3.org/2000/svg}"
 HOSTILE = '<b>$x_1$ & "q" ]]> </svg>機械'
@@ -63,14 +63,14 @@ EACH = pytest.mark.parametrize(
 )
 
 
-def grid(*rows: str, **more: Any) -> Grid:
-    look = {"#": Cell("fits", "#", tone="passes"), ".": Cell("short", "."), " ": None}
+def grid(*rows: str, **more: Any) -> ChartGrid:
+    look = {"#": ChartCell("fits", "#", tone="passes"), ".": ChartCell("short", "."), " ": None}
     cells = tuple(tuple(look[mark] for mark in row) for row in rows)
     across, up = choices("across", map(str, range(len(rows[0])))), choices("up", map(str, range(len(rows))))
-    return Grid(across, up, cells, (FITS, LATE))._replace(**more)
+    return ChartGrid(across, up, cells, (FITS, LATE))._replace(**more)
 
 
-def svg_of(plot: Grid | Curves | Lanes | Dial) -> Element:
+def svg_of(plot: ChartGrid | Curves | Lanes | Dial) -> Element:
     return fromstring(inline(Drawing("title", (Panel(plot),))))
 
 

@@ -10,6 +10,7 @@ from typing import Any, get_args
 import pytest
 from markdown_it import MarkdownIt
 
+from busplan.english import to_json
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form, render
 from busplan.forms.blocks import (
@@ -37,19 +38,18 @@ from busplan.forms.blocks import (
     first_drawing,
     sentence,
 )
-from busplan.forms.charts import Cell, Drawing, Entry, Grid, Panel, choices
+from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Entry, Panel, choices
 from busplan.forms.csv_rows import csv_cell, to_csv
 from busplan.forms.lines import Mark
 from busplan.forms.numbers import decimals_of, period, with_unit
 from busplan.forms.terminal import block_lines
-from busplan.printable import to_json
 
 MARGIN = ShownValue(3.96912, "margin_us", "us", 3)
 FAILED = ShownValue(False, "fits", state="fails")
 HOSTILE = "<b>*x*</b> | `y` [z](javascript:alert(1)) \x1b[2J"
 
 
-GRID = Grid(choices("x", "1"), choices("y", "1"), ((Cell("fits", "#"),),), (Entry("fits", "fits", "#"),))
+GRID = ChartGrid(choices("x", "1"), choices("y", "1"), ((ChartCell("fits", "#"),),), (Entry("fits", "fits", "#"),))
 PICTURE = Drawing("A map", (Panel(GRID),), has_characters=True)
 
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import busplan
-from busplan.forms.picture import INKS
-from busplan.forms.raster import png
+from busplan.forms.svg import INKS, png
 
 SVG = "{http://www.w3.org/2000/svg}"
 Pixels = NDArray[np.uint8]

@@ -10,7 +10,7 @@ from busplan.errors import BusplanError
 from busplan.gate.baseline import MODELS, Baseline, Record, load_baseline, read_baseline, worse, write_baseline
 from busplan.gate.gate import FileResult, check_document
 from busplan.profile.document import Document
-from busplan.profile.shipped import load
+from busplan.profile.sources import load
 
 Changed = Callable[..., str]
 Check = Callable[..., FileResult]

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from busplan.profile.collect import Collection, collect
-from busplan.profile.shipped import shipped_folder, shipped_names
+from busplan.profile.sources import Collection, collect, shipped_folder, shipped_names
 
 CLAIM = "schema_version = 1\n"
 

@@ -15,12 +15,10 @@ import pytest
 
 from busplan.errors import PlacedError
 from busplan.gate.baseline import MODELS, read_baseline
-from busplan.gate.circle import MOST_STEPS
-from busplan.gate.finding import finding_line
+from busplan.gate.finding import MOST_STEPS, Recording, finding_line
 from busplan.gate.gate import FileResult, check_document, unreadable
-from busplan.gate.recording import Recording
 from busplan.gate.rules import all_rules
-from busplan.profile.toml import decode
+from busplan.profile.document import decode
 
 EXAMPLES = Path(__file__).parent / "examples"
 MESSAGES = Path(__file__).parent / "messages.txt"

@@ -6,8 +6,8 @@ import pytest
 
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.gate.gate import check_document
-from busplan.profile.shipped import locate
-from busplan.profile.toml import decode
+from busplan.profile.document import decode
+from busplan.profile.sources import locate
 
 PLAIN = re.sub(r" *#.*", "", locate("paper-4ms")[0].read_text(encoding="utf-8")).split("[servo]")[0]
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import busplan
-from busplan.profile.shipped import locate
+from busplan.profile.sources import locate
 
 Run = Callable[..., Any]
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from busplan.buses import kind_names
 from busplan.errors import BusplanError
 from busplan.profile.changes import KeyChange, KeyChanges, parse_set
-from busplan.profile.shipped import load
-from busplan.sections.execution import LinearExecution, TableExecution
+from busplan.profile.sources import load
+from busplan.sections.cycle import LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
 KINDS = " or ".join(f'"{one}"' for one in kind_names())

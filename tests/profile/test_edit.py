@@ -13,12 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
-from busplan.profile.document import Document
+from busplan.profile.document import Document, validate
 from busplan.profile.edit import edited_file
-from busplan.profile.keys import dotted_keys
-from busplan.profile.shipped import load, shipped_names
+from busplan.profile.kinds import dotted_keys
+from busplan.profile.sources import load, shipped_names
 from busplan.profile.starter import starter_text
-from busplan.profile.toml import validate
 
 LINEAR = {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}
 TABLE = {"kind": "table", "payload_bytes": [4, 64, 1024], "time_us": [30, 50.5, 400.0]}

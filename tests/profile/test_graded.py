@@ -3,11 +3,10 @@
 import pytest
 
 import busplan
-from busplan.profile.document import Document
-from busplan.profile.keys import dotted_keys
-from busplan.profile.shipped import load
-from busplan.profile.toml import comment_grade, override, validate
-from busplan.profile.write import profile_text
+from busplan.profile.document import Document, comment_grade, override, validate
+from busplan.profile.edit import profile_text
+from busplan.profile.kinds import dotted_keys
+from busplan.profile.sources import load
 from busplan.questions.fit.inputs import given
 
 TEXT = """\

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from busplan.buses.published import published
 from busplan.errors import BusplanError
 from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, parse_measurements
-from busplan.profile.shipped import locate_measurements
+from busplan.profile.sources import locate_measurements
 
 EXPECTED = "expected payload_bytes,latency_us and, where known, transaction"
 

@@ -25,8 +25,7 @@ from busplan.buses.ieee1394.section import (
 )
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, link_of
 from busplan.questions.fit.network import network_of
-from busplan.sections.cycle import Limits
-from busplan.sections.execution import LinearExecution, TableExecution
+from busplan.sections.cycle import Limits, LinearExecution, TableExecution
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 
 TABLE = {"kind": "table", "payload_bytes": [4, 16, 64], "time_us": [40.0, 34.0, 58.0]}

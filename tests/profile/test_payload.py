@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.errors import PlacedError
-from busplan.profile.toml import decode, validate
+from busplan.profile.document import decode, validate
 from busplan.questions.fit.network import network_of
 
 TEXT = """schema_version = 1

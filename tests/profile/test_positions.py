@@ -12,8 +12,7 @@ import tomli_w
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from busplan.profile.positions import KeyPath, Place, comments, places
-from busplan.profile.toml import decode
+from busplan.profile.document import KeyPath, Place, comments, decode, places
 
 # --- what holds of every document -------------------------------------------------------------------------
 

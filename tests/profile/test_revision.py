@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from busplan.errors import BusplanError
-from busplan.profile import revision
-from busplan.profile.revision import load_revision
+from busplan.profile import edit as revision
+from busplan.profile.edit import load_revision
 
 Git = Callable[..., bytes]
 

@@ -11,11 +11,11 @@ import pytest
 import busplan
 from busplan.buses.ieee1394.transactions import gap_count_of
 from busplan.errors import BusplanError
-from busplan.profile.shipped import load, locate, locate_measurements, shipped_folder, shipped_names
+from busplan.profile.document import decode, override, validate
+from busplan.profile.sources import load, locate, locate_measurements, shipped_folder, shipped_names
 from busplan.profile.starter import starter_text
-from busplan.profile.toml import decode, override, validate
 from busplan.questions.fit.network import network_of
-from busplan.sections.execution import TableExecution
+from busplan.sections.cycle import TableExecution
 
 NAMES = ["paper-1ms", "paper-4ms", "paper-dma", "paper-optimal-gap", "paper-two-node"]
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from busplan.buses import kind_names
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
-from busplan.profile.shipped import shipped_folder
-from busplan.profile.toml import MAX_FILE_BYTES, decode, override, read_bytes, validate
-from busplan.sections.execution import TableExecution
+from busplan.profile.document import MAX_FILE_BYTES, decode, override, read_bytes, validate
+from busplan.profile.sources import shipped_folder
+from busplan.sections.cycle import TableExecution
 from busplan.sections.profile import Profile
 
 TEXT: Final = """\

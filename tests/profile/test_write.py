@@ -2,9 +2,9 @@
 
 import tomllib
 
-from busplan.profile.shipped import load, shipped_names
-from busplan.profile.toml import decode, override, validate
-from busplan.profile.write import profile_text
+from busplan.profile.document import decode, override, validate
+from busplan.profile.edit import profile_text
+from busplan.profile.sources import load, shipped_names
 from busplan.sections.profile import Profile
 
 

@@ -13,7 +13,7 @@ import pytest
 import busplan
 from busplan.gate.baseline import MODELS, Baseline, Record, write_baseline
 from busplan.profile.changes import NO_CHANGES, KeyChanges, parse_set
-from busplan.profile.shipped import load, shipped_folder
+from busplan.profile.sources import load, shipped_folder
 
 TEXT = (shipped_folder() / "paper-4ms.toml").read_text(encoding="utf-8")
 

@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 
 import busplan
 from busplan.gate.report import Located
-from busplan.questions.compare.kinds import MachineOnKind, NotOnKind
+from busplan.questions.compare import MachineOnKind, NotOnKind
 from busplan.questions.diff import KeyDifference
 from busplan.questions.explain.derivation import Step
 from busplan.questions.fit.figures import CapacityFigures
-from busplan.questions.map.trade_off import Cell
+from busplan.questions.map import Cell
 from busplan.questions.plan import Option
 
 

@@ -20,10 +20,10 @@ from busplan.cli import app
 from busplan.cli.lazy import COMMANDS
 from busplan.forms.markdown import code, table
 from busplan.manual import FOLDER, topics
+from busplan.profile.document import decode, validate
 from busplan.profile.kinds import models_of
-from busplan.profile.shipped import load, shipped_names
-from busplan.profile.toml import decode, validate
-from busplan.questions.circle.figures import CIRCLE_BY_KEY
+from busplan.profile.sources import load, shipped_names
+from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.explain.derivation import figures_of
 from busplan.questions.explain.report import constant_rows, equation_rows
 from busplan.sections.machine import AxisOverride

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Final
 
+from busplan.english import did_you_mean
 from busplan.errors import BusplanError
-from busplan.nearest import did_you_mean
 
 if TYPE_CHECKING:
     from busplan.buses.bus import Bus
@@ -18,8 +18,8 @@ _MODULES: Final[dict[str, str]] = {
     "ieee1394": "busplan.buses.ieee1394.kind",
     "can": "busplan.buses.can.kind",
     "ethercat": "busplan.buses.ethercat.kind",
-    "sercos3": "busplan.buses.sercos3.kind",
-    "sercos2": "busplan.buses.sercos2.kind",
+    "sercos3": "busplan.buses.sercos.sercos3_kind",
+    "sercos2": "busplan.buses.sercos.sercos2_kind",
 }
 _LOADED: Final[dict[str, "Bus"]] = {}
 

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import BusFigures
-from busplan.buses.limits import ANY_PERIOD, Periods
-from busplan.buses.network import Network
-from busplan.buses.parts import (
+from busplan.buses.limits import (
+    ANY_PERIOD,
     IDLE,
     EventKind,
     Key,
@@ -22,6 +21,7 @@ from busplan.buses.parts import (
     Limit,
     MeasuredLatencies,
     PayloadRange,
+    Periods,
     Perturbation,
     Safety,
     Setting,
@@ -29,8 +29,8 @@ from busplan.buses.parts import (
     TimingModel,
     Value,
 )
-from busplan.buses.recorded import Recorded
-from busplan.buses.rule import Rule
+from busplan.buses.network import Network
+from busplan.buses.rule import Recorded, Rule
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.progress import Progress
@@ -83,9 +83,9 @@ class Bus(ABC):
     """Data files, in busplan/data, with figures of it that others have published or measured."""
 
     def profile_model(self) -> "type[Profile]":
-        """The model of its profiles: that of module `section` beside the kind's own, which loads pydantic."""
-        room = type(self).__module__.rpartition(".")[0]
-        model: type[Profile] = import_module(f"{room}.section").PROFILE
+        """The model of its profiles: that of the module `section` beside its `kind`, which loads pydantic."""
+        module = type(self).__module__.removesuffix("kind")
+        model: type[Profile] = import_module(f"{module}section").PROFILE
         return model
 
     @abstractmethod

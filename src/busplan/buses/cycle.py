@@ -11,8 +11,7 @@ from itertools import chain
 from typing import ClassVar, Final, Literal, NamedTuple, TypeAlias
 
 from busplan.buses.figure import REQUIRED, Figure, term_name
-from busplan.buses.network import Group, Network
-from busplan.buses.rates import Rate
+from busplan.buses.network import Group, Network, Rate
 from busplan.elementwise import Number, is_off, plain, total
 
 Rounds: TypeAlias = Literal["all", "first", "but first"]

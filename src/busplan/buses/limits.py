@@ -1,15 +1,299 @@
-"""Limits that several kinds of bus have: a period that the bus allows, and nodes that finish within the period."""
+"""Parts of a kind of bus: timing models, limits, settings of a plan, and the start of a new profile."""
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from enum import IntEnum
 from functools import reduce
 from math import inf
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
+from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
-from busplan.buses.parts import COVERAGE, Bound, Limit, share_of_period
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, told_apart
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry, plain
+from busplan.sourced import Grade, Sourced
+
+Value = int | float | str
+"""A value of a profile's key."""
+
+
+class TimingModel(NamedTuple):
+    """One way to count the cycle of a kind of bus."""
+
+    name: str
+    meaning: str
+    error: str = "how far the bus is from this timing model is not known"
+    """Its error in words, where no bias of it is known."""
+
+
+class Safety(NamedTuple):
+    """A setting of a bus that is safe or not, whether or not the cycle fits."""
+
+    setting: str = "setting"
+    """Name of the setting in sentences."""
+    figure: Figure | None = None
+    """The figure that says whether every safety limit holds."""
+    after_reset: Mapping[str, Value] = {}
+    """Keys as they are after a bus reset, until somebody sets them again."""
+
+
+KeyRole = Literal["cable", "clock", "host", "pipeline"]
+"""Part of a machine that a key of any kind stands for: the length of a cable [m], whether the nodes have a common
+clock, the host's own time in the cycle, whole periods that the host adds to a loop."""
+
+
+class Key(NamedTuple):
+    """Facts about a key of a profile that its schema does not have."""
+
+    symbol: str = ""
+    """Symbol in formulas, where it is not its name."""
+    default: Sourced | None = None
+    """Its default, where that is a figure with a source."""
+    grade: Grade | None = None
+    """Best grade of its value, where that is less than given."""
+    meaning: str = ""
+    """Meaning of a change on the machine, where the key does not say it."""
+    short: str = ""
+    """Short form in a table of plans: a format of the value."""
+    chooses: bool = False
+    """Whether its word selects a formula, so that a derivation has it among its inputs."""
+    role: KeyRole | None = None
+    """Part of the machine that it stands for, where other kinds have a key for it, too."""
+
+
+class EventKind(NamedTuple):
+    """Name and colour of a kind of event, or of a stretch of several."""
+
+    key: str
+    label: str
+    reference: str
+    """Number of the equation that its time comes from, or where else it comes from."""
+    mark: str
+    """Its character in a terminal."""
+    ink: Ink
+
+
+IDLE: Final = EventKind("idle", "idle", MARGIN.reference, "~", "idle")
+"""The rest of the slice."""
+
+
+COVERAGE: Final = 2
+"""Expanded by it, a standard uncertainty covers at least 95 %, on one side (JCGM 100, 6.2)."""
+KEPT, NOT_SHOWN_KEPT, BROKEN = range(3)
+"""Verdicts on a limit, the better first."""
+
+
+class Bound(NamedTuple):
+    """A value that must not exceed another one. Value and doubt must not decrease as nodes are added."""
+
+    value: Callable[[Network], Number]
+    most: Callable[[Network], Number]
+    doubt: Callable[[Network], Number] | None = None
+    """Standard uncertainty of the value, less that of the most; without it both are exact."""
+    perhaps: Callable[[Network], Number] | None = None
+    """Part of the value that may not be there: it counts where a limit must be shown to be kept, and breaks none."""
+
+    def uncertainty(self, network: Network) -> Number:
+        """Expanded uncertainty U of the value, two standard uncertainties; 0 where it is exact."""
+        return 0.0 if self.doubt is None else COVERAGE * self.doubt(network)
+
+    def least_value(self, network: Network) -> Number:
+        """Lower bound of the value: less U, and without what may not count."""
+        least = self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
+        return least if self.perhaps is None else least - self.perhaps(network)
+
+    @property
+    def nominal(self) -> "Bound":
+        """The bound of the value as it is, its uncertainty left out."""
+        return self._replace(doubt=None, perhaps=None)
+
+    @property
+    def shown(self) -> "Bound":
+        """The bound that a network keeps where it is shown to keep this one: of value + U."""
+        if self.doubt is None:
+            return self
+        return Bound(lambda network: self.value(network) + self.uncertainty(network), self.most)
+
+    def is_broken(self, network: Network) -> Number:
+        """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
+        return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
+
+    def verdict_code(self, network: Network) -> Number:
+        """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
+        surely = choose(self.is_broken(network), BROKEN, KEPT)
+        if self.doubt is None:
+            return surely
+        return larger(surely, choose(self.shown.is_broken(network), NOT_SHOWN_KEPT, KEPT))
+
+
+class Limit(NamedTuple):
+    """A bound of the bus that a network must keep, with what is said where it does not."""
+
+    key: str
+    over: str | Callable[[Network], str]
+    """Sentence on a limit that is broken or not shown to be kept: a format of `value`, its `uncertainty`, `most` and
+    the profile's `bus`; or what writes it."""
+    bound: Bound
+    period: Callable[[Bound, Network], Number] | None = None
+    """Shortest period that keeps a bound, by network [us]; None where no longer period does."""
+    way_out: str = ""
+    """Advice that makes room where this limit keeps nodes out."""
+    role: Literal["cycle", "safety", "period"] = "cycle"
+    """safety: a cycle fits without it, but nothing is advised that breaks it. period: the period alone breaks it, and a
+    plan takes no period that does."""
+    has_rule: bool = False
+    """A rule of the kind reports the broken limit; otherwise the rule of the verdict does."""
+    is_slow: bool = False
+    """Its value and its period take long to find, and are of plain numbers: they are asked last."""
+
+    @property
+    def nominal(self) -> "Limit":
+        """The limit of the value as it is, its uncertainty left out."""
+        return self._replace(bound=self.bound.nominal)
+
+    @property
+    def shown(self) -> "Limit":
+        """The limit that a network keeps where it is shown to keep this one."""
+        return self._replace(bound=self.bound.shown)
+
+    def is_broken(self, network: Network) -> Number:
+        """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
+        return self.bound.is_broken(network)
+
+    def kept_from_us(self, network: Network) -> float:
+        """Shortest period that is shown to keep it, of plain numbers; infinite where no longer one does [us]."""
+        return inf if self.period is None else plain(self.period(self.bound.shown, network))
+
+    def words(self, network: Network) -> str:
+        """Say by how much a network breaks it."""
+        if not isinstance(self.over, str):
+            return self.over(network)
+        value, most = self.bound.value(network), self.bound.most(network)
+        uncertainty = self.bound.uncertainty(network)
+        return self.over.format(value=value, uncertainty=uncertainty, most=most, bus=network.profile.bus)
+
+
+def share_of_period(
+    value: Callable[[Network], Number],
+    *,
+    share: Callable[[Network], Number],
+    doubt: Callable[[Network], Number] | None = None,
+    perhaps: Callable[[Network], Number] | None = None,
+) -> tuple[Bound, Callable[[Bound, Network], Number]]:
+    """The bound of a time that must be over within a share of the period, and the shortest period that keeps it.
+
+    Parameters
+    ----------
+    value
+        The time, which rests on no period [us].
+    share
+        The share [1].
+    doubt, perhaps
+        As `Bound` has them.
+    """
+    bound = Bound(value, lambda network: share(network) * network.period_us, doubt, perhaps)
+    return bound, lambda of, network: of.least_value(network) / share(network)
+
+
+class Starter(NamedTuple):
+    """Parts of a new profile that the kind decides."""
+
+    bus: str
+    """Section [bus], as TOML without its nodes and its host."""
+    hosts: Mapping[str, str] = {}
+    """Hosts to choose from by name, each with its lines of [bus]; none where the host plays no part."""
+    host: str = ""
+    """Host of a new profile, unless another is asked for."""
+    period: str = "1ms"
+    """Communication period, unless another is asked for."""
+    slice_ratio: str = "1            # the whole period is for communication"
+    """Value of cycle.slice_ratio, with a comment."""
+    measure: str = "measure it on a node"
+    """Advice on finding execution times, a format of `file`, the profile, and `group`, an option of `calibrate`."""
+    base: str = "what a node does in each cycle"
+    """Meaning of execution.base_us."""
+    more: str = ""
+    """Commented lines at its end."""
+
+    def section(self, host: str | None = None) -> str:
+        """Section [bus] with the lines of a host, by default of `host`."""
+        return "\n".join(filter(None, (self.bus, self.hosts.get(host or self.host))))
+
+
+class Cost(IntEnum):
+    """Cost of a change of a network, the cheapest first: the order of plans, of advice and of cures."""
+
+    REGISTER = 1
+    """A number in the nodes, such as a gap count."""
+    HOST_TIME = 2
+    """The slice ratio: the host computes in the rest of the period."""
+    RESPONSES = 3
+    """The way nodes answer: their firmware."""
+    SCHEDULE = 4
+    """The way the host asks them: the firmware of all."""
+    PAYLOAD = 5
+    """Data of a cycle."""
+    PERIOD = 6
+    """A requirement of the machine."""
+    NODES = 7
+    """Nodes that go to a second bus."""
+
+
+class Setting(NamedTuple):
+    """A setting of the bus that a plan may change without new parts."""
+
+    name: str
+    """Name in options: gap_count."""
+    label: str
+    """Name in a sentence: gap count."""
+    cost: Cost
+    keys: tuple[str, ...]
+    """Dotted keys that it turns."""
+    values: tuple[Mapping[str, Value], ...]
+    """Values that this network could have and has not yet, safe and the smallest change first: new values by key."""
+    reason: str = ""
+    """Why there is none."""
+
+
+class Perturbation(NamedTuple):
+    """A small change of a profile, made to see what it does to the margin."""
+
+    label: str
+    changes: Mapping[str, Value]
+    """New value by dotted key."""
+    why_not: str = ""
+    """Why it cannot be made here; empty where it can."""
+    if_nothing: str = ""
+    """Why the margin stays as it is, where it does."""
+
+
+class PayloadRange(NamedTuple):
+    """Payloads that a plan may choose from: the largest, and the step between them."""
+
+    step_bytes: int
+    most_bytes: int
+    carrier: str = "a packet"
+    """Carrier that holds no more."""
+
+
+class PacketTime(NamedTuple):
+    """What is not the execution in a measured latency [us]."""
+
+    us: float
+    """Time of the packets."""
+    shortest_us: float = 0.0
+    """The bus waits so long whatever the node does: a shorter execution cannot be told from a latency."""
+
+
+class MeasuredLatencies(NamedTuple):
+    """Calibration of execution times from latencies that were measured on a kind of bus."""
+
+    packets: Callable[[Network, str, str, str, int], PacketTime]
+    """Time of the packets of a transaction, by network, name of the group, timing model, "read" or "write", and
+    payload [bytes]; a BusplanError where its latency could not be measured."""
+    fit_keys: Callable[[Network, str], dict[str, Value]]
+    """Keys of [node.execution] that say what an execution time was fitted against, by network and by timing model whose
+    packets were taken off."""
 
 
 class Periods(NamedTuple):

@@ -1,13 +1,121 @@
 """Inputs of a cycle: groups of nodes, the period, and the kind's own keys."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
+from math import lcm
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from busplan.elementwise import Number, is_everywhere, larger, total
-from busplan.sections.alike_nodes import AlikeNodes
+from busplan.sections.machine import AlikeNodes
+from busplan.sourced import SYMBOLS, published
 
 if TYPE_CHECKING:
     from busplan.buses.bus import Bus
+
+
+SYMBOLS.update(
+    {
+        "period_us": "T_s",
+        "slice_ratio": "alpha",
+        "nodes": "N",
+        "available_us": "alpha T_s",
+        "required_us": "T_need",
+        "nonperiodic_us": "T_npd",
+    }
+)
+
+
+@published(1, symbol="T_cs", section="II")
+def time_slice_us(period_us: Number, *, slice_ratio: Number, nodes: Number) -> Number:
+    """Communication time slice that the cycle gives each node.
+
+    Parameters
+    ----------
+    period_us
+        Communication period T_s [us]; float or array.
+    slice_ratio
+        Share alpha of the period that belongs to communication, 0..1 [1]; float or array.
+    nodes
+        Number of distributed nodes N, host not counted [1]; float or array.
+
+    Returns
+    -------
+    float
+        T_cs = alpha T_s / N [us]; the broadcast shape of the arguments.
+
+    Raises
+    ------
+    ZeroDivisionError
+        `nodes` is zero.
+
+    Examples
+    --------
+    >>> time_slice_us(4000.0, slice_ratio=0.5, nodes=2)
+    1000.0
+    """
+    return slice_ratio * period_us / nodes
+
+
+@published(2, symbol="T_cs", section="III-C")
+def required_time_slice_us(required_us: Number, *, nodes: Number) -> Number:
+    """Communication time slice that each node needs.
+
+    Parameters
+    ----------
+    required_us
+        What the whole cycle needs, the sum of its terms [us]; float or array. The paper has four: all reads T_r and all
+        writes T_w with their gaps, the time for non-periodic data T_npd, and the synchronous packet CTS.
+    nodes
+        Number of distributed nodes N [1]; float or array.
+
+    Returns
+    -------
+    float
+        T_cs = T_need / N [us]; the broadcast shape of the arguments.
+
+    Raises
+    ------
+    ZeroDivisionError
+        `nodes` is zero.
+
+    Examples
+    --------
+    >>> required_time_slice_us(300.0, nodes=2)
+    150.0
+    """
+    return required_us / nodes
+
+
+class Rate(NamedTuple):
+    """Of a group whose data go in every n-th cycle; of plain numbers."""
+
+    every: int
+    """n [1]."""
+    first: int = 1
+    """First of its cycles, from 1 to n."""
+
+    def is_due(self, number: int) -> bool:
+        """Whether its data go in a cycle, from 1."""
+        return (number - self.first) % self.every == 0
+
+
+def common_multiple(rates: Iterable[Rate]) -> int:
+    """Cycles until all groups meet again, however many [1]."""
+    return lcm(*(rate.every for rate in rates))
+
+
+def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int, ...]]:
+    """Cycles of the common multiple by which groups are due in them, in the order of their first.
+
+    Examples
+    --------
+    >>> numbers_by_due([Rate(1), Rate(3, first=2)])
+    {(True, False): (1, 3), (True, True): (2,)}
+    """
+    numbers: dict[tuple[bool, ...], list[int]] = {}
+    for number in range(1, common_multiple(rates) + 1):
+        numbers.setdefault(tuple(rate.is_due(number) for rate in rates), []).append(number)
+    return {due: tuple(each) for due, each in numbers.items()}
 
 
 class Group(NamedTuple):

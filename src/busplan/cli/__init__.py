@@ -8,10 +8,8 @@ from typing import Annotated
 import typer
 
 from busplan import __version__
-from busplan.cli.interrupt import signals_end_the_run
 from busplan.cli.lazy import SETTINGS, LazyGroup
-from busplan.cli.output import CANNOT, PAGER, PLAN_FAILS, PlanFailsError, say
-from busplan.cli.streams import mend_streams
+from busplan.cli.output import CANNOT, PAGER, PLAN_FAILS, PlanFailsError, mend_streams, say, signals_end_the_run
 from busplan.errors import BusplanError
 
 app = typer.Typer(

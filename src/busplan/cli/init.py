@@ -132,9 +132,8 @@ def init_command(
 
 def _with_settings(text: str, *, name: str) -> str:
     """The same profile with a setting of the bus that its machine needs."""
-    from busplan.profile.edit import edited_file
-    from busplan.profile.toml import decode, validate
-    from busplan.profile.write import value_text
+    from busplan.profile.document import decode, validate
+    from busplan.profile.edit import edited_file, value_text
     from busplan.questions.plan import needed_settings
 
     needed = needed_settings(validate(decode(text.encode(), name=name)))
@@ -266,7 +265,7 @@ def _asked(words: str, default: _Answer) -> _Answer:
 def _card(text: str) -> list[str]:
     """The card of a new profile, in lines as wide as the terminal."""
     from busplan.forms.terminal import block_lines
-    from busplan.profile.toml import decode, validate
+    from busplan.profile.document import decode, validate
     from busplan.questions.capacity import capacity
 
     card, *_ = capacity(validate(decode(text.encode(), name="profile"))).report().blocks

@@ -113,8 +113,12 @@ GROUPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     }
 )
 """In the order of the help."""
-_MODULES: Final = {"circle-test": "circle", "import": "import_"}
-"""Where a command is whose name no module has: `circle_test` would look like a test, `import` is a keyword."""
+_MODULES: Final = {
+    **{name: title.casefold() for title, names in GROUPS.items() for name in names},
+    "init": "init",
+    "sweep": "sweep",
+}
+"""Module of each command: one for each group, and two commands with their own."""
 COMMANDS: Final = tuple(name for names in GROUPS.values() for name in names)
 
 
@@ -129,7 +133,7 @@ class LazyCommands(Mapping[str, Any]):
             raise KeyError(name)
         if name not in self._made:
             stem = name.replace("-", "_")
-            module = import_module(f"busplan.cli.{_MODULES.get(name, stem)}")
+            module = import_module(f"busplan.cli.{_MODULES[name]}")
             single = typer.Typer(
                 add_completion=False,
                 rich_markup_mode=None,
@@ -161,8 +165,8 @@ class LazyGroup(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the command of a command line."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
+            from busplan.english import did_you_mean
             from busplan.errors import BusplanError
-            from busplan.nearest import did_you_mean
 
             near = did_you_mean(args[0], list(COMMANDS)) or "`busplan --help` lists them"
             raise BusplanError(f"{args[0]}: no such command; {near}")

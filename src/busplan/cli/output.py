@@ -1,12 +1,125 @@
-"""All output: documents to stdout, messages to stderr."""
+"""All output: documents to stdout, messages to stderr, streams that write everything, and signals."""
 
+import codecs
+import io
 import os
+import signal
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
+from typing import Any, Final
 
 from busplan.errors import BusplanError
 from busplan.files import document_bytes, write_file
+
+_BY_OTHERS: Final = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Signals of a service manager or a closing terminal; for Ctrl-C, Python raises KeyboardInterrupt."""
+ENDING: Final = (signal.SIGINT, *_BY_OTHERS)
+_SIGNALLED: Final = 128
+"""Exit code of a signal minus its number, as in shells."""
+
+
+@contextmanager
+def signals_end_the_run() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP end the run like Ctrl-C; a second signal ends the process at once."""
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        raise SystemExit(_SIGNALLED + number)
+
+    # A signal that is ignored (nohup) stays ignored.
+    before = {number: signal.getsignal(number) for number in _BY_OTHERS}
+    heard = {number: old for number, old in before.items() if old not in {signal.SIG_IGN, None}}
+    for number in heard:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number, old in heard.items():
+            signal.signal(number, old)
+
+
+class _WholeWriter(io.FileIO):
+    """A file that writes all bytes or fails; FileIO itself may write only a part, or nothing if it would block."""
+
+    def __init__(self, descriptor: int) -> None:
+        super().__init__(descriptor, "wb", closefd=False)
+
+    def write(self, data: Any, /) -> int:
+        rest = memoryview(data).cast("B")
+        size = len(rest)
+        while rest:
+            taken = super().write(rest)
+            if taken is None:  # a pipe that does not block, and is full
+                from select import select
+
+                select([], [self], [])
+            else:
+                rest = rest[taken:]
+        return size
+
+
+class _StandardOutput(_WholeWriter):
+    """Standard output whose errors are messages for the user."""
+
+    def write(self, data: Any, /) -> int:
+        try:
+            return super().write(data)
+        except BrokenPipeError:  # the reader has closed the pipe: typer ends the run silently
+            raise
+        except OSError as error:
+            raise BusplanError(f"standard output cannot be written: {error.strerror}") from None
+
+
+class _ClosedOutput(io.RawIOBase):
+    """Replacement for a standard output that the caller has closed."""
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: Any, /) -> int:
+        if data:
+            raise BusplanError("standard output is closed")
+        return 0
+
+
+def mend_streams() -> None:
+    """Replace closed standard streams, and escape characters that their encoding lacks."""
+    codecs.register_error("busplan", _escaped)
+    if sys.stdout is None:
+        sys.stdout = _unbuffered(_ClosedOutput(), encoding="utf-8")
+    else:
+        sys.stdout = _mended(sys.stdout, _StandardOutput)
+    if sys.stderr is None:
+        # Messages are lost, but must not go to stdout.
+        sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - open until the process ends
+    else:
+        sys.stderr = _mended(sys.stderr, _WholeWriter)
+
+
+def _mended(stream: Any, writer: type[_WholeWriter]) -> Any:
+    raw = getattr(stream.buffer, "raw", stream.buffer)
+    if isinstance(raw, io.FileIO):
+        return _unbuffered(writer(raw.fileno()), encoding=stream.encoding)
+    stream.reconfigure(errors="busplan")  # in memory in a test, or a console without bytes
+    return stream
+
+
+def _unbuffered(raw: io.RawIOBase, *, encoding: str) -> io.TextIOWrapper:
+    """Text stream without a buffer, so that no flush can fail at exit."""
+    return io.TextIOWrapper(raw, encoding=encoding, errors="busplan", write_through=True)  # type: ignore[arg-type]
+
+
+def _escaped(error: UnicodeError) -> tuple[str, int]:
+    """Write characters that an encoding lacks as JSON escapes."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    from busplan.english import json_escape  # loaded only if needed
+
+    return json_escape(error.object[error.start : error.end]), error.end
+
 
 PLAN_FAILS: int = 1
 """Exit code if the answer is that the plan fails."""
@@ -22,7 +135,7 @@ class PlanFailsError(Exception):
 
 def say(*messages: str) -> None:
     """Write messages to stderr, one on each line; a closed stderr is ignored."""
-    from busplan.printable import printable  # loaded only if there is a message
+    from busplan.english import printable  # loaded only if there is a message
 
     with suppress(OSError):
         for message in messages:

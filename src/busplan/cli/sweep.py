@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO, Final, Literal, NamedTupl
 
 import typer
 
-from busplan.cli.answering import give
-from busplan.cli.changes import load_changed, takes_changes
-from busplan.cli.destinations import profile_files, require_apart
+from busplan.cli.answering import give, profile_files, require_apart
+from busplan.cli.design import plot_form
 from busplan.cli.options import (
     VALUES_HELP,
     AllOption,
@@ -20,12 +19,13 @@ from busplan.cli.options import (
     TimingModelOption,
     chosen_model,
     form_of_file,
+    load_changed,
     option,
     output_option,
     parse_axes,
+    takes_changes,
 )
 from busplan.cli.output import emit_document, refuse_terminal, say
-from busplan.cli.pictures import plot_form
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
@@ -214,7 +214,7 @@ class _Rows(NamedTuple):
 def _write(answer: "SweepAnswer", form: SweepForm, rows: _Rows, file: BinaryIO | None) -> None:
     """Write a sweep to a file, and say how much fits; or to standard output."""
     from busplan.forms.numbers import sentence_text
-    from busplan.questions.words.documents import changes_sentences
+    from busplan.questions.base.sentences import changes_sentences
 
     changes = answer.sweep.changes
     match form:
@@ -235,7 +235,7 @@ def _write(answer: "SweepAnswer", form: SweepForm, rows: _Rows, file: BinaryIO |
 def _crew(asked: "Sweep", *, jobs: int | None, cluster: str | None) -> Iterator["Executor | None"]:
     """Where circle tests run: in worker processes or on a cluster; None for this thread."""
     if cluster is not None:
-        from busplan.cli.cluster import dask_executor
+        from busplan.cli.workers import dask_executor
 
         with dask_executor(cluster) as there:
             yield there

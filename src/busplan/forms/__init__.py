@@ -66,7 +66,7 @@ def render(report: "Report", form: Form) -> str:
 
             return csv_rows.text(report)
         case "json":
-            from busplan.printable import to_json
+            from busplan.english import to_json
 
             return to_json(report.document)
         case _:

@@ -38,7 +38,7 @@ class Ruler(NamedTuple):
     is_log: bool = False
 
 
-class Cell(NamedTuple):
+class ChartCell(NamedTuple):
     """A cell of a grid."""
 
     ink: str
@@ -51,12 +51,12 @@ class Cell(NamedTuple):
     """A line is drawn between cells where it is True and where it is False."""
 
 
-class Grid(NamedTuple):
+class ChartGrid(NamedTuple):
     """Cells of equal size over two scales, the first row at the bottom."""
 
     across: Ruler
     up: Ruler
-    rows: tuple[tuple[Cell | None, ...], ...]
+    rows: tuple[tuple[ChartCell | None, ...], ...]
     """Cells by row and column; None where there is nothing to show."""
     legend: tuple[Entry, ...]
     own: tuple[float, float] | None = None
@@ -151,7 +151,7 @@ class Dial(NamedTuple):
 class Panel(NamedTuple):
     """One chart of a drawing."""
 
-    plot: Grid | Curves | Lanes | Dial | None
+    plot: ChartGrid | Curves | Lanes | Dial | None
     title: str = ""
     words: str = ""
     tone: Tone = "neutral"
@@ -183,9 +183,9 @@ def legend(panels: Iterable[Panel]) -> list[Entry]:
     return list(dict.fromkeys(entry for entry in entries if entry.words))
 
 
-def _entries(plot: Grid | Curves | Lanes | Dial | None) -> Iterator[Entry]:
+def _entries(plot: ChartGrid | Curves | Lanes | Dial | None) -> Iterator[Entry]:
     match plot:
-        case Grid():
+        case ChartGrid():
             yield from plot.legend
         case Curves():
             yield from (curve.entry for curve in plot.curves)

@@ -12,13 +12,12 @@ from markupsafe import Markup
 
 from busplan import __version__
 from busplan.buses.figure import unit_of
+from busplan.english import json_text, printable_lines
 from busplan.forms import blocks as made_of
 from busplan.forms.blocks import Bar, Block, Chapter, Command, Report, Sentence, Table
 from busplan.forms.charts import Drawing
 from busplan.forms.numbers import cell_text, figure_text, sentence_text, shown_blocks, unit_text
-from busplan.forms.picture import DARK, fills
-from busplan.forms.svg import inline, signed_bar
-from busplan.printable import json_text, printable_lines
+from busplan.forms.svg import DARK, fills, inline, signed_bar
 
 _TYPES: Final = ("ShownValue", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
 _BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Calculation", "Question", "Card", "Chapter")

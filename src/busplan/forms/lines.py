@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
 from typing import Final, Literal, NamedTuple
 
-from busplan.printable import printable
+from busplan.english import printable
 
 Tone = Literal["passes", "fails", "warns", "title", "heading", "neutral", "drawn"]
 """Style of a line."""

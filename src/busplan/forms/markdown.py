@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import Final
 
+from busplan.english import printable
 from busplan.forms.blocks import (
     Block,
     Calculation,
@@ -26,10 +27,9 @@ from busplan.forms.blocks import (
     Table,
     Words,
 )
-from busplan.forms.characters import drawing_lines
 from busplan.forms.lines import plain_text
 from busplan.forms.numbers import cell_text, part_text, shown_blocks, with_unit
-from busplan.printable import printable
+from busplan.forms.terminal import drawing_lines
 
 _INSIDE: Final = re.compile(r"[\\`*_\[\]<>~&@:$]|(?<=www)\.")
 """Markup inside a line, and characters that turn plain words into a link, a mention or a formula."""

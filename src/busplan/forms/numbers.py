@@ -5,7 +5,7 @@ from math import isnan
 from typing import Final
 
 from busplan.buses.figure import unit_of
-from busplan.english import nouns
+from busplan.english import nouns, printable
 from busplan.forms.blocks import (
     Bar,
     Block,
@@ -21,7 +21,6 @@ from busplan.forms.blocks import (
     Words,
 )
 from busplan.forms.lines import Line, Mark
-from busplan.printable import printable
 
 MISSING: Final = "-"
 _DIGITS: Final = 12

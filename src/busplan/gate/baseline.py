@@ -22,15 +22,13 @@ from busplan.buses.figure import (
     by_key,
 )
 from busplan.buses.rule import RuleProblem, told_apart
-from busplan.english import first_of, plural
+from busplan.english import first_of, plural, to_json
 from busplan.errors import BusplanError
 from busplan.gate.finding import Subject
-from busplan.printable import to_json
-from busplan.profile.collect import ProfileSource, claims
-from busplan.profile.keys import default_of, flat
-from busplan.profile.shipped import shipped_names
-from busplan.profile.toml import LoadedProfile, override, read_bytes
-from busplan.profile.write import value_text
+from busplan.profile.document import LoadedProfile, override, read_bytes
+from busplan.profile.edit import value_text
+from busplan.profile.kinds import default_of, flat
+from busplan.profile.sources import ProfileSource, claims, shipped_names
 from busplan.questions.fit.figures import capacity_figures
 from busplan.questions.fit.network import model_names
 from busplan.sections.profile import Profile

@@ -11,14 +11,13 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.gate.baseline import Baseline, load_baseline
-from busplan.gate.circle import MOST_STEPS
+from busplan.gate.finding import MOST_STEPS, Recording
 from busplan.gate.gate import FileResult, check_document, check_source
-from busplan.gate.recording import Recording
 from busplan.gate.report import CheckReport, Located, check_report, summary_sentence
 from busplan.profile.changes import NO_CHANGES, KeyChanges
-from busplan.profile.collect import Collection, ProfileSource, collect
 from busplan.profile.document import Document
-from busplan.profile.write import profile_text
+from busplan.profile.edit import profile_text
+from busplan.profile.sources import Collection, ProfileSource, collect
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, argument, items, key_changes
 from busplan.sections.profile import Profile
@@ -73,7 +72,7 @@ def check(
     paths
         One or several files, folders (every *.toml below with a `schema_version`), shipped names or a `Profile` each. A
         `Profile` is checked as the file that `busplan` would write of it, NAME.toml. Or what
-        `busplan.profile.collect.collect` returns.
+        `busplan.profile.sources.collect` returns.
     circle
         Run the circle test of profiles that ask for one.
     circle_steps

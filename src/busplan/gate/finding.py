@@ -1,21 +1,26 @@
-"""Findings of rules, and the profile that rules check."""
+"""Findings of the gate: of a profile's bus, its circle, and a recording of the machine."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from busplan.buses.parts import Value
-from busplan.buses.rule import Mending, Rule, RuleProblem, Severity
-from busplan.english import listed
-from busplan.printable import printable
+from busplan.buses.limits import Value
+from busplan.buses.rule import Mending, RecordedFigure, Rule, RuleProblem, Severity, told_apart
+from busplan.english import listed, printable
+from busplan.gate.rules import NOT_RECORDED, NOTHING_RECORDED, OUTSIDE_PLAN
 from busplan.profile.changes import NO_CHANGES, KeyChanges
-from busplan.profile.document import Spot
-from busplan.profile.toml import LoadedProfile
-from busplan.profile.write import short_text
+from busplan.profile.document import LoadedProfile, Spot
+from busplan.profile.edit import short_text
+from busplan.questions.base.inputs import Path
 from busplan.questions.fit.certainty import available_us, fits_in
+from busplan.questions.fit.circle_refusal import path_steps, refusals
 from busplan.questions.fit.figures import FitFigures, GroupCapacity, figures, node_counts
 from busplan.questions.fit.network import PERIOD, changed, model_names, network_of
-from busplan.questions.plan.changes import changeable, cure
+from busplan.questions.plan.search import changeable, cure
+from busplan.sections.base import value_at
+from busplan.sections.machine import CONTOUR_MEASURES
+from busplan.sections.profile import Profile
+from busplan.servo.checks import Refused
 
 
 class Finding(NamedTuple):
@@ -151,3 +156,123 @@ class Subject:
     def cure(self) -> Mending:
         """The change after which the profile holds every constraint of a plan; one for all rules."""
         return self._cure
+
+
+MOST_STEPS: Final = 10_000_000
+"""Most steps of a circle that the gate runs: seconds, and a few hundred megabytes."""
+_NOT_RUN: Final = ("BP203", "BP204")
+
+
+def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
+    """Run the circle test of a profile, and yield the code of each broken rule with its problem.
+
+    A circle that cannot be run is said whether or not it was to be run. A cycle that does not fit breaks another rule,
+    and has no circle.
+
+    Parameters
+    ----------
+    subject
+        The profile, and the most simulated steps of each axis: a longer circle is not run.
+    """
+    profile, network, most_steps = subject.profile, subject.network, subject.circle_steps
+    refused = refusals(network) if profile.asks_for_circle else ()
+    yield from (("BP203", _refused(cause, profile)) for cause in refused)
+    if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
+        return
+    from busplan.questions.circle.failures import STABILITY
+    from busplan.questions.circle.roundness import circle_test, to_attack
+
+    steps = path_steps(network)
+    if steps > most_steps:
+        words = f"the circle takes {steps:,} steps, more than {most_steps:,}: not run"
+        yield "BP204", RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
+        return
+    result = circle_test(network).results[0]
+    # A cycle that is not shown to fit has a rule of its own: nothing of the circle mends it.
+    failures = [failure for failure in result.failures if not failure.is_of_bus]
+    first = to_attack(result)
+    attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
+    for failure in failures:
+        stability = failure.name in STABILITY
+        # A finding needs a key in the file: a default limit has none.
+        said = failure.name in profile.tolerance.model_fields_set
+        key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
+        gain = profile.servo.position_gain_per_s
+        way_out = "lower servo.position_gain_per_s or what delays the loop" if stability and gain else ""
+        if failure.name in CONTOUR_MEASURES and failure.value is not None:
+            way_out = attack
+        yield "BP202" if stability else "BP201", RuleProblem(key, failure.text, way_out)
+
+
+def _refused(cause: Refused, profile: Profile) -> RuleProblem:
+    """Why a circle cannot be run, at a key of the file."""
+    key = _key_in_file(cause.name, *cause.beside, profile=profile)
+    # A key that is the cause says its name already.
+    words, _, way_out = (f"{cause.value}: {cause.right}" if key == cause.name else cause.message).partition("; ")
+    return RuleProblem(key, words, way_out)
+
+
+def _key_in_file(*keys: str, profile: Profile) -> str:
+    """The first of some keys that the profile sets, or the nearest section."""
+    for key in keys:
+        section, _, name = key.rpartition(".")
+        if name in value_at(profile, section).model_fields_set:
+            return key
+    return "servo" if "servo" in profile.model_fields_set else "circle"
+
+
+def answered(subject: Subject, problems: Sequence[tuple[str, RuleProblem]]) -> set[str]:
+    """Codes of the rules that were checked; without a test, only that of the rule that says why there is none."""
+    not_run = {code for code, _ in problems if code in _NOT_RUN}
+    if not_run:
+        return not_run
+    is_run = subject.circle_steps is not None and (subject.deciding.fits or not subject.profile.asks_for_circle)
+    return {"BP201", "BP202", *_NOT_RUN} if is_run else {"BP203"}
+
+
+_UNPLANNED: Final = "name"
+"""Key of a figure that no key plans: the first one of every profile that has the whole machine."""
+
+
+class Recording(NamedTuple):
+    """A recording of the machine that a profile plans."""
+
+    path: Path
+    quantile: float = 1.0
+    """Share of the events that worst cases hold for, 0.5..1."""
+
+
+def beside_plan(profile: Profile, recording: Recording) -> Iterator[tuple[Rule, RuleProblem]]:
+    """What a recording shows outside the plan, what it does not show to be within it, and where it shows nothing.
+
+    Raises
+    ------
+    BusplanError
+        It cannot be read, or compared with the profile.
+    """
+    from busplan.questions.measured import measured
+
+    answer = measured(profile, recording.path, quantile=recording.quantile)
+    for figure in answer.figures:
+        way_out = "busplan measured --apply writes what was measured" if answer.edits.get(figure.key) else ""
+        if figure.verdict == "outside":
+            yield OUTSIDE_PLAN, RuleProblem(figure.key or _UNPLANNED, _words(figure), way_out)
+        elif figure.verdict == "not shown" and not answer.shows_nothing:
+            yield NOT_RECORDED, RuleProblem(figure.key or _UNPLANNED, f"not shown: {_words(figure)}", way_out)
+    for reason in answer.shows_nothing:
+        yield NOTHING_RECORDED, RuleProblem(_UNPLANNED, reason, "record it anew")
+
+
+def _words(figure: RecordedFigure) -> str:
+    if figure.hidden or figure.planned is None or figure.recorded is None:
+        return f"{figure.quantity}: {figure.hidden}"
+    unit = {"1": "", "share": " %"}.get(figure.unit, f" {figure.unit}")
+    factor = 100 if figure.unit == "share" else 1
+    if figure.unit in ("1", "bytes"):
+        recorded, allowed = f"{figure.recorded:.0f}", f"{figure.planned:.0f}"
+    else:
+        recorded, allowed = told_apart(factor * figure.recorded, factor * figure.planned)
+    doubt = "" if figure.uncertainty is None else f" +/- {factor * figure.uncertainty:.2g}"
+    sense = "" if figure.sense == "equal" else f"{figure.sense} "
+    note = f" ({figure.note})" if figure.note else ""
+    return f"{figure.quantity}: {recorded}{doubt}{unit} recorded, {sense}{allowed}{unit} planned{note}"

@@ -6,11 +6,9 @@ from typing import Any, Final, Literal, NamedTuple
 
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
-from busplan.gate import circle
+from busplan.gate import finding as circle
 from busplan.gate.baseline import Record, figures_of, keys_of, regression
-from busplan.gate.circle import MOST_STEPS
-from busplan.gate.finding import Finding, Subject, Violation, finding_of
-from busplan.gate.recording import Recording, beside_plan
+from busplan.gate.finding import MOST_STEPS, Finding, Recording, Subject, Violation, beside_plan, finding_of
 from busplan.gate.rules import (
     BASELINE,
     BY_KIND,
@@ -22,10 +20,9 @@ from busplan.gate.rules import (
     cycle_rules,
 )
 from busplan.profile.changes import NO_CHANGES, KeyChanges
-from busplan.profile.collect import ProfileSource
-from busplan.profile.document import Document, Spot
-from busplan.profile.keys import path_of
-from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
+from busplan.profile.document import Document, LoadedProfile, Spot, decode, read_bytes, validate
+from busplan.profile.kinds import path_of
+from busplan.profile.sources import ProfileSource
 
 MARK: Final = "busplan:"
 _ADDRESSED: Final = re.compile(r"#\s*busplan:")

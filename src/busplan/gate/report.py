@@ -1,16 +1,29 @@
-"""Answer of `busplan check`: its findings and their summary, as sentences and as JSON."""
+"""Reports of the gate: text, JSON, SARIF, JUnit, and what builds read."""
 
-from collections.abc import Iterator
+import os
+import re
+from collections.abc import Callable, Iterator
 from hashlib import sha256
-from typing import NamedTuple
+from pathlib import Path, PurePath
+from textwrap import wrap
+from typing import Final, Literal, NamedTuple
+from unicodedata import category, east_asian_width
+from urllib.parse import quote
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from busplan.buses.rule import Severity
-from busplan.english import nouns
+from busplan import __version__
+from busplan.buses.rule import Rule, Severity, told_apart
+from busplan.english import nouns, plural, printable, printable_lines, to_json
+from busplan.forms import markdown, terminal
 from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, State, count_value, joined, sentence
-from busplan.gate.finding import Finding, finding_parts
+from busplan.forms.lines import BLANK, Line, Mark, Tone, plain_text, styled_text
+from busplan.forms.markdown import code, escaped, table
+from busplan.forms.numbers import MISSING, sentence_text
+from busplan.gate.finding import Finding, finding_line, finding_parts
 from busplan.gate.gate import FileResult, Fit
+from busplan.gate.rules import all_rules, rule_report
 from busplan.profile.changes import NO_CHANGES, KeyChanges
-from busplan.questions.words.documents import changed_document, document
+from busplan.questions.base.sentences import changed_document, changes_sentences, document
 
 
 class Summary(NamedTuple):
@@ -142,3 +155,344 @@ def check_document(report: CheckReport) -> JsonDocument:
         }
         files.append(content if file.failure is None else {**content, "failure": file.failure})
     return changed_document(document("check", files=files, summary=report.summary._asdict()), report.changes)
+
+
+TONES: Final[dict[Severity, Tone]] = {"error": "fails", "warning": "warns"}
+"""Colour of each severity, which is always said in a word, too."""
+
+
+def marked_line(text: str, path: str, finding: Finding) -> Line:
+    """Mark the place, the code and the severity of a line that begins with them."""
+    place, words = finding_parts(path, finding)
+    start = len(printable(place)) + 1
+    said = Mark(start, start + words.index(": "), TONES[finding.severity])
+    return Line(text, "drawn", (Mark(0, start, "title"), said))
+
+
+def concise(report: CheckReport, *, width: int | None = None) -> str:
+    """One line for each finding; in colours if there is a width, at which the terminal breaks the lines itself."""
+    lines = [
+        marked_line(finding_line(located.path, located.finding), located.path, located.finding)
+        for located in report.located
+    ]
+    return plain_text(lines) if width is None else styled_text(lines)
+
+
+WIDTH: Final = 100
+"""Widest line, in columns: of sentences, which are wrapped, and of source lines, which are cut."""
+_INDENT: Final = 4 * " "
+_CUT: Final = "..."
+_UNBROKEN: Final = "\xa0"
+"""A space at which no line ends; printable text has none."""
+_NUMBER_AND_WORD: Final = re.compile(r"(?<=[0-9]) (?=[a-z])")
+
+
+def full(report: CheckReport, *, width: int | None = None) -> str:
+    """Each finding with its line of the file; in colours if there is the width of a terminal, in columns."""
+    return plain_text(_lines(report, WIDTH)) if width is None else styled_text(_lines(report, min(width, WIDTH)))
+
+
+def _lines(report: CheckReport, width: int) -> Iterator[Line]:
+    for located in report.located:
+        yield from _heading(located, width)
+        yield from _source(located, width)
+        yield from _mending(located, width)
+        yield BLANK
+
+
+def _heading(located: Located, width: int) -> Iterator[Line]:
+    """Place, code and severity, which editors read, and the problem, wrapped."""
+    place, words = finding_parts(located.path, located.finding)
+    head = printable(f"{place} {words.removesuffix(located.finding.message)}")
+    first, *others = _wrapped(located.finding.problem, width, first=head)
+    yield marked_line(first, located.path, located.finding)
+    yield from (Line(line, "drawn") for line in others)
+
+
+def _source(located: Located, width: int) -> Iterator[Line]:
+    number, finding = str(located.finding.line), located.finding
+    margin = f"{' ' * len(number)} | "
+    shown = _shown(located.source, finding.marked_column - 1, finding.marked_end_column - 1, width - len(margin))
+    under = f"{margin}{' ' * _columns(shown.before)}"
+    carets = "^" * max(_columns(shown.marked), 1)
+    named = f"{under}{carets} {finding.rule}"
+    marked = named if len(named) <= width else f"{under}{carets}"
+    yield Line(margin.rstrip(), "drawn")
+    yield Line(f"{number} | {shown.before}{shown.marked}{shown.after}".rstrip(), "drawn")
+    yield Line(marked, "drawn", (Mark(len(under), len(marked), TONES[finding.severity]),))
+
+
+def _mending(located: Located, width: int) -> Iterator[Line]:
+    if located.finding.help:
+        yield from (Line(line, "drawn") for line in _wrapped(located.finding.help, width, first="help: "))
+    if located.finding.cure:
+        yield Line("cheapest cure:", "drawn")
+        yield from (Line(f"{_INDENT}{line}", "drawn") for line in located.finding.cure.split("\n"))
+
+
+def _wrapped(text: str, width: int, *, first: str) -> list[str]:
+    """Break a sentence between words, but never between a number and its unit."""
+    lines = wrap(
+        _NUMBER_AND_WORD.sub(_UNBROKEN, printable(text)),
+        width,
+        initial_indent=first,
+        subsequent_indent=_INDENT,
+        break_long_words=False,
+        break_on_hyphens=False,
+        replace_whitespace=False,
+    )
+    return [line.replace(_UNBROKEN, " ") for line in lines]
+
+
+class _Shown(NamedTuple):
+    """A source line as shown: what is marked, and what stands around it."""
+
+    before: str
+    marked: str
+    after: str
+
+
+def _shown(source: str, start: int, end: int, width: int) -> _Shown:
+    """Cut a source line around what is marked; tabs become spaces, so that the carets stand below it."""
+    parts = source[:start], source[start:end], source[end:]
+    before, marked, after = (
+        printable(part, write=lambda character: _INDENT if character == "\t" else " ") for part in parts
+    )
+    if _columns(before + marked + after) <= width:
+        return _Shown(before, marked, after)
+    room = width - 2 * len(_CUT)
+    marked, rest = marked[:room], marked[room:]
+    kept = max(room - len(marked), 0)
+    behind = (rest + after)[: max(kept - len(before), kept // 2)]
+    ahead = before[max(len(before) - (kept - len(behind)), 0) :]
+    return _Shown(
+        f"{_CUT if ahead != before else ''}{ahead}", marked, f"{behind}{_CUT if behind != rest + after else ''}"
+    )
+
+
+def _columns(text: str) -> int:
+    """Columns that a text takes."""
+    return sum(
+        0 if category(character) in ("Mn", "Me") else 2 if east_asian_width(character) in "WF" else 1
+        for character in text
+    )
+
+
+def json(report: CheckReport) -> str:
+    """The document of `busplan check`."""
+    return to_json(check_document(report))
+
+
+def gitlab(report: CheckReport) -> str:
+    """GitLab's code quality report: one issue for each finding."""
+    issues = [
+        {
+            "description": f"{located.finding.code} {located.finding.message}",
+            "check_name": located.finding.rule,
+            "fingerprint": located.fingerprint,
+            "severity": "major" if located.finding.severity == "error" else "minor",
+            "location": {"path": PurePath(located.path).as_posix(), "lines": {"begin": located.finding.line}},
+        }
+        for located in report.located
+    ]
+    return to_json(issues)
+
+
+_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
+
+
+def sarif(report: CheckReport) -> str:
+    """One SARIF run with all rules and results; files that could not be checked are notifications."""
+    failures = [file for file in report.files if file.failure is not None]
+    run = {
+        "tool": {
+            "driver": {
+                "name": "busplan",
+                "semanticVersion": __version__,
+                "rules": [_rule(rule) for rule in all_rules().values()],
+            }
+        },
+        "columnKind": "unicodeCodePoints",
+        "invocations": [
+            {
+                "executionSuccessful": not failures,
+                "toolExecutionNotifications": [
+                    {"level": "error", "message": {"text": file.failure}} for file in failures
+                ],
+            }
+        ],
+        "results": [_result(located) for located in report.located],
+    }
+    document = {"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}
+    return to_json(document)
+
+
+def _rule(rule: Rule) -> JsonDocument:
+    page = rule_report(rule)
+    return {
+        "id": rule.code,
+        "name": "".join(word.capitalize() for word in rule.name.split("-")),
+        "shortDescription": {"text": rule.summary},
+        "fullDescription": {"text": rule.explanation},
+        "help": {"text": terminal.text(page), "markdown": markdown.text(page)},
+        "defaultConfiguration": {"level": rule.severity},
+    }
+
+
+def _result(located: Located) -> JsonDocument:
+    finding = located.finding
+    return {
+        "ruleId": finding.code,
+        "ruleIndex": list(all_rules()).index(finding.code),
+        "level": finding.severity,
+        "message": {"text": finding.message},
+        "locations": [
+            {
+                "physicalLocation": {
+                    "artifactLocation": _artifact(located.path),
+                    "region": {
+                        "startLine": finding.line,
+                        "startColumn": finding.column,
+                        "endColumn": finding.marked_end_column,
+                    },
+                }
+            }
+        ],
+        "partialFingerprints": {"busplanFinding/v1": located.fingerprint},
+        # SARIF's own fixes are edits of a file, and a cure may be a key that the file does not have.
+        **({"properties": {"cure": finding.cure}} if finding.cure else {}),
+    }
+
+
+def _artifact(path: str) -> dict[str, str]:
+    """URI of a file, relative to the working folder if the file is below it."""
+    pure = PurePath(path)
+    if pure.is_absolute() or ".." in pure.parts:
+        return {"uri": Path(path).resolve().as_uri()}
+    return {"uri": quote(os.fsencode(pure.as_posix())), "uriBaseId": "%SRCROOT%"}
+
+
+def github(report: CheckReport) -> str:
+    """One workflow command for each finding, which GitHub shows next to the line of the file."""
+    return "".join(f"{_command(located)}\n" for located in report.located)
+
+
+def _command(located: Located) -> str:
+    finding = located.finding
+    properties = {
+        "file": located.path,
+        "line": str(finding.line),
+        "col": str(finding.column),
+        "title": f"{finding.code} {finding.rule}",
+    }
+    said = ",".join(f"{name}={_escaped(value, property_=True)}" for name, value in properties.items())
+    return f"::{finding.severity} {said}::{_escaped(finding.message, property_=False)}"
+
+
+def _escaped(text: str, *, property_: bool) -> str:
+    text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    # GitHub has no escape for other control characters.
+    return printable(text.replace(":", "%3A").replace(",", "%2C") if property_ else text)
+
+
+_NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def junit(report: CheckReport) -> str:
+    """One test case for each profile: errors are failures, files that could not be checked errors, warnings output."""
+    failures = sum(any(finding.severity == "error" for finding in file.findings) for file in report.files)
+    errors = sum(file.failure is not None for file in report.files)
+    counts = {"tests": str(len(report.files)), "failures": str(failures), "errors": str(errors)}
+    root = Element("testsuites", {"name": "busplan check", **counts})
+    suite = SubElement(root, "testsuite", {"name": "busplan check", **counts})
+    for file in report.files:
+        _case(suite, file)
+    indent(root)
+    return tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _case(suite: Element, file: FileResult) -> None:
+    case = SubElement(suite, "testcase", classname="busplan.check", name=_clean(file.path), file=_clean(file.path))
+    if file.failure is not None:
+        SubElement(case, "error", message=_clean(file.failure))
+    for severity, tag in (("error", "failure"), ("warning", "system-out")):
+        findings = [finding for finding in file.findings if finding.severity == severity]
+        if not findings:
+            continue
+        said = {"message": _clean(findings[0].message), "type": findings[0].code} if tag == "failure" else {}
+        SubElement(case, tag, said).text = _clean("\n".join(finding_line(file.path, finding) for finding in findings))
+
+
+def _clean(text: str) -> str:
+    return _NO_XML.sub("?", printable_lines(text))
+
+
+_PROFILES: Final = ("profile", "result", "verdict", "corrected margin, us")
+_FINDINGS: Final = ("place", "rule", "severity", "what is wrong", "how to mend it")
+
+
+def markdown_report(report: CheckReport) -> str:
+    """A table of the profiles with their verdicts, and one of the findings; an empty one is left out."""
+    return "".join(f"{line}\n" for line in _markdown_lines(report))
+
+
+def _markdown_lines(report: CheckReport) -> Iterator[str]:
+    said = (*changes_sentences(report.changes), summary_sentence(report))
+    yield from ("### Check of profiles", "", escaped(" ".join(map(sentence_text, said))))
+    if report.files:
+        yield from ("", *table(_PROFILES, map(_profile, report.files), left=3))
+    if report.located:
+        yield from ("", *table(_FINDINGS, map(_finding_row, report.located), left=len(_FINDINGS)))
+
+
+def _profile(file: FileResult) -> list[str]:
+    fit = file.fit or Fit(None, None, None)
+    margin = MISSING
+    if fit.margin_corrected_us is not None:
+        doubt = "" if fit.uncertainty_us is None else f" +/- {fit.uncertainty_us:.1f}"
+        margin = f"{told_apart(fit.margin_corrected_us, 0.0)[0]}{doubt}"
+    return [code(file.path), _profile_result(file), fit.verdict or MISSING, margin]
+
+
+def _profile_result(file: FileResult) -> str:
+    if file.failure is not None:
+        return f"**could not be checked**: {escaped(file.failure)}"
+    severities = [finding.severity for finding in file.findings]
+    counts = [
+        plural(severities.count(severity), severity) for severity in ("error", "warning") if severity in severities
+    ]
+    said = ", ".join(counts) or "passes"
+    return f"**{said}**" if "error" in severities else said
+
+
+def _finding_row(located: Located) -> list[str]:
+    finding = located.finding
+    mending = [escaped(finding.help)] if finding.help else []
+    mending += map(code, finding.cure.split("\n")) if finding.cure else []
+    place = code(f"{located.path}:{finding.line}:{finding.column}")
+    words = [escaped(f"{finding.code} {finding.rule}"), finding.severity, escaped(finding.problem)]
+    return [place, *words, "<br>".join(mending)]
+
+
+class GateFormat(NamedTuple):
+    """A format of the gate's report."""
+
+    write: Callable[..., str]
+    """Function from a report to its text. That of a format for people takes the `width` of a terminal, too."""
+    reader: Literal["people", "programs", "builds"]
+    """Who reads it. Only what people read is in the encoding of the terminal; all else is UTF-8."""
+    repeats: bool = False
+    """If True, the concise lines go to standard error, too: GitHub shows ten annotations of a severity in a step."""
+
+
+FORMATS: Final[dict[str, GateFormat]] = {
+    "concise": GateFormat(concise, "people"),
+    "full": GateFormat(full, "people"),
+    "json": GateFormat(json, "programs"),
+    "github": GateFormat(github, "builds", repeats=True),
+    "gitlab": GateFormat(gitlab, "builds"),
+    "junit": GateFormat(junit, "builds"),
+    "sarif": GateFormat(sarif, "builds"),
+    "markdown": GateFormat(markdown_report, "builds"),
+}
+"""Every format by its name, in the order of the help."""

@@ -90,7 +90,7 @@ class KeyChanges:
         BusplanError
             The profile's schema refuses them; each problem names its option.
         """
-        from busplan.profile.toml import override  # noqa: PLC0415 - loads pydantic, which --help does not need
+        from busplan.profile.document import override  # noqa: PLC0415 - loads pydantic, which --help does not need
 
         return override(
             profile, self.values, origin={change.key: f"{change.typed}{change.note}" for change in self.each}

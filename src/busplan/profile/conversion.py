@@ -12,12 +12,10 @@ from typing import Any, Literal, NamedTuple
 from pydantic import BaseModel
 
 from busplan.buses import kind_named
-from busplan.profile.document import TomlTable
-from busplan.profile.keys import dotted_keys, flat, named_tables
-from busplan.profile.kinds import models_of
-from busplan.profile.toml import profile_of
+from busplan.profile.document import TomlTable, profile_of
+from busplan.profile.kinds import dotted_keys, flat, models_of, named_tables
+from busplan.sections.base import TRANSACTION_KINDS
 from busplan.sections.profile import Profile
-from busplan.sections.transactions import TRANSACTION_KINDS
 
 _KIND, _NODES, _SHOWN_FIRST = "kind", "nodes", "timing_model"
 _SIZES = ("read_bytes", "write_bytes")
@@ -64,7 +62,7 @@ def converted(profile: Profile, kind: str) -> Conversion:
 
     Examples
     --------
-    >>> from busplan.profile.shipped import load
+    >>> from busplan.profile.sources import load
     >>> conversion = converted(load("paper-4ms").profile, "can")
     >>> conversion.profile.bus.kind, conversion.profile.bus.nodes, conversion.profile.node.axes
     ('can', 2, 4)

@@ -1,19 +1,174 @@
 """A TOML text: its data, and the line and column of its parts."""
 
 import re
+import sys
 import tomllib
 from bisect import bisect_right
 from codecs import BOM_UTF8
+from collections.abc import KeysView, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias, cast, get_args
+from pathlib import Path
+from typing import Any, Final, NamedTuple, TypeAlias, cast, get_args
 
-from busplan.errors import PlacedError, PlacedProblem
+from pydantic import ValidationError
+
+from busplan.errors import BusplanError, PlacedError, PlacedProblem
+from busplan.files import is_unwritten_pipe
+from busplan.profile.kinds import holder, kind_of, profile_model
+from busplan.sections.profile import Profile
 from busplan.sourced import Grade
 
-if TYPE_CHECKING:
-    from busplan.profile.positions import KeyPath, Place
+KeyPath = tuple[str | int, ...]
+"""Keys from the top, and indexes into arrays: ("node", "execution", "time_us", 0)."""
+
+
+class Place(NamedTuple):
+    """Place of a key and of its value, as offsets into the text, ends excluded.
+
+    An element of an array has no key: its key span is its value span. A table without a text of its own (`[a]`,
+    `a.b = 1`) has its key span as value span.
+    """
+
+    key_start: int
+    key_end: int
+    value_start: int
+    value_end: int
+
+
+_GAP: Final = re.compile(r"[ \t\n,]*(?:#[^\n]*[ \t\n,]*)*")
+"""Between two statements, or two values of an array or inline table."""
+_KEY: Final = re.compile(r"""[ \t]*([A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')[ \t]*([.=\]]?)[ \t]*""")
+"""One part of a key, and the sign after it."""
+# A multi-line string may end in one or two quotes before the closing three.
+_STRING: Final = (
+    r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\''''
+)
+# A date may contain a space.
+_SCALAR: Final = re.compile(_STRING + r"|[^,\]}#\s](?:[^,\]}#\n]*[^,\]}#\s])?", re.DOTALL)
+_STRING_OR_COMMENT: Final = re.compile(_STRING + r"|(#)[^\n]*", re.DOTALL)
+
+
+@dataclass(slots=True)
+class _Container:
+    """An array or inline table that the scanner is inside of."""
+
+    path: KeyPath
+    start: int
+    is_array: bool
+    length: int = 0
+    """Elements of an array that were read."""
+
+
+class _Scanner:
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.at = 0
+        self.places: dict[KeyPath, Place] = {}
+        self.newest: dict[KeyPath, int] = {}
+        """Index of the newest table of each array of tables."""
+
+    def document(self) -> dict[KeyPath, Place]:
+        text = self.text
+        table: KeyPath = ()
+        inside: list[_Container] = []
+        while (gap := _GAP.match(text, self.at)) and (start := gap.end()) < len(text):
+            self.at = start
+            container = inside[-1] if inside else None
+            if container is None and text[start] == "[":
+                table = self.header()
+                continue
+            if container is not None and text[start] in "]}":
+                self.at += 1
+                self.value(inside.pop().path, container.start)
+                continue
+            if container is not None and container.is_array:
+                path = (*container.path, container.length)
+                container.length += 1
+            else:
+                path, _ = self.key(table if container is None else container.path)
+            start = self.at
+            if text[start] in "[{":
+                inside.append(_Container(path, start, is_array=text[start] == "["))
+                self.at += 1
+            elif scalar := _SCALAR.match(text, start):
+                self.at = scalar.end()
+                self.value(path, start)
+        return self.places
+
+    def value(self, path: KeyPath, start: int) -> None:
+        """Record a value that ends here."""
+        key_start, key_end, *_ = self.places.get(path, (start, self.at))
+        self.places[path] = Place(key_start, key_end, start, self.at)
+
+    def key(self, path: KeyPath) -> tuple[KeyPath, Place]:
+        """Read a, "b" or a.b.c inside a table, and the sign after it: its path and the place of its last part."""
+        while match := _KEY.match(self.text, self.at):
+            if path in self.newest:
+                path = (*path, self.newest[path])
+            path = (*path, _key_value(match[1]))
+            place = Place(*match.span(1), *match.span(1))
+            self.places.setdefault(path, place)
+            self.at = match.end()
+            if match[2] != ".":
+                return path, place
+        raise ValueError(f"no key at offset {self.at}")  # impossible for text that tomllib has accepted
+
+    def header(self) -> KeyPath:
+        """Read [a.b] or [[a.b]]; return the table of the next line."""
+        several = self.text.startswith("[[", self.at)
+        self.at += 1 + several
+        path, place = self.key(())
+        self.at += several
+        if several:
+            self.newest[path] = self.newest.get(path, -1) + 1
+            path = (*path, self.newest[path])
+        # A table's own header replaces the place of an earlier [a.b] that implied it.
+        self.places[path] = place
+        return path
+
+
+def _key_value(written: str) -> str:
+    """Key without quotes and escapes, decoded by the standard library."""
+    if written[0] in "\"'":
+        return next(iter(tomllib.loads(f"{written} = 0")))
+    return written
+
+
+def places(text: str) -> dict[KeyPath, Place]:
+    r"""Find the place of every key and array element.
+
+    Parameters
+    ----------
+    text
+        TOML that `tomllib.loads` has accepted, with LF as line end.
+
+    References
+    ----------
+    TOML 1.0.0.
+
+    Examples
+    --------
+    >>> text = "[bus]\nnodes = 2  # two\n"
+    >>> place = places(text)["bus", "nodes"]
+    >>> text[place.key_start : place.key_end], text[place.value_start : place.value_end]
+    ('nodes', '2')
+    """
+    return _Scanner(text).document()
+
+
+def comments(text: str) -> list[int]:
+    r"""Find the hash of every comment of such a text.
+
+    Examples
+    --------
+    >>> text = 'name = "# no comment"  # two\n'
+    >>> [text[at:] for at in comments(text)]
+    ['# two\n']
+    """
+    return [match.start() for match in _STRING_OR_COMMENT.finditer(text) if match[1]]
+
 
 GRADING: Final = re.compile(rf"#\s*({'|'.join(get_args(Grade))})\b")
 """A comment that grades the key beside it: `master_us = 30  # measured: on the line's own host`."""
@@ -93,15 +248,11 @@ class Document:
     @cached_property
     def places(self) -> "dict[KeyPath, Place]":
         """Place of every key; only for text that tomllib accepts."""
-        from busplan.profile.positions import places  # loaded only if places are needed
-
         return places(self.text)
 
     @cached_property
     def comments(self) -> list[int]:
         """Offset of the hash of every comment; only for text that tomllib accepts."""
-        from busplan.profile.positions import comments  # as above
-
         return comments(self.text)
 
     @cached_property
@@ -115,7 +266,7 @@ class Document:
     @cached_property
     def grades(self) -> dict[str, Grade]:
         """Grades that comments give values, by dotted key: that of a table is for all its keys."""
-        from busplan.profile.keys import named_path  # loads pydantic
+        from busplan.profile.kinds import named_path  # loads pydantic
 
         grades: dict[str, Grade] = {}
         known: dict[int, Any] = {}
@@ -210,3 +361,220 @@ def _first_deep_bracket(text: str) -> int:
         if depth > _MAX_NESTING:
             return match.start()
     return 0
+
+
+MAX_FILE_BYTES: Final = 2_000_000
+"""Some 10,000 messages of a CAN network with their comments; a larger file is something else."""
+PERIOD_KEY: Final = "cycle.period_us"
+_KINDS: Final = ("bus", "bus.kind")
+"""Keys whose change may ask for tables of another kind of bus."""
+_SOURCE: Final = "_source"
+"""Attribute of a profile that holds its document and the keys changed since; no field, so no part of its value."""
+
+
+class LoadedProfile(NamedTuple):
+    """A profile and its text."""
+
+    profile: Profile
+    document: Document
+
+
+def decode(content: bytes, *, name: str) -> Document:
+    """Decode a file.
+
+    Parameters
+    ----------
+    content
+        The bytes; a byte order mark is skipped.
+    name
+        Name of the file in messages.
+
+    Raises
+    ------
+    PlacedError
+        Too large, or not UTF-8.
+    """
+    if len(content) > MAX_FILE_BYTES:
+        raise too_large(name)
+    text = text_of(content, name=name, wanted="a profile is TOML in UTF-8")
+    # With LF only, offsets of the parser and the scanner agree.
+    return Document(name, text.replace("\r\n", "\n"))
+
+
+def too_large(name: str) -> PlacedError:
+    """Make the error for a file that is too large for a profile."""
+    message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; no profile is"
+    return PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
+
+
+def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
+    """Read a file, or standard input for the path "-", up to one byte more than the limit.
+
+    Parameters
+    ----------
+    path
+        The file, or "-".
+    name
+        Name of the file in messages.
+    limit
+        Largest size [bytes]; by default that of a profile.
+
+    Raises
+    ------
+    BusplanError
+        It does not exist, is a directory, or cannot be read.
+    """
+    try:
+        if str(path) == "-":
+            if sys.stdin is None:
+                raise BusplanError(f"{name}: standard input is closed")
+            return sys.stdin.buffer.read(limit + 1)
+        if is_unwritten_pipe(path):
+            raise BusplanError(f"{name}: is a named pipe; give a regular file")
+        with path.open("rb") as file:
+            return file.read(limit + 1)
+    except FileNotFoundError:
+        raise BusplanError(f"{name}: no such file") from None
+    except IsADirectoryError:
+        raise BusplanError(f"{name}: is a directory; give a file") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise BusplanError(f"{name}: cannot be read: {reason}") from None
+
+
+def validate(document: Document) -> Profile:
+    """Validate a document against the profile's schema.
+
+    Raises
+    ------
+    PlacedError
+        Not TOML or not a profile; one message for each problem, in the order of their places.
+    """
+    data = document.data()
+    result = _checked(data)
+    if isinstance(result, Profile):
+        result.__dict__[_SOURCE] = document, frozenset()
+        return result
+    from busplan.profile.problems import refusal  # loaded only for an invalid profile
+
+    raise refusal(result, data, document)
+
+
+def profile_of(data: TomlTable) -> Profile:
+    """Validate plain data that stands in no file.
+
+    Parameters
+    ----------
+    data
+        What a file would hold, with a kind of bus that is known.
+
+    Raises
+    ------
+    BusplanError
+        No profile of its kind; each problem names its key.
+    """
+    result = _checked(data)
+    if isinstance(result, Profile):
+        return result
+    from busplan.profile.problems import refused_data  # as above
+
+    raise refused_data(result, data)
+
+
+def _checked(data: TomlTable) -> Profile | ValidationError | None:
+    """The profile of some data, or its error from pydantic; None if only the kind of bus is unknown."""
+    kind = kind_of(data)
+    try:
+        valid = profile_model(kind).model_validate(data)
+    except ValidationError as error:
+        return error
+    return None if kind is None else valid
+
+
+def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, str] | None = None) -> Profile:
+    """Return a profile with new values, validated; keys that it does not set stay unset.
+
+    Parameters
+    ----------
+    profile
+        The profile.
+    changes
+        New value by dotted key: {"bus.nodes": 3}.
+    origin
+        What set a key, for messages, if it is not key and value: {"bus.nodes": "--nodes 3"}.
+
+    Raises
+    ------
+    BusplanError
+        A value that the profile's schema refuses.
+    """
+    if not changes:
+        return profile
+    origin = origin or {}
+    kept = _unchanged_tables(profile, changes.keys())
+    data = profile.model_dump(exclude_unset=True, exclude=set(kept))
+    for key, value in changes.items():
+        table, last = holder(data, key, name=origin.get(key))
+        table[last] = value
+    result = _checked(data | kept)
+    if isinstance(result, Profile):
+        if _SOURCE in profile.__dict__:
+            document, before = profile.__dict__[_SOURCE]
+            result.__dict__[_SOURCE] = document, before | set(changes)
+        return result
+    from busplan.profile.problems import refused_changes  # as above
+
+    data |= profile.model_dump(exclude_unset=True, include=set(kept))
+    raise refused_changes(result, data, changes, origin)
+
+
+def _unchanged_tables(profile: Profile, changes: KeysView[str]) -> dict[str, object]:
+    """Arrays of tables that no change touches: there may be thousands of tables, which are valid as they are."""
+    if not changes.isdisjoint(_KINDS):
+        return {}
+    changed = {key.partition(".")[0] for key in changes}
+    values = {name: getattr(profile, name) for name in profile.model_fields_set - changed}
+    return {name: value for name, value in values.items() if isinstance(value, tuple)}
+
+
+def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Profile]:
+    """Return a profile at each of some communication periods [us]; without them, as it is.
+
+    Raises
+    ------
+    BusplanError
+        A period that the profile's schema refuses.
+    """
+    if periods_us is None:
+        return [profile]
+    return [
+        override(profile, {PERIOD_KEY: period_us}, origin={PERIOD_KEY: f"period {period_us}"})
+        for period_us in periods_us
+    ]
+
+
+def has_comment_grades(profile: Profile) -> bool:
+    """Whether comments of its file may grade keys; one that was read from no file has no comments."""
+    document, _ = profile.__dict__.get(_SOURCE, (None, ()))
+    return document is not None and GRADING.search(document.text) is not None
+
+
+def comment_grade(profile: Profile, key: str) -> Grade | None:
+    """The grade that a comment of its file, at the key or at its table, gives the value of a key.
+
+    Another value is not measured because the old one was; but an assumption that is made otherwise is still one.
+
+    Parameters
+    ----------
+    profile
+        The profile; one that was read from no file has no comments.
+    key
+        Dotted key.
+    """
+    document, changed = profile.__dict__.get(_SOURCE, (None, ()))
+    if document is None:
+        return None
+    grades: dict[str, Grade] = document.grades
+    grade = grades.get(key)
+    is_changed = any(key == changed_key or key.startswith(f"{changed_key}.") for changed_key in changed)
+    return None if is_changed and grade != "assumed" else grade

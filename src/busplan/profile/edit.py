@@ -1,4 +1,4 @@
-r"""Change values in the text of a profile and keep everything else: bytes, comments and layout.
+"""Change values in the text of a profile and keep everything else: bytes, comments and layout.
 
 A value is replaced, or a line is added to or removed from a section. A layout that needs more is refused, with the
 lines to change by hand. As a check, the new text is parsed and compared with the wanted data. A comment that grades a
@@ -6,23 +6,226 @@ value, as `# measured: by whom`, was said of the old one: it becomes `# was meas
 better than what was assumed before it: it stays assumed.
 """
 
+import json
+import math
+import os
 import re
+import shutil
+import subprocess
 import tomllib
 from codecs import BOM_UTF8
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
+from pathlib import Path
 from typing import Any, Final
 
 import tomli_w
 
+from busplan.english import printable
 from busplan.errors import BusplanError, PlacedError
-from busplan.printable import printable
-from busplan.profile.document import GRADING, Document
-from busplan.profile.keys import flat, holder, path_of
-from busplan.profile.positions import KeyPath, Place
-from busplan.profile.shipped import SHIPPED_SCHEMA
-from busplan.profile.toml import LoadedProfile, decode, override, validate
-from busplan.profile.write import profile_text, value_text
+from busplan.profile.document import (
+    GRADING,
+    MAX_FILE_BYTES,
+    Document,
+    KeyPath,
+    LoadedProfile,
+    Place,
+    comment_grade,
+    decode,
+    has_comment_grades,
+    override,
+    too_large,
+    validate,
+)
+from busplan.profile.kinds import flat, holder, named_path, path_of
+from busplan.profile.sources import SHIPPED_SCHEMA, load, locate
+from busplan.sections.profile import Profile
+
+
+def value_text(value: object) -> str:
+    r"""Write a value as TOML, in one line without control characters.
+
+    Raises
+    ------
+    TypeError
+        Not a bool, a number, a str, or a sequence or table of them.
+    ValueError
+        A number is not finite.
+
+    Examples
+    --------
+    >>> print(value_text([4, 2.5, "two\nlines"]))
+    [4, 2.5, "two\nlines"]
+    """
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int):
+        return str(int(value))
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{value} is not finite")
+        return repr(float(value))
+    if isinstance(value, str):
+        # TOML has JSON's escapes; for other characters that are not printable, it needs \U.
+        return printable(json.dumps(value, ensure_ascii=False), write=lambda character: f"\\U{ord(character):08x}")
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key} = {value_text(inner)}' for key, inner in value.items())}}}"
+    if isinstance(value, Sequence):
+        return f"[{', '.join(map(value_text, value))}]"
+    raise TypeError(f"{value!r} is no value of a profile")
+
+
+def whole(value: Any) -> Any:
+    """A whole float as an integer, and any other value as it is: where the schema has a float, both mean the same."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def short_text(value: object) -> str:
+    """Write a value as TOML, a whole float without its fraction.
+
+    Examples
+    --------
+    >>> short_text(1200.0), short_text(0.83), short_text("unified")
+    ('1200', '0.83', '"unified"')
+    """
+    return value_text(whole(value))
+
+
+def profile_text(profile: Profile) -> str:
+    """Write a profile as TOML, without keys that it does not set; grades that comments gave are comments again.
+
+    Parameters
+    ----------
+    profile
+        Any profile.
+
+    Returns
+    -------
+    str
+        TOML that parses to the same profile, without other comments; `profile.edit` keeps those of a file.
+
+    Examples
+    --------
+    >>> from busplan.profile.sources import load
+    >>> profile_text(load("paper-4ms").profile).splitlines()[0]
+    'schema_version = 1'
+    """
+    import tomli_w  # noqa: PLC0415 - needed only here
+
+    # TOML has no null: leave out keys that are None.
+    data = profile.model_dump(exclude_unset=True, exclude_none=True)
+    return _graded(tomli_w.dumps(data, multiline_strings=True), profile)
+
+
+def _graded(text: str, profile: Profile) -> str:
+    """The text with the grade of each key that a comment of the profile's file grades."""
+    if not has_comment_grades(profile):
+        return text
+    document = Document("", text)
+    known: dict[int, Any] = {}
+    lines = text.split("\n")
+    for path, place in document.places.items():
+        grade = comment_grade(profile, ".".join(map(str, named_path(document.data(), path, known))))
+        # A string of several lines has no room beside its key, and is no value that has a grade.
+        if grade is not None and place.value_start > place.key_end and not text.startswith('"""', place.value_start):
+            lines[document.lines.line_and_column(place.key_start)[0] - 1] += f"  # {grade}"
+    return "\n".join(lines)
+
+
+TIMEOUT_S: Final = 10.0
+"""Longest wait for git, which only reads a short file."""
+
+_FORM: Final = re.compile(r"(?P<revision>(?!-)(?:\{[^}]*\}|[^:{])+):(?P<path>.+)", re.DOTALL)
+"""A colon in braces belongs to the revision: main@{10:00}:line.toml. A dash at the start would be an option."""
+_BLOB: Final = re.compile(r"(?P<id>[0-9a-f]{40,64}) blob (?P<size>[0-9]+)\n")
+"""Git's answer for an existing file."""
+_NEVER: Final = ("\0", "\n", "\r")
+"""Characters that end a name for git."""
+_KEPT_VARIABLES: Final = ("GIT_CONFIG", "GIT_EXEC_PATH", "GIT_CEILING_DIRECTORIES", "GIT_DISCOVERY_", "GIT_NO_REPLACE")
+"""Prefixes of git's variables that are kept; others, which git sets for hooks, would select another repository."""
+_AT_HOME: Final = ("-c", "protocol.allow=never", "-c", "core.fsmonitor=false")
+"""No network access, and no program configured in the repository."""
+_ALONE: Final = {"LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0", "GIT_NO_LAZY_FETCH": "1", "GIT_ALLOW_PROTOCOL": ""}
+"""No network access, even if the configuration of the repository allows a protocol."""
+
+
+def load_revision(argument: str) -> LoadedProfile:
+    """Read and check a profile as `load` does, or from REV:path.
+
+    Parameters
+    ----------
+    argument
+        Shipped name, path, "-" for standard input; or a commit, branch or tag, a colon and a path, relative to the
+        current folder, in the git checkout of the path. An existing file of exactly that name comes first.
+
+    Raises
+    ------
+    BusplanError
+        As `load`; or git cannot read the file, with git's message.
+    """
+    form = _FORM.fullmatch(argument)
+    if form is None or any(mark in argument for mark in _NEVER) or _is_there(argument):
+        return load(argument)
+    document = decode(_content(argument, form["revision"], Path(form["path"])), name=argument)
+    return LoadedProfile(validate(document), document)
+
+
+def _is_there(argument: str) -> bool:
+    try:
+        locate(argument)
+    except BusplanError:
+        return False
+    return True
+
+
+def _content(argument: str, revision: str, path: Path) -> bytes:
+    """Content of the file in the revision, links followed."""
+    # The folder of the path may no longer exist: use the nearest existing one above it.
+    folder = path.parent
+    try:
+        while not folder.is_dir():
+            folder = folder.parent
+    except OSError as error:
+        raise BusplanError(f"{argument}: cannot be read: {error.strerror}") from None
+    name = f"{revision}:./{path.relative_to(folder).as_posix()}"
+    check = ("cat-file", "--batch-check", "--follow-symlinks")
+    file = _BLOB.fullmatch(_git(argument, folder, *check, names=name).decode(errors="replace"))
+    if file is None:
+        # Reading the object itself gives git's error message; for a link it succeeds.
+        _git(argument, folder, "cat-file", "blob", name)
+        raise BusplanError(f"{argument}: leads to no file of revision {revision}; name the file itself, not a link")
+    if int(file["size"]) > MAX_FILE_BYTES:
+        raise too_large(argument)
+    return _git(argument, folder, "cat-file", "blob", file["id"])
+
+
+def _git(argument: str, folder: Path, *command: str, names: str = "") -> bytes:
+    """Run git in a folder and return its output."""
+    git = shutil.which("git")
+    if git is None:
+        raise BusplanError(f"{argument}: no such file; to read REV:path needs git, and there is no git on PATH")
+    kept = {
+        key: value for key, value in os.environ.items() if not key.startswith("GIT_") or key.startswith(_KEPT_VARIABLES)
+    }
+    try:
+        done = subprocess.run(  # noqa: S603 - no shell; -C takes a folder of any name
+            [git, *_AT_HOME, "-C", str(folder), *command],
+            check=False,
+            capture_output=True,
+            env={**kept, **_ALONE},
+            input=os.fsencode(names),
+            timeout=TIMEOUT_S,
+        )
+    except subprocess.TimeoutExpired:
+        raise BusplanError(f"{argument}: git gave no answer within {TIMEOUT_S:g} s") from None
+    except OSError as error:
+        raise BusplanError(f"{argument}: git cannot be run: {error.strerror}") from None
+    # A warning means that git may have chosen another revision: an ambiguous name, or a reflog that is too short.
+    if done.returncode or done.stderr:
+        said = printable(" ".join(done.stderr.decode(errors="backslashreplace").split()))
+        raise BusplanError(f"{argument}: no file of that name; of REV:path git says: {said or 'nothing'}")
+    return done.stdout
+
 
 _ASSUMED: Final = "assumed"
 _HEADER_END: Final = re.compile(r"[ \t]*\]")
@@ -74,7 +277,7 @@ def edited_file(
 
     Examples
     --------
-    >>> from busplan.profile.shipped import load
+    >>> from busplan.profile.sources import load
     >>> content = load("paper-4ms").document.text.encode()
     >>> new = edited_file(content, {"bus.nodes": 16, "limits.min_spare_nodes": 3}, name="paper-4ms").decode()
     >>> print(*(line for line in new.splitlines() if line.startswith(("nodes", "min_spare"))), sep="\n")

@@ -8,8 +8,7 @@ from typing import Any, Final, NamedTuple
 from busplan.english import plural
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.profile.document import text_of
-from busplan.sections.base import MAX_COUNT, MAX_TIME_US
-from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
+from busplan.sections.base import MAX_COUNT, MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 MAX_MEASUREMENTS_BYTES: Final = 20_000_000
 """About a million measurements; a larger file is something else."""

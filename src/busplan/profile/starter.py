@@ -4,12 +4,12 @@ import re
 from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
-from busplan.buses.parts import Starter
+from busplan.buses.limits import Starter
+from busplan.english import did_you_mean
 from busplan.errors import BusplanError, PlacedError
-from busplan.nearest import did_you_mean
-from busplan.profile.shipped import SHIPPED_SCHEMA, locate, shipped_names
-from busplan.profile.toml import decode, read_bytes, validate
-from busplan.profile.write import short_text, value_text
+from busplan.profile.document import decode, read_bytes, validate
+from busplan.profile.edit import short_text, value_text
+from busplan.profile.sources import SHIPPED_SCHEMA, locate, shipped_names
 from busplan.servo.checks import dividing_step_us
 
 _CIRCLE: Final = re.compile(r"^(\[circle\].*\n)", re.MULTILINE)

@@ -1,7 +1,7 @@
 """Base of all sections of a profile: strictness, ranges, and errors in our own words."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -142,3 +142,7 @@ def _by_name(tables: tuple[Any, ...]) -> dict[str, Any]:
         by_name = {table.name: table for table in reversed(tables) if hasattr(table, "name")}
         known = _known[id(tables)] = tables, by_name
     return known[1]
+
+
+TransactionKind = Literal["read", "write"]
+TRANSACTION_KINDS: Final[tuple[TransactionKind, ...]] = ("read", "write")

@@ -6,11 +6,12 @@ take their names, defaults, ranges and descriptions from there.
 
 from collections import Counter
 from collections.abc import Callable
-from typing import Annotated, Any, Final, Literal, TypeVar
+from typing import Annotated, Any, Final, Literal, NamedTuple, TypeVar
 
 from pydantic import AfterValidator, Field, create_model
 
-from busplan.sections.base import Extended, Problem, Section, refused
+from busplan.elementwise import Number
+from busplan.sections.base import Extended, Problem, Section, TransactionKind, refused
 from busplan.servo.checks import parameters
 from busplan.servo.parameters import (
     MAX_LENGTH_MM,
@@ -22,6 +23,39 @@ from busplan.servo.parameters import (
     LoopTiming,
     Mechanics,
 )
+
+
+class AlikeNodes(NamedTuple):
+    """Nodes that are alike, as a profile says them: in a section [[group]], or in [node] and [payload]."""
+
+    name: str
+    """Of the group; empty for the nodes of [node]."""
+    nodes: Any
+    """Number of nodes [1]."""
+    node: Any
+    """A node of the group, of its kind's own model: how it executes and answers."""
+    payload: Any
+    """Payloads of a node, of its kind's own model."""
+
+    @property
+    def nodes_key(self) -> str:
+        """Dotted key of their number."""
+        return f"group.{self.name}.nodes" if self.name else "bus.nodes"
+
+    def node_key(self, key: str) -> str:
+        """Dotted key of a node's value in the profile, as of "execution.base_us"."""
+        return f"group.{self.name}.{key}" if self.name else f"node.{key}"
+
+    def payload_key(self, kind: TransactionKind) -> str:
+        """Dotted key that a payload is changed by first: what each axis adds, where it adds something."""
+        key = self.payload.key_of(kind)
+        return f"group.{self.name}.{key}" if self.name else f"payload.{key}"
+
+    def bytes_of(self, kind: TransactionKind) -> Number:
+        """Payload of a transaction with a node [bytes]."""
+        size: Number = self.payload.bytes_of(kind, axes=self.node.axes)
+        return size
+
 
 SERVO_GRADES: Final = ("published", "measured", "calibrated", "assumed")
 """The strongest first."""

@@ -9,9 +9,8 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from busplan.printable import has_controls
-from busplan.sections.alike_nodes import AlikeNodes
-from busplan.sections.base import MISSING, Problem, Section, refused
+from busplan.english import has_controls
+from busplan.sections.base import MISSING, TRANSACTION_KINDS, Problem, Section, refused
 from busplan.sections.cycle import (
     BusSection,
     CycleSection,
@@ -19,10 +18,16 @@ from busplan.sections.cycle import (
     Limits,
     NodeSection,
     PayloadSection,
+    TableExecution,
 )
-from busplan.sections.execution import TableExecution
-from busplan.sections.machine import CircleSection, DeliverySection, MechanicsSection, ServoSection, ToleranceSection
-from busplan.sections.transactions import TRANSACTION_KINDS
+from busplan.sections.machine import (
+    AlikeNodes,
+    CircleSection,
+    DeliverySection,
+    MechanicsSection,
+    ServoSection,
+    ToleranceSection,
+)
 
 SCHEMA_VERSION: Final = 1
 

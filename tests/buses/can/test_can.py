@@ -14,15 +14,14 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named
-from busplan.buses.can.limits import shared_identifiers
+from busplan.buses.can.frames import streams, traffic_of_profile
+from busplan.buses.can.rules import shared_identifiers
 from busplan.buses.can.section import CanProfile
-from busplan.buses.can.streams import streams
-from busplan.buses.can.traffic import traffic_of_profile
 from busplan.buses.can.waiting import responses
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.profile.write import profile_text
-from busplan.questions.fit.loop_delays import loop_delays_us
+from busplan.profile.edit import profile_text
+from busplan.questions.fit.circle_refusal import loop_delays_us
 from busplan.questions.fit.network import network_of
 
 if TYPE_CHECKING:

@@ -11,13 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.can.limits import LIMITS
+from busplan.buses.can.frames import identifiers_twice, streams, traffic_of_profile
+from busplan.buses.can.rules import LIMITS
 from busplan.buses.can.section import CanProfile
-from busplan.buses.can.streams import identifiers_twice, streams
-from busplan.buses.can.traffic import traffic_of_profile
 from busplan.errors import BusplanError
-from busplan.profile.document import Document
-from busplan.profile.toml import validate
+from busplan.profile.document import Document, validate
 from busplan.questions.fit.network import network_of
 
 Run = Callable[..., Any]

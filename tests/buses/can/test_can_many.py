@@ -13,11 +13,11 @@ import pytest
 
 import busplan
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.limits import LIMITS
+from busplan.buses.can.rules import LIMITS
 from busplan.buses.can.section import CanProfile
 from busplan.elementwise import pointwise
 from busplan.forms.blocks import Chapter, Table
-from busplan.profile.write import profile_text
+from busplan.profile.edit import profile_text
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import with_unchecked
 

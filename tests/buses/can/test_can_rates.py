@@ -10,13 +10,12 @@ import pytest
 
 import busplan
 from busplan.buses.can.cycle import NONE, WORST, CanCycle
-from busplan.buses.can.limits import LIMITS
+from busplan.buses.can.frames import streams, traffic_of_profile
+from busplan.buses.can.rules import LIMITS
 from busplan.buses.can.section import CanProfile
-from busplan.buses.can.streams import streams
-from busplan.buses.can.traffic import traffic_of_profile
 from busplan.elementwise import plain
 from busplan.profile.conversion import converted
-from busplan.profile.write import profile_text
+from busplan.profile.edit import profile_text
 from busplan.questions.fit.network import network_of
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import Profile

@@ -20,11 +20,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import pytest
 
-from busplan.buses.can.streams import Stream, streams
-from busplan.buses.can.traffic import SYNC, Message, Pdos, Traffic
+from busplan.buses.can.frames import SYNC, Message, Pdos, Stream, Traffic, streams
 from busplan.buses.can.waiting import responses, waits
 from busplan.elementwise import plain
-from busplan.sections.transactions import TRANSACTION_KINDS
+from busplan.sections.base import TRANSACTION_KINDS
 
 if TYPE_CHECKING:
     from tests.oracles.can_simulation import Frame, Run, SimulatedMessage, SimulatedNode, simulate

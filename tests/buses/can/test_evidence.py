@@ -6,7 +6,7 @@ from subprocess import CompletedProcess
 import pytest
 
 from busplan.buses import kind_named
-from busplan.questions.evidence.rows import EvidenceSection, sections_of
+from busplan.questions.evidence import EvidenceSection, sections_of
 
 SECTIONS = [*sections_of(kind_named("can"), "can"), *sections_of(kind_named("can"), "paper")]
 SYSTEM = SECTIONS[-1]

@@ -18,9 +18,9 @@ from busplan.buses import kind_named
 from busplan.buses.ethercat.section import EthercatProfile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.questions.compare.kinds import MachineOnKind
-from busplan.questions.evidence.rows import sections_of
-from busplan.questions.fit.loop_delays import loop_delays_us, skew_us
+from busplan.questions.compare import MachineOnKind
+from busplan.questions.evidence import sections_of
+from busplan.questions.fit.circle_refusal import loop_delays_us, skew_us
 from busplan.questions.fit.network import network_of
 
 Run = Callable[..., Any]

@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from busplan.buses.ethercat.equations import datagram_bytes, frame_bytes, room_bytes, sending_us
-from busplan.buses.ethercat.packing import Devices, frames_of, pack
+from busplan.buses.ethercat.frames import Devices, frames_of, pack
 from busplan.elementwise import Traced, plain
 
 MOST, LEAST = 1538, 84

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named
+from busplan.buses.ethercat.frames import Unit, starts
 from busplan.buses.ethercat.section import EthercatProfile
-from busplan.buses.ethercat.units import Unit, starts
 from busplan.errors import BusplanError
 from busplan.questions.fit.network import network_of
 

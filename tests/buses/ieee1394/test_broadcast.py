@@ -19,8 +19,8 @@ from busplan.buses.ieee1394.kind import packets_of
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
+from busplan.questions.fit.circle_refusal import loop_delays_us
 from busplan.questions.fit.figures import CapacityFigures
-from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import network_of
 
 DVRK = busplan.load_profile("dvrk")

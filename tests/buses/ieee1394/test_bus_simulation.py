@@ -18,7 +18,7 @@ from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.buses.network import Group
 from busplan.questions.fit.network import network_of
-from busplan.sections.alike_nodes import AlikeNodes
+from busplan.sections.machine import AlikeNodes
 
 ROUNDING_US = 1e-6
 RATES = {"S100": 98.304, "S200": 196.608, "S400": 393.216}

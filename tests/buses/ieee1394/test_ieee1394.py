@@ -10,8 +10,8 @@ import busplan
 from busplan.buses import kind_named
 from busplan.buses.ieee1394 import constants as ieee1394
 from busplan.elementwise import plain
-from busplan.questions.evidence.rows import sections_of
-from busplan.questions.fit.loop_delays import loop_delays_us
+from busplan.questions.evidence import sections_of
+from busplan.questions.fit.circle_refusal import loop_delays_us
 from busplan.questions.fit.network import network_of
 from busplan.sourced import Sourced
 

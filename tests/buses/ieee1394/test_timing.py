@@ -13,7 +13,7 @@ from busplan.buses.ieee1394.timing import (
     TimingModelName,
     transaction,
 )
-from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
+from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 # Table I, experiment, as printed: payload in bytes, T1+T2 in us.
 TABLE_1_MEASURED = {4: 6.0, 16: 6.3, 32: 6.6, 64: 7.5, 128: 9.1, 256: 11.5, 512: 16.9, 1024: 27.4}

@@ -8,11 +8,11 @@ import pytest
 import busplan
 from busplan.buses import kind_named
 from busplan.buses.published import parts_tested
-from busplan.buses.sercos2.section import Sercos2Profile
+from busplan.buses.sercos.sercos2_section import Sercos2Profile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.profile.write import profile_text
-from busplan.questions.evidence.rows import sections_of
+from busplan.profile.edit import profile_text
+from busplan.questions.evidence import sections_of
 from busplan.questions.fit.inputs import given
 from busplan.sections.profile import Profile
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.buses.sercos2.equations import PERIODS, start_us, telegram_bits, telegram_us
+from busplan.buses.sercos.sercos2 import PERIODS, start_us, telegram_bits, telegram_us
 
 FLAG = [0, 1, 1, 1, 1, 1, 1, 0]
 

@@ -6,9 +6,9 @@ import pytest
 
 import busplan
 from busplan.buses import kind_named
-from busplan.buses.sercos3.section import Sercos3Profile
+from busplan.buses.sercos.sercos3_section import Sercos3Profile
 from busplan.elementwise import plain
-from busplan.questions.fit.loop_delays import loop_delays_us
+from busplan.questions.fit.circle_refusal import loop_delays_us
 from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
 

@@ -8,11 +8,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from busplan.buses import kind_named
-from busplan.buses.sercos3.cycle import TELEGRAMS, Sercos3Cycle
-from busplan.buses.sercos3.equations import PERIODS
-from busplan.buses.sercos3.section import Sercos3Profile
+from busplan.buses.sercos.sercos3 import PERIODS
+from busplan.buses.sercos.sercos3_cycle import TELEGRAMS, Sercos3Cycle
+from busplan.buses.sercos.sercos3_section import Sercos3Profile
 from busplan.elementwise import plain
-from busplan.questions.evidence.rows import sections_of
+from busplan.questions.evidence import sections_of
 from busplan.questions.fit.network import network_of
 
 BYTE_NS = 80

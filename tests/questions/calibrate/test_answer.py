@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import busplan
 from busplan.cli import app
-from busplan.profile.shipped import shipped_folder
+from busplan.profile.sources import shipped_folder
 
 ROWS = [(4, 48.7), (4, 48.9), (16, 55.2), (64, 80.9), (256, 184.4)]
 TEXT = "payload_bytes,latency_us\n" + "".join(f"{size},{us}\n" for size, us in ROWS)

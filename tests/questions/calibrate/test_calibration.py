@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan import BusplanError, CalibrateAnswer
 from busplan.buses.ieee1394.constants import MAX_PAYLOAD_BYTES
-from busplan.profile.toml import override
+from busplan.profile.document import override
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]

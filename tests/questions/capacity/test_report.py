@@ -11,7 +11,7 @@ import pytest
 import busplan
 from busplan.forms import render
 from busplan.forms.blocks import Report
-from busplan.profile.shipped import shipped_names
+from busplan.profile.sources import shipped_names
 
 
 def paper(**changes: object) -> busplan.Profile:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.profile.shipped import shipped_names
+from busplan.profile.sources import shipped_names
 from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, sensitivity_of, standing
 from busplan.questions.fit.certainty import certainty, deciding_cycle
 from busplan.questions.fit.figures import FitFigures

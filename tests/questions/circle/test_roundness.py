@@ -9,9 +9,9 @@ import pytest
 
 import busplan
 from busplan.errors import BusplanError
-from busplan.profile.shipped import shipped_names
-from busplan.questions.circle.contour import CONTOUR_SECTORS, contour_profile, drawn_profile
-from busplan.questions.circle.figures import CircleFigures
+from busplan.profile.sources import shipped_names
+from busplan.questions.circle import CircleFigures
+from busplan.questions.circle.failures import CONTOUR_SECTORS, contour_profile, drawn_profile
 from busplan.questions.circle.roundness import to_attack
 
 Make = Callable[..., busplan.Profile]

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named, kind_names
 from busplan.profile.conversion import converted
-from busplan.profile.keys import dotted_keys
-from busplan.questions.compare.kinds import MachineOnKind, NotOnKind
+from busplan.profile.kinds import dotted_keys
+from busplan.questions.compare import MachineOnKind, NotOnKind
 from busplan.questions.fit.network import network_of
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, TRANSACTION_KINDS
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
-from busplan.sections.transactions import TRANSACTION_KINDS
 
 Profiles = Mapping[str, st.SearchStrategy[Profile]]
 SOME = settings(max_examples=4)

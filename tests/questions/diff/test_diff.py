@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.profile.keys import dotted_keys
-from busplan.profile.shipped import load, shipped_names
-from busplan.profile.toml import override
+from busplan.profile.document import override
+from busplan.profile.kinds import dotted_keys
+from busplan.profile.sources import load, shipped_names
 from busplan.questions.diff import ComparedFigure, DiffAnswer, diff
 from busplan.sections.profile import Profile
 

@@ -11,8 +11,8 @@ from markdown_it import MarkdownIt
 import busplan
 from busplan.forms import render
 from busplan.forms.blocks import Sentence, Table
-from busplan.profile.shipped import load
-from busplan.profile.toml import override
+from busplan.profile.document import override
+from busplan.profile.sources import load
 from busplan.questions.diff.report import excerpt
 from busplan.sections.profile import Profile
 

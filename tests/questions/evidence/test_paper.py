@@ -4,8 +4,8 @@ import pytest
 
 import busplan
 from busplan.buses import kind_named
-from busplan.profile.shipped import load
-from busplan.questions.evidence.rows import Comparison, sections_of
+from busplan.profile.sources import load
+from busplan.questions.evidence import Comparison, sections_of
 
 # As printed in Table I: payload, T_lant, T1+T2, T1+T2 theory.
 TABLE_1 = [

@@ -11,7 +11,7 @@ from busplan.buses import kind_named, kind_names
 from busplan.buses.published import parts_tested, published
 from busplan.errors import BusplanError
 from busplan.forms import render
-from busplan.questions.evidence import rows
+from busplan.questions import evidence as rows
 
 Breaks = Callable[[dict[str, Any]], object]
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses.ieee1394.constants import CONSTANTS
 from busplan.forms import terminal
+from busplan.profile.document import override
 from busplan.profile.kinds import cycle_keys
-from busplan.profile.shipped import shipped_names
-from busplan.profile.toml import override
+from busplan.profile.sources import shipped_names
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile

@@ -13,11 +13,10 @@ import busplan
 from busplan.buses import kind_named, kind_names
 from busplan.elementwise import Traced, plain
 from busplan.profile.kinds import cycle_keys
-from busplan.profile.shipped import shipped_names
+from busplan.profile.sources import shipped_names
 from busplan.questions.fit.certainty import FITS, certainty, deciding_cycle, limits_to_be_safe, limits_with_time
-from busplan.questions.fit.figures import figures
+from busplan.questions.fit.figures import figures, largest_nodes, safe_nodes
 from busplan.questions.fit.network import changed, model_names, network_of
-from busplan.questions.fit.node_limit import largest_nodes, safe_nodes
 
 Profiles = Mapping[str, st.SearchStrategy[busplan.Profile]]
 KINDS = pytest.mark.parametrize("kind", kind_names())

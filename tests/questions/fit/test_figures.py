@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.figures import CapacityFigures, capacity_figures, largest_nodes
 from busplan.questions.fit.network import at_period, model_names, network_of
-from busplan.questions.fit.node_limit import largest_nodes
 
 Make = Callable[..., busplan.Profile]
 Exact = Callable[[busplan.Profile, str, int], Fraction]

@@ -14,10 +14,10 @@ from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.profile.keys import dotted_keys
-from busplan.profile.shipped import load
-from busplan.profile.toml import decode, validate
-from busplan.profile.write import profile_text
+from busplan.profile.document import decode, validate
+from busplan.profile.edit import profile_text
+from busplan.profile.kinds import dotted_keys
+from busplan.profile.sources import load
 from busplan.questions.fit.figures import COUNTS, CapacityFigures, capacity_figures
 from busplan.questions.fit.network import model_names, network_of
 

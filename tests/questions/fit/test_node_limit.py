@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
+from busplan.buses.limits import Bound, Limit
 from busplan.buses.network import Network
-from busplan.buses.parts import Bound, Limit
 from busplan.elementwise import Number, choose, rounded_up
+from busplan.questions.fit.figures import most_nodes
 from busplan.questions.fit.network import network_of
-from busplan.questions.fit.node_limit import most_nodes
 
 NETWORK = network_of(busplan.load_profile("paper-4ms"))
 FORMS: dict[str, Callable[[Number], Number]] = {

@@ -7,11 +7,10 @@ import pytest
 
 import busplan
 from busplan.forms import terminal
-from busplan.forms.charts import Cell, Grid, legend
-from busplan.forms.picture import INKS
-from busplan.questions.map import MapAnswer
-from busplan.questions.map.drawing import LOOKS
-from busplan.questions.map.trade_off import NotDrawn
+from busplan.forms.charts import ChartCell, ChartGrid, legend
+from busplan.forms.svg import INKS
+from busplan.questions.map import MapAnswer, NotDrawn
+from busplan.questions.map.report import LOOKS
 
 MAPS: dict[str, tuple[str, Any, Any]] = {
     "shown": ("paper-4ms", {}, {}),
@@ -29,9 +28,9 @@ def mapped(name: str) -> MapAnswer:
     return busplan.map_(profile, x=x or None, y=y or None)
 
 
-def grid_of(name: str) -> Grid:
+def grid_of(name: str) -> ChartGrid:
     (panel,) = mapped(name).drawing().panels
-    assert isinstance(panel.plot, Grid)
+    assert isinstance(panel.plot, ChartGrid)
     return panel.plot
 
 
@@ -57,7 +56,7 @@ def test_each_cell_has_the_look_of_its_state_and_says_its_setting(name: str) -> 
 @EVERY
 def test_the_legend_explains_every_mark_once_and_this_design(name: str) -> None:
     entries = legend(mapped(name).drawing().panels)
-    cells = {cell for row in grid_of(name).rows for cell in row if isinstance(cell, Cell)}
+    cells = {cell for row in grid_of(name).rows for cell in row if isinstance(cell, ChartCell)}
     assert sorted(entry.mark for entry in entries if entry.mark) == sorted({cell.mark for cell in cells})
     words = [entry.words for entry in entries]
     assert ("blank: cannot exist" in words) == bool(mapped(name).not_drawn)
@@ -121,7 +120,7 @@ def test_values_stand_below_their_columns() -> None:
 def test_rows_have_equal_steps_or_say_that_they_do_not(periods_us: list[int], label: str) -> None:
     found = busplan.map_("paper-4ms", x={"axes": [4, 8]}, y={"cycle.period_us": periods_us})
     (panel,) = found.drawing().panels
-    assert isinstance(panel.plot, Grid)
+    assert isinstance(panel.plot, ChartGrid)
     assert (panel.plot.up.label, panel.plot.across.label) == (label, "axes (bus.nodes)")
     assert ("period against axes (bus.nodes), in unequal steps" in str(found)) == ("unequal" in label)
     assert (grid_of("words").up.label, grid_of("words").across.label) == ("bus.speed", "bus.gap_count")

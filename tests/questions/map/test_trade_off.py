@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.questions.map.trade_off import Cell, NotDrawn
+from busplan.questions.map import Cell, NotDrawn
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 
 AXES, PERIOD, TIME = "axes", "cycle.period_us", "time"

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.recorded import RecordedFigure
+from busplan.buses.rule import RecordedFigure
 from busplan.errors import BusplanError
 from busplan.questions.measured import MeasuredAnswer
 from busplan.recordings.can import read_can, written_bits

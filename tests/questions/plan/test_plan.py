@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 import busplan
 from busplan.errors import BusplanError
 from busplan.gate.gate import check_document
-from busplan.profile.shipped import load, shipped_names
-from busplan.profile.toml import decode, override
-from busplan.profile.write import profile_text
+from busplan.profile.document import decode, override
+from busplan.profile.edit import profile_text
+from busplan.profile.sources import load, shipped_names
 from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]

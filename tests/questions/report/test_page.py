@@ -19,9 +19,9 @@ from busplan.buses import kind_named, kind_names
 from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, ShownValue, Table
 from busplan.forms.numbers import cell_text, sentence_text
-from busplan.forms.picture import INKS
+from busplan.forms.svg import INKS
 from busplan.profile.changes import NO_CHANGES
-from busplan.questions.base.shell import shell_word
+from busplan.questions.base.answer import shell_word
 
 NAMES = (
     "</title><script>alert(1)</script> \"><img src=x onerror=alert(1)> ' autofocus onfocus='alert(1)",

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import busplan
-from busplan.forms.charts import Curves, Drawing, Grid, legend
-from busplan.forms.picture import INKS
+from busplan.forms.charts import ChartGrid, Curves, Drawing, legend
+from busplan.forms.svg import INKS
 
 MODELS = ("paper", "standard")
 TOO_FAST_AND_NOT = {"cycle.period_us": [100.0, 2000.0, 4000.0], "circle.radius_mm": [10.0]}
@@ -30,8 +30,8 @@ def curves(drawing: Drawing) -> Curves:
     return panel.plot
 
 
-def grids(drawing: Drawing) -> list[Grid]:
-    return [panel.plot for panel in drawing.panels if isinstance(panel.plot, Grid)]
+def grids(drawing: Drawing) -> list[ChartGrid]:
+    return [panel.plot for panel in drawing.panels if isinstance(panel.plot, ChartGrid)]
 
 
 def words(drawing: Drawing) -> list[str]:

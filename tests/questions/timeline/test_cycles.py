@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named
-from busplan.buses.rates import Rate, numbers_by_due
-from busplan.profile.write import profile_text
+from busplan.buses.network import Rate, numbers_by_due
+from busplan.profile.edit import profile_text
 
 Run = Callable[..., Any]
 WORST, NONE = "worst-stuffing", "no-stuffing"

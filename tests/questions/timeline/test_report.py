@@ -8,7 +8,7 @@ import pytest
 
 import busplan
 from busplan.buses import kind_named
-from busplan.buses.parts import IDLE
+from busplan.buses.limits import IDLE
 from busplan.forms import markdown, terminal
 from busplan.forms.blocks import Report, Sentence, ShownValue, Table
 from busplan.forms.charts import Lane, Lanes, legend

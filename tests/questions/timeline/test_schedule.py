@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.errors import BusplanError
-from busplan.profile.shipped import shipped_names
+from busplan.profile.sources import shipped_names
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import model_names, network_of
 

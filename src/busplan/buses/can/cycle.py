@@ -6,17 +6,26 @@ from itertools import islice
 from math import inf
 from typing import Final, Literal
 
-from busplan.buses.can.constants import EXPECTED_STUFFING
-from busplan.buses.can.equations import bit_us, frame_us, payload_us
-from busplan.buses.can.figures import BUS_LOAD, TERMS
-from busplan.buses.can.streams import Stream, frame_sizes, last_identifier, place, streams
-from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Traffic, traffic_of
+from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, TERMS, bit_us, frame_us, payload_us
+from busplan.buses.can.frames import (
+    LOOP,
+    NAMES,
+    SYNC,
+    Message,
+    Pdos,
+    Stream,
+    Traffic,
+    frame_sizes,
+    last_identifier,
+    place,
+    streams,
+    traffic_of,
+)
 from busplan.buses.can.waiting import counted, message_responses, responses, sent_in, sync_response, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import NONPERIODIC
-from busplan.buses.network import Group, Network
-from busplan.buses.parts import EventKind
-from busplan.buses.rates import Rate
+from busplan.buses.limits import EventKind
+from busplan.buses.network import Group, Network, Rate
 from busplan.elementwise import (
     FIT_ROUNDING,
     Number,
@@ -31,7 +40,7 @@ from busplan.elementwise import (
     total,
     value_of,
 )
-from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
+from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"

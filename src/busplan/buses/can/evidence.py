@@ -5,9 +5,8 @@ from math import inf
 from typing import Final, Literal
 
 from busplan.buses.can import equations
-from busplan.buses.can.constants import EXPECTED_STUFFING
-from busplan.buses.can.streams import streams
-from busplan.buses.can.traffic import Message, Traffic
+from busplan.buses.can.equations import EXPECTED_STUFFING
+from busplan.buses.can.frames import Message, Traffic, streams
 from busplan.buses.can.waiting import message_responses
 from busplan.elementwise import plain
 

@@ -9,25 +9,24 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from busplan.buses.can.constants import BASE_BITS, FD_FRAME_BYTES, FD_LENGTHS, FRAME_BYTES
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.equations import bit_us, frame_us
-from busplan.buses.can.streams import Stream, streams
-from busplan.buses.can.traffic import SYNC
+from busplan.buses.can.equations import BASE_BITS, FD_FRAME_BYTES, FD_LENGTHS, FRAME_BYTES, bit_us, frame_us
+from busplan.buses.can.frames import SYNC, Stream, streams
 from busplan.buses.network import Network
-from busplan.buses.recorded import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, Sense, day_of
+from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, Sense, day_of
 from busplan.elementwise import plain
 from busplan.english import first_of, plural
 from busplan.progress import Progress
-from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.can_messages import (
+from busplan.recordings.can import (
     LISTED,
+    CanFrames,
     SentFrames,
     event_model,
     faults,
     least_bit_rate,
     longest_stretch,
     mean_period,
+    read_can,
     sent_messages,
     stamps_of_no_bus,
     step_us,

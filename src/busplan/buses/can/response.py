@@ -21,7 +21,7 @@ revisited and revised, Real-Time Systems 35, 2007, equations (4)-(12).
 import math
 from collections.abc import MutableSequence, Sequence
 
-from busplan.buses.can import constants
+from busplan.buses.can import equations as constants
 
 SATURATED = float(constants.SATURATED)
 MOST_STEPS = int(constants.MOST_STEPS)

@@ -5,7 +5,8 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from busplan.buses.can.constants import (
+from busplan.buses.can.cycle import WORST, TimingModelName
+from busplan.buses.can.equations import (
     FD_FRAME_BYTES,
     FRAME_BYTES,
     LEAST_BIT_RATE,
@@ -21,11 +22,21 @@ from busplan.buses.can.constants import (
     UNMEASURED_SHARE,
     IdentifierBits,
 )
-from busplan.buses.can.cycle import WORST, TimingModelName
-from busplan.buses.can.traffic import LOOP, NAMES, SYNC
+from busplan.buses.can.frames import LOOP, NAMES, SYNC
 from busplan.elementwise import Number
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, MISSING, Count, Problem, Section, TimeUs, refused
+from busplan.sections.base import (
+    MAX_TIME_US,
+    MIN_STEP_US,
+    MISSING,
+    Count,
+    Problem,
+    Section,
+    TimeUs,
+    TransactionKind,
+    refused,
+)
 from busplan.sections.cycle import (
+    UNKNOWN_SHARE,
     BusSection,
     CycleSection,
     GroupAxes,
@@ -35,9 +46,7 @@ from busplan.sections.cycle import (
     NodeSection,
     PayloadSection,
 )
-from busplan.sections.execution import UNKNOWN_SHARE
 from busplan.sections.profile import CIRCLE_SECTIONS, OF_ALIKE_NODES, Profile
-from busplan.sections.transactions import TransactionKind
 
 Identifier = Annotated[int, Field(ge=0, le=MAX_IDENTIFIER[29])]
 BitRate = Annotated[float, Field(ge=LEAST_BIT_RATE, le=MOST_BIT_RATE, allow_inf_nan=False)]

@@ -10,10 +10,8 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from busplan.buses.can import response
-from busplan.buses.can.constants import MOST_BLOCKS
-from busplan.buses.can.equations import bit_us
-from busplan.buses.can.streams import Points, Stream, last_place, streams
-from busplan.buses.can.traffic import NAMES, SYNC, Traffic
+from busplan.buses.can.equations import MOST_BLOCKS, bit_us
+from busplan.buses.can.frames import NAMES, SYNC, Points, Stream, Traffic, last_place, streams
 from busplan.elementwise import choose, from_rows, plain, rounded_up, rows, shape_of, smaller, total
 from busplan.english import first_of
 

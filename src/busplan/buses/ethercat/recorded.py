@@ -19,18 +19,17 @@ from busplan.buses.ethercat.equations import (
     frame_bytes,
     sending_us,
 )
-from busplan.buses.ethercat.numbering import Places, SeenCycles, seen_cycles
-from busplan.buses.ethercat.ports import line_delays
-from busplan.buses.ethercat.traffic import (
+from busplan.buses.ethercat.frames import (
+    UnitCycle,
     cables_us,
     devices_doubts,
     devices_us,
     has_rates,
     housekeeping_bytes,
 )
-from busplan.buses.ethercat.units import UnitCycle
+from busplan.buses.ethercat.ports import Places, SeenCycles, line_delays, seen_cycles
 from busplan.buses.network import Network
-from busplan.buses.recorded import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
+from busplan.buses.rule import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
 from busplan.elementwise import plain
 from busplan.english import plural
 from busplan.errors import BusplanError

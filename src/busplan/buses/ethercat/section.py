@@ -17,12 +17,19 @@ from busplan.buses.ethercat.equations import (
     ProcessData,
     room_bytes,
 )
-from busplan.buses.ethercat.units import MOST_CYCLES, common_multiple
+from busplan.buses.ethercat.frames import MOST_CYCLES, common_multiple
 from busplan.elementwise import Number
 from busplan.errors import BusplanError
 from busplan.sections.base import MAX_COUNT, MISSING, Bytes, Count, Problem, TimeUs, refused
-from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
-from busplan.sections.execution import UNKNOWN_SHARE, Execution
+from busplan.sections.cycle import (
+    UNKNOWN_SHARE,
+    BusSection,
+    Execution,
+    GroupAxes,
+    GroupSection,
+    NodeSection,
+    PayloadSection,
+)
 from busplan.sections.profile import Profile
 
 HousekeepingBytes = Annotated[int, Field(ge=0, le=int(room_bytes(1)))]

@@ -16,7 +16,8 @@ from functools import cached_property, partial
 from typing import NamedTuple
 
 from busplan.buses.cycle import BUT_FIRST, FIRST, BusEvent, BusLatency, Doubt, Run
-from busplan.buses.ieee1394 import doubts, equations, figures
+from busplan.buses.ieee1394 import equations, figures
+from busplan.buses.ieee1394 import transactions as doubts
 from busplan.buses.ieee1394.constants import (
     BASE_RATE_MBIT_S,
     BLOCK_READ_REQUEST_BYTES,
@@ -32,7 +33,7 @@ from busplan.buses.ieee1394.constants import (
     QUADLET_WRITE_REQUEST_BYTES,
     padded_bytes,
 )
-from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
+from busplan.buses.ieee1394.cycle import CycleWithStarts
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, alike, is_off, larger, named, total
 

@@ -16,8 +16,8 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.table_1 import residual
 from busplan.buses.ieee1394.timing import TIMING_MODELS
+from busplan.buses.ieee1394.transactions import residual
 from busplan.buses.network import Network
 from busplan.buses.published import published
 from busplan.elementwise import plain

@@ -17,14 +17,12 @@ from busplan.buses.ieee1394.constants import (
     SLICE_RATIO,
     safe_gap_count,
 )
-from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.cycle_starts import EVENTS, STRETCHES, CycleWithStarts
+from busplan.buses.ieee1394.cycle import EVENTS, STRETCHES, CycleWithStarts, Ieee1394Cycle
 from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE
 from busplan.buses.ieee1394.rules import LIMITS, RULES
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
-from busplan.buses.network import Network
-from busplan.buses.parts import (
+from busplan.buses.limits import (
     Cost,
     Key,
     MeasuredLatencies,
@@ -37,6 +35,7 @@ from busplan.buses.parts import (
     TimingModel,
     Value,
 )
+from busplan.buses.network import Network
 from busplan.elementwise import plain
 from busplan.english import plural
 from busplan.errors import BusplanError

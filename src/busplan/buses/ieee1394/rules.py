@@ -25,12 +25,12 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
+from busplan.buses.limits import Bound, Limit
 from busplan.buses.network import Network
-from busplan.buses.parts import Bound, Limit
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, margin, told_apart
 from busplan.elementwise import Number
 from busplan.english import plural
-from busplan.sections.transactions import TRANSACTION_KINDS
+from busplan.sections.base import TRANSACTION_KINDS
 
 if TYPE_CHECKING:
     from busplan.buses.ieee1394.section import Ieee1394Bus

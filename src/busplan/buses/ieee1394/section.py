@@ -19,15 +19,17 @@ from busplan.buses.ieee1394.timing import BroadcastRequest, TimingModelName
 from busplan.elementwise import Number, choose
 from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
 from busplan.sections.cycle import (
+    UNKNOWN_SHARE,
     BusSection,
     CycleSection,
     GroupAxes,
     GroupSection,
+    LinearExecution,
     NodeSection,
     PayloadSection,
     SliceRatio,
+    TableExecution,
 )
-from busplan.sections.execution import UNKNOWN_SHARE, LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
 

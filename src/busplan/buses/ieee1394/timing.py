@@ -3,7 +3,7 @@
 `paper` takes the equations as they are published: gaps and PHY delays are counted in the data rate, and both
 packets of a transaction carry the payload and the same overhead. `standard` counts gaps and PHY delays in the base
 rate, as the gap tables of three independent stacks show, and gives every packet its real size on the wire.
-Gaps are added up in `paper`, and are thresholds of an idle period in `standard` (`busplan.buses.ieee1394.idle`).
+Gaps are added up in `paper`, and are thresholds of an idle period in `standard` (`busplan.buses.ieee1394.timing`).
 Operators only, as in `equations`: floats in, floats out; arrays in, arrays out.
 """
 
@@ -24,9 +24,97 @@ from busplan.buses.ieee1394.constants import (
     WRITE_RESPONSE_BYTES,
     padded_bytes,
 )
-from busplan.buses.ieee1394.idle import Answer, Gaps, IdleTime, gaps_added_up, gaps_as_thresholds
-from busplan.elementwise import Number, alike, choose, named, worded
-from busplan.sections.transactions import TransactionKind
+from busplan.elementwise import Number, alike, choose, is_off, larger, named, smaller, worded
+from busplan.sections.base import TransactionKind
+
+Answer = Literal["split", "concatenated", "unified"]
+"""Answer of a node to a request.
+
+split: it acknowledges, executes, and arbitrates for its response. concatenated: its response follows its acknowledge,
+and the bus stays busy. unified: its acknowledge completes the transaction.
+"""
+
+
+class Gaps(NamedTuple):
+    """The gaps of a bus [us], and whether a single node answers on it."""
+
+    subaction_us: Number
+    """T_sub."""
+    arbitration_reset_us: Number
+    """T_reset."""
+    both_us: Number
+    """T_sum, equation (10)."""
+    alone: Number
+    """Whether there is a single node: a boolean, or an array of booleans."""
+
+
+class IdleTime(NamedTuple):
+    """Idle bus around a transaction, without the execution [us]."""
+
+    idle_us: Number
+    """Idle bus of the gaps."""
+    host_us: Number
+    """Idle bus while the host takes longer than the gaps."""
+
+
+def gaps_added_up(_answer: Answer, *, gaps: Gaps, execution_us: Number, host_us: Number) -> IdleTime:  # noqa: ARG001
+    """Both gaps after every transaction, whatever the node and the host do, as equation (11) has it."""
+    return IdleTime(gaps.both_us, 0.0)
+
+
+def gaps_as_thresholds(answer: Answer, *, gaps: Gaps, execution_us: Number, host_us: Number) -> IdleTime:
+    """Idle bus of a transaction as the bus runs it.
+
+    Parameters
+    ----------
+    answer
+        How the node answers.
+    gaps
+        The gaps.
+    execution_us
+        Upper bound of the execution time of a split transaction [us]; of any sort.
+    host_us
+        The host's own time between a response and its next request [us]; of any sort.
+
+    Examples
+    --------
+    >>> gaps = Gaps(10.5, 21.0, 31.5, alone=False)
+    >>> gaps_as_thresholds("split", gaps=gaps, execution_us=36.5, host_us=0.0)
+    IdleTime(idle_us=10.5, host_us=0.0)
+    >>> gaps_as_thresholds("split", gaps=gaps, execution_us=0.0, host_us=30.0)
+    IdleTime(idle_us=31.5, host_us=9.0)
+    """
+    if answer == "split":
+        without_host_us = between_packets_us(answer, gaps=gaps, execution_us=execution_us, host_us=0.0)
+        if is_off(host_us):
+            return IdleTime(without_host_us - execution_us, 0.0)
+        with_host_us = between_packets_us(answer, gaps=gaps, execution_us=execution_us, host_us=host_us)
+        return IdleTime(without_host_us - execution_us, with_host_us - without_host_us)
+    idle_us = gaps.arbitration_reset_us
+    return IdleTime(
+        idle_us, between_packets_us(answer, gaps=gaps, execution_us=execution_us, host_us=host_us) - idle_us
+    )
+
+
+def between_packets_us(answer: Answer, *, gaps: Gaps, execution_us: Number, host_us: Number) -> Number:
+    """Time of a transaction without its packets: execution, gaps and host [us].
+
+    A split transaction has two idle periods, before and after its response. A fast node ends the first before the
+    arbitration reset gap has passed; then the second must be as long as that gap. A single node on the bus may have
+    used its turn in the fairness interval; then the first must be as long.
+
+    Parameters
+    ----------
+    answer, gaps, execution_us, host_us
+        As in `gaps_as_thresholds`.
+    """
+    sub_us, reset_us = gaps.subaction_us, gaps.arbitration_reset_us
+    if answer != "split":
+        return larger(reset_us, host_us)
+    first_us = choose(gaps.alone, reset_us, larger(sub_us, smaller(execution_us, reset_us)))
+    fast_us = first_us + larger(reset_us, host_us)
+    return larger(fast_us, execution_us + larger(sub_us, host_us))
+
 
 TimingModelName = Literal["paper", "standard"]
 BroadcastRequest = Literal["isochronous", "priority", "timed"]

@@ -9,10 +9,10 @@ from busplan.buses.network import Network
 from busplan.english import listed
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
-from busplan.profile.keys import dotted_keys
-from busplan.profile.shipped import load, shipped_names
-from busplan.profile.toml import override
-from busplan.profile.write import value_text
+from busplan.profile.document import override
+from busplan.profile.edit import value_text
+from busplan.profile.kinds import dotted_keys
+from busplan.profile.sources import load, shipped_names
 from busplan.questions.fit.network import model_names, network_of
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
@@ -256,7 +256,7 @@ def origin_of(profile: Profile) -> Origin:
 
     Examples
     --------
-    >>> from busplan.profile.toml import override
+    >>> from busplan.profile.document import override
     >>> changed = override(load("paper-4ms").profile, {"bus.nodes": 3})
     >>> origin_of(changed)[0], origin_of(changed)[1].words
     ('paper-4ms', '--set bus.nodes=3')

@@ -20,11 +20,10 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.numbers import sentence_text
-from busplan.profile.write import value_text
-from busplan.questions.calibrate import CalibrateAnswer
-from busplan.questions.calibrate.fit import REPETITIONS_TO_COMPARE, Outlier
-from busplan.questions.words.documents import document, with_profile
-from busplan.sections.transactions import TRANSACTION_KINDS
+from busplan.profile.edit import value_text
+from busplan.questions.base.sentences import document, with_profile
+from busplan.questions.calibrate import REPETITIONS_TO_COMPARE, CalibrateAnswer, Outlier
+from busplan.sections.base import TRANSACTION_KINDS
 
 _COLUMNS: Final = {
     "payload_bytes": TableColumn("payload", "bytes"),

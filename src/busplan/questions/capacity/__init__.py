@@ -15,7 +15,7 @@ from busplan.questions.base.inputs import (
     one_or_several,
     with_cycle,
 )
-from busplan.questions.capacity.verdict import Verdict, verdict_of
+from busplan.questions.capacity.lines import Verdict, verdict_of
 from busplan.questions.fit.certainty import FITS, VerdictWord
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.network import at_periods, model_names
@@ -78,7 +78,7 @@ class CapacityAnswer(Answer):
     def report(self) -> Report:
         """The answer in blocks."""
         if self.sensitivities:
-            from busplan.questions.capacity.sensitivity_report import sensitivity_report
+            from busplan.questions.capacity.sensitivity import sensitivity_report
 
             return sensitivity_report(self)
         from busplan.questions.capacity.report import capacity_report

@@ -25,14 +25,12 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import period, sentence_text
+from busplan.questions.base.sentences import Owner, document, fields, figure_table, safety_record, with_profile
 from busplan.questions.capacity import CapacityAnswer
-from busplan.questions.capacity.lines import card, card_text, uncertainty_parts
-from busplan.questions.capacity.verdict import Verdict
+from busplan.questions.capacity.lines import Verdict, card, card_text, uncertainty_parts
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS, CapacityFigures
 from busplan.questions.fit.network import leading_model
-from busplan.questions.words.documents import Owner, document, fields, figure_table, with_profile
-from busplan.questions.words.sentences import safety_record
 
 
 def capacity_report(answer: CapacityAnswer) -> Report:

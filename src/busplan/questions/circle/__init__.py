@@ -1,14 +1,267 @@
 """`busplan.circle_test`."""
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final, NamedTuple
 
+from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, VERDICT, Figure, by, by_key
+from busplan.buses.network import required_time_slice_us, time_slice_us
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Periods, ProfileLike, load_network, one_or_several, whole
-from busplan.questions.circle.figures import CircleTest
+from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from busplan.questions.circle.failures import Failure
+    from busplan.questions.circle.roundness import Contribution
+    from busplan.servo.circle import CircleRun
+
+
+NEGLIGIBLE_MM: Final = 1e-4
+"""Contour error below which nothing of the profile makes a circle what it is: chosen, far below any machine [mm]."""
+_CYCLE: Final = by(time_slice_us, required_time_slice_us)
+_ISO: Final = "ISO 230-4"
+
+JITTER: Final = Figure(
+    "jitter_us",
+    "J",
+    "profile",
+    "jitter of the synchronous packet, either way of its mean: delivery.jitter_us and what the bus adds",
+    "jitter of the packet",
+)
+CIRCLE_FIGURES: Final = (
+    PERIOD,
+    Figure("feed_mm_per_min", "F", "profile", "speed along the circle", "feed", decimals=None),
+    Figure("radius_mm", "r", "profile", "radius of the circle", "radius", decimals=None),
+    Figure("path", "path", "profile", "the move: trapezoid or iso230-4", "path", sort="word"),
+    Figure("duration_s", "D", "path", "duration of the move", "duration"),
+    Figure("setpoints", "n", "path", "set-points of the move", "set-points", "1", "count"),
+    Figure("steps", "n_h", "path", "simulated steps of each axis"),
+    Figure(
+        "step_us",
+        "h",
+        "profile",
+        "period of the node's position loop, and step of the simulation",
+        "position-loop step",
+        decimals=None,
+    ),
+    Figure(
+        "loop",
+        "loop",
+        "profile",
+        "where the position loop is closed: node or host",
+        "position loop on the",
+        sort="word",
+    ),
+    Figure(
+        "update", "update", "profile", "when a node applies a command of a loop on the host: next_sync or on_arrival"
+    ),
+    Figure("delay_us", "T_d", "III-C", "bus delay inside the loop, the longer one of both axes", "delay in the loop"),
+    Figure("delay_x_us", "T_dx", "III-C", "bus delay inside the loop of x"),
+    Figure("delay_y_us", "T_dy", "III-C", "bus delay inside the loop of y"),
+    JITTER,
+    Figure("timing_model", "model", "profile", "timing model that decides whether the bus fits"),
+    Figure("bus_fits", "fits", _CYCLE, "whether required <= available, and no limit is broken"),
+    VERDICT,
+    REQUIRED,
+    AVAILABLE,
+    Figure("servo_grade", "grade", "profile", "how the servo values are known", "servo values", sort="word"),
+    Figure("ideal_drive", "ideal", "profile", "whether an ideal drive was simulated, for the profile has no [servo]"),
+    Figure("stable", "stable", "loop", "whether both position loops are stable", "stable", sort="truth", better="more"),
+    Figure(
+        "phase_margin_deg",
+        "phase margin",
+        "loop",
+        "smallest change of the loop's phase that makes it unstable",
+        "phase margin",
+        decimals=2,
+        better="more",
+    ),
+    Figure(
+        "gain_margin_db",
+        "gain margin",
+        "loop",
+        "smallest change of the loop's gain, up or down, that makes it unstable",
+        "gain margin",
+        decimals=2,
+        better="more",
+        relative=False,
+    ),
+    Figure(
+        "crossover_hz",
+        "f_c",
+        "loop",
+        "frequency at which the loop gain is 1, where the phase margin is taken",
+        "crossover",
+        decimals=2,
+    ),
+    Figure("settled", "settled", "loop", "whether the loops settle before the measured turn; null on a trapezoid"),
+    Figure(
+        "mean_contour_error_mm",
+        "mean",
+        "simulation",
+        "mean contour error of the turn, or of the whole trapezoid",
+        "mean contour error",
+        "um",
+        better="less",
+        scale="radius_mm",
+    ),
+    Figure(
+        "max_contour_error_mm",
+        "max",
+        "simulation",
+        "largest contour error of the turn, or of the whole trapezoid",
+        "largest contour error",
+        "um",
+        better="less",
+        scale="radius_mm",
+    ),
+    Figure(
+        "radial_deviation_min_mm",
+        "F_min",
+        _ISO,
+        "smallest radial deviation of the turn, or of a trapezoid at constant speed",
+        "smallest radial deviation F_min",
+        "um",
+    ),
+    Figure(
+        "radial_deviation_max_mm",
+        "F_max",
+        _ISO,
+        "largest radial deviation of the turn, or of a trapezoid at constant speed",
+        "largest radial deviation F_max",
+        "um",
+    ),
+    Figure(
+        "circular_deviation_mm",
+        "G",
+        _ISO,
+        "circular deviation about the least-squares centre of the turn; null on a trapezoid",
+        "circular deviation G",
+        "um",
+        better="less",
+        scale="radius_mm",
+    ),
+    Figure(
+        "radius_deviation_mm",
+        "r_ls - r",
+        "least squares",
+        "least-squares radius less the nominal one",
+        "radius deviation",
+        "um",
+    ),
+    Figure("centre_offset_mm", "centre", "least squares", "least-squares centre, x and y"),
+    Figure("constant_speed_deg", "arc", "simulation", "arc that F, G, centre and radius are taken on: 360 for a turn"),
+    Figure(
+        "sources_matter",
+        "matter",
+        "simulation",
+        "whether a measure with a tolerance, or without any the largest error, is 0.1 um or more; null without a turn",
+    ),
+    Figure(
+        "passed",
+        "passed",
+        "profile",
+        "whether the circle holds every tolerance; null if nothing fails, and no contour tolerance is asked for or no "
+        "error source matters",
+        "passed",
+        sort="truth",
+        better="more",
+    ),
+    Figure("failures", "failures", "profile", "what the circle does not hold"),
+    Figure("contributions", "contributions", "simulation", "what each error source takes of the largest error"),
+)
+CIRCLE_BY_KEY: Final = by_key(CIRCLE_FIGURES)
+"""The same by key."""
+
+
+class CircleFigures(NamedTuple):
+    """Circle test at one period. Figures of a simulation that did not run are None."""
+
+    period_us: float
+    feed_mm_per_min: float
+    radius_mm: float
+    path: str
+    """trapezoid or iso230-4."""
+    duration_s: float
+    setpoints: int
+    steps: int
+    step_us: float
+    loop: str
+    update: str
+    """When a node applies a command of a loop on the host."""
+    delay_us: float
+    """Bus delay inside the loop, the longer of both axes; 0 for a loop on the node."""
+    delay_x_us: float
+    delay_y_us: float
+    jitter_us: float
+    """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds."""
+    timing_model: str
+    """Timing model that decided whether the bus fits."""
+    bus_fits: bool
+    """Whether no limit is broken, time among them: required <= available."""
+    verdict: str
+    """fits, not shown to fit, or does not fit: a circle passes only on a bus that is shown to carry it."""
+    required_us: float
+    available_us: float
+    servo_grade: str
+    """The weakest grade of the profile's servo values: published, measured, calibrated or assumed."""
+    ideal_drive: bool
+    """Whether the profile has no [servo], so that an ideal drive was simulated."""
+    stable: bool | None
+    phase_margin_deg: float | None
+    """The smaller of both axes; None also if no loop gain reaches one."""
+    gain_margin_db: float | None
+    """The smaller of both axes; None also if no gain makes a loop unstable."""
+    crossover_hz: float | None
+    """Of the axis with the smaller phase margin."""
+    settled: bool | None
+    """Whether the loops had settled before the measured turn; None on a trapezoid. Without it no measure is given."""
+    mean_contour_error_mm: float | None
+    max_contour_error_mm: float | None
+    radial_deviation_min_mm: float | None
+    radial_deviation_max_mm: float | None
+    circular_deviation_mm: float | None
+    """About the least-squares centre of a whole turn; None on a trapezoid."""
+    radius_deviation_mm: float | None
+    centre_offset_mm: tuple[float, float] | None
+    constant_speed_deg: float | None
+    """Arc at constant speed from which F, G, radius and centre are taken: 360 on a turn."""
+    sources_matter: bool | None
+    """Whether a judged measure, or without any the largest error, is 0.1 um or more: below, the profile has no error
+    source that matters, which says nothing of how round a machine is. None if none was measured."""
+    passed: bool | None
+    """None if nothing fails, and the profile has no contour tolerance or no error source matters: it is not judged."""
+    failures: "tuple[Failure, ...]"
+    contributions: "tuple[Contribution, ...] | None"
+    """Largest first; None if they were not requested and no contour measure failed."""
+
+    @property
+    def verdict_word(self) -> str:
+        """The verdict in a word or two."""
+        if self.stable is None:
+            return "NOT RUN"
+        if self.passed is not None:
+            return "PASSED" if self.passed else "FAILED"
+        return "NO SOURCE MATTERS" if self.sources_matter is False else "NOT JUDGED"
+
+
+class CircleTest(NamedTuple):
+    """Answer of `circle_test`: the profile, and the figures and simulation of each period."""
+
+    profile: Profile
+    results: tuple[CircleFigures, ...]
+    runs: "tuple[CircleRun | None, ...]"
+    with_contributions: bool = False
+    """If True, document and report rank the error sources."""
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether every period holds every tolerance; None if no period fails and some period is not judged."""
+        verdicts = [result.passed for result in self.results]
+        return False if False in verdicts else None if None in verdicts else True
 
 
 class CircleTestAnswer(Answer, CircleTest):
@@ -47,7 +300,7 @@ class CircleTestAnswer(Answer, CircleTest):
             `every` is no whole number from 1 on.
         """
         from busplan.forms.csv_rows import csv_blocks
-        from busplan.questions.circle.contour import TRACE_COLUMNS, trace_records
+        from busplan.questions.circle.failures import TRACE_COLUMNS, trace_records
 
         return csv_blocks(trace_records(self, every=whole(every, name="every")), columns=TRACE_COLUMNS)
 
@@ -59,7 +312,7 @@ class CircleTestAnswer(Answer, CircleTest):
         BusplanError
             No period fits the bus, so nothing was simulated.
         """
-        from busplan.questions.circle.plot import test_drawing
+        from busplan.questions.circle.drawing import test_drawing
 
         if not any(self.runs):
             raise BusplanError("there is nothing to draw: no period fits the bus")

@@ -1,12 +1,35 @@
 """The circle with its error magnified, as in ballbar reports."""
 
-from math import floor
+from collections.abc import Sequence
+from math import ceil, floor
 from typing import Final, NamedTuple
 
-from busplan.forms.charts import Dial, Drawing, Entry, Panel
-from busplan.forms.numbers import ROUNDING_UM
+import numpy as np
+from numpy.typing import NDArray
+
+from busplan.forms.charts import (
+    Curve,
+    Curves,
+    Dial,
+    Drawing,
+    Entry,
+    Guide,
+    Lane,
+    Lanes,
+    Panel,
+    Ruler,
+    Shade,
+    Span,
+    numbers,
+)
+from busplan.forms.lines import Tone
+from busplan.forms.numbers import ROUNDING_UM, decimals_of, period
 from busplan.forms.scale import ring_step
-from busplan.questions.circle.contour import ContourProfile
+from busplan.questions.circle import CircleFigures, CircleTest
+from busplan.questions.circle.failures import ContourProfile, contour_profile
+from busplan.sections.machine import ToleranceSection
+from busplan.servo.circle import CircleRun
+from busplan.servo.contour import contour_error
 from busplan.servo.path import Direction
 
 _ERROR_SHARE: Final = 0.25
@@ -170,3 +193,235 @@ def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> Dia
 def circle_drawing(contour: ContourProfile, scale: Magnified, direction: Direction) -> Drawing:
     """Draw the circle alone; parameters as `dial` has them."""
     return Drawing("Circle with its contour error magnified", (Panel(dial(contour, scale, direction)),))
+
+
+Floats = NDArray[np.float64]
+
+_MAX_POINTS: Final = 2000
+"""Most points of one curve: more would not be visible."""
+
+
+class Stretch(NamedTuple):
+    """A part of the move. Of many points, the smallest and the largest error of each stretch are kept."""
+
+    time_s: Floats
+    error_um: Floats
+    measured: bool
+
+
+class CircleRow(NamedTuple):
+    """One simulated period."""
+
+    result: CircleFigures
+    run: CircleRun
+    curves: tuple[Stretch, ...]
+
+    @property
+    def judged(self) -> tuple[Stretch, ...]:
+        """Curves that mean and largest error are taken from: the whole move on a trapezoid."""
+        return tuple(curve for curve in self.curves if curve.measured or self.result.path == "trapezoid")
+
+
+class Scales(NamedTuple):
+    """Scales and limits that all rows share, so that they compare."""
+
+    circle: Magnified | None
+    """None if there is no error to show."""
+    errors: ErrorRange
+    unit: LengthUnit
+    tolerance: ToleranceSection
+
+
+def circle_rows(test: CircleTest) -> list[CircleRow]:
+    """Rows of the periods that were simulated.
+
+    Parameters
+    ----------
+    test
+        The circle test.
+    """
+    pairs = zip(test.results, test.runs, strict=True)
+    return [CircleRow(result, run, _curves(run)) for result, run in pairs if run is not None]
+
+
+def common_scales(rows: Sequence[CircleRow], tolerance: ToleranceSection) -> Scales:
+    """Scales of all rows. A row whose table left the circle counts only if there is no other.
+
+    Parameters
+    ----------
+    rows
+        The rows, one or more.
+    tolerance
+        Limits of the circle.
+    """
+    shown = [row for row in rows if not row.run.diverged] or rows
+    measured = [curve.error_um for row in shown for curve in row.curves if curve.measured]
+    judged = [curve.error_um for row in shown for curve in row.judged]
+    radius_um = rows[0].result.radius_mm * 1e3
+    low_um, high_um = (float(np.clip(end, -radius_um, radius_um)) for end in _ends(judged))
+    largest_mm = min(max(map(abs, _ends(measured))), radius_um) / 1e3
+    circle = magnified(largest_mm, tolerance_mm=tolerance.max_contour_error_mm)
+    errors = error_range(low_um, high_um)
+    if circle is not None and circle.tolerance_mm is not None and not errors.zero_outside:
+        limit_um = circle.tolerance_mm * 1e3
+        errors = ErrorRange(min(errors.bottom_um, -limit_um), max(errors.top_um, limit_um))
+    return Scales(circle, errors, length_unit(errors.largest_um), tolerance)
+
+
+def _ends(errors: Sequence[Floats]) -> tuple[float, float]:
+    return min(float(error_um.min()) for error_um in errors), max(float(error_um.max()) for error_um in errors)
+
+
+def _curves(run: CircleRun) -> tuple[Stretch, ...]:
+    """The measured part, and what lies before and after it; neighbours share a point."""
+    error_um = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm) * 1e3
+    start, stop = run.measured.start, min(run.measured.stop, run.steps)
+    parts = ((0, start + 1, False), (start, stop, True), (stop - 1, run.steps, False))
+    curves = []
+    for first, end, measured in parts:
+        kept = first + extremes(error_um[first:end], most=_MAX_POINTS)
+        time_s = (kept + 1).astype(np.float64) * (run.timing.step_us / 1e6)
+        curves.append(Stretch(time_s, error_um[kept], measured))
+    return tuple(curves)
+
+
+def extremes(values: Floats, *, most: int) -> NDArray[np.int64]:
+    """Choose points that keep the outline of a curve: of each stretch the smallest and the largest.
+
+    Parameters
+    ----------
+    values
+        The curve, shape (n,).
+    most
+        About how many points are chosen; a shorter curve keeps all [1].
+
+    Returns
+    -------
+    ndarray
+        Indices in ascending order, the first and the last one among them.
+
+    Examples
+    --------
+    >>> extremes(np.array([0.0, 1.0, 9.0, 2.0, 3.0, -7.0, 4.0, 5.0]), most=4).tolist()
+    [0, 2, 5, 7]
+    """
+    if len(values) <= most:
+        return np.arange(len(values))
+    width = ceil(2 * len(values) / most)
+    whole = len(values) // width
+    stretches = values[: whole * width].reshape(whole, width)
+    first = np.arange(whole) * width
+    rest = whole * width + extremes(values[whole * width :], most=width)
+    ends = np.array([0, len(values) - 1])
+    return np.unique(np.concatenate((first + stretches.argmin(axis=1), first + stretches.argmax(axis=1), rest, ends)))
+
+
+_ROOM: Final = 0.08
+"""Empty room above and below the errors, as a share of their range."""
+_TONES: Final[dict[bool | None, Tone]] = {True: "passes", False: "fails", None: "neutral"}
+_DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
+
+
+def test_drawing(test: CircleTest) -> Drawing:
+    """Draw each simulated period on the same scales, one below the other.
+
+    Parameters
+    ----------
+    test
+        The circle test, with at least one simulated period.
+    """
+    rows = circle_rows(test)
+    scales = common_scales(rows, test.profile.tolerance)
+    servo = "ideal drive" if test.results[0].ideal_drive else f"servo values: {test.profile.servo.grades_text}"
+    missing = [period(result.period_us) for result, run in zip(test.results, test.runs, strict=True) if run is None]
+    words = [f"circle test, {servo}"]
+    if missing:
+        words.append(f"not drawn, for the bus does not carry it: {', '.join(missing)}")
+    panels = (
+        panel for row in rows for panel in (_circle(row, scales), _errors(row, scales), _ranking(row, rows, scales))
+    )
+    description = f"Circle test of {test.profile.name}"
+    return Drawing(test.profile.name, tuple(panel for panel in panels if panel), tuple(words), description)
+
+
+def _circle(row: CircleRow, scales: Scales) -> Panel:
+    """The setup, the verdict, and the circle on the scale of all periods."""
+    result, scale = row.result, scales.circle
+    setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
+    deviation = measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
+    whole = "no G on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}"
+    words = f"{_shown(row, scales)}; {whole}; {_DIRECTIONS[row.run.path.direction]}"
+    plot = None
+    if scale is not None and not row.run.diverged:
+        plot = dial(contour_profile(row.run), scale, row.run.path.direction)
+    return Panel(plot, f"{result.verdict_word}: {setup}", words, _TONES[result.passed])
+
+
+def _shown(row: CircleRow, scales: Scales) -> str:
+    """What the circle shows, or why it is not drawn."""
+    if row.run.diverged:
+        return f"circle not drawn: the {'table left the circle' if row.result.stable else 'loop is unstable'}"
+    if scales.circle is None:
+        return "no contour error"
+    times = decimals_of(scales.circle.times(row.result.radius_mm), 0)
+    return f"{scales.circle.ring_text} a ring, {times} times magnified"
+
+
+def measure_text(value_mm: float | None, limit_mm: float | None, scales: Scales) -> str:
+    """Write a measure with its unit, and its tolerance where there is one."""
+    unit = scales.unit
+    value = "-" if value_mm is None else f"{decimals_of(value_mm * 1e3 * unit.per_um, 3)} {unit.name}"
+    return value if limit_mm is None else f"{value} (limit {unit.text(limit_mm * 1e3)})"
+
+
+def _errors(row: CircleRow, scales: Scales) -> Panel:
+    """The contour error over time, with its mean and maximum above: the measured part strong and shaded."""
+    errors, per_um, tolerance = scales.errors, scales.unit.per_um, scales.tolerance
+    result, limit_mm = row.result, tolerance.max_contour_error_mm
+    mean = measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
+    largest = measure_text(result.max_contour_error_mm, limit_mm, scales)
+    label = ", ".join(filter(None, (f"contour error [{scales.unit.name}]", errors.zero_outside)))
+    up = numbers(label, errors.bottom_um * per_um, errors.top_um * per_um, room=_ROOM)
+    guides = [] if errors.zero_outside else [Guide(Entry("zero"), y=0.0)]
+    limits = () if limit_mm is None else (-limit_mm * 1e3 * per_um, limit_mm * 1e3 * per_um)
+    guides += [Guide(TOLERANCE, y=limit) for limit in limits if up.low <= limit <= up.high]
+    curves = tuple(_curve(curve, up, row, per_um=per_um) for curve in row.curves)
+    during = (Shade(Entry("during"), *curve.time_s[[0, -1]].tolist()) for curve in row.curves if curve.measured)
+    across = numbers("time [s]", 0.0, float(row.curves[-1].time_s[-1]))
+    return Panel(Curves(across, up, curves, tuple(guides), tuple(during)), f"mean {mean}, max {largest}")
+
+
+def _curve(curve: Stretch, up: Ruler, row: CircleRow, *, per_um: float) -> Curve:
+    """A part of the move; far outside, where no huge coordinate can be drawn, the place does not matter."""
+    spread, is_turn = up.high - up.low, row.result.path != "trapezoid"
+    errors = np.clip(curve.error_um * per_um, up.low - spread, up.high + spread)
+    if curve.measured:
+        entry = Entry(
+            "first", "measured: one whole turn" if is_turn else "measured: arc at constant speed", shape="line"
+        )
+    else:
+        words = "the rest: lead-in and ramps" if is_turn else "the rest: ramps and settling"
+        entry = Entry("apart", words, shape="line")
+    return Curve(entry, tuple(zip(curve.time_s.tolist(), errors.tolist(), strict=True)))
+
+
+def _ranking(row: CircleRow, rows: Sequence[CircleRow], scales: Scales) -> Panel | None:
+    """What each error source takes from the largest error, largest first.
+
+    Periods whose table followed the circle share a scale; the others share a second.
+    """
+    if not row.result.contributions:
+        return None
+    unit = scales.unit
+    alike = [drawn for drawn in rows if drawn.run.diverged == row.run.diverged]
+    taken = [source.removed_mm * 1e3 * unit.per_um for drawn in alike for source in drawn.result.contributions or ()]
+    lanes = []
+    for source in row.result.contributions:
+        value = source.removed_mm * 1e3 * unit.per_um
+        bar = Span(Entry("takes" if value >= 0 else "hides"), min(value, 0.0), max(value, 0.0))
+        note = f"{decimals_of(value, 3, signed=True)} {unit.name}"
+        lanes.append(Lane(source.source.replace("_", " "), (bar,), note, is_thin=True))
+    low, high = min(0.0, *taken), max(0.0, *taken)
+    scale = numbers(unit.name, low, high if high > low else low + 1.0)
+    title = "Each error source removed in turn: taken from the largest error"
+    return Panel(Lanes(scale, tuple(lanes), (Guide(Entry("zero"), x=0.0),)), title)

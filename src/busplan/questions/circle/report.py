@@ -25,12 +25,11 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.numbers import period, period_value
-from busplan.questions.circle.contour import ContourProfile, drawn_profile
+from busplan.questions.base.sentences import Owner, document, figure_table, with_profile
+from busplan.questions.circle import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTest
 from busplan.questions.circle.drawing import circle_drawing, largest_mm, magnified
-from busplan.questions.circle.failures import MARGINS, Stated
-from busplan.questions.circle.figures import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTest
+from busplan.questions.circle.failures import MARGINS, ContourProfile, Stated, drawn_profile
 from busplan.questions.circle.roundness import failed_measure, to_attack
-from busplan.questions.words.documents import Owner, document, figure_table, with_profile
 from busplan.sections.profile import Profile
 
 

@@ -4,25 +4,276 @@ The bus is checked first: a cycle that does not fit its period delivers no set-p
 delay of a host loop can make the circle rounder while it reduces the margins, so a circle without margins fails.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Final
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import inf
+from typing import Any, Final, NamedTuple
 
 from busplan.buses.network import Network
 from busplan.progress import Progress
-from busplan.questions.circle.failures import (
-    bus_failures,
-    circle_failures,
-    tightest_margins,
+from busplan.questions.circle import NEGLIGIBLE_MM, CircleFigures, CircleTest
+from busplan.questions.circle.failures import bus_failures, circle_failures, tightest_margins
+from busplan.questions.fit.circle_refusal import (
+    delivery_of,
+    jitter_us,
+    loop_axes,
+    loop_delays_us,
+    loop_timing,
+    parameters_in,
+    path_setpoints,
+    path_settling_us,
+    require_circle,
 )
-from busplan.questions.circle.figures import NEGLIGIBLE_MM, CircleFigures, CircleTest
-from busplan.questions.circle.setup import Contribution, Setup, announce, bus, contributions, estimate, setup, sources
-from busplan.questions.fit.circle_refusal import loop_timing, path_setpoints, require_circle
-from busplan.questions.fit.figures import FitFigures
-from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us
+from busplan.questions.fit.figures import FitFigures, figures
 from busplan.questions.fit.network import at_periods
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.servo.circle import CircleRun, simulate_circle
-from busplan.servo.parameters import LoopTiming
+from busplan.servo.engine import compiled_kernel
+from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
+from busplan.servo.path import CirclePath, circle_path
+from busplan.servo.runnable import MAX_SETPOINTS
+
+
+class Setup(NamedTuple):
+    """Input of one simulation of the circle test."""
+
+    path: CirclePath
+    x: Axis
+    y: Axis
+    timing: LoopTiming
+    delivery: Delivery
+    mechanics: Mechanics
+    settled: bool = True
+    """Whether the loops settle before the measured turn; a trapezoid has none."""
+
+    @property
+    def steps(self) -> int:
+        """Simulated steps of each axis [1]."""
+        return self.path.setpoints * self.timing.steps_per_period
+
+    def with_axes(self, **changes: Any) -> "Setup":
+        """Return a copy with parameters replaced on both axes."""
+        return self._replace(x=replace(self.x, **changes), y=replace(self.y, **changes))
+
+
+class Contribution(NamedTuple):
+    """One error source, and the circle without it."""
+
+    source: str
+    max_contour_error_mm: float
+    """Largest contour error when this source is removed [mm]."""
+    removed_mm: float
+    """Decrease of the largest contour error by its removal [mm]; negative if it hides another source."""
+    mean_contour_error_mm: float
+    """Mean contour error when this source is removed [mm]."""
+    circular_deviation_mm: float | None
+    """Circular deviation G when this source is removed [mm]; None on a trapezoid."""
+
+
+Removal = Callable[[Setup], Setup]
+
+
+def _with_setpoints_every_step(setup: Setup) -> Setup:
+    """Return the setup with a set-point at every step; unchanged if the period has other effects than chords."""
+    path, timing, delivery = setup.path, setup.timing, setup.delivery
+    # A host's loop, jitter, skew and losses act once per period, so that another period would change them.
+    irregular = delivery.jitter_us or delivery.skew_us or delivery.loss_probability
+    if timing.loop == "host" or irregular or timing.steps_per_period == 1 or setup.steps >= MAX_SETPOINTS:
+        return setup
+    return setup._replace(
+        path=circle_path(
+            path.radius_mm,
+            feed_mm_per_min=path.feed_mm_per_min,
+            period_us=timing.step_us,
+            ramp_periods=round(path.constant_from_us / timing.step_us),
+            direction=path.direction,
+            settling_us=path.settling_us,
+        ),
+        timing=replace(timing, period_us=timing.step_us),
+    )
+
+
+_REMOVALS: Mapping[str, Removal] = {
+    "velocity_feedforward": lambda setup: setup.with_axes(velocity_feedforward=1.0),
+    "acceleration_feedforward": lambda setup: setup.with_axes(acceleration_feedforward_s=0.0),
+    "drive_lag": lambda setup: setup.with_axes(drive_lag_us=0.0),
+    "drive_offset": lambda setup: setup.with_axes(drive_offset_mm_s=0.0),
+    "dac_resolution": lambda setup: setup.with_axes(dac_bits=0),
+    "encoder_resolution": lambda setup: setup.with_axes(encoder_resolution_mm=0.0),
+    "reversal": lambda setup: setup.with_axes(reversal_mm_s=0.0),
+    "axis_mismatch": lambda setup: setup._replace(y=replace(setup.x, delay_us=setup.y.delay_us)),
+    "hold": lambda setup: setup._replace(timing=replace(setup.timing, interpolation="linear")),
+    "period": _with_setpoints_every_step,
+    "bus_delay": lambda setup: setup.with_axes(delay_us=0.0),
+    "jitter": lambda setup: setup._replace(delivery=replace(setup.delivery, jitter_us=0.0)),
+    "skew": lambda setup: setup._replace(delivery=replace(setup.delivery, skew_us=0.0)),
+    "loss": lambda setup: setup._replace(delivery=replace(setup.delivery, loss_probability=0.0)),
+    "backlash": lambda setup: setup._replace(mechanics=replace(setup.mechanics, backlash_mm=0.0)),
+    "scale": lambda setup: setup._replace(mechanics=replace(setup.mechanics, scale_x_ppm=0.0, scale_y_ppm=0.0)),
+    "squareness": lambda setup: setup._replace(mechanics=replace(setup.mechanics, squareness_um_per_m=0.0)),
+}
+"""How to remove each source. A velocity feed-forward of 1 has no error of its own."""
+
+
+def sources(whole: Setup) -> dict[str, Setup]:
+    """Error sources of a setup, each with the setup without it."""
+    without = {source: remove(whole) for source, remove in _REMOVALS.items()}
+    if whole.timing.loop == "host":
+        # A host's loop holds its command between periods: interpolation does not apply.
+        del without["hold"]
+    return {source: setup for source, setup in without.items() if setup != whole}
+
+
+def contributions(
+    without: Mapping[str, Setup], *, max_contour_error_mm: float, simulate: Callable[[Setup], CircleRun]
+) -> tuple[Contribution, ...]:
+    """Rank the error sources of a circle test.
+
+    Parameters
+    ----------
+    without
+        The test without each source (`sources`).
+    max_contour_error_mm
+        Its largest contour error [mm].
+    simulate
+        Runs a setup.
+
+    Returns
+    -------
+    tuple
+        The sources, largest `removed_mm` first.
+
+    Notes
+    -----
+    Sources interact: their single contributions need not add up to the whole error.
+    """
+    contours = {source: simulate(setup).contour for source, setup in without.items()}
+    ranked = (
+        Contribution(
+            source,
+            left.max_contour_error_mm,
+            max_contour_error_mm - left.max_contour_error_mm,
+            left.mean_contour_error_mm,
+            left.circular_deviation_mm,
+        )
+        for source, left in contours.items()
+    )
+    return tuple(sorted(ranked, key=lambda contribution: -contribution.removed_mm))
+
+
+def bus(network: Network) -> FitFigures:
+    """Capacity under the timing model that decides."""
+    return figures(network, model=network.bus.deciding_model)
+
+
+def setup(network: Network) -> Setup:
+    """Input of the circle simulation of a network.
+
+    Raises
+    ------
+    BusplanError
+        As `circle_test`.
+    """
+    require_circle(network)
+    profile, settling_us = network.profile, path_settling_us(network)
+    circle = profile.circle
+    x, y = loop_axes(network)
+    return Setup(
+        path=circle_path(
+            circle.radius_mm,
+            feed_mm_per_min=circle.feed_mm_per_min,
+            period_us=profile.cycle.period_us,
+            ramp_periods=circle.ramp_periods,
+            direction=circle.direction,
+            settling_us=0.0 if settling_us == inf else settling_us,
+        ),
+        x=x,
+        y=y,
+        timing=loop_timing(profile),
+        delivery=delivery_of(network),
+        mechanics=Mechanics(**parameters_in(profile.mechanics, Mechanics)),
+        settled=settling_us != inf,
+    )
+
+
+_AXES: Final = 2
+_STEP_US: Final = {True: 0.08, False: 0.5}
+"""Time for a step of one axis with its measures, by whether the kernel is compiled; measured on a machine of 2024."""
+_SETPOINT_US: Final = 1.5
+_STEP_BYTES: Final = 18
+"""Positions of both axes, and what is computed from them at a time."""
+_SETPOINT_BYTES: Final = 200
+_LONG_S: Final = 10.0
+
+
+class Estimate(NamedTuple):
+    """Approximate cost of some simulations."""
+
+    steps: int
+    """Simulated steps, an axis at a time."""
+    time_s: float
+    memory_bytes: float
+
+    def then(self, following: "Estimate") -> "Estimate":
+        """Cost of this and, with its memory free again, of what follows.
+
+        Parameters
+        ----------
+        following
+            Cost of the runs that follow.
+        """
+        memory_bytes = max(self.memory_bytes, following.memory_bytes)
+        return Estimate(self.steps + following.steps, self.time_s + following.time_s, memory_bytes)
+
+    @property
+    def is_long(self) -> bool:
+        """Whether it takes long enough to be announced."""
+        return self.time_s > _LONG_S
+
+    @property
+    def text(self) -> str:
+        """The estimate in words."""
+        engine = "" if compiled_kernel("auto") else ", in plain Python"
+        memory = f"{self.memory_bytes / 1e9:.2g} GB"
+        return f"circle test: {self.steps:,} steps, about {self.time_s:.0f} s and {memory}{engine}"
+
+
+NOTHING: Final = Estimate(0, 0.0, 0.0)
+"""Cost of no simulation."""
+
+
+def estimate(kept: Sequence[Setup], passing: Sequence[Setup] = ()) -> Estimate:
+    """Estimate what simulations cost.
+
+    Parameters
+    ----------
+    kept
+        Simulations whose positions are kept, one for each period.
+    passing
+        Simulations that are only measured.
+    """
+    rate_us = _STEP_US[compiled_kernel("auto") is not None]
+    setups = [*kept, *passing]
+    sizes = [_STEP_BYTES * setup.steps + _SETPOINT_BYTES * setup.path.setpoints for setup in setups]
+    return Estimate(
+        steps=_AXES * sum(setup.steps for setup in setups),
+        time_s=sum(_AXES * rate_us * setup.steps + _SETPOINT_US * setup.path.setpoints for setup in setups) / 1e6,
+        memory_bytes=sum(sizes[: len(kept)]) + max(sizes[len(kept) :], default=0),
+    )
+
+
+def announce(cost: Estimate) -> None:
+    """Say what a long run costs; without a handler of its own, `logging` writes it to standard error.
+
+    Parameters
+    ----------
+    cost
+        The estimate; a short run is not announced.
+    """
+    if cost.is_long:
+        logging.getLogger("busplan").warning(cost.text)
+
 
 _LEAST_ARC_DEG: Final = 270.0
 """Shortest arc of a trapezoid for a least-squares centre and radius."""

@@ -1,15 +1,224 @@
 """`busplan.compare`."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from math import ceil, floor, log2
+from typing import Final, NamedTuple
 
+from busplan.buses import kind_names
+from busplan.buses.network import Network
+from busplan.english import did_you_mean
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
+from busplan.profile.conversion import AssumedKey, converted
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, with_cycle
-from busplan.questions.compare import kinds as analysis
-from busplan.questions.compare.kinds import KindComparison, MachineOnKind, NotOnKind
-from busplan.questions.fit.network import network_of
+from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes
+from busplan.questions.fit.inputs import assumed_rates, given
+from busplan.questions.fit.network import at_period, changed, network_of, varied_nodes
+from busplan.questions.plan.search import SmallestPeriod, settings_to_be_carried, smallest_period
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, value_at
+from busplan.sections.profile import Profile
+
+_ROUND_US: Final = 1000.0
+"""Periods of a curve are halves and doubles of it, which buses with some periods alone know, too [us]."""
+_MOST_POINTS: Final = 12
+
+
+class SafeAxes(NamedTuple):
+    """The most axes that are shown to fit a period."""
+
+    period_us: float
+    axes: int | None
+    """Of all nodes; where nodes are in groups, with more nodes of one group, the others as they are. None where the
+    machine has no axes."""
+    nodes: int
+    """Of the nodes that are counted [1]."""
+    limited_by: str
+    """Key of the limit that keeps them from being more."""
+
+
+class MachineOnKind(NamedTuple):
+    """The machine on one kind of bus."""
+
+    network: Network
+    is_own: bool
+    """Whether this is the kind of the profile, which stays as it is."""
+    assumed: tuple[AssumedKey, ...]
+    left_out: tuple[str, ...]
+    """Keys and sections that the profile sets and this kind does not have."""
+    figures: FitFigures
+    """Under the timing model that decides, at the profile's period."""
+    after_reset: FitFigures | None
+    """After a bus reset, where it is shown to fit as it is set and not then."""
+    safe: SafeAxes
+    """At the profile's period."""
+    smallest: SmallestPeriod
+    curve: tuple[SafeAxes, ...]
+    """The most axes over the period."""
+
+    @property
+    def profile(self) -> Profile:
+        """The profile of the network."""
+        profile: Profile = self.network.profile
+        return profile
+
+    @property
+    def assumed_host(self) -> tuple[AssumedKey, ...]:
+        """Assumptions about the host's own time, of its own profile, too; with any it has no rank."""
+        key = self.network.bus.key_of("host")
+        inputs = [given(self.profile, key)] if self.is_own and key else []
+        own = (
+            AssumedKey(known.name, known.value, "profile")
+            for known in inputs
+            if known.grade == "assumed" and known.value
+        )
+        return (*own, *(assumed for assumed in self.assumed if assumed.key == key))
+
+
+class NotOnKind(NamedTuple):
+    """A kind of bus that cannot have the machine."""
+
+    kind: str
+    why: tuple[str, ...]
+
+
+class KindComparison(NamedTuple):
+    """Answer of `compare`."""
+
+    network: Network
+    kinds: tuple[MachineOnKind | NotOnKind, ...]
+    """In the order asked for; of all, the profile's own first."""
+
+    @property
+    def profile(self) -> Profile:
+        """The profile of the network."""
+        profile: Profile = self.network.profile
+        return profile
+
+    @property
+    def compared(self) -> tuple[MachineOnKind, ...]:
+        """The kinds that can have the machine."""
+        return tuple(machine for machine in self.kinds if isinstance(machine, MachineOnKind))
+
+    @property
+    def counted(self) -> str:
+        """Name of the group whose nodes are counted for the most axes; empty where all nodes are alike."""
+        return varied_nodes(self.profile).name
+
+
+def checked_kinds(names: Sequence[str], *, option: str) -> tuple[str, ...]:
+    """Check names of kinds of bus; each is taken once.
+
+    Parameters
+    ----------
+    names
+        The names.
+    option
+        Option or key that gives them, for messages.
+
+    Raises
+    ------
+    BusplanError
+        No kind of bus has the name, or there is no name.
+    """
+    known = kind_names()
+    for name in names or [""]:
+        if name not in known:
+            near = did_you_mean(name, known)
+            raise BusplanError(f"{option} {name}: no kind of bus; there are {', '.join(known)}{near and f'; {near}'}")
+    return tuple(dict.fromkeys(names))
+
+
+def compared_kinds(network: Network, *, kinds: Sequence[str] | None = None) -> KindComparison:
+    """Put the machine of a network on several kinds of bus.
+
+    Parameters
+    ----------
+    network
+        The network; on its own kind it stays as it is.
+    kinds
+        Names of kinds, from `checked_kinds`; all without it, the network's own first.
+    """
+    own = network.bus.kind
+    names = tuple(kinds) if kinds is not None else (own, *(kind for kind in kind_names() if kind != own))
+    machines = [_on_kind(network, name) for name in names]
+    smallest = [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
+    periods_us = _curve_periods(network.profile.cycle.period_us, smallest)
+    return KindComparison(
+        network,
+        tuple(
+            machine if isinstance(machine, NotOnKind) else machine._replace(curve=_curve(machine, periods_us))
+            for machine in machines
+        ),
+    )
+
+
+def _on_kind(network: Network, kind: str) -> MachineOnKind | NotOnKind:
+    try:
+        conversion = converted(network.profile, kind)
+    except BusplanError as error:
+        return NotOnKind(kind, error.problems)
+    on_kind, assumed = network_of(conversion.profile), conversion.assumed
+    is_own = kind == network.bus.kind
+    needed = {} if is_own else settings_to_be_carried(on_kind)
+    if needed:
+        tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
+        assumed = (*tried, *(each for each in assumed if each.key not in needed))
+        on_kind = changed(on_kind, needed)
+    rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
+    capacity = figures(on_kind, model=on_kind.bus.deciding_model)
+    return MachineOnKind(
+        network=on_kind,
+        is_own=is_own,
+        assumed=tuple(rates) if is_own else assumed,
+        left_out=conversion.left_out,
+        figures=capacity,
+        after_reset=after_reset(on_kind, capacity),
+        safe=most_safe_axes(on_kind),
+        smallest=smallest_period(on_kind, with_limits=False),
+        curve=(),
+    )
+
+
+def most_safe_axes(network: Network) -> SafeAxes:
+    """Count the most axes that are shown to fit a network's period, on a bus that is set safely for them.
+
+    Where nodes are in groups, the one with the most axes gets more nodes and the others stay.
+
+    Parameters
+    ----------
+    network
+        The network.
+    """
+    profile = network.profile
+    varied = varied_nodes(profile)
+    nodes, limit = safe_nodes(network, group=varied.name)
+    node_axes = int(varied.node.axes)
+    axes_beside = sum(
+        int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name
+    )
+    axes = None if not node_axes else axes_beside + nodes * node_axes if nodes else 0
+    return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
+
+
+def _curve_periods(own_us: float, smallest_us: Sequence[float | None]) -> tuple[float, ...]:
+    """Periods about the smallest ones and the machine's own, which is among them [us]."""
+    marks_us = [own_us, *(us for us in smallest_us if us is not None)]
+    first, last = floor(log2(min(marks_us) / _ROUND_US)) - 1, ceil(log2(max(marks_us) / _ROUND_US)) + 1
+    every = ceil((last - first + 1) / _MOST_POINTS)
+    round_us = (_ROUND_US * 2.0**power for power in range(first, last + 1) if power % every == 0)
+    return tuple(sorted({own_us, *(us for us in round_us if MIN_STEP_US <= us <= MAX_TIME_US)}))
+
+
+def _curve(machine: MachineOnKind, periods_us: Sequence[float]) -> tuple[SafeAxes, ...]:
+    return tuple(most_safe_axes(at_period(machine.network, period_us)) for period_us in periods_us)
+
+
+def fitting(comparison: KindComparison) -> Iterator[MachineOnKind]:
+    """The kinds on which the machine is shown to fit its period, on a bus that is set safely."""
+    return (machine for machine in comparison.compared if machine.figures.verdict == FITS and machine.figures.safe)
 
 
 class CompareAnswer(Answer, KindComparison):
@@ -88,5 +297,5 @@ def compare(
     network = network_of(with_cycle(load_profile(profile), question="compare"))
     kinds = None
     if buses is not None:
-        kinds = analysis.checked_kinds([str(kind) for kind in one_or_several(buses, name="buses")], option="buses")
-    return CompareAnswer(*analysis.compare(network, kinds=kinds))
+        kinds = checked_kinds([str(kind) for kind in one_or_several(buses, name="buses")], option="buses")
+    return CompareAnswer(*compared_kinds(network, kinds=kinds))

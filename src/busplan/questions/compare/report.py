@@ -5,11 +5,11 @@ from typing import Final
 
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
-from busplan.buses.figure import SAFE_AXES, VERDICT
+from busplan.buses.figure import SAFE_AXES, VERDICT, Ink
 from busplan.buses.network import Network
 from busplan.buses.published import parts_tested
 from busplan.elementwise import plain
-from busplan.english import listed, nouns
+from busplan.english import listed, nouns, plural
 from busplan.forms.blocks import (
     Block,
     Cell,
@@ -29,20 +29,71 @@ from busplan.forms.blocks import (
     sentence,
     state_of,
 )
+from busplan.forms.charts import Curve, Curves, Drawing, Entry, Guide, Panel, letters, logarithmic
 from busplan.forms.numbers import period, period_value, sentence_text
 from busplan.profile.conversion import AssumedKey
-from busplan.profile.write import short_text
-from busplan.questions.compare.drawing import CAPTION, compare_drawing
-from busplan.questions.compare.kinds import (
-    KindComparison,
-    MachineOnKind,
-    NotOnKind,
-    SafeAxes,
-    fitting,
+from busplan.profile.edit import short_text
+from busplan.questions.base.sentences import (
+    document,
+    evidence_sentence,
+    execution_sentence,
+    fields,
+    parts_by,
+    reset_sentence,
+    with_profile,
 )
+from busplan.questions.compare import KindComparison, MachineOnKind, NotOnKind, SafeAxes, fitting
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
-from busplan.questions.words.documents import document, fields, parts_by, with_profile
-from busplan.questions.words.sentences import evidence_sentence, execution_sentence, reset_sentence
+from busplan.questions.fit.network import bus_of, network_of
+
+_INKS: Final[tuple[Ink, ...]] = ("request", "contention", "work", "sync", "acknowledge", "response", "reserve")
+"""Colours of the curves; each has a letter, too."""
+_LEAST_TOP: Final = 10
+CAPTION: Final = "Most axes that are shown to fit over the period, both logarithmic"
+
+
+def compare_drawing(comparison: KindComparison, *, title: str) -> Drawing:
+    """Draw the curves of a comparison in which some kind of bus can have the machine.
+
+    Parameters
+    ----------
+    comparison
+        The comparison.
+    title
+        Its message in a sentence.
+    """
+    compared, own_us = comparison.compared, comparison.profile.cycle.period_us
+    own_axes = int(plain(network_of(comparison.profile).axes))
+    points = [point for machine in compared for point in machine.curve]
+    periods_us, top = sorted({point.period_us for point in points}), max(point.axes or 1 for point in points)
+    own = Entry("own", f"this machine: {period(own_us)}, {plural(own_axes, 'axis')}", shape="line")
+    marks = letters(machine.profile.bus.kind.upper() for machine in compared)
+    plot = Curves(
+        logarithmic("period, logarithmic", periods_us[0], periods_us[-1], period, at=periods_us, own=own_us),
+        logarithmic("axes, logarithmic", 1, max(_LEAST_TOP, own_axes, top), lambda axes: f"{axes:.0f}"),
+        tuple(
+            _curve(machine, mark, _INKS[number % len(_INKS)])
+            for number, (machine, mark) in enumerate(zip(compared, marks, strict=True))
+        ),
+        (Guide(own, x=own_us), *([Guide(own, y=own_axes)] if own_axes else [])),
+    )
+    return Drawing(title, (Panel(plot),), description=CAPTION)
+
+
+def _curve(machine: MachineOnKind, mark: str, ink: Ink) -> Curve:
+    """A point for each period that carries an axis: none has no place on the scale."""
+    points = [(point.period_us, point.axes) for point in machine.curve if point.axes]
+    own, none, title = (
+        " (this profile)" if machine.is_own else "",
+        "" if points else ": none",
+        bus_of(machine.profile).title,
+    )
+    return Curve(
+        Entry(ink, f"{title}{own}{none}", mark, "line"),
+        tuple(points),
+        tuple(f"{title}: {plural(axes, 'axis')} at {period(us)}" for us, axes in points),
+    )
+
 
 _FIGURES = (
     *("timing_model", "verdict", "safe", "exceeded", "not_shown", "available_us", "required_us"),

@@ -12,14 +12,14 @@ from busplan.buses.figure import Figure, by_key
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.profile.keys import KeyValue, dotted_keys
-from busplan.profile.revision import load_revision
+from busplan.profile.edit import load_revision
+from busplan.profile.kinds import KeyValue, dotted_keys
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, argument, checked_models, finite, load_network
 from busplan.questions.fit.certainty import VERDICTS, VerdictWord
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.network import model_names, network_of
-from busplan.questions.plan.needs import missed_limits
+from busplan.questions.plan.search import missed_limits
 from busplan.sections.profile import Profile
 
 Judgement = Literal["better", "worse", "same", "neutral"]

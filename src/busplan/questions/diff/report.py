@@ -22,12 +22,12 @@ from busplan.forms.blocks import (
     figure_value,
 )
 from busplan.forms.numbers import MISSING, figure_text, sentence_text
-from busplan.profile.keys import KeyValue
-from busplan.profile.write import value_text
+from busplan.profile.edit import value_text
+from busplan.profile.kinds import KeyValue
+from busplan.questions.base.sentences import document, fields
 from busplan.questions.diff import ComparedFigure, DiffAnswer, DiffSide, Judgement, KeyDifference
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
 from busplan.questions.fit.network import model_names
-from busplan.questions.words.documents import document, fields
 
 _KEYS: Final = (
     TableColumn("key", kind="words", wraps=True),

@@ -1,16 +1,274 @@
 """`busplan.evidence`."""
 
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
+from inspect import signature
+from math import hypot
+from typing import Any, Literal, NamedTuple, Self, TypeVar
+
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from busplan.buses import kind_named, kind_names
-from busplan.buses.published import Tested, parts_tested
+from busplan.buses.bus import Bus
+from busplan.buses.cycle import BusCycle
+from busplan.buses.limits import COVERAGE
+from busplan.buses.published import Tested, parts_tested, published
+from busplan.elementwise import plain
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
+from busplan.profile.document import override
+from busplan.profile.sources import load
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.evidence.rows import EvidenceSection, sections_of
+from busplan.questions.circle import CircleFigures
+from busplan.questions.circle.roundness import circle_test
+from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.network import bus_of, model_names, network_of
+from busplan.sections.base import Section
+from busplan.sourced import Grade
+
+Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
+_Model = TypeVar("_Model", bound=Section)
+
+
+class Comparison(NamedTuple):
+    """One published figure and one way to compute it."""
+
+    section: str
+    quantity: str
+    unit: Unit
+    published: float | None
+    """As printed, or the quotient of two printed figures; None where the source gives a formula and no figure."""
+    method: str
+    """The equation or timing model behind the computed figure."""
+    computed: float
+    grade: Grade | None
+    """How well the published figure is known; None where there is none."""
+    uncertainty: float | None = None
+    """Expanded uncertainty of the computed figure, in `unit`; None where it is not weighed."""
+
+    @property
+    def residual(self) -> float | None:
+        """Computed less published, in `unit`."""
+        return None if self.published is None else self.computed - self.published
+
+    @property
+    def relative_residual(self) -> float | None:
+        """The residual as a share of the published figure [1]."""
+        return None if self.published is None else (self.computed - self.published) / self.published
+
+
+class EvidenceSection(NamedTuple):
+    """One table or passage of a source."""
+
+    title: str
+    note: str
+    comparisons: tuple[Comparison, ...]
+    data: str
+    """Data file that the published figures stand in, with their sources."""
+
+
+class Row(Section):
+    """A row with the keys of its table and its method filled in; `set` and `given` of all three are joined."""
+
+    quantity: str
+    unit: Unit
+    published: int | float | None = Field(
+        default=None, gt=0, description="The figure as printed; None for a computed one alone"
+    )
+    grade: Grade | None = Field(default=None, description="How well the published figure is known")
+    share_of: int | float = Field(default=1, gt=0, description="A printed figure that both are shown as a share of")
+    profile: str = Field(description="Shipped profile that is computed")
+    set: dict[str, Any] = Field(default={}, description="New values of the profile, by dotted key")
+    model: str | None = Field(default=None, description="Timing model; None for the one that decides")
+    method: str | None = Field(default=None, description="Name of the way to compute it; None for the timing model")
+    figures: tuple[str | int | float, ...] = Field(
+        strict=False,
+        min_length=1,
+        description="What is computed, added up: figures of capacity (required_us), of a transaction "
+        "(latency.write.latency_us) or of the circle test (circle.duration_s), constants and functions of the kind of "
+        "bus, and numbers of the source",
+    )
+    given: dict[str, Any] = Field(default={}, description="Arguments of the function")
+    divided_by: dict[str, Any] | None = Field(
+        default=None, description="Divisor of the computed figure: the same row with these keys changed"
+    )
+    doubt: str | None = Field(default=None, description="Key of the doubts that U of the computed figure comes from")
+
+    @model_validator(mode="after")
+    def _is_graded(self) -> Self:
+        if (self.published is None) != (self.grade is None):
+            raise ValueError("a published figure has a grade, and nothing else has")
+        return self
+
+
+class _Table(Section):
+    """A table [[evidence]]; its further keys are those of its rows."""
+
+    model_config = ConfigDict(extra="allow")
+    title: str
+    source: str = ""
+    note: str = ""
+    part: str = ""
+    methods: list[dict[str, Any]] = Field(default=[{}])
+    rows: list[dict[str, Any]] = Field(min_length=1)
+
+
+def sections_of(bus: Bus, data: str, *, progress: Progress | None = None) -> Iterator[EvidenceSection]:
+    """Compare the published figures of a data file with computed ones, table by table.
+
+    Parameters
+    ----------
+    bus
+        The kind of bus; a table whose first profile is of another kind is left out.
+    data
+        Name of the data file.
+    progress
+        Called from time to time with the steps of circle tests simulated and the steps known to be needed.
+
+    Raises
+    ------
+    BusplanError
+        An unknown or missing key, or a profile, timing model or figure that does not exist; the message names file,
+        table and row.
+    """
+    cases: dict[str, _Case] = {}
+
+    def case(row: Row) -> _Case:
+        key = f"{row.profile} {row.set} {row.model}"
+        if key not in cases:
+            cases[key] = _Case(row, progress)
+        return cases[key]
+
+    for content in published(data).get("evidence", ()):
+        with _placed(f"{data}.toml: [[evidence]] {content.get('title')!r}"):
+            table = _checked(_Table, content)
+            rows = list(_rows(table))
+            if bus_of(load(rows[0].profile).profile) is bus:
+                note = " ".join(filter(None, (table.source and f"{table.source}.", table.note)))
+                comparisons = tuple(_comparison(table.title, row, case) for row in rows)
+                yield EvidenceSection(table.title, note, comparisons, data)
+
+
+def _rows(table: _Table) -> Iterator[Row]:
+    """Each row by each of its methods."""
+    for content in table.rows:
+        own = {key: value for key, value in content.items() if key != "methods"}
+        for method in content.get("methods", table.methods):
+            with _placed(f"row {content.get('quantity')!r}"):
+                yield _checked(Row, _joined(table.model_extra or {}, own, method))
+
+
+def _joined(*parts: Mapping[str, Any]) -> dict[str, Any]:
+    """All keys, a later part's before an earlier one's; `set` and `given` key by key."""
+    joined: dict[str, Any] = {}
+    for part in parts:
+        for key, value in part.items():
+            joined[key] = {**joined.get(key, {}), **value} if key in ("set", "given") else value
+    return joined
+
+
+def _checked(model: type[_Model], content: Mapping[str, Any]) -> _Model:
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise BusplanError(
+            *(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
+        ) from None
+
+
+@contextmanager
+def _placed(place: str) -> Iterator[None]:
+    """Put a place before each message of an error."""
+    try:
+        yield
+    except BusplanError as error:
+        raise BusplanError(*(f"{place}: {problem}" for problem in str(error).split("\n"))) from None
+
+
+class _Case:
+    """A profile under a timing model, asked for figures by the names that rows have for them."""
+
+    def __init__(self, row: Row, progress: Progress | None) -> None:
+        self.profile = override(load(row.profile).profile, row.set)
+        self.network = network_of(self.profile)
+        self.bus = self.network.bus
+        self.model = row.model or self.bus.deciding_model
+        self._progress = progress
+        if self.model not in model_names(self.network):
+            raise BusplanError(f"model: {self.model!r} is none of {', '.join(model_names(self.network))}")
+
+    @cached_property
+    def _figures(self) -> CapacityFigures:
+        return capacity_figures(self.network, model=self.model)
+
+    @cached_property
+    def _cycle(self) -> BusCycle:
+        return self.bus.cycle(self.network, model=self.model)
+
+    @cached_property
+    def _circle(self) -> CircleFigures:
+        return circle_test(self.network, progress=self._progress).results[0]
+
+    def sum_of(self, row: Row) -> float:
+        """The figures of a row with this profile and this model, added up."""
+        return sum(self._figure(name, row.given) if isinstance(name, str) else name for name in row.figures)
+
+    def _figure(self, name: str, given: Mapping[str, Any]) -> float:
+        source, _, key = name.rpartition(".")
+        value: Any = None
+        if name in self.bus.constants:
+            value = float(self.bus.constants[name])
+        elif function := self.bus.evidence_functions().get(name):
+            try:
+                signature(function).bind(self._cycle, **given)
+            except TypeError as error:
+                raise BusplanError(f"given: {name}: {error}") from None
+            value = function(self._cycle, **given)
+        elif source == "circle":
+            value = getattr(self._circle, key, None)
+        elif source:
+            transactions = {f"latency.{each.name}": each.phases for each in self._cycle.latencies()}
+            value = transactions.get(source, {}).get(key)
+        else:
+            value = self._figures.values().get(name)
+        if not isinstance(value, (int, float)):
+            raise BusplanError(f"figures: {name!r} is no number of {self.profile.name}, a bus of kind {self.bus.kind}")
+        return value
+
+    def uncertainty(self, key: str) -> float:
+        """Expanded uncertainty from the doubts of a key."""
+        doubts = [plain(doubt.us) for doubt in self._figures.doubts if doubt.key == key]
+        if not doubts:
+            raise BusplanError(f"doubt: {key!r} is no doubt of {self.profile.name}")
+        return COVERAGE * hypot(*doubts)
+
+
+def _comparison(title: str, row: Row, case: Callable[[Row], _Case]) -> Comparison:
+    with _placed(f"row {row.quantity!r}"):
+        own, divisor = case(row), row.share_of
+        if row.divided_by is not None:
+            below = _checked(Row, _joined(row.model_dump(exclude={"divided_by"}), row.divided_by))
+            divisor = divisor * case(below).sum_of(below)
+        return Comparison(
+            title,
+            row.quantity,
+            row.unit,
+            None if row.published is None else _divided(row.published, row.share_of),
+            row.method or f"{own.model} model",
+            _divided(own.sum_of(row), divisor),
+            row.grade,
+            None if row.doubt is None else _divided(own.uncertainty(row.doubt), divisor),
+        )
+
+
+def _divided(number: float, divisor: float) -> float:
+    """The quotient; a whole number that nothing divides stays one."""
+    return number if divisor == 1 else number / divisor
+
 
 _PAPER = ("ieee1394", "paper")
 """Kind of bus and data file of the paper."""

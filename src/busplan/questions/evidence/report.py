@@ -17,10 +17,8 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
 )
-from busplan.questions.evidence import KindEvidence
-from busplan.questions.evidence.rows import Comparison
-from busplan.questions.words.documents import document, parts_by
-from busplan.questions.words.sentences import evidence_sentence
+from busplan.questions.base.sentences import document, evidence_sentence, parts_by
+from busplan.questions.evidence import Comparison, KindEvidence
 
 _DIGITS: Final = 5
 """Significant digits of a published figure or a quotient of two."""

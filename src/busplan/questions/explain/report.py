@@ -22,10 +22,9 @@ from busplan.forms.blocks import (
     Words,
 )
 from busplan.forms.numbers import figure_text, period_value
-from busplan.questions.explain.derivation import CommandName, Derivation, Step
-from busplan.questions.explain.formulas import formula_of
+from busplan.questions.base.sentences import document, fields, with_profile
+from busplan.questions.explain.derivation import CommandName, Derivation, Step, formula_of
 from busplan.questions.fit.network import bus_of
-from busplan.questions.words.documents import document, fields, with_profile
 from busplan.sections.profile import Profile
 from busplan.sourced import DIGITS, EQUATIONS, Input, short
 

@@ -7,11 +7,10 @@ from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, is_everywhere, total
-from busplan.profile.toml import override
-from busplan.sections.alike_nodes import AlikeNodes
-from busplan.sections.base import Section, with_unchecked
+from busplan.profile.document import override
+from busplan.sections.base import TRANSACTION_KINDS, Section, with_unchecked
+from busplan.sections.machine import AlikeNodes
 from busplan.sections.profile import Profile
-from busplan.sections.transactions import TRANSACTION_KINDS
 
 PERIOD: Final = "cycle.period_us"
 

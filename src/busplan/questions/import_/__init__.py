@@ -8,16 +8,14 @@ from typing import Final
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.profile.toml import decode, validate
+from busplan.profile.document import decode, validate
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, one_or_several
 from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import PERIOD, network_of
 from busplan.questions.import_ import can, ethercat
-from busplan.questions.import_.record import Fact, Reading, merged
-from busplan.questions.import_.sources import machines, stem_of
-from busplan.questions.import_.text import ProfileLine, profile_text
+from busplan.questions.import_.reading import Fact, ProfileLine, Reading, machines, merged, profile_text, stem_of
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import Profile
 

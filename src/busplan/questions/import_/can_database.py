@@ -6,8 +6,7 @@ from typing import Any, Final
 
 from busplan.errors import BusplanError
 from busplan.extras import require_extra
-from busplan.questions.import_.record import Fact, Reading
-from busplan.questions.import_.xml_tree import parsed
+from busplan.questions.import_.reading import Fact, Reading, parsed
 
 EXTENDED: Final = 1 << 31
 """Added to the number of a message with an identifier of 29 bits, as DBC has it."""

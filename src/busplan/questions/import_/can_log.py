@@ -7,16 +7,16 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from busplan.buses.recorded import CLOCK_TOLERANCE
+from busplan.buses.rule import CLOCK_TOLERANCE
 from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.questions.import_.can import BIT_RATE, LEAST, SHOWN
 from busplan.questions.import_.can_database import EXTENDED
-from busplan.questions.import_.record import Fact, Reading
-from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.can_messages import (
+from busplan.questions.import_.reading import Fact, Reading
+from busplan.recordings.can import (
     LISTED,
+    CanFrames,
     ClockStretch,
     EventModel,
     SentFrames,
@@ -24,6 +24,7 @@ from busplan.recordings.can_messages import (
     faults,
     least_bit_rate,
     longest_stretch,
+    read_can,
     sent_messages,
     stamps_of_no_bus,
     step_us,

@@ -5,8 +5,7 @@ from collections.abc import Iterator, Mapping
 from math import ceil, lcm
 from typing import Final
 
-from busplan.questions.import_.record import Fact, Line, Reading
-from busplan.questions.import_.xml_tree import Element, parsed
+from busplan.questions.import_.reading import Element, Fact, Line, Reading, parsed
 
 TITLE: Final = "ENI"
 _LRD, _LWR, _LRW = 10, 11, 12

@@ -8,8 +8,7 @@ from busplan.buses import kind_named
 from busplan.english import first_of
 from busplan.errors import BusplanError
 from busplan.questions.import_.igh import PDOS
-from busplan.questions.import_.record import Fact, Facts, Reading
-from busplan.questions.import_.text import ProfileLine, group_name, time_us
+from busplan.questions.import_.reading import Fact, Facts, ProfileLine, Reading, group_name, time_us
 
 _SIZES: Final = ("read_bytes", "write_bytes")
 _MOST_SHARE: Final = 0.999

@@ -6,7 +6,7 @@ from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact
-from busplan.questions.import_.record import Fact, Facts, Reading
+from busplan.questions.import_.reading import Fact, Facts, Reading
 
 SLAVES: Final = "ethercat slaves -v"
 PDOS: Final = "ethercat pdos"

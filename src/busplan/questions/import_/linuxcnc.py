@@ -5,8 +5,7 @@ from math import ceil
 from typing import Final
 
 from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact, whole_number
-from busplan.questions.import_.record import Fact, Line, Reading
-from busplan.questions.import_.xml_tree import Element, parsed
+from busplan.questions.import_.reading import Element, Fact, Line, Reading, parsed
 
 TITLE: Final = "ethercat-conf.xml"
 _DIRECTIONS: Final = {"out": "write_bytes", "in": "read_bytes"}

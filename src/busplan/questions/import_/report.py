@@ -13,9 +13,9 @@ from busplan.forms.blocks import (
     TableRow,
     sentence,
 )
-from busplan.profile.write import short_text
-from busplan.questions.import_.text import assumed
-from busplan.questions.words.documents import document
+from busplan.profile.edit import short_text
+from busplan.questions.base.sentences import document
+from busplan.questions.import_.reading import assumed
 
 if TYPE_CHECKING:
     from busplan.questions.import_ import ImportAnswer

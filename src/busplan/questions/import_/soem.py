@@ -5,7 +5,7 @@ from math import ceil
 from typing import Final
 
 from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact
-from busplan.questions.import_.record import Fact, Reading
+from busplan.questions.import_.reading import Fact, Reading
 
 TITLE: Final = "slaveinfo"
 _SLAVE: Final = re.compile(r"Slave:(\d{1,5})\s*$")

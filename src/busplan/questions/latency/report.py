@@ -20,9 +20,16 @@ from busplan.forms.blocks import (
     TableRow,
     attribute_value,
 )
-from busplan.questions.latency.figures import LatencyResult, Transaction, with_payload
-from busplan.questions.words.documents import Owner, document, figure_table, with_profile
-from busplan.questions.words.sentences import execution_sentence, not_applicable, warning_sentences
+from busplan.questions.base.sentences import (
+    Owner,
+    document,
+    execution_sentence,
+    figure_table,
+    not_applicable,
+    warning_sentences,
+    with_profile,
+)
+from busplan.questions.latency import LatencyResult, Transaction, with_payload
 
 
 def latency_report(result: LatencyResult) -> Report:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 
-from busplan.buses.recorded import RecordedFigure
+from busplan.buses.rule import RecordedFigure
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.progress import Progress

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import PurePath
 from typing import Final
 
-from busplan.buses.recorded import RecordedFigure, RecordedVerdict
+from busplan.buses.rule import RecordedFigure, RecordedVerdict
 from busplan.english import plural
 from busplan.forms.blocks import (
     Block,
@@ -23,9 +23,9 @@ from busplan.forms.blocks import (
     TableRow,
     Words,
 )
-from busplan.profile.write import value_text
+from busplan.profile.edit import value_text
+from busplan.questions.base.sentences import document, with_profile
 from busplan.questions.measured import MeasuredAnswer
-from busplan.questions.words.documents import document, with_profile
 
 _COLUMNS: Final = (
     TableColumn("figure", kind="words", wraps=True),

@@ -4,13 +4,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from busplan.buses.limits import Value
 from busplan.buses.network import Network
-from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.profile.changes import KeyChange, KeyChanges
-from busplan.profile.keys import flat
-from busplan.profile.write import whole as as_whole
+from busplan.profile.edit import whole as as_whole
+from busplan.profile.kinds import flat
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import (
     ProfileLike,
@@ -24,18 +24,19 @@ from busplan.questions.base.inputs import (
 )
 from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
 from busplan.questions.fit.network import PERIOD, changed, model_names, network_of
-from busplan.questions.plan.changes import (
+from busplan.questions.plan.search import (
     Changes,
     Freedom,
+    Need,
     Step,
     freed,
     freedoms,
+    most_asking,
     nodes_for_axes,
     search,
     settings_to_be_carried,
     stands_in_the_way,
 )
-from busplan.questions.plan.needs import Need, most_asking
 from busplan.sections.profile import Profile
 
 _AS_IT_IS: Final = "as it is"

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from busplan.buses.figure import AXES, MARGIN_CORRECTED, NODES, SAFE_AXES, SAFE_NODES, UNCERTAINTY
+from busplan.buses.limits import Value as BusValue
 from busplan.buses.network import Network
-from busplan.buses.parts import Value as BusValue
 from busplan.elementwise import plain
 from busplan.english import listed, nouns
 from busplan.forms.blocks import (
@@ -28,24 +28,26 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.numbers import MISSING, period_value, sentence_text
-from busplan.profile.keys import flat
-from busplan.questions.fit.certainty import FITS, limits_behind
-from busplan.questions.fit.figures import COUNTS
-from busplan.questions.fit.network import PERIOD
-from busplan.questions.plan import Option, PlanAnswer, Relaxation
-from busplan.questions.plan.changes import freedoms
-from busplan.questions.words.documents import document, fields, with_profile
-from busplan.questions.words.sentences import (
+from busplan.profile.kinds import flat
+from busplan.questions.base.sentences import (
     NewValues,
     change_meanings,
+    document,
+    fields,
     key_value,
     margin_parts,
     reset_sentence,
     settings_sentence,
     warning_sentences,
+    with_profile,
 )
+from busplan.questions.fit.certainty import FITS, limits_behind
+from busplan.questions.fit.figures import COUNTS
+from busplan.questions.fit.network import PERIOD
+from busplan.questions.plan import Option, PlanAnswer, Relaxation
+from busplan.questions.plan.search import freedoms
+from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 from busplan.sections.profile import Profile
-from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 
 def plan_report(plan: PlanAnswer) -> Report:
@@ -73,7 +75,7 @@ def settings(network: Network, changes: NewValues) -> str:
 
     Examples
     --------
-    >>> from busplan.profile.shipped import load
+    >>> from busplan.profile.sources import load
     >>> from busplan.questions.fit.network import network_of
     >>> settings(network_of(load("paper-4ms").profile), {"bus.nodes": 20, "bus.speed": "S400"})
     'bus.nodes = 20, bus.speed = "S400" (if all nodes can)'

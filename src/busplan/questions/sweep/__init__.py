@@ -18,16 +18,15 @@ from busplan.forms.csv_rows import spelled
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network
-from busplan.questions.circle.figures import CIRCLE_BY_KEY
+from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.sweep.asked import Sweep, checked_sweep, column_figures
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, mapper_of
 from busplan.questions.sweep.digest import default_columns, sentences, top_rows
-from busplan.questions.sweep.grid import Array
+from busplan.questions.sweep.grid import Array, axis_values
 from busplan.questions.sweep.plot import FigureData, is_drawable, require_drawable
 from busplan.questions.sweep.rows import sweep_facts, written_rows
 from busplan.questions.sweep.seeds_run import summaries
 from busplan.questions.sweep.table import Columns, figure_table
-from busplan.questions.sweep.values import axis_values
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:

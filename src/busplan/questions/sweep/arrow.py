@@ -13,10 +13,10 @@ from pyarrow.parquet import write_table
 
 from busplan import __version__
 from busplan.buses.figure import Sort, unit_of
+from busplan.english import json_text
 from busplan.forms.blocks import JsonDocument
 from busplan.forms.csv_rows import spelled
-from busplan.printable import json_text
-from busplan.profile.write import profile_text
+from busplan.profile.edit import profile_text
 from busplan.questions.sweep.asked import Sweep, column_figures
 from busplan.questions.sweep.grid import Array
 from busplan.questions.sweep.table import Columns

@@ -7,14 +7,13 @@ from busplan.buses.figure import Figure, by_key
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
-from busplan.questions.circle.figures import CIRCLE_FIGURES
+from busplan.questions.circle import CIRCLE_FIGURES
 from busplan.questions.fit.figures import COUNTS
 from busplan.questions.fit.network import varied_nodes
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
-from busplan.questions.sweep.grid import Array, Grid, checked_grid, grid_models
+from busplan.questions.sweep.grid import Array, Grid, axis_values, checked_grid, grid_models
 from busplan.questions.sweep.seeds_run import SEED, SUMMARY_COLUMNS, SUMMARY_FIGURES, without_seed
 from busplan.questions.sweep.table import figure_names
-from busplan.questions.sweep.values import axis_values
 from busplan.sections.profile import Profile
 
 

@@ -8,10 +8,9 @@ import numpy as np
 
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
-from busplan.profile.toml import override
+from busplan.profile.document import override
 from busplan.progress import Progress
-from busplan.questions.circle.roundness import circle_test
-from busplan.questions.circle.setup import NOTHING, Estimate, announce, bus, estimate, setup
+from busplan.questions.circle.roundness import NOTHING, Estimate, announce, bus, circle_test, estimate, setup
 from busplan.questions.fit.circle_refusal import require_circle
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Array, Grid

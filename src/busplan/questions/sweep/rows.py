@@ -5,14 +5,14 @@ import io
 from collections.abc import Iterator
 from typing import Any, Final
 
+from busplan.english import json_text
 from busplan.forms import RowsForm
 from busplan.forms.blocks import JsonDocument
 from busplan.forms.csv_rows import csv_cell
-from busplan.printable import json_text
+from busplan.questions.base.sentences import changed_document, document
 from busplan.questions.sweep.asked import Sweep, column_figures
 from busplan.questions.sweep.grid import Array
 from busplan.questions.sweep.table import Columns
-from busplan.questions.words.documents import changed_document, document
 
 _ROWS_AT_ONCE: Final = 4096
 _NUMBERS: Final = {int, float, type(None)}

@@ -9,7 +9,7 @@ import numpy as np
 
 from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
-from busplan.questions.circle.figures import CIRCLE_BY_KEY
+from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS
 from busplan.questions.sweep.grid import Array, Grid
 from busplan.questions.sweep.table import Columns

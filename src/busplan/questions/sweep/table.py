@@ -13,8 +13,8 @@ import numpy as np
 
 from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, Sort
+from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
-from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.elementwise import Number
 from busplan.progress import Progress, ignored
 from busplan.questions.fit.certainty import (
@@ -28,9 +28,8 @@ from busplan.questions.fit.certainty import (
     time_code,
     verdict_code,
 )
-from busplan.questions.fit.figures import COUNTS, certainty_numbers, numeric_figures
+from busplan.questions.fit.figures import COUNTS, certainty_numbers, most_nodes, numeric_figures
 from busplan.questions.fit.network import network_of
-from busplan.questions.fit.node_limit import most_nodes
 from busplan.questions.sweep.grid import Array, Grid
 from busplan.sections.base import with_all_unchecked
 from busplan.sections.profile import Profile

@@ -1,0 +1,1 @@
+"""SERCOS: the ring of I and II, whose drives answer in turn, and that of III, on Ethernet."""

@@ -1,0 +1,270 @@
+"""SERCOS I and II: sourced figures, the length of telegrams, and the cycle."""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Final, Literal
+
+from busplan.buses.cycle import ALL, BUT_FIRST, BusEvent, BusLatency, Doubt, LeftOut, Run
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.limits import EventKind, Periods
+from busplan.buses.network import Network
+from busplan.buses.sercos import shared as sercos
+from busplan.buses.sercos.shared import DELAYS, SercosCycle, delays, word_bytes
+from busplan.elementwise import Number, choose, named, plain, rounded_down, total
+from busplan.sourced import Sourced, constants
+
+DataRate = Literal[2, 4, 8, 16]
+"""Data rates [Mbit/s]."""
+
+_CODE: Final = "sercos2-linuxcnc, a master that drives a ring"
+_KOLLMORGEN: Final = "Kollmorgen, sercos IDN set of S300/S700"
+_HDLC: Final = "sercos.com, telegrams of SERCOS I and II: a 0 after five 1s"
+
+
+def _bytes(value: int, meaning: str, *, source: str = _CODE) -> Sourced:
+    return Sourced(value, unit="bytes", grade="published", source=source, meaning=meaning)
+
+
+def _us(value: float, meaning: str, *, symbol: str = "") -> Sourced:
+    return Sourced(value, unit="us", grade="published", source=_KOLLMORGEN, meaning=meaning, symbol=symbol)
+
+
+BITS_PER_BYTE: Final = Sourced(8, unit="bits", grade="published", source="definition", meaning="bits of a byte")
+FLAG_BITS: Final = Sourced(
+    16, unit="bits", grade="published", source=_CODE, meaning="opening and closing flag of a telegram, never stuffed"
+)
+STUFF_STEP_BITS: Final = Sourced(
+    5, unit="bits", grade="published", source=_HDLC, meaning="bits for each stuff bit in the worst case"
+)
+FRAME_BYTES: Final = _bytes(3, "address 1 and check sequence 2 of a telegram")
+MST_BYTES: Final = _bytes(1, "data of the synchronisation telegram")
+RECORD_BYTES: Final = _bytes(4, "status 2 and service 2 of an AT; control 2 and service 2 of a record of the MDT")
+MOST_MDT_BYTES: Final = _bytes(65_534, "most data of the MDT", source=_KOLLMORGEN)
+MOST_DRIVE_BYTES: Final = _bytes(
+    32, "data of a drive that can be configured in either direction", source="Rexroth, IndraDrive MPx-02"
+)
+MOST_DRIVES: Final = Sourced(
+    254, unit="1", grade="published", source="sercos.de, introduction", meaning="drives of a ring"
+)
+SLOW_MBIT_S: Final = Sourced(
+    4, unit="Mbit/s", grade="published", source=_KOLLMORGEN, meaning="fastest rate of the slow start"
+)
+SLOW_START_US: Final = _us(12, "from MST to the first AT at 2 and 4 Mbit/s, t1min", symbol="t_1")
+FAST_START_US: Final = _us(4, "from MST to the first AT at 8 and 16 Mbit/s, t1min", symbol="t_1")
+TURNAROUND_US: Final = _us(12, "from the last AT to the MDT, t_ATMT", symbol="t_ATMT")
+
+GAP_SHARE: Final = Sourced(
+    0.1,
+    unit="1",
+    grade="assumed",
+    source="chosen, as of an execution time that is assumed",
+    meaning="standard uncertainty of the gap between two drives, as a share of it",
+)
+
+_STEP_US: Final = 1000
+_LONGEST_US: Final = 65_000
+PERIODS: Final = Periods((62.5, 125.0, 250.0, 500.0, *map(float, range(_STEP_US, _LONGEST_US + 1, _STEP_US))))
+"""Communication periods: sercos.com, cycle times; the longest by Rexroth."""
+PERIODS_SOURCE: Final = (
+    "62.5, 125, 250 and 500 us, and multiples of 1 ms (sercos.com), up to 65 ms (Rexroth); a drive may know fewer, as "
+    "0.5, 1, 2, ... 8 ms (Kollmorgen)"
+)
+
+CONSTANTS: Final = {**sercos.CONSTANTS, **constants(globals())}
+
+
+def telegram_bits(data_bytes: Number, *, is_stuffed: bool) -> Number:
+    """Length of a telegram with its flags.
+
+    Parameters
+    ----------
+    data_bytes
+        Data of the telegram s [bytes]; float or array.
+    is_stuffed
+        Whether the stuff bits of the worst case are counted, floor(8 (s + 3) / 5), or none.
+
+    Returns
+    -------
+    float
+        16 + 8 (s + 3) bits and the stuff bits [bits]; the shape of the argument.
+
+    Examples
+    --------
+    >>> telegram_bits(1, is_stuffed=True), telegram_bits(1, is_stuffed=False)
+    (54.0, 48.0)
+    """
+    stuffable: Number = (data_bytes + FRAME_BYTES) * BITS_PER_BYTE
+    bits = stuffable + FLAG_BITS
+    return bits + rounded_down(stuffable / STUFF_STEP_BITS) if is_stuffed else bits
+
+
+def telegram_us(data_bytes: Number, *, data_rate_mbit_s: Number, is_stuffed: bool) -> Number:
+    """Time of a telegram on the ring [us].
+
+    Parameters
+    ----------
+    data_bytes, is_stuffed
+        As `telegram_bits` takes them.
+    data_rate_mbit_s
+        Data rate [Mbit/s]; float or array.
+
+    Examples
+    --------
+    >>> telegram_us(1, data_rate_mbit_s=4, is_stuffed=True)
+    13.5
+    """
+    return telegram_bits(data_bytes, is_stuffed=is_stuffed) / data_rate_mbit_s
+
+
+def start_us(data_rate_mbit_s: Number) -> Number:
+    """From MST to the first AT, where the drives say no other time [us].
+
+    Examples
+    --------
+    >>> start_us(4), start_us(16)
+    (12.0, 4.0)
+    """
+    return choose(data_rate_mbit_s > SLOW_MBIT_S, FAST_START_US, SLOW_START_US)
+
+
+_IEC: Final = "IEC 61491"
+
+DATA_RATE: Final = Figure(
+    "data_rate_mbit_s", "f", "profile", "data rate of the ring", "data rate, Mbit/s", decimals=None
+)
+MDT_BYTES: Final = Figure(
+    "mdt_bytes", "s_MDT", _IEC, "data of the master data telegram", "data of the MDT", sort="count"
+)
+TERMS: Final = (
+    Figure("cycle_mst_us", "MST", _IEC, "synchronisation telegram", "MST", ink="sync", letter="S"),
+    Figure("cycle_at_us", "AT", _IEC, "telegrams of all drives", "AT", ink="in", letter="A"),
+    Figure("cycle_gap_us", "gap", "profile", "gaps between the telegrams of two drives", "gaps", ink="gap", letter="G"),
+    Figure("cycle_mdt_us", "MDT", _IEC, "master data telegram", "MDT", ink="out", letter="M"),
+    Figure(
+        "cycle_wait_us",
+        "wait",
+        "profile",
+        "wait for the drives: before the first AT, after the last, after the MDT",
+        "wait for drives",
+        ink="work",
+        letter="W",
+    ),
+    NONPERIODIC,
+)
+FIGURES: Final = BusFigures(
+    TERMS,
+    capacity_figures(TERMS, setup=(DATA_RATE,), own=(MDT_BYTES,)),
+    setup=(DATA_RATE,),
+    headings=(DATA_RATE.key,),
+    table=(MDT_BYTES,),
+    compared=(MDT_BYTES,),
+    phases=DELAYS,
+)
+
+
+TimingModelName = Literal["worst-stuffing", "no-stuffing"]
+WORST: Final[TimingModelName] = "worst-stuffing"
+NONE: Final[TimingModelName] = "no-stuffing"
+_GAP: Final = "gap between the AT of two drives"
+
+
+_TELEGRAMS: Final = MDT_BYTES.reference
+EVENTS: Final = (
+    EventKind("mst", "MST", _TELEGRAMS, "S", "sync"),
+    EventKind("wait", "wait for drives", "profile", "=", "work"),
+    EventKind("at", "AT of a drive", _TELEGRAMS, "<", "in"),
+    EventKind("gap", "gap between two drives", "profile", ".", "gap"),
+    EventKind("record", "record of a drive", _TELEGRAMS, ">", "out"),
+    EventKind("mdt", "MDT, all but the records", _TELEGRAMS, "m", "request"),
+    EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (
+    EventKind("at_stretch", "AT", "", "A", "in"),
+    EventKind("mdt_stretch", "MDT", "", "M", "out"),
+)
+"""Stretches that several events make together."""
+
+
+class Sercos2Cycle(SercosCycle):
+    """MST, t1, an AT of each drive with gaps between them, t_ATMT, the MDT, and the drives' recovery."""
+
+    term_figures = TERMS
+
+    def __init__(self, network: Network, model: str) -> None:
+        self.network = network
+        self.is_stuffed = model == WORST
+
+    def _telegram_us(self, data_bytes: Number) -> Number:
+        rate: Number = self.network.profile.bus.data_rate_mbit_s
+        return telegram_us(data_bytes, data_rate_mbit_s=rate, is_stuffed=self.is_stuffed)
+
+    @cached_property
+    def mdt_bytes(self) -> Number:
+        """Data of the MDT, a record for each drive [bytes]."""
+        data_bytes = total(
+            (word_bytes(group.write_bytes) + RECORD_BYTES) * group.nodes for group in self.network.groups
+        )
+        return named(data_bytes, "mdt_bytes", "s_MDT")
+
+    @cached_property
+    def start_us(self) -> Number:
+        """From MST to the first AT [us]."""
+        bus = self.network.profile.bus
+        said: Number | None = bus.at_start_us
+        return start_us(bus.data_rate_mbit_s) if said is None else said
+
+    def written(self) -> Iterator[BusEvent | Run]:
+        """MST, the telegrams of all drives, the MDT and its records, with the waits and gaps between them."""
+        bus = self.network.profile.bus
+        yield BusEvent("mst", "cycle_mst_us", self._telegram_us(MST_BYTES), "MST")
+        yield BusEvent("wait", "cycle_wait_us", self.start_us, "wait before the first AT")
+        for place, group in enumerate(self.network.groups):
+            rounds = ALL if place else BUT_FIRST
+            at_us = self._telegram_us(word_bytes(group.read_bytes) + RECORD_BYTES)
+            gap = BusEvent("gap", "cycle_gap_us", bus.at_gap_us, _GAP, rests_on="bus.at_gap_us", rounds=rounds)
+            at = BusEvent("at", "cycle_at_us", at_us, "AT of a drive", transaction="at_stretch")
+            yield Run((gap, at), group.nodes, place)
+        yield BusEvent("wait", "cycle_wait_us", bus.turnaround_us, "wait after the last AT")
+        mdt = BusEvent("mdt", "cycle_mdt_us", self._telegram_us(self.mdt_bytes), "MDT", transaction="mdt_stretch")
+        yield Run((mdt,), laid_out=lambda _: self._records(plain(mdt.us)))
+        yield BusEvent("wait", "cycle_wait_us", bus.recovery_us, "recovery of the drives after the MDT")
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        """The gap between two drives, which is the same in the whole cycle."""
+        return (Doubt("bus.at_gap_us", "gap between two drives", self.by_term["cycle_gap_us"] * GAP_SHARE),)
+
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """The drives' recovery after the MDT."""
+        said = self.network.profile.bus.recovery_us
+        return () if said else (LeftOut("the recovery of the drives after the MDT", "bus.recovery_us"),)
+
+    def figures(self) -> Mapping[str, Number | None]:
+        """The data rate, and the data of the MDT."""
+        return {"data_rate_mbit_s": self.network.profile.bus.data_rate_mbit_s, "mdt_bytes": self.mdt_bytes}
+
+    @property
+    def feedback_due_us(self) -> Number:
+        """Feedback is that of the start of MST [us]."""
+        return 0.0
+
+    def latencies(self) -> tuple[BusLatency, ...]:
+        """Age of feedback when the host has it, and delay of a command up to its effect."""
+        sent = self.by_term
+        before_us = sent["cycle_mst_us"] + self.start_us
+        ats_us = sent["cycle_at_us"] + sent["cycle_gap_us"]
+        turned_us = before_us + ats_us + self.network.profile.bus.turnaround_us
+        return delays(self.network, feedback_us=(before_us, ats_us), command_us=(turned_us, sent["cycle_mdt_us"]))
+
+    def _records(self, mdt_us: float) -> Iterator[BusEvent]:
+        """The record of each drive, then all else of the MDT: flags, address, check sequence and stuff bits."""
+        rate, records_us, node = plain(self.network.profile.bus.data_rate_mbit_s), 0.0, 0
+        for group in self.network.groups:
+            record_us = 8 * (plain(word_bytes(group.write_bytes)) + RECORD_BYTES) / rate
+            for _ in range(int(plain(group.nodes))):
+                node += 1
+                records_us += record_us
+                yield BusEvent("record", "cycle_mdt_us", record_us, "record of a drive", node, "mdt_stretch")
+        rest_us = mdt_us - records_us
+        yield BusEvent("mdt", "cycle_mdt_us", rest_us, "MDT, all but the records", None, "mdt_stretch")

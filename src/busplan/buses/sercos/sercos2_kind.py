@@ -1,0 +1,125 @@
+"""SERCOS I and II, as a kind of bus."""
+
+from collections.abc import Mapping
+from typing import ClassVar, Final
+
+from busplan.buses.limits import (
+    NODE_LIMIT,
+    Bound,
+    Key,
+    Limit,
+    PayloadRange,
+    Perturbation,
+    Starter,
+    TimingModel,
+    period_limit,
+    period_rule,
+)
+from busplan.buses.network import Network
+from busplan.buses.sercos.sercos2 import (
+    CONSTANTS,
+    EVENTS,
+    FIGURES,
+    MOST_DRIVE_BYTES,
+    MOST_DRIVES,
+    MOST_MDT_BYTES,
+    NONE,
+    PERIODS,
+    PERIODS_SOURCE,
+    STRETCHES,
+    TURNAROUND_US,
+    WORST,
+    Sercos2Cycle,
+)
+from busplan.buses.sercos.shared import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
+from busplan.elementwise import plain
+
+_FASTEST: Final = 16
+
+LIMITS: Final = (
+    period_limit(PERIODS),
+    NODE_LIMIT,
+    Limit(
+        "nodes",
+        "{value:.0f} drives are over the {most:.0f} of a ring",
+        Bound(lambda network: network.nodes, lambda _network: MOST_DRIVES),
+        way_out=f"a second ring has {MOST_DRIVES:g} more",
+    ),
+    Limit(
+        "payload",
+        "the MDT has {value:.0f} bytes of data, over {most:.0f}",
+        Bound(lambda network: Sercos2Cycle(network, NONE).mdt_bytes, lambda _network: MOST_MDT_BYTES),
+        way_out="a smaller payload or a second ring would do",
+    ),
+)
+
+
+class Sercos2(SercosBus):
+    """SERCOS I and II, whose drives answer in turn, and get their commands in a single telegram."""
+
+    kind = "sercos2"
+    title = "SERCOS I and II"
+    also_called = ("SERCOS II", "SERCOS I", "SERCOS 1")
+    timing_models = (
+        TimingModel(WORST, "a stuff bit after every five bits, the most there can be"),
+        TimingModel(NONE, "no stuff bits"),
+    )
+    deciding_model = WORST
+    figures = FIGURES
+    limits = LIMITS
+    rules = (period_rule("BP151", PERIODS, kind="sercos2", source=PERIODS_SOURCE),)
+    periods = PERIODS
+    starter = Starter(
+        """\
+[bus]
+kind = "sercos2"
+data_rate_mbit_s = 16      # assumed: 2 or 4, and with SERCOS II 8 or 16
+at_gap_us = 5              # assumed: no public figure says it; the master's time slots do""",
+        slice_ratio=WHOLE_PERIOD,
+        measure=MEASURE,
+        base=BASE,
+    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
+    constants = CONSTANTS
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.nodes": Key(meaning="the others on a second ring"),
+        "bus.data_rate_mbit_s": Key("f"),
+        "bus.at_gap_us": Key("t_gap", grade="assumed"),
+        "bus.at_start_us": Key("t_1"),
+        "bus.turnaround_us": Key("t_ATMT", TURNAROUND_US),
+        "bus.recovery_us": Key("t_MTSY"),
+        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
+        "node.execution.worst_extra_us": Key("T_extra"),
+    }
+    evidence_data = ("sercos2",)
+
+    def cycle(self, network: Network, *, model: str) -> Sercos2Cycle:
+        """The cycle of a network under a timing model."""
+        return Sercos2Cycle(network, model)
+
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
+        """A longer gap, and the fastest ring."""
+        bus = network.profile.bus
+        fastest = "it is the fastest already" if bus.data_rate_mbit_s == _FASTEST else ""
+        return (
+            Perturbation("gap between two drives +1 us", {"bus.at_gap_us": bus.at_gap_us + 1}),
+            Perturbation(f"{_FASTEST} Mbit/s", {"bus.data_rate_mbit_s": _FASTEST}, why_not=fastest),
+        )
+
+    def payloads(self, network: Network) -> PayloadRange:
+        """Whole words, as many as a drive can be told to send for each of its axes."""
+        axes = min((int(plain(group.axes)) for group in network.groups), default=1)
+        return PayloadRange(int(WORD_BYTES), int(MOST_DRIVE_BYTES) * max(axes, 1), carrier="a drive's telegram")
+
+    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
+        """Say what each drive is charged."""
+        return "every drive its telegram and its record"
+
+    def setup_words(self, network: Network) -> tuple[str, ...]:
+        """The data rate and the gap."""
+        bus = network.profile.bus
+        return (f"{bus.data_rate_mbit_s} Mbit/s", f"gap of {bus.at_gap_us:g} us between two drives (assumed)")
+
+
+BUS: Final = Sercos2()

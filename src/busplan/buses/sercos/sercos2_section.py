@@ -1,0 +1,63 @@
+"""The keys that only profiles of SERCOS I and II have, in [bus]."""
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from busplan.buses.sercos.sercos2 import TURNAROUND_US, WORST, DataRate, TimingModelName
+from busplan.buses.sercos.shared import MOST_PIPELINE, PIPELINE_CYCLES
+from busplan.sections.base import Count, TimeUs
+from busplan.sections.cycle import BusSection
+from busplan.sections.profile import Profile
+
+
+class Sercos2Bus(BusSection):
+    """Section [bus]: a SERCOS I or II ring."""
+
+    kind: Literal["sercos2"] = Field(description="Kind of bus", examples=["sercos2"])
+    data_rate_mbit_s: DataRate = Field(
+        description="Data rate of the ring: 2 or 4, and with SERCOS II 8 or 16 [Mbit/s]", examples=[16]
+    )
+    at_gap_us: TimeUs = Field(
+        description="Gap between the telegrams of two drives. No public figure says how long it is: take it from the "
+        "master's time slots, or assume one [us]",
+        examples=[5],
+    )
+    nodes: Count | None = Field(default=None, description="Drives N, master not counted", examples=[8])
+    at_start_us: TimeUs | None = Field(
+        default=None,
+        description="From MST to the first AT, t1min of the slowest drive (S-0-0003). Without it 12 at 2 and 4 Mbit/s, "
+        "4 at 8 and 16 [us]",
+        examples=[12],
+    )
+    turnaround_us: TimeUs = Field(
+        default=float(TURNAROUND_US),
+        description="From the last AT to the MDT, t_ATMT of the slowest drive (S-0-0004) [us]",
+        examples=[12],
+    )
+    recovery_us: TimeUs = Field(
+        default=0.0,
+        description="From the MDT to the next MST, t_MTSY of the slowest drive (S-0-0088) [us]",
+        examples=[20],
+    )
+    pipeline_cycles: Annotated[int, Field(ge=0, le=MOST_PIPELINE)] = Field(
+        default=int(PIPELINE_CYCLES),
+        description="Cycles from the AT that bring feedback to the MDT with the command computed from it; 0 where the "
+        "master computes between them, within turnaround_us. Of a loop on the host",
+        examples=[2],
+    )
+    timing_model: TimingModelName = Field(
+        default=WORST,
+        description="Timing model whose figures lead the tables, worst-stuffing or no-stuffing; the verdict is always "
+        "by worst-stuffing",
+        examples=[WORST],
+    )
+
+
+class Sercos2Profile(Profile):
+    """A whole profile: one motion network and its cycle."""
+
+    bus: Sercos2Bus = Field(description="The bus")
+
+
+PROFILE: Final = Sercos2Profile

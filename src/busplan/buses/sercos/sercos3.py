@@ -1,0 +1,342 @@
+"""SERCOS III: sourced figures, and its telegrams."""
+
+from collections.abc import Iterable
+from math import sqrt
+from typing import Final, Literal, NamedTuple
+
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.limits import Periods
+from busplan.buses.network import Group, Network
+from busplan.buses.sercos import shared as sercos
+from busplan.buses.sercos.shared import DELAYS, word_bytes
+from busplan.elementwise import Number, alike, choose, larger, named, rounded_down, rounded_up, smaller
+from busplan.sections.base import TransactionKind
+from busplan.sourced import Sourced, constants
+
+Version = Literal["V1.0", "V1.1"]
+TimingMethod = Literal["mdt-at-ucc", "mdt-ucc-at", "at-last"]
+HotPlug = Literal["first", "all"]
+
+_COSEMA: Final = "CoSeMa V6.1, the common SERCOS master library"
+_PAGE: Final = "sercos.com, performance of SERCOS III"
+
+
+def _bytes(value: int, meaning: str) -> Sourced:
+    return Sourced(value, unit="bytes", grade="published", source=_COSEMA, meaning=meaning)
+
+
+def _us(value: float, meaning: str, *, symbol: str = "") -> Sourced:
+    return Sourced(value, unit="us", grade="published", source=_COSEMA, meaning=meaning, symbol=symbol)
+
+
+BYTE_US: Final = _us(0.08, "time of a byte at 100 Mbit/s", symbol="t_byte")
+OVERHEAD_BYTES: Final = _bytes(32, "preamble 8, addresses 12, type 2, header 6 and check sequence 4 of a telegram")
+HEADER_US: Final = _us(2.24, "from the preamble to the end of the header, 28 bytes", symbol="t_TH")
+LEAST_BYTES: Final = _bytes(40, "least data of a telegram; less is padded")
+MOST_BYTES: Final = _bytes(1494, "most data of a telegram")
+HOT_PLUG_BYTES: Final = _bytes(8, "hot-plug field")
+EXTENDED_BYTES: Final = _bytes(4, "extended function field of the first MDT")
+ALIGNED_BYTES: Final = _bytes(
+    2, "more of it where every telegram has a hot-plug field, before V1.3 of the specification"
+)
+CHANNEL_BYTES: Final = _bytes(6, "service channel of a device")
+DEVICE_BYTES: Final = _bytes(2, "control, or status, of a device")
+CONNECTION_BYTES: Final = _bytes(2, "connection control of a device's cyclic data, from V1.1 on")
+MOST_TELEGRAMS: Final = Sourced(
+    4, unit="1", grade="published", source=_COSEMA, meaning="MDT, and as many AT, of a cycle"
+)
+MOST_DEVICES: Final = Sourced(511, unit="1", grade="published", source="sercos.com; CoSeMa", meaning="devices")
+DEFAULT_GAP_BYTES: Final = _bytes(37, "gap between telegrams that every device takes")
+LEAST_GAP_BYTES: Final = _bytes(12, "least gap between telegrams, that of Ethernet")
+DEVICE_DELAY_US: Final = _us(0.9, "delay of a device, one way", symbol="t_dev")
+COMPONENT_DELAY_US: Final = _us(1.8, "delay of all components in the ring that are no devices", symbol="t_comp")
+MASTER_JITTER_US: Final = Sourced(
+    1.0, unit="us", grade="published", source=f"{_PAGE}: a sub-microsecond jitter", meaning="jitter of the master"
+)
+MASTER_DELAY_US: Final = _us(2.56, "from the start of a cycle in the master to the end of the first header")
+CHANNEL_US: Final = _us(0.4, "time of the master's hardware for a service channel")
+HARDWARE_CHANNELS: Final = Sourced(
+    32, unit="1", grade="published", source=_COSEMA, meaning="service channels that its hardware serves"
+)
+DEVICE_DELAY_SHARE: Final = Sourced(
+    0.4 / sqrt(12) / 0.9,
+    unit="1",
+    grade="derived",
+    source=f"{_COSEMA}: 0.5 to 0.9 us, typically",
+    meaning="standard uncertainty of the delay of a device, as a share of it",
+)
+MASTER_JITTER_SHARE: Final = Sourced(
+    1 / sqrt(12),
+    unit="1",
+    grade="derived",
+    source=f"{_PAGE}: anything below it",
+    meaning="standard uncertainty of the master's jitter, as a share of it",
+)
+GAP_SHARE: Final = Sourced(
+    25 / sqrt(12) / 37,
+    unit="1",
+    grade="derived",
+    source=f"{_COSEMA}: 12 to 37 bytes",
+    meaning="standard uncertainty of the gap between two telegrams, as a share of it",
+)
+LEAST_UCC_US: Final = _us(125.0, "shortest channel for other frames that the master opens")
+
+_STEP_US: Final = 250
+_LONGEST_US: Final = 65_000
+PERIODS: Final = Periods((31.25, 62.5, 125.0, *map(float, range(_STEP_US, _LONGEST_US + 1, _STEP_US))))
+"""Communication periods, CSMD_TSCYC of CoSeMa."""
+PERIODS_SOURCE: Final = f"31.25, 62.5 and 125 us, and multiples of 250 us up to 65 ms ({_COSEMA})"
+
+CONSTANTS: Final = {**sercos.CONSTANTS, **constants(globals())}
+
+
+class Items(NamedTuple):
+    """Some pieces of data that are not split. The numbers may be of any sort."""
+
+    pieces: Number
+    """Number of pieces [1]."""
+    size_bytes: Number
+    """Of each [bytes]."""
+
+
+class Filling(NamedTuple):
+    """Telegrams of one sort that are filled, the last of them open. The numbers may be of any sort."""
+
+    telegrams: Number
+    """Number of telegrams, with the open one [1]."""
+    closed_bytes: Number
+    """Data of those before the open one [bytes]."""
+    open_bytes: Number
+    """Data of the open one [bytes]."""
+
+    @property
+    def data_bytes(self) -> Number:
+        """Data of all of them, padded [bytes]."""
+        return self.closed_bytes + padded_bytes(self.open_bytes)
+
+
+def padded_bytes(data_bytes: Number) -> Number:
+    """Data of a telegram, with what is padded [bytes].
+
+    Examples
+    --------
+    >>> padded_bytes(12), padded_bytes(100)
+    (40.0, 100)
+    """
+    return larger(data_bytes, LEAST_BYTES)
+
+
+def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number, name: str = "") -> Filling:
+    """Fill telegrams with items in their order: what does not fit into one goes whole into the next.
+
+    Parameters
+    ----------
+    items
+        They, like ones together.
+    first_bytes
+        What the first telegram begins with [bytes].
+    next_bytes
+        What each other telegram begins with [bytes].
+    name
+        What a derivation calls the telegrams.
+
+    Examples
+    --------
+    >>> filled([Items(3, 700)], first_bytes=12, next_bytes=0)
+    Filling(telegrams=2, closed_bytes=1412, open_bytes=700)
+    """
+    filling = Filling(1, 0, first_bytes)
+    for place, group in enumerate(items, start=1):
+        filling = _with_items(filling, group, next_bytes, f"{name},{place}")
+    return filling
+
+
+def _with_items(before: Filling, items: Items, next_bytes: Number, name: str) -> Filling:
+    size_bytes = items.size_bytes
+    room = larger(rounded_down((MOST_BYTES - before.open_bytes) / size_bytes), 0)
+    here = named(smaller(items.pieces, room), f"fit_{name}", f"k_{name}")
+    each = larger(rounded_down((MOST_BYTES - next_bytes) / size_bytes), 1)
+    more = rounded_up((items.pieces - here) / each)
+    last = items.pieces - here - (more - 1) * each
+    own_bytes = before.open_bytes + here * size_bytes
+    closed_bytes = padded_bytes(own_bytes) + (more - 1) * padded_bytes(next_bytes + each * size_bytes)
+    open_bytes = choose(more > 0, next_bytes + last * size_bytes, own_bytes)
+    return Filling(
+        named(before.telegrams + more, f"telegrams_{name}", f"n_{name}"),
+        before.closed_bytes + choose(more > 0, closed_bytes, 0),
+        named(open_bytes, f"open_{name}_bytes", f"s_{name}"),
+    )
+
+
+def telegrams_us(filling: Filling, *, gap_bytes: Number) -> Number:
+    """Time of telegrams on the wire, each with the gap after it [us].
+
+    Parameters
+    ----------
+    filling
+        The telegrams.
+    gap_bytes
+        Gap between two telegrams [bytes]; float or array.
+
+    Returns
+    -------
+    float
+        (data + telegrams (32 + gap)) 0.08 us.
+
+    Examples
+    --------
+    >>> telegrams_us(Filling(1, 0, 140), gap_bytes=12)
+    14.72
+    """
+    return (filling.data_bytes + filling.telegrams * (OVERHEAD_BYTES + gap_bytes)) * BYTE_US
+
+
+def sync_jitter_us(master_jitter_us: Number, *, gap_bytes: Number) -> Number:
+    """Jitter of the synchronisation: half of the master's and of the gap [us].
+
+    Examples
+    --------
+    >>> sync_jitter_us(1.0, gap_bytes=25)
+    1.5
+    """
+    return (master_jitter_us + gap_bytes * BYTE_US) / 2
+
+
+def ring_delay_us(
+    devices: Number, *, device_delay_us: Number, gap_bytes: Number, component_delay_us: Number = 0.0
+) -> Number:
+    """Delay of the ring: there and back through every device, half a gap, and what is no device [us].
+
+    Examples
+    --------
+    >>> ring_delay_us(8, device_delay_us=0.9, gap_bytes=25, component_delay_us=1.8)
+    17.2
+    """
+    return 2 * devices * device_delay_us + gap_bytes * BYTE_US / 2 + component_delay_us
+
+
+def start_wait_us(least_us: Number, *, earliest_us: Number) -> Number:
+    """Wait before the AT, where the devices ask for a later start, the minimum of S-0-1006 [us].
+
+    Parameters
+    ----------
+    least_us
+        The least time that they ask for, from the start of the cycle [us].
+    earliest_us
+        When the AT could begin without it [us].
+
+    Examples
+    --------
+    >>> start_wait_us(100.0, earliest_us=22.5), start_wait_us(100.0, earliest_us=130.0)
+    (77.5, 0.0)
+    """
+    return larger(least_us - earliest_us, 0.0)
+
+
+_LIBRARY: Final = "CoSeMa"
+
+MDT_TELEGRAMS: Final = Figure(
+    "mdt_telegrams", "n_MDT", _LIBRARY, "master data telegrams of a cycle", "MDT", sort="count", better="less"
+)
+AT_TELEGRAMS: Final = Figure(
+    "at_telegrams", "n_AT", _LIBRARY, "device telegrams of a cycle", "AT", sort="count", better="less"
+)
+TERMS: Final = (
+    Figure("cycle_mdt_us", "MDT", _LIBRARY, "master data telegrams with their gaps", "MDT", ink="out", letter="M"),
+    Figure(
+        "cycle_wait_us",
+        "wait",
+        _LIBRARY,
+        "what the devices make the AT wait",
+        "wait of devices",
+        ink="sync",
+        letter="W",
+    ),
+    Figure("cycle_at_us", "AT", _LIBRARY, "device telegrams with their gaps", "AT", ink="in", letter="A"),
+    Figure("cycle_jitter_us", "jitter", _LIBRARY, "allowances for the jitter", "jitter", ink="contention", letter="J"),
+    Figure("cycle_master_us", "master", _LIBRARY, "the master's own time", "master", ink="work", letter="T"),
+    Figure(
+        "cycle_ring_us",
+        "ring",
+        _LIBRARY,
+        "delay of the ring, where the timing method has it",
+        "ring delay",
+        ink="long-gap",
+        letter="R",
+    ),
+    NONPERIODIC,
+)
+"""In the order of the wire, where other frames come last."""
+COUNTS: Final = (MDT_TELEGRAMS, AT_TELEGRAMS)
+FIGURES: Final = BusFigures(
+    TERMS,
+    capacity_figures(TERMS, own=COUNTS),
+    table=COUNTS,
+    compared=COUNTS,
+    planned=tuple(figure.key for figure in COUNTS),
+    phases=DELAYS,
+)
+
+
+SORTS: Final[dict[TransactionKind, str]] = {"write": "mdt", "read": "at"}
+"""Which telegrams carry a node's payloads, in the order of the cycle."""
+
+
+class Telegrams(NamedTuple):
+    """All MDT or all AT of a network. The numbers may be of any sort."""
+
+    first_bytes: Number
+    """Fields at the start of the first telegram [bytes]."""
+    next_bytes: Number
+    """Fields at the start of each further telegram [bytes]."""
+    items: tuple[Items, ...]
+    """Service channels, control or status, then the data of each group."""
+    name: str
+    """Name in a derivation."""
+
+    @property
+    def filling(self) -> Filling:
+        """The telegrams, filled."""
+        return filled(self.items, first_bytes=self.first_bytes, next_bytes=self.next_bytes, name=self.name)
+
+
+def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
+    """The telegrams that carry one of a node's payloads.
+
+    Parameters
+    ----------
+    network
+        The network.
+    kind
+        "write" for MDT, "read" for AT.
+    """
+    is_in_all = network.profile.bus.hot_plug_field == "all"
+    first_bytes = alike(HOT_PLUG_BYTES, network.nodes)
+    if kind == "write":
+        first_bytes = first_bytes + EXTENDED_BYTES + (ALIGNED_BYTES if is_in_all else 0)
+    return Telegrams(
+        first_bytes,
+        HOT_PLUG_BYTES if is_in_all else 0,
+        (
+            Items(network.nodes, CHANNEL_BYTES),
+            Items(network.nodes, DEVICE_BYTES),
+            *(Items(group.nodes, data_bytes(network, size)) for group, size in sizes(network, kind)),
+        ),
+        SORTS[kind].upper(),
+    )
+
+
+def sizes(network: Network, kind: TransactionKind) -> list[tuple[Group, Number]]:
+    """Each group of nodes with its payload [bytes]."""
+    return [(group, group.write_bytes if kind == "write" else group.read_bytes) for group in network.groups]
+
+
+def data_bytes(network: Network, payload_bytes: Number) -> Number:
+    """Cyclic data of a device in whole words, with the control of its connection [bytes]."""
+    words: Number = word_bytes(payload_bytes)
+    return words + CONNECTION_BYTES if has_connections(network) else words
+
+
+def has_connections(network: Network) -> bool:
+    """Tell whether the cyclic data of a device are a connection with a control of its own: from V1.1 on."""
+    return bool(network.profile.bus.version != "V1.0")

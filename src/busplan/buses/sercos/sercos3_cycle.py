@@ -1,0 +1,254 @@
+"""The cycle of SERCOS III: MDT, AT, the channel for other frames, and what the window of the master keeps free."""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Final, Literal
+
+from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Run
+from busplan.buses.figure import NONPERIODIC
+from busplan.buses.limits import EventKind
+from busplan.buses.network import Network
+from busplan.buses.sercos.sercos3 import (
+    BYTE_US,
+    CHANNEL_US,
+    DEVICE_DELAY_SHARE,
+    GAP_SHARE,
+    HARDWARE_CHANNELS,
+    HEADER_US,
+    MASTER_JITTER_SHARE,
+    MDT_TELEGRAMS,
+    MOST_BYTES,
+    OVERHEAD_BYTES,
+    SORTS,
+    TERMS,
+    Filling,
+    Telegrams,
+    padded_bytes,
+    ring_delay_us,
+    start_wait_us,
+    sync_jitter_us,
+    telegrams_of,
+    telegrams_us,
+)
+from busplan.buses.sercos.shared import SercosCycle, delays
+from busplan.elementwise import Number, choose, larger, named, plain, smaller, total
+from busplan.sections.base import TransactionKind
+
+TimingModelName = Literal["window", "telegrams"]
+WINDOW: Final[TimingModelName] = "window"
+TELEGRAMS: Final[TimingModelName] = "telegrams"
+
+
+_COSEMA: Final = MDT_TELEGRAMS.reference
+EVENTS: Final = (
+    EventKind("mdt_frame", "MDT, its own fields", _COSEMA, "m", "request"),
+    EventKind("mdt_data", "data to a device", _COSEMA, ">", "out"),
+    EventKind("wait", "wait of the devices", _COSEMA, "w", "sync"),
+    EventKind("at_frame", "AT, its own fields", _COSEMA, "a", "response"),
+    EventKind("at_data", "data of a device", _COSEMA, "<", "in"),
+    EventKind("gap", "gap and padding", _COSEMA, ".", "gap"),
+    EventKind("ring", "ring delay", _COSEMA, "o", "long-gap"),
+    EventKind("jitter", "jitter allowance", _COSEMA, "j", "contention"),
+    EventKind("master", "master", _COSEMA, "=", "work"),
+    EventKind("nonperiodic", "channel for other frames", NONPERIODIC.reference, "N", "reserve"),
+)
+"""Kinds of events, in the order of the cycle."""
+STRETCHES: Final = (EventKind("mdt", "MDT", "", "M", "out"), EventKind("at", "AT", "", "A", "in"))
+"""Stretches that several events make together."""
+
+
+class Sercos3Cycle(SercosCycle):
+    """MDT, AT, the channel for other frames, and under the model `window` jitter, the master, the ring and the devices.
+
+    The window is that of CoSeMa: by the timing method it asks that the channel for other frames ends before the next
+    cycle begins, or before the AT do. What the nodes execute runs beside the telegrams.
+    """
+
+    term_figures = TERMS
+
+    def __init__(self, network: Network, model: str) -> None:
+        self.network = network
+        self.is_window = model == WINDOW
+        self.method: str = network.profile.bus.timing_method
+
+    @cached_property
+    def fillings(self) -> dict[TransactionKind, Filling]:
+        """MDT and AT, filled."""
+        return {kind: telegrams_of(self.network, kind).filling for kind in SORTS}
+
+    def _telegrams_us(self, kind: TransactionKind) -> Number:
+        return telegrams_us(self.fillings[kind], gap_bytes=self.network.profile.bus.gap_bytes)
+
+    @cached_property
+    def jitter_us(self) -> Number:
+        """Jitter of the synchronisation [us]."""
+        bus = self.network.profile.bus
+        return named(sync_jitter_us(bus.master_jitter_us, gap_bytes=bus.gap_bytes), "sync_jitter_us", "J")
+
+    @cached_property
+    def ring_us(self) -> Number:
+        """Delay of the ring; none under the model `telegrams` [us]."""
+        bus = self.network.profile.bus
+        if not self.is_window:
+            return 0.0
+        delay_us: Number = bus.device_delay_us
+        around_us = ring_delay_us(
+            self.network.nodes,
+            device_delay_us=delay_us,
+            gap_bytes=bus.gap_bytes,
+            component_delay_us=bus.component_delay_us,
+        )
+        return named(around_us, "ring_delay_us", "t_ring")
+
+    @property
+    def _jitters(self) -> tuple[int, int]:
+        """Number of jitters kept free: before the AT at the earliest, and in the whole cycle."""
+        return {"mdt-at-ucc": (1, 3), "mdt-ucc-at": (2, 3), "at-last": (1, 2)}[self.method]
+
+    @property
+    def _has_ring(self) -> bool:
+        return self.is_window and self.method != "mdt-at-ucc"
+
+    @cached_property
+    def _master_us(self) -> Number:
+        """Time that the window keeps free for the master [us]."""
+        if not self.is_window:
+            return 0.0
+        delay_us: Number = self.network.profile.bus.master_delay_us
+        if self.method == "mdt-at-ucc":
+            return delay_us + HEADER_US
+        channels_us = smaller(self.network.nodes, HARDWARE_CHANNELS) * CHANNEL_US
+        return larger(delay_us, channels_us - self.jitter_us)
+
+    @cached_property
+    def _start_wait_us(self) -> Number:
+        """Wait of the AT for the devices [us]."""
+        least_us: Number | None = self.network.profile.bus.at_start_us
+        return 0.0 if least_us is None or not self.is_window else start_wait_us(least_us, earliest_us=self._earliest_us)
+
+    @property
+    def _earliest_us(self) -> Number:
+        """When the AT could begin, from the start of the cycle [us]."""
+        before_us = self.network.nonperiodic_us if self._has_ring else 0.0
+        return self._telegrams_us("write") + before_us + self._jitters[0] * self.jitter_us
+
+    def written(self) -> Iterator[BusEvent | Run]:
+        """The telegrams, the wait of the devices, and what the window keeps free."""
+        channel = BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "channel for other frames")
+        is_last = self.method == "mdt-at-ucc"
+        jitter_us = self._jitters[1] * self.jitter_us if self.is_window else 0.0
+        yield self._run("write")
+        if not is_last:
+            yield channel
+        wait = "wait of the devices before the AT"
+        yield BusEvent("wait", "cycle_wait_us", self._start_wait_us, wait, rests_on="bus.at_start_us")
+        yield self._run("read")
+        ring_us = self.ring_us if self._has_ring else 0.0
+        yield BusEvent("ring", "cycle_ring_us", ring_us, "the last telegram goes round the ring")
+        if is_last:
+            yield channel
+        yield BusEvent("jitter", "cycle_jitter_us", jitter_us, "allowances for the jitter")
+        master = "the master's own time before the next cycle"
+        yield BusEvent("master", "cycle_master_us", self._master_us, master, rests_on="bus.master_delay_us")
+
+    def _run(self, kind: TransactionKind) -> Run:
+        """All telegrams of one sort, which a timeline shows device by device."""
+        sort = SORTS[kind]
+        telegrams = BusEvent(f"{sort}_frame", f"cycle_{sort}_us", self._telegrams_us(kind), sort.upper())
+        return Run((telegrams,), laid_out=lambda _: self._telegrams(kind))
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Inputs that are published as a range alone: the delay of a device, the master's jitter, and the gap.
+
+        Each is the same in the whole cycle. A wait of the devices may hide some of it.
+        """
+        bus = self.network.profile.bus
+        if not self.is_window or bus.ring_grade == "measured":
+            return ()
+        jitters, rings = self._jitters[1], 1 if self._has_ring else 0
+        count = total(filling.telegrams for filling in self.fillings.values())
+        gap_us: Number = bus.gap_bytes * BYTE_US * (count + (jitters + rings) / 2)
+        delays_us: Number = 2 * rings * self.network.nodes * bus.device_delay_us
+        return (
+            Doubt("bus.gap_bytes", "gap between telegrams", gap_us * GAP_SHARE),
+            Doubt(
+                "bus.master_jitter_us", "jitter of the master", jitters / 2 * bus.master_jitter_us * MASTER_JITTER_SHARE
+            ),
+            Doubt("bus.device_delay_us", "delay of the devices", delays_us * DEVICE_DELAY_SHARE),
+        )
+
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """The channel for other frames, and the devices' least time before the AT."""
+        least = LeftOut("the devices' least time before the AT, S-0-1006", "bus.at_start_us")
+        channel = LeftOut("the channel for other frames", "cycle.nonperiodic_us")
+        said = ((self.network.profile.bus.at_start_us is not None, least), (self.network.nonperiodic_us, channel))
+        return tuple(left for is_said, left in said if not is_said)
+
+    def figures(self) -> Mapping[str, Number | None]:
+        """Numbers of telegrams."""
+        return {f"{sort}_telegrams": self.fillings[kind].telegrams for kind, sort in SORTS.items()}
+
+    def _start_us(self) -> Number:
+        """From the start of a cycle in the master to the first byte: its delay ends with the first header [us]."""
+        if not self.is_window:
+            return 0.0
+        delay_us: Number = self.network.profile.bus.master_delay_us
+        return larger(delay_us - HEADER_US, 0.0)
+
+    @property
+    def feedback_due_us(self) -> Number:
+        """The first AT begins then; by the last method it ends with the cycle [us]."""
+        mdt_us, sent = self._telegrams_us("write"), self.by_term
+        if not self.is_window:
+            return mdt_us
+        if self.method == "at-last":
+            behind_us = sent["cycle_at_us"] + sent["cycle_ring_us"] + self._master_us + self.jitter_us
+            return self.network.period_us - behind_us
+        start_us, other_us = mdt_us + self.jitter_us, self.network.nonperiodic_us
+        if self.method == "mdt-ucc-at":
+            start_us = choose(other_us > 0, start_us + self.jitter_us + other_us + self.ring_us, start_us)
+        return self._start_us() + larger(start_us, self.network.profile.bus.at_start_us or 0.0)
+
+    def latencies(self) -> tuple[BusLatency, ...]:
+        """Age of feedback when the host has it, and delay of a command up to its effect."""
+        return delays(
+            self.network,
+            feedback_us=(0.0, self._telegrams_us("read")),
+            command_us=(self._start_us(), self._telegrams_us("write")),
+            ring_us=self.ring_us,
+        )
+
+    def _telegrams(self, kind: TransactionKind) -> Iterator[BusEvent]:
+        """All telegrams of one sort."""
+        sort, gap = SORTS[kind], self.network.profile.bus.gap_bytes
+        term = f"cycle_{sort}_us"
+        for number, telegram in enumerate(_laid_out(telegrams_of(self.network, kind))):
+            label, data = f"{sort.upper()}{number}", [(size, node) for size, node in telegram if node]
+            used = sum(size for size, _ in telegram)
+            fields = used - sum(size for size, _ in data)
+            head_us = (OVERHEAD_BYTES + fields) * BYTE_US
+            yield BusEvent(f"{sort}_frame", term, head_us, f"{label}: its own fields", None, sort)
+            for size, node in data:
+                yield BusEvent(f"{sort}_data", term, size * BYTE_US, f"{label}: data of a device", node, sort)
+            padding_us = (plain(padded_bytes(used)) - used) * BYTE_US
+            yield BusEvent("gap", term, padding_us + gap * BYTE_US, f"gap after {label}", None, sort)
+
+
+def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:
+    """The pieces of each telegram of plain numbers: bytes, and the device whose data they are; 0 for other fields."""
+    laid_out = [[(plain(telegrams.first_bytes), 0)]]
+    used, node = plain(telegrams.first_bytes), 0
+    for place, items in enumerate(telegrams.items):
+        size, has_owner = plain(items.size_bytes), place >= _FIELDS
+        for _ in range(int(plain(items.pieces))):
+            if used + size > MOST_BYTES:
+                used = plain(telegrams.next_bytes)
+                laid_out.append([(used, 0)])
+            node += has_owner
+            laid_out[-1].append((size, node if has_owner else 0))
+            used += size
+    return laid_out
+
+
+_FIELDS: Final = 2
+"""Items before the data of devices: service channels, and control or status."""

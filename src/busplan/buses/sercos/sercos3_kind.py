@@ -1,0 +1,167 @@
+"""SERCOS III, as a kind of bus."""
+
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from typing import ClassVar, Final
+
+from busplan.buses.limits import (
+    NODE_LIMIT,
+    Bound,
+    Cost,
+    Key,
+    Limit,
+    PayloadRange,
+    Perturbation,
+    Setting,
+    Starter,
+    TimingModel,
+    period_limit,
+    period_rule,
+)
+from busplan.buses.network import Network
+from busplan.buses.sercos.sercos3 import (
+    COMPONENT_DELAY_US,
+    CONNECTION_BYTES,
+    CONSTANTS,
+    DEFAULT_GAP_BYTES,
+    DEVICE_DELAY_US,
+    FIGURES,
+    LEAST_UCC_US,
+    MASTER_DELAY_US,
+    MASTER_JITTER_US,
+    MOST_BYTES,
+    MOST_DEVICES,
+    MOST_TELEGRAMS,
+    PERIODS,
+    PERIODS_SOURCE,
+    SORTS,
+    data_bytes,
+    telegrams_of,
+)
+from busplan.buses.sercos.sercos3_cycle import EVENTS, STRETCHES, TELEGRAMS, WINDOW, Sercos3Cycle
+from busplan.buses.sercos.shared import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
+from busplan.elementwise import Number, larger, plain
+
+_METHOD: Final = "bus.timing_method"
+_METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
+
+
+def _most_telegrams(network: Network) -> Number:
+    return reduce(larger, (telegrams_of(network, kind).filling.telegrams for kind in SORTS))
+
+
+def _largest_telegram(network: Network) -> Number:
+    return data_bytes(network, network.largest_payload_bytes) + telegrams_of(network, "write").next_bytes
+
+
+LIMITS: Final = (
+    period_limit(PERIODS),
+    NODE_LIMIT,
+    Limit(
+        "nodes",
+        "{value:.0f} devices are over the {most:.0f} of a network",
+        Bound(lambda network: network.nodes, lambda _network: MOST_DEVICES),
+        way_out=f"a second network has {MOST_DEVICES:g} more",
+    ),
+    Limit(
+        "payload",
+        "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
+        Bound(_largest_telegram, lambda _network: MOST_BYTES),
+        way_out="a smaller payload would do",
+    ),
+    Limit(
+        "telegrams",
+        "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
+        Bound(_most_telegrams, lambda _network: MOST_TELEGRAMS),
+        way_out="a smaller payload or a second network would do",
+    ),
+)
+
+
+class Sercos3(SercosBus):
+    """SERCOS III, whose devices take their data from the MDT and put theirs into the AT while these pass."""
+
+    kind = "sercos3"
+    title = "SERCOS III"
+    also_called = ("SERCOS",)  # the newest is meant where none is said
+    timing_models = (
+        TimingModel(WINDOW, "telegrams, jitter, master and devices, and the ring delay where the method has it"),
+        TimingModel(TELEGRAMS, "telegrams and their gaps alone, as performance tables count"),
+    )
+    deciding_model = WINDOW
+    figures = FIGURES
+    limits = LIMITS
+    rules = (period_rule("BP141", PERIODS, kind="sercos3", source=PERIODS_SOURCE),)
+    periods = PERIODS
+    starter = Starter(
+        """\
+[bus]
+kind = "sercos3"
+version = "V1.1"           # assumed: from V1.1 on each device's data carry 2 bytes of connection control
+gap_bytes = 37             # what every device takes; S-0-1036 of the network says what it runs at""",
+        slice_ratio=WHOLE_PERIOD,
+        measure=MEASURE,
+        base=BASE,
+    )
+    event_kinds = EVENTS
+    stretch_kinds = STRETCHES
+    constants = CONSTANTS
+    keys: ClassVar[Mapping[str, Key]] = {
+        "bus.nodes": Key(meaning="the others on a second network"),
+        "bus.gap_bytes": Key("gap", DEFAULT_GAP_BYTES),
+        "bus.device_delay_us": Key("t_dev", DEVICE_DELAY_US),
+        "bus.master_jitter_us": Key("J_master", MASTER_JITTER_US),
+        "bus.master_delay_us": Key("t_master", MASTER_DELAY_US),
+        "bus.component_delay_us": Key("t_comp", COMPONENT_DELAY_US),
+        "bus.at_start_us": Key("t_1,min"),
+        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
+        _METHOD: Key(meaning="a setting of the master", short="method {}"),
+        "node.execution.worst_extra_us": Key("T_extra"),
+    }
+    evidence_data = ("sercos3",)
+
+    def cycle(self, network: Network, *, model: str) -> Sercos3Cycle:
+        """The cycle of a network under a timing model."""
+        return Sercos3Cycle(network, model)
+
+    def settings(self, network: Network) -> tuple[Setting, ...]:
+        """The other timing methods, in the order of CoSeMa."""
+        own = network.profile.bus.timing_method
+        values = tuple({_METHOD: method} for method in _METHODS if method != own)
+        return (Setting("timing_method", "timing method", Cost.SCHEDULE, (_METHOD,), values),)
+
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
+        """A wider gap, and slower devices."""
+        bus = network.profile.bus
+        beside = "" if bus.timing_method != "mdt-at-ucc" else "this timing method has no ring delay"
+        return (
+            Perturbation("gap +1 byte", {"bus.gap_bytes": bus.gap_bytes + 1}),
+            Perturbation(
+                "delay of a device +0.1 us", {"bus.device_delay_us": bus.device_delay_us + 0.1}, if_nothing=beside
+            ),
+        )
+
+    def payloads(self, network: Network) -> PayloadRange:
+        """Whole words that four telegrams carry for all devices, no more than one carries for a device."""
+        share = int(MOST_TELEGRAMS * MOST_BYTES) // int(plain(network.nodes))
+        return PayloadRange(int(WORD_BYTES), min(share, int(MOST_BYTES - CONNECTION_BYTES)), carrier="four telegrams")
+
+    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
+        """Say what each device is charged."""
+        return "every device its connection control and its data"
+
+    def setup_words(self, network: Network) -> tuple[str, ...]:
+        """Version, timing method and gap."""
+        bus = network.profile.bus
+        return (bus.version, f"timing method {bus.timing_method}", f"gap {bus.gap_bytes} bytes")
+
+    def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - whatever their number
+        """A channel for other frames that the master does not open."""
+        given_us = plain(network.nonperiodic_us)
+        if not 0 < given_us < LEAST_UCC_US:
+            return []
+        why = f"the master opens no channel for other frames of less than {LEAST_UCC_US:g} us"
+        return [f"cycle.nonperiodic_us = {given_us:g}: {why}"]
+
+
+BUS: Final = Sercos3()

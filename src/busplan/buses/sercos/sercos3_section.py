@@ -1,0 +1,111 @@
+"""The keys that only profiles of SERCOS III have, in [bus] and [[group]]."""
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field
+
+from busplan.buses.sercos.sercos3 import (
+    COMPONENT_DELAY_US,
+    DEFAULT_GAP_BYTES,
+    DEVICE_DELAY_US,
+    LEAST_GAP_BYTES,
+    MASTER_DELAY_US,
+    MASTER_JITTER_US,
+    HotPlug,
+    TimingMethod,
+    Version,
+)
+from busplan.buses.sercos.sercos3_cycle import WINDOW, TimingModelName
+from busplan.buses.sercos.shared import MOST_PIPELINE, PIPELINE_CYCLES
+from busplan.sections.base import Count, TimeUs
+from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
+from busplan.sections.profile import Profile
+
+
+class Sercos3Bus(BusSection):
+    """Section [bus]: a SERCOS III network, ring or line."""
+
+    kind: Literal["sercos3"] = Field(description="Kind of bus", examples=["sercos3"])
+    nodes: Count | None = Field(default=None, description="Devices N, master not counted", examples=[8])
+    version: Version = Field(
+        default="V1.1",
+        description="Protocol version: from V1.1 on each device's data carry 2 bytes of connection control",
+        examples=["V1.0"],
+    )
+    hot_plug_field: HotPlug = Field(
+        default="all",
+        description="Which telegrams have a hot-plug field: all (specification before V1.3), or the first (from V1.3)",
+        examples=["first"],
+    )
+    timing_method: TimingMethod = Field(
+        default="mdt-at-ucc",
+        description="Order of MDT, AT and the channel for other frames (UCC): mdt-at-ucc, mdt-ucc-at, or at-last, with "
+        "the AT at the end of the cycle; methods 1, 2 and 3 of CoSeMa",
+        examples=["mdt-ucc-at"],
+    )
+    gap_bytes: Annotated[int, Field(ge=int(LEAST_GAP_BYTES), le=1000)] = Field(
+        default=int(DEFAULT_GAP_BYTES),
+        description="Gap between two telegrams, S-0-1036; more devices with more jitter need more [bytes]",
+        examples=[12],
+    )
+    device_delay_us: TimeUs = Field(
+        default=float(DEVICE_DELAY_US), description="Delay of a device, one way [us]", examples=[0.6]
+    )
+    master_jitter_us: TimeUs = Field(
+        default=float(MASTER_JITTER_US),
+        description="Jitter with which the master sends; no more than an eighth of the period [us]",
+        examples=[0.1],
+    )
+    master_delay_us: TimeUs = Field(
+        default=float(MASTER_DELAY_US),
+        description="From the start of a cycle in the master to the end of the first header [us]",
+        examples=[2.56],
+    )
+    component_delay_us: TimeUs = Field(
+        default=float(COMPONENT_DELAY_US),
+        description="Delay of all components in the ring that are no devices [us]",
+        examples=[1.8],
+    )
+    at_start_us: TimeUs | None = Field(
+        default=None,
+        description="Least time from the start of the cycle to the first AT that the devices ask for: the largest of "
+        "their minima of S-0-1006. Without it none is counted [us]",
+        examples=[100],
+    )
+    ring_grade: Literal["measured", "published", "assumed"] | None = Field(
+        default=None,
+        description='How device_delay_us, master_jitter_us and gap_bytes are known; unless "measured", read from the '
+        "network itself, they have the uncertainty of the range that is published of each",
+        examples=["measured"],
+    )
+    pipeline_cycles: Annotated[int, Field(ge=1, le=MOST_PIPELINE)] = Field(
+        default=int(PIPELINE_CYCLES),
+        description="Cycles from the AT that bring feedback to the MDT with the command computed from it; of a loop on "
+        "the host",
+        examples=[2],
+    )
+    timing_model: TimingModelName = Field(
+        default=WINDOW,
+        description="Timing model whose figures lead the tables, window or telegrams; the verdict is always by window",
+        examples=[WINDOW],
+    )
+
+
+class Sercos3Group(GroupSection):
+    """One of the sections [[group]]: devices that are alike, in the order of their addresses."""
+
+    axes: GroupAxes = Field(examples=[4])
+
+
+class Sercos3Profile(Profile):
+    """A whole profile: one motion network and its cycle."""
+
+    bus: Sercos3Bus = Field(description="The bus")
+    payload: PayloadSection | None = Field(default=None, description="What travels in a cycle, where devices are alike")
+    node: NodeSection | None = Field(default=None, description="One device, where devices are alike")
+    group: Annotated[tuple[Sercos3Group, ...], Field(strict=False)] = Field(
+        default=(), description="Groups of unlike devices, instead of bus.nodes, [node] and [payload]"
+    )
+
+
+PROFILE: Final = Sercos3Profile

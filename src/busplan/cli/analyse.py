@@ -1,0 +1,437 @@
+"""Commands that analyse a profile: capacity, latency, circle-test, timeline, explain and report."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from busplan.cli.answering import answer, profile_files, require_apart
+from busplan.cli.design import DrawnFormatOption, DrawnOutputOption, drawn_form, plot_form, show_drawn
+from busplan.cli.options import (
+    ALL_MODELS,
+    AllOption,
+    FormatOption,
+    OutputOption,
+    PeriodsOption,
+    ProfileArgument,
+    TimingModelOption,
+    chosen_model,
+    complete_profile,
+    format_option,
+    load_changed,
+    load_each,
+    option,
+    parse_sizes,
+    periods_us,
+    takes_changes,
+    time_us,
+)
+from busplan.cli.output import PlanFailsError, say
+from busplan.cli.progress import progress_bar
+from busplan.errors import BusplanError
+from busplan.files import NewFile, document_bytes, new_file
+from busplan.forms import Form, Picture
+from busplan.profile.changes import NO_CHANGES, KeyChanges
+
+if TYPE_CHECKING:
+    from busplan.forms.blocks import Command
+    from busplan.questions.capacity import CapacityAnswer
+    from busplan.questions.circle import CircleTestAnswer
+    from busplan.questions.timeline import TimelineAnswer
+
+
+@takes_changes()
+def capacity_command(
+    profile: ProfileArgument,
+    period: PeriodsOption = None,
+    changes: KeyChanges = NO_CHANGES,
+    timing_model: TimingModelOption = "both",
+    sensitivity: Annotated[
+        bool,
+        typer.Option(
+            "--sensitivity",
+            help="Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or "
+            "one retry more, 10 us more host time, or a bus reset, one at a time; and what binds next. CSV has these "
+            "rows instead.",
+        ),
+    ] = False,
+    all_: AllOption = False,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
+
+    It begins with a card: the verdict (fits, not shown to fit, or does not fit) by the timing model that decides on
+    this bus; how much of the period is used and free, the fastest period, room for more nodes, and what to measure or
+    change. The figures follow; a low terminal shows them with --all. Times are in us. Exits 0 with any verdict.
+
+    Example: busplan capacity paper-4ms --period 4ms --period 500us
+    """
+    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
+        from busplan.questions.capacity import capacity
+
+        loaded = load_changed(profile, changes)
+        result = capacity(
+            loaded,
+            period_us=periods_us(period, loaded),
+            timing_model=chosen_model(timing_model),
+            sensitivity=sensitivity,
+        )
+        give(result.report()._replace(next_commands=_next_commands(str(profile), result, changes)))
+
+
+def _next_commands(argument: str, result: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
+    """Commands to run next for the same profile."""
+    from busplan.forms.blocks import Command
+    from busplan.questions.base.answer import change_options, period_option, shell_word
+
+    own_us, asked_us = result.profile.cycle.period_us, [verdict.period_us for verdict in result.verdicts]
+    tried = period_option(asked_us[0]) if len(asked_us) == 1 and asked_us[0] != own_us else ()
+    changed = " ".join((shell_word(argument), *change_options(changes, period_us=own_us), *tried))
+    all_well = all(verdict.all_well for verdict in result.verdicts)
+    second = "circle-test" if all_well else "plan"
+    asked = (f"capacity {changed} --sensitivity", f"{second} {changed}", f"report {changed}")
+    return tuple(Command(f"busplan {words}") for words in asked)
+
+
+@takes_changes()
+def latency_command(
+    profile: ProfileArgument,
+    payload: Annotated[
+        str | None,
+        option(
+            "--payload BYTES[,BYTES...]",
+            "Payload of read and write alike in bytes, or several with commas, as 4,16,32.  [default: the profile's "
+            "payload.read_bytes and payload.write_bytes]",
+        ),
+    ] = None,
+    changes: KeyChanges = NO_CHANGES,
+    timing_model: TimingModelOption = "both",
+    all_: AllOption = False,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Show how long data takes to arrive, phase by phase, under each timing model.
+
+    On IEEE 1394 it times one read and one write of the farthest node, or, in the broadcast schedule, the data and the
+    commands of all nodes; on CAN the worst-case response time of every message, and a loop over feedback and commands;
+    on EtherCAT a command, feedback, and a loop over both; on SERCOS feedback and commands of all nodes. Times are in
+    us, sizes in bytes; each phase has its equation or source. Exits 0 with any figures.
+
+    Example: busplan latency paper-two-node --payload 4,16,1024
+    """
+    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
+        from busplan.questions.latency import latency
+
+        loaded = load_changed(profile, changes)
+        latencies = latency(
+            loaded,
+            payload_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
+            timing_model=chosen_model(timing_model),
+        )
+        give(latencies.report())
+
+
+@takes_changes()
+def circle_test_command(
+    profile: ProfileArgument,
+    period: PeriodsOption = None,
+    changes: KeyChanges = NO_CHANGES,
+    contributions: Annotated[
+        bool, typer.Option("--contributions", help="Rank the error sources: run the test again without each of them.")
+    ] = False,
+    trace: Annotated[
+        Path | None,
+        option(
+            "--trace FILE.csv",
+            "Write time [us], commanded and actual position [mm] and contour error [mm] as CSV; an old file is "
+            "replaced.  [default: no file]",
+        ),
+    ] = None,
+    every: Annotated[
+        int | None, option("--every N", "Write one of N steps of the simulation to --trace.  [default: 10]")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        option(
+            "--plot FILE",
+            "Draw the magnified polar error, the error over time and the ranked error sources, with tolerances, "
+            "into FILE.svg or FILE.png; an old file is replaced. PNG needs the extra plot (resvg-py).  "
+            "[default: no figure]",
+        ),
+    ] = None,
+    all_: AllOption = False,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
+
+    The test has three parts. The bus: a cycle that does not fit its period fails before any simulation. Stability: a
+    loop without its phase and gain margin fails, however round its circle. The tolerances of the profile: without any,
+    the circle is not judged, nor below 0.1 um, where no error source of the profile matters. Errors are in um in the
+    table, in mm in JSON and CSV; F_min, F_max and G are the terms of ISO 230-4, and circle.path = "iso230-4" measures
+    them on a whole turn. Exits 0 when the test passes or the circle is not judged, and 1 when it fails.
+
+    Example: busplan circle-test paper-4ms --contributions
+    """
+    if every is not None and trace is None:
+        raise BusplanError("--every: goes with --trace FILE.csv")
+    if every is not None and every < 1:
+        raise BusplanError(f"--every {every}: must be 1 or more")
+    require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
+    form = None if plot is None else plot_form(plot)
+    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
+        from busplan.questions.circle import circle_test
+
+        loaded = load_changed(profile, changes)
+        periods = periods_us(period, loaded)
+        with ExitStack() as files:
+            # Opened before the simulation, so that a path that cannot be written fails at once.
+            trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
+            plot_file = files.enter_context(new_file(plot, overwrite=True)) if plot else None
+            with _naming(profile, period), progress_bar("circle test") as progress:
+                test = circle_test(loaded, period_us=periods, contributions=contributions, progress=progress)
+            if trace_file is not None:
+                trace_file.writelines(block.encode() for block in test.trace_csv(every=every or 10))
+            if plot_file is not None and form is not None:
+                _draw(test, plot_file, changes, form)
+        _say_written(trace, plot, drawn=any(test.runs))
+        give(test.report())
+    if test.passed is False:
+        raise PlanFailsError
+
+
+@contextmanager
+def _naming(profile: str, period: list[str] | None) -> Iterator[None]:
+    """Name the file and --period in errors about a circle that cannot be run."""
+    try:
+        yield
+    except BusplanError as error:
+        from busplan.profile.sources import locate
+
+        _, name = locate(profile)
+        typed = "".join(f" (with --period {text})" for text in period or ())
+        raise BusplanError(*(f"{name}: {problem}{typed}" for problem in error.problems)) from None
+
+
+def _draw(test: "CircleTestAnswer", file: NewFile, changes: KeyChanges, form: Picture) -> None:
+    """Draw the simulated periods; without any, an old file stays unchanged."""
+    if not any(test.runs):
+        file.abandon()
+        return
+    from busplan.forms.svg import content
+
+    file.write(document_bytes(content(test.drawing(), form, note=changes.words)))
+
+
+def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
+    if trace is not None:
+        say(f"wrote {trace}")
+    if plot is not None:
+        say(f"wrote {plot}" if drawn else f"{plot}: not written, for no period fits the bus: nothing to draw")
+
+
+@takes_changes(period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]")
+def timeline_command(
+    profile: ProfileArgument,
+    from_: Annotated[
+        str | None,
+        option(
+            "--from TIME",
+            "Show the cycle from this time on, counted from its start, with its unit, as 50us or 0.1ms.  "
+            "[default: its start]",
+        ),
+    ] = None,
+    to: Annotated[
+        str | None,
+        option(
+            "--to TIME",
+            "Show the cycle up to this time, with its unit; beyond its end means its end.  [default: its end]",
+        ),
+    ] = None,
+    transaction: Annotated[
+        str | None,
+        option(
+            "--transaction NAME:N",
+            "Show one transaction of one node (from 1) with its gaps, by its name on this bus, as read:1, feedback:1, "
+            "frame:1 or mdt:1; a wrong name lists the right ones. --from and --to may narrow it further.  [default: "
+            "all of them]",
+        ),
+    ] = None,
+    cycle: Annotated[
+        int | None,
+        option(
+            "--cycle N",
+            "Show the N-th cycle, from 1, of groups with rates of their own (every = n, on CAN and EtherCAT); beyond "
+            "their common multiple the cycles repeat.  [default: the fullest, which the verdict is for]",
+        ),
+    ] = None,
+    changes: KeyChanges = NO_CHANGES,
+    timing_model: Annotated[
+        str | None,
+        option(
+            "--timing-model MODEL",
+            "Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard.  [default: the "
+            "profile's bus.timing_model, where it is applicable]",
+        ),
+    ] = None,
+    all_: AllOption = False,
+    format_: DrawnFormatOption = None,
+    output: DrawnOutputOption = None,
+) -> None:
+    """Show one communication cycle as events, node by node and to scale.
+
+    The events are everything that takes time on the wire, in its order, the time for non-periodic data, and the rest of
+    the slice. Without that rest they add up to the required time of `busplan capacity`. A cycle that overruns its slice
+    is shown whole, and says so. Every node is computed with the hops of the farthest, unless the profile says
+    otherwise. Times are in us. Exits 0 with any verdict.
+
+    Example: busplan timeline paper-4ms --transaction read:1
+    """
+    chosen = drawn_form(format_, output)
+    from_us = None if from_ is None else time_us(from_, option="--from")
+    to_us = None if to is None else time_us(to, option="--to")
+    if from_us is not None and to_us is not None and from_us >= to_us:
+        raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
+
+    def find() -> "TimelineAnswer":
+        from busplan.questions.timeline import timeline
+
+        loaded = load_changed(profile, changes)
+        return timeline(
+            loaded, timing_model=timing_model, from_us=from_us, to_us=to_us, transaction=transaction, cycle=cycle
+        )
+
+    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
+
+
+def complete_figure(incomplete: str) -> list[str]:
+    """Complete the name of a figure for the shell."""
+    from busplan.questions.explain import figure_names
+
+    return [name for name in figure_names() if name.startswith(incomplete)]
+
+
+@takes_changes()
+def explain_command(
+    profile: ProfileArgument,
+    figure: Annotated[
+        str | None,
+        typer.Argument(
+            help="A key in the JSON of capacity or latency, as required_us (latency.gaps_us where both have it); the "
+            'number of an equation, as "(11)"; a label of a table, as arbitration; or a transaction, a message or a '
+            "group of nodes, for its latency.  [default: what the verdict rests on, and a list of all figures]",
+            autocompletion=complete_figure,
+            show_default=False,
+        ),
+    ] = None,
+    period: PeriodsOption = None,
+    changes: KeyChanges = NO_CHANGES,
+    timing_model: Annotated[
+        str | None,
+        option(
+            "--timing-model MODEL|both",
+            "Timing model; bias and uncertainty have only the one that decides.  [default: the profile's "
+            "bus.timing_model]",
+        ),
+    ] = None,
+    transaction: Annotated[
+        str | None,
+        option(
+            "--transaction NAME",
+            "For a figure of latency: the name of the transaction or message, as read, SYNC or loop. A wrong name "
+            "lists the right ones.  [default: all]",
+        ),
+    ] = None,
+    all_: AllOption = False,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Show where a figure of the bus comes from: every step in symbols and in numbers, and its inputs.
+
+    Each step names its equation. Each input has its source and its grade: published, derived, recalled, measured,
+    calibrated or assumed, or "given" where the profile sets it. The steps are those of the computation itself. What is
+    searched for, compared or simulated has no equation: capacity and circle-test show it. Exits 0 with any figures.
+
+    Example: busplan explain paper-4ms required_us
+    """
+    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
+        from busplan.questions.base.inputs import checked_models, load_network
+        from busplan.questions.explain import explain
+
+        loaded = load_changed(profile, changes)
+        explanation = explain(
+            loaded,
+            figure,
+            period_us=periods_us(period, loaded),
+            timing_model=checked_models(None, load_network(loaded)) if timing_model == ALL_MODELS else timing_model,
+            transaction=transaction,
+        )
+        give(explanation.report())
+
+
+_REFUSED: Final[dict[Form, str]] = {
+    "csv": "a page holds many tables; each names its command, and that command's --format csv has its rows"
+}
+
+
+@takes_changes(
+    period=" of all profiles with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
+    words="Of all profiles.",
+)
+def report_command(
+    profiles: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="PROFILE",
+            help="Profile files, shipped names (see `busplan profiles`), or once - for standard input.",
+            autocompletion=complete_profile,
+            show_default=False,
+        ),
+    ],
+    format_: Annotated[Form | None, format_option("html")] = None,
+    output: OutputOption = None,
+    title: Annotated[
+        str | None,
+        option("--title TEXT", "Heading of the page.  [default: the profile's name, or the number of profiles]"),
+    ] = None,
+    changes: KeyChanges = NO_CHANGES,
+    circle: Annotated[
+        bool | None,
+        typer.Option(
+            "--circle/--no-circle",
+            help="Run the circle test of profiles that ask for one.  [default: where servo values are measured]",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Put the answers for a profile on one page, for a screen, a machine's file or a repository.
+
+    The first screen has the verdict and the map; every other answer is behind a fold, with its command, and is printed
+    whole. Times are in us, contour errors in um. Several profiles are compared at the top. The HTML needs no network
+    and no script. Exits 0 with any verdict.
+
+    Example: busplan report paper-4ms paper-1ms -o report.html
+    """
+    from busplan.english import has_controls
+
+    if title is not None and (has_controls(title) or not title.strip()):
+        raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
+    files = profile_files(*profiles)
+    # The answer names the changes itself, for they stand in the commands of the page, too.
+    with answer(format_, output, inputs=files, default="html", refused=_REFUSED) as give:
+        from busplan.questions.report import report
+
+        loaded = load_each(profiles, partial(load_changed, changes=changes))
+        with progress_bar("circle tests") as progress:
+            page = report(
+                loaded,
+                title=title,
+                circle=circle,
+                progress=progress,
+                origins=[(argument, changes) for argument in profiles],
+            )
+        give(page.report())

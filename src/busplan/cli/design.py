@@ -1,0 +1,641 @@
+"""Commands that design a machine: plan, calibrate, measured, map, compare and import."""
+
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, suppress
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Final, Literal, Protocol
+
+import typer
+
+from busplan.cli.answering import answer, profile_files, report_with, require_apart
+from busplan.cli.gate import apply_changes, require_own_file
+from busplan.cli.options import (
+    STANDARD_OUTPUT,
+    VALUES_HELP,
+    AllOption,
+    FormatOption,
+    JobsOption,
+    OutputOption,
+    ProfileArgument,
+    form_of_file,
+    load_changed,
+    option,
+    output_option,
+    parse_axis,
+    takes_changes,
+)
+from busplan.cli.output import PlanFailsError, emit_document, message_width, refuse_terminal, say, write_document
+from busplan.cli.progress import progress_bar
+from busplan.english import printable
+from busplan.errors import BusplanError
+from busplan.extras import require_resvg
+from busplan.files import NewFile, new_file
+from busplan.forms import ENDINGS, PICTURES, Form, Picture, ending_expected
+from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges, require_separate
+
+if TYPE_CHECKING:
+    from busplan.forms.blocks import Report
+    from busplan.forms.charts import Drawing
+    from busplan.profile.document import LoadedProfile
+    from busplan.questions.compare import CompareAnswer
+    from busplan.questions.map import MapAnswer
+    from busplan.questions.plan import PlanAnswer
+
+
+DrawnForm = Literal[Form, Picture]
+_ENDINGS: Final[Mapping[str, DrawnForm]] = MappingProxyType({**ENDINGS, **PICTURES})
+DrawnFormatOption = Annotated[
+    DrawnForm | None,
+    typer.Option(
+        "--format",
+        help="Form of the answer; a table is plain text. png goes to a file or a pipe, and needs the extra plot "
+        "(resvg-py).  [default: by the ending of --output, else table]",
+        show_default=False,
+    ),
+]
+DrawnOutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")]
+
+
+def drawn_form(given: DrawnForm | None, output: Path | None) -> DrawnForm:
+    """Choose the form by --format or by the ending of the file; a table without both.
+
+    Raises
+    ------
+    BusplanError
+        The ending is not known, or the form is png and resvg-py is missing or standard output is a terminal.
+    """
+    chosen = form_of_file(given, output, forms=_ENDINGS, default="table")
+    if chosen == "png":
+        if output is None:
+            refuse_terminal(chosen)
+        require_resvg(f"--format {chosen}")
+    return chosen
+
+
+def plot_form(path: Path) -> Picture:
+    """Form of the picture of --plot, by the ending of its name.
+
+    Raises
+    ------
+    BusplanError
+        The ending is not known, or the form is png and resvg-py is missing.
+    """
+    ending = path.suffix.lower()
+    if ending not in PICTURES:
+        raise BusplanError(f"--plot {path}: {ending_expected(ending, PICTURES)}")
+    if ending == ".png":
+        require_resvg("--plot")
+    return PICTURES[ending]
+
+
+class Drawn(Protocol):
+    """An answer that has a picture."""
+
+    def report(self) -> "Report":
+        """The answer in blocks."""
+
+    def drawing(self) -> "Drawing":
+        """The picture."""
+
+
+def show_drawn(
+    find: Callable[[], Drawn],
+    form: DrawnForm,
+    output: Path | None,
+    *,
+    inputs: Iterable[Path],
+    changes: KeyChanges,
+    is_whole: bool,
+) -> None:
+    """Write an answer, as a picture or as a report.
+
+    Parameters
+    ----------
+    find
+        Function that gives the answer.
+    form
+        As `picture_form` chose it.
+    output, inputs, changes, is_whole
+        As for `answer`.
+
+    Raises
+    ------
+    BusplanError
+        It cannot be written, or there is nothing to draw.
+    """
+    match form:
+        case "svg" | "png":
+            from busplan.forms.svg import content
+
+            require_apart({"--output": output}, inputs=inputs)
+            write_document(content(find().drawing(), form, note=_changes_words(changes)), output)
+        case _:
+            with answer(form, output, inputs=inputs, changes=changes, is_whole=is_whole) as give:
+                give(find().report())
+
+
+def _changes_words(changes: KeyChanges) -> str:
+    """The --set options, for the title of a picture in a file of its own."""
+    from busplan.forms.numbers import sentence_text
+    from busplan.questions.base.sentences import changes_sentences
+
+    return " ".join(map(sentence_text, changes_sentences(changes)))
+
+
+_PROFILE_ENDINGS = ("", ".toml")
+_MAX_AXES = 1_000_000
+_LONGEST_NAME = 100
+_LONGEST_DESCRIPTION = 2000
+
+
+@takes_changes(
+    "Part of the goal: it is kept, and --apply and -o write it.",
+    period=" with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
+    "[default: the profile's cycle.period_us, which may be changed]",
+)
+def plan_command(
+    profile: ProfileArgument,
+    nodes: Annotated[
+        int | None,
+        option(
+            "--nodes N", "Goal: number of distributed nodes, the host not counted.  [default: the profile's bus.nodes]"
+        ),
+    ] = None,
+    changes: KeyChanges = NO_CHANGES,
+    axes: Annotated[
+        int | None,
+        option(
+            "--axes N",
+            "Goal: number of axes, instead of --nodes; the nodes follow from the profile's node.axes.  [default: "
+            "those of the nodes]",
+            min=1,
+            max=_MAX_AXES,
+        ),
+    ] = None,
+    free: Annotated[
+        str | None,
+        option(
+            "--free NAMES",
+            "Settings that may change, with commas, in the order of their cost: gap_count, slice_ratio, responses "
+            "(reads concatenated, writes unified), schedule (where the bus has one), payload (less), period, nodes "
+            "(fewer).  [default: gap_count,slice_ratio,period]",
+        ),
+    ] = None,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply", help="Write the recommended values into PROFILE, a file; comments and layout stay as they are."
+        ),
+    ] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help=f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
+            "name, as NEW.toml: write a copy of PROFILE with the recommended values, whose name is that of the file; - "
+            "is standard output, and the report goes to standard error.  [default: no file, and the report to standard "
+            "output]",
+        ),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Let -o NEW.toml overwrite a file that is already there.")
+    ] = False,
+    all_: AllOption = False,
+    format_: FormatOption = None,
+) -> None:
+    """Tell what to set for a number of nodes or axes: gap count, slice ratio, period, or several of them.
+
+    It changes one thing at a time, the cheapest first and as little as possible, until the goal is shown to fit with
+    its reserve, at a safe gap count, within all [limits]; --free lists them by cost. The slice ratio goes up to 0.9;
+    the period changes only if nothing cheaper is enough. Values given by an option are kept.
+
+    The table has a row for each thing that was tried. Margins are in us, less the model's bias. Without a plan the
+    answer names what prevents it and what would be enough. `busplan manual plan` has more. Exits 0 when there is a
+    plan, 1 when there is none.
+
+    Example: busplan plan paper-1ms --axes 16
+    """
+    if nodes is not None:
+        changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.each))
+    report_file = output if output is not None and output.suffix.lower() in ENDINGS else None
+    if report_file is None and output is not None and output.suffix.lower() not in _PROFILE_ENDINGS:
+        raise BusplanError(
+            f"--output {output}: expected a name ending in .toml for the profile, or in {', '.join(ENDINGS)} for the "
+            "report"
+        )
+    new = None if report_file is not None else output
+    _check_options(changes, axes=axes, apply=apply, new=new, force=force, format_=format_)
+    piped = new == STANDARD_OUTPUT
+    require_apart({"--output": None if piped else new}, inputs=profile_files(profile), of_profiles=True)
+    with answer(format_, report_file, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
+        from busplan.profile.sources import load
+        from busplan.questions.plan import plan
+
+        if apply:
+            require_own_file(profile)
+        loaded = load(profile)
+        with ExitStack() as files:
+            # Opened before the search, so that a path that cannot be written fails at once.
+            file = files.enter_context(new_file(new, overwrite=force)) if new and not piped else None
+            result = plan(
+                loaded.profile,
+                axes=axes,
+                wanted=changes,
+                free=None if free is None else [name.strip() for name in free.split(",")],
+            )
+            if new is not None:
+                _write_profile(loaded, result, file, name=None if piped else new.stem)
+        if result.recommended is None:
+            if apply or new:
+                say(f"{profile if apply else new}: not written, for there is no plan")
+        elif apply:
+            _apply(loaded, result)
+        elif file is not None:
+            say(f"wrote {new}")
+        (partial(_say_report, changes) if piped else give)(result.report())
+    if result.recommended is None:
+        raise PlanFailsError
+
+
+def _check_options(
+    changes: KeyChanges, *, axes: int | None, apply: bool, new: Path | None, force: bool, format_: Form | None
+) -> None:
+    problems = []
+    if axes is not None:
+        nodes = [change.typed for change in changes.each if change.key == "bus.nodes"]
+        problems += [f"{typed} and --axes {axes}: give one of them" for typed in nodes]
+    if apply and new is not None:
+        problems.append(f"--apply and -o {new}: give one of them; -o leaves PROFILE as it is")
+    if new == STANDARD_OUTPUT and format_ not in (None, "table"):
+        problems.append(f"--format {format_} and -o -: standard output takes one document; give -o a file")
+    if force and new is None:
+        problems.append("--force: goes with -o NEW.toml")
+    if problems:
+        raise BusplanError(*problems)
+
+
+def _apply(loaded: "LoadedProfile", result: "PlanAnswer") -> None:
+    """Write the recommended values into the profile's file."""
+    if not result.recommended_changes:
+        say(f"{loaded.document.name}: nothing to change, left as it is")
+        return
+    apply_changes(loaded.document, _choices(result), are_choices=True)
+    say(f"changed {loaded.document.name}: {result.recommended_words}")
+
+
+def _write_profile(loaded: "LoadedProfile", result: "PlanAnswer", file: NewFile | None, *, name: str | None) -> None:
+    """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged.
+
+    A file is another plan than that of the profile: it has a name of its own, and what its description says is said
+    of the profile that it comes from.
+    """
+    if result.recommended is not None:
+        from busplan.profile.edit import edited_copy
+
+        profile, choices = loaded.profile, _choices(result)
+        if name is not None:
+            choices["name"] = printable(name).strip()[:_LONGEST_NAME] or profile.name
+            said = f"A plan of {profile.name}, which is: {profile.description.strip()}"[:_LONGEST_DESCRIPTION]
+            choices |= {"description": said} if profile.description.strip() else {}
+        write = emit_document if file is None else file.write
+        write(edited_copy(loaded, choices))
+    elif file is not None:
+        file.abandon()
+
+
+def _choices(result: "PlanAnswer") -> dict[str, object]:
+    """The recommended values by key, as a file has them."""
+    from busplan.profile.edit import whole
+
+    return {key: whole(value) for key, value in (result.recommended_changes or {}).items()}
+
+
+def _say_report(changes: KeyChanges, report: "Report") -> None:
+    """Write the report to standard error: standard output has the profile."""
+    from busplan.forms.terminal import block_lines
+
+    say(*(line.text for line in block_lines(report_with(changes, report).blocks, width=message_width())))
+
+
+@takes_changes("Of the bench, where it was not as the profile: --apply does not write it.")
+def calibrate_command(
+    profile: ProfileArgument,
+    measurements: Annotated[
+        str,
+        typer.Argument(
+            help="A CSV file of measured latencies, the shipped example table-1.csv, or - for standard input.",
+            show_default=False,
+        ),
+    ],
+    group: Annotated[
+        str | None,
+        option(
+            "--group NAME", "In a profile with groups: the group of nodes that was measured.  [default: its one group]"
+        ),
+    ] = None,
+    timing_model: Annotated[
+        str | None,
+        option("--timing-model MODEL", "Timing model that computes the packets.  [default: the one that decides]"),
+    ] = None,
+    changes: KeyChanges = NO_CHANGES,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply",
+            help="Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; "
+            "your own comments stay.",
+        ),
+    ] = False,
+    all_: AllOption = False,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Find the execution time T_exec of a node from latencies measured on an IEEE 1394 bus.
+
+    The CSV file has a header, the columns payload_bytes and latency_us (T_lant, from the request to its last
+    acknowledge, in us) and a line for each measurement; payloads may repeat, and lines that begin with # are comments.
+    A column transaction says read or write (write without it).
+
+    T_exec is the latency less the time of its packets by the timing model, equation (3); of each payload the median. If
+    the bench differs from the profile, say so: --set bus.nodes=2 --set bus.gap_count=63. Of three or more measurements
+    of a payload, those far from their median are named by their line and left out; slow ones are in worst_extra_us.
+    Times are in us. Exits 0 with any figures.
+
+    Example: busplan calibrate paper-two-node table-1.csv
+    """
+    if profile == measurements == "-":
+        raise BusplanError("only one of PROFILE and MEASUREMENTS can be standard input")
+    if apply:
+        require_own_file(profile)
+    files = chain(profile_files(profile), _measurements_file(measurements))
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_) as give:
+        from busplan.profile.document import read_bytes
+        from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES
+        from busplan.profile.sources import load, locate_measurements
+        from busplan.questions.calibrate import calibrate
+
+        loaded = load(profile)
+        bench = changes.applied(loaded.profile)
+        path, name, shipped = locate_measurements(measurements)
+        calibration = calibrate(
+            bench,
+            # Read here: Python reads no standard input, and takes a name of several lines for CSV text.
+            measurements if shipped else read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES),
+            group=group,
+            timing_model=timing_model,
+            source=name,
+        )
+        if apply:
+            for change in changes.by_set:
+                for key in calibration.edits:
+                    require_separate(change, key, typed="--apply")
+            apply_changes(loaded.document, calibration.edits, notes=calibration.notes)
+            kept = "your comments are kept: see whether they hold of the new values"
+            say(f"wrote [{' '.join(calibration.notes)}] of {profile}; {kept}")
+        give(calibration.report(applied_to=profile if apply else None))
+
+
+def _measurements_file(argument: str) -> Iterator[Path]:
+    """File of the MEASUREMENTS argument; nothing if there is none: reading it will report the error."""
+    from busplan.profile.sources import locate_measurements
+
+    with suppress(BusplanError, ValueError):  # ValueError: a NUL in the path
+        yield locate_measurements(argument).path
+
+
+@takes_changes("Of the machine as it was recorded: --apply does not write it.")
+def measured_command(
+    profile: ProfileArgument,
+    recording: Annotated[
+        str,
+        typer.Argument(
+            help="A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, BLF or "
+            "TRC.",
+            show_default=False,
+        ),
+    ],
+    quantile: Annotated[
+        float,
+        option(
+            "--quantile SHARE",
+            "Share of the cycles that jitter and times are to hold for, 0.5..1 [1].  [default: 1, the worst recorded]",
+        ),
+    ] = 1.0,
+    changes: KeyChanges = NO_CHANGES,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply",
+            help="Write the values that were measured into the file PROFILE, with a comment on their origin; your own "
+            "comments stay.",
+        ),
+    ] = False,
+    all_: AllOption = False,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Show what the machine does by a recording of its bus, beside what was planned.
+
+    Each figure has the planned and the recorded value, the residual, its expanded uncertainty U, and whether it is
+    within the plan: jitter, times, load and bytes at most as planned, or no further beside than U. What the recording
+    does not show is said. Of EtherCAT record all packets of the master's port, both ways. Times are in us. `busplan
+    manual measured` says how each figure is found. Exits 0 with any figures.
+
+    Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
+    """
+    if apply:
+        require_own_file(profile)
+    files = chain(profile_files(profile), [Path(recording)])
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_) as give:
+        from busplan.profile.sources import load
+        from busplan.questions.measured import measured
+
+        loaded = load(profile)
+        with progress_bar("recording") as progress:
+            seen = measured(changes.applied(loaded.profile), recording, quantile=quantile, progress=progress)
+        if apply and not seen.edits:
+            raise BusplanError(f"--apply: {recording} shows no value of a key")
+        if apply:
+            for change in changes.by_set:
+                for key in seen.edits:
+                    require_separate(change, key, typed="--apply")
+            apply_changes(loaded.document, seen.edits, notes=seen.notes)
+            say(f"wrote {', '.join(seen.edits)} of {profile}; your comments are kept: see whether they hold")
+        give(seen.report(applied_to=profile if apply else None))
+
+
+def _direction(option: str, *, default: str) -> typer.models.OptionInfo:
+    help_ = (
+        f"Quantity on the {option[-1]} axis: a key of the profile, or axes for the axes of all nodes (varies the "
+        "number of nodes; with groups, of the group with the most axes), and up to 64 values in its unit: "
+        f"{VALUES_HELP}  [default: {default}]"
+    )
+    direction: typer.models.OptionInfo = typer.Option(option, metavar="KEY=VALUES", help=help_, show_default=False)
+    return direction
+
+
+@takes_changes(
+    period=" of this design with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
+    words="For a key on an axis of the map, it moves the mark.",
+)
+def map_command(
+    profile: ProfileArgument,
+    x: Annotated[str | None, _direction("--x", default="axes about the most that fit")] = None,
+    y: Annotated[str | None, _direction("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
+    changes: KeyChanges = NO_CHANGES,
+    circle: Annotated[
+        bool, typer.Option("--circle", help="Also run the circle test of every cell that fits, up to 1,000.")
+    ] = False,
+    jobs: JobsOption = None,
+    all_: AllOption = False,
+    format_: DrawnFormatOption = None,
+    output: DrawnOutputOption = None,
+) -> None:
+    """Draw where a design fits: period against axes, or any two keys of the profile.
+
+    Each cell is the verdict of `busplan capacity` for its two values: fits, not shown to fit, does not fit, or an
+    unsafe gap count; with --circle also whether the circle fails. A table says what limits each region: time with its
+    largest term, or a limit of the bus. The profile's own cell is marked. Values that cannot be combined are blank.
+    Exits 0 with any verdict.
+
+    Example: busplan map paper-4ms --y cycle.period_us=500:4000:500
+    """
+    chosen = drawn_form(format_, output)
+    if jobs is not None and not circle:
+        raise BusplanError("--jobs: goes with --circle")
+    if jobs is not None and jobs < 1:
+        raise BusplanError(f"--jobs {jobs}: must be 1 or more")
+
+    def find() -> "MapAnswer":
+        from busplan.cli.workers import available_processors, executor
+        from busplan.questions.map import map_
+
+        loaded = load_changed(profile, changes)
+        with ExitStack() as run:
+            return map_(
+                loaded,
+                x=_along(x, option="--x"),
+                y=_along(y, option="--y"),
+                circle=circle,
+                progress=run.enter_context(progress_bar("map")),
+                executor=run.enter_context(executor(jobs or available_processors())) if circle else None,
+            )
+
+    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
+
+
+def _along(text: str | None, *, option: str) -> dict[str, str] | None:
+    return None if text is None else dict([parse_axis(text, option=option)])
+
+
+def _complete_kinds(incomplete: str) -> list[str]:
+    """Complete the last of several names of kinds for the shell."""
+    from busplan.buses import kind_names
+
+    before, comma, last = incomplete.rpartition(",")
+    return [f"{before}{comma}{name}" for name in kind_names() if name.startswith(last)]
+
+
+@takes_changes(
+    period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
+    words="Of the profile, before it is put on other kinds.",
+)
+def compare_command(
+    profile: ProfileArgument,
+    buses: Annotated[
+        str | None,
+        option(
+            "--buses KIND[,KIND...]",
+            "Kinds of bus, by their bus.kind.  [default: all, the profile's own first]",
+            autocompletion=_complete_kinds,
+        ),
+    ] = None,
+    changes: KeyChanges = NO_CHANGES,
+    all_: AllOption = False,
+    format_: DrawnFormatOption = None,
+    output: DrawnOutputOption = None,
+) -> None:
+    """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
+
+    The machine is the part of a profile that every kind has: nodes and axes, bytes, execution times and period.
+    On its own kind the profile stays as it is. On another kind it gets the bus and the slice ratio of a new
+    profile, which are assumed; keys that only its own kind has are left out, and named. The smallest period [us] is the
+    one at which this machine is shown to fit; the most axes are those at the profile's period. Exits 0 with any
+    verdict.
+
+    Example: busplan compare gantry-24
+    """
+    chosen = drawn_form(format_, output)
+
+    def find() -> "CompareAnswer":
+        from busplan.questions.compare import compare
+
+        kinds = None if buses is None else [kind.strip() for kind in buses.split(",")]
+        return compare(load_changed(profile, changes), buses=kinds)
+
+    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
+
+
+def import_command(
+    paths: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE",
+            help="Files of one machine, each recognised by its content; - is standard input.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="NEW.toml",
+            help="Write the profile to a new file.  [default: standard output]",
+            show_default=False,
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
+) -> None:
+    """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
+
+    Several files of one machine are merged: an ENI has the frames, the text of `ethercat slaves -v` the measured delays
+    of devices, `ethercat pdos` their bytes; a CAN log has the messages of a network, a DBC their names. Each value has
+    its grade, file and line in a comment; values in no file are assumed, and named at the end with the verdict.
+    `busplan manual import` lists what each format gives.
+
+    The profile goes to standard output or to the file of -o; an existing file stays, unless --force is given. Exits 0
+    when the profile is written, with any verdict.
+
+    Example: busplan import machine.xml slaves.txt -o machine.toml
+    """
+    if paths.count("-") > 1:
+        raise BusplanError("-: only one FILE can be standard input")
+    new = None if output == STANDARD_OUTPUT else output
+    if new is not None and new.suffix.lower() != ".toml":
+        raise BusplanError(f"--output {new}: expected a name ending in .toml, for it is a profile")
+    inputs = [Path(path) for path in paths]
+    require_apart({"--output": new}, inputs=inputs, of_profiles=True)
+    with ExitStack() as files:
+        # Opened before the work, so that a path that cannot be written fails at once.
+        file = None if new is None else files.enter_context(new_file(new, overwrite=force))
+        from busplan.questions.import_ import import_profile
+
+        name = None if new is None else new.stem
+        with progress_bar("recording") as progress:
+            answer = import_profile(paths, name=name, progress=progress)
+        sentences = answer.sentences()
+        if file is None:
+            emit_document(answer.text)
+        else:
+            file.write(answer.text.encode())
+    say(*([f"wrote {new}"] if new else []), *sentences)
+    if new:
+        shown = shlex.quote(f"./{new}" if str(new).startswith("-") else str(new))
+        say(f"next: busplan capacity {shown}")

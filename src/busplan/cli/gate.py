@@ -1,0 +1,545 @@
+"""Commands of the gate: check, diff, rule and schema."""
+
+import os
+import stat
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final, Literal
+
+import typer
+
+from busplan.cli.answering import answer, columns, profile_files, require_apart
+from busplan.cli.options import (
+    AllOption,
+    FormatOption,
+    OutputOption,
+    TimingModelOption,
+    chosen_model,
+    complete_profile,
+    load_each,
+    option,
+    output_option,
+    takes_changes,
+)
+from busplan.cli.output import PlanFailsError, emit_document, emit_text, is_styled, is_terminal, say, write_document
+from busplan.english import plural
+from busplan.errors import BusplanError
+from busplan.files import NewFile, lock, new_file
+from busplan.gate.report import FORMATS
+from busplan.profile.changes import NO_CHANGES, KeyChanges
+
+if TYPE_CHECKING:
+    from busplan.profile.document import Document
+
+
+PATIENCE_S: Final = 30.0
+"""Longest wait for another run, which only reads and writes a short file."""
+_LOOK_AGAIN_S: Final = 0.02
+
+
+@contextmanager
+def changing(path: Path) -> Iterator[None]:
+    """Lock a file against other runs between reading and writing it.
+
+    The folder is locked, because the file is replaced or may not exist yet. The lock ends with the process at the
+    latest.
+
+    Raises
+    ------
+    BusplanError
+        There is no such folder, or another run holds the lock too long.
+    """
+    folder = Path(os.path.realpath(path)).parent
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise BusplanError(f"{path}: cannot be written: folder {folder}: {error.strerror}") from None
+    try:
+        _lock(descriptor, path)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _lock(folder: int, path: Path) -> None:
+    end = time.monotonic() + PATIENCE_S
+    try:
+        while not lock(folder):
+            if time.monotonic() > end:
+                raise BusplanError(
+                    f"{path}: another run has been changing a file of this folder for {PATIENCE_S:g} s; try again"
+                )
+            time.sleep(_LOOK_AGAIN_S)
+    except OSError as error:  # some network file systems have no locks
+        say(f"{path}: its folder cannot be locked ({error.strerror}); let no other run write it meanwhile")
+
+
+def require_changeable(path: Path) -> os.stat_result | None:
+    """Refuse a file that cannot be changed in place; call it before the work.
+
+    Returns
+    -------
+    os.stat_result or None
+        Status of the file, symbolic links followed; None if it does not exist.
+
+    Raises
+    ------
+    BusplanError
+        It is not a regular file, is read-only, or has further hard links.
+    """
+    try:
+        status = path.stat()
+    except (OSError, ValueError):  # reading it will report the error
+        return None
+    if not stat.S_ISREG(status.st_mode):
+        raise BusplanError(f"{path}: is not a regular file, so it cannot be changed")
+    # Root could write it nevertheless, so check the mode, too.
+    if not status.st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH) or not os.access(path, os.W_OK):
+        mode = stat.S_IMODE(status.st_mode)
+        raise BusplanError(f"{path}: is read-only (mode {mode:04o}) and stays as it is; make it writable first")
+    if status.st_nlink > 1:
+        raise BusplanError(
+            f"{path}: has {status.st_nlink} hard links, which replacing it would break; copy it and change the copy"
+        )
+    return status
+
+
+def rewrite(path: Path, content: bytes) -> None:
+    """Replace the content of a file atomically; it keeps owner and mode.
+
+    Raises
+    ------
+    BusplanError
+        It cannot be changed (see `require_changeable`) or written, or its owner cannot be kept.
+    """
+    status = require_changeable(path)
+    with new_file(path, overwrite=True) as file:
+        if status is not None:
+            _keep_owner(file, status, path)
+        file.write(content)
+
+
+def _keep_owner(file: NewFile, status: os.stat_result, path: Path) -> None:
+    own = os.fstat(file.fileno())
+    if (own.st_uid, own.st_gid) == (status.st_uid, status.st_gid):
+        return
+    try:
+        os.fchown(file.fileno(), status.st_uid, status.st_gid)
+    except OSError as error:
+        raise BusplanError(
+            f"{path}: belongs to user {status.st_uid} and group {status.st_gid}, which cannot be kept "
+            f"({error.strerror}); it stays as it is"
+        ) from None
+
+
+def require_own_file(argument: str) -> None:
+    """Refuse a PROFILE argument that is not a file of the user, or a file that cannot be changed.
+
+    Raises
+    ------
+    BusplanError
+        Standard input, a shipped profile, or a file that is read-only or has hard links.
+    """
+    from busplan.profile.sources import shipped_names
+
+    if argument == "-":
+        raise BusplanError("--apply: standard input cannot be written back; give the profile as a file")
+    if argument in shipped_names():
+        raise BusplanError(
+            f"--apply: {argument} is a shipped profile and stays as it is; busplan init my-machine --from {argument} "
+            "writes one of your own"
+        )
+    require_changeable(Path(argument))
+
+
+def apply_changes(
+    document: "Document",
+    changes: Mapping[str, object],
+    *,
+    notes: Mapping[str, str] | None = None,
+    are_choices: bool = False,
+) -> None:
+    """Change values in a profile's file; comments, layout and line ends stay.
+
+    Parameters
+    ----------
+    document
+        The text that the changes are made for, from a file of the user (see `require_own_file`).
+    changes, notes, are_choices
+        As for `profile.edit.edited`.
+
+    Raises
+    ------
+    BusplanError
+        The file was changed meanwhile, a change cannot be made, or the file cannot be written. The file is unchanged.
+    """
+    from busplan.profile.document import decode, read_bytes
+    from busplan.profile.edit import edited_file
+
+    name = document.name
+    path = Path(name)
+    with changing(path):
+        # Absolute, because "-" would mean standard input.
+        content = read_bytes(path.absolute(), name=name)
+        if decode(content, name=name) != document:
+            raise BusplanError(f"--apply: {name} was changed meanwhile, and stays as it is now; run the command again")
+        rewrite(path, edited_file(content, changes, name=name, notes=notes, are_choices=are_choices))
+
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from concurrent.futures import Executor
+
+    from busplan.gate.baseline import Baseline
+    from busplan.gate.report import CheckReport
+    from busplan.profile.sources import ProfileSource
+
+    FormatName = str
+else:
+    # The choices for typer.
+    FormatName = Literal[tuple(FORMATS)]
+
+_BUILD_FORMATS: Final = [name for name, report_format in FORMATS.items() if report_format.reader == "builds"]
+
+
+@takes_changes(
+    words="Of all files, each of which must be valid without it; a finding is at the key's place in the file, or at "
+    "its section."
+)
+def check_command(
+    paths: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="PATH",
+            help="Profile files, folders (every `*.toml` below that has a `schema_version`), names of shipped "
+            "profiles, or - for standard input.",
+            autocompletion=complete_profile,
+            show_default=False,
+        ),
+    ],
+    changes: KeyChanges = NO_CHANGES,
+    format_: Annotated[
+        FormatName | None,
+        option(
+            "--format FORM",
+            "Form of the report: concise is one line for each finding, full shows the line of the file with the value "
+            f"underlined, json is one document; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are for "
+            "build services.  [default: full on a terminal, otherwise concise]",
+            envvar="BUSPLAN_FORMAT",
+        ),
+    ] = None,
+    output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
+    fail_on: Annotated[
+        Literal["error", "warning"], typer.Option("--fail-on", help="Least severity that fails the check.")
+    ] = "error",
+    exit_zero: Annotated[bool, typer.Option("--exit-zero", help="Exit 0 even with findings; 2 stays 2.")] = False,
+    circle: Annotated[
+        bool,
+        typer.Option("--circle/--no-circle", help="Run the circle test of profiles that ask for one, or leave it out."),
+    ] = True,
+    circle_steps: Annotated[
+        int | None,
+        option(
+            "--circle-steps N",
+            "Most simulated steps of each axis of a circle; a longer circle is not run, and BP204 warns of it.  "
+            "[default: 10000000]",
+            min=1,
+        ),
+    ] = None,
+    baseline: Annotated[
+        Path | None,
+        option("--baseline FILE", "File with recorded axes and margins, which no profile may lose.  [default: none]"),
+    ] = None,
+    update_baseline: Annotated[
+        bool,
+        typer.Option(
+            "--update-baseline",
+            help="Record the present axes and margins in the --baseline file, and drop records without a profile.",
+        ),
+    ] = False,
+    pass_on_unmatched: Annotated[
+        bool,
+        typer.Option(
+            "--pass-on-unmatched",
+            help="Let profiles without a record in the --baseline file pass, and records without a profile; without "
+            "it they exit 2.",
+        ),
+    ] = False,
+    recording: Annotated[
+        Path | None,
+        option(
+            "--recording FILE",
+            "Recording of the machine of the one profile, as `busplan measured` takes it: what is outside the plan "
+            "fails the check.  [default: none]",
+        ),
+    ] = None,
+    quantile: Annotated[
+        float,
+        option(
+            "--quantile SHARE",
+            "Share of the cycles of --recording that jitter and times are to hold for, 0.5..1 [1].  [default: 1]",
+        ),
+    ] = 1.0,
+    skip_others: Annotated[
+        bool, typer.Option("--skip-others", help="Skip named files without a `schema_version`, and count them.")
+    ] = False,
+    jobs: Annotated[
+        int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Number of processes to check with.")
+    ] = 1,
+    stdin_filename: Annotated[
+        str, typer.Option("--stdin-filename", metavar="NAME", help="Name of standard input in the report.")
+    ] = "<stdin>",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on standard error.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also name files without findings and skipped files.")
+    ] = False,
+) -> None:
+    """Fail a build when a profile no longer fits its bus or its circle.
+
+    Each finding is a line: `path:line:column: CODE severity: message`. `busplan rule CODE` explains it. A comment `#
+    busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. A file that is not TOML or not
+    a profile is a finding, too. Exits 0 when clean, 1 with findings at or above --fail-on, 2 when it could not do the
+    job, as with a missing file; the other files are still checked.
+
+    Example: busplan check paper-1ms paper-4ms --format github
+    """
+    if circle_steps is not None and not circle:
+        raise BusplanError("--circle-steps: goes without --no-circle")
+    if quantile != 1 and recording is None:
+        raise BusplanError("--quantile: goes with --recording FILE")
+    _require_baseline(baseline, update=update_baseline, passes=pass_on_unmatched)
+    if update_baseline and changes.each:
+        raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
+    from busplan.gate.check import check
+    from busplan.profile.sources import collect
+
+    collection = collect(paths, stdin_name=stdin_filename, skip_others=skip_others)
+    _require_apart(collection.sources, recording, output=output, baseline=baseline, updated=update_baseline)
+    recorded = None if baseline is None else _read_baseline(baseline, needed=not update_baseline)
+    with _executor(min(jobs, len(collection.sources))) as where:
+        report = check(
+            collection,
+            circle=circle,
+            changes=changes,
+            baseline=None if update_baseline else recorded,
+            pass_on_unmatched=pass_on_unmatched,
+            record=update_baseline,
+            recording=recording,
+            quantile=quantile,
+            skip_others=skip_others,
+            executor=where,
+            **({} if circle_steps is None else {"circle_steps": circle_steps}),
+        )
+    _write(report, format_=format_, output=output)
+    say(*(file.failure for file in report.files if file.failure is not None))
+    if pass_on_unmatched and report.unmatched:
+        say(f"warning: {report.unmatched}")
+    if verbose:
+        say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
+        say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
+    if update_baseline and baseline is not None:
+        _update_baseline(baseline, collection.sources, report, quiet=quiet)
+    if not quiet:
+        from busplan.forms.numbers import sentence_text
+        from busplan.questions.base.sentences import changes_sentences
+
+        say(*map(sentence_text, changes_sentences(changes)), report.headline)
+    if report.failed:
+        raise typer.Exit(2)
+    if not exit_zero and report.has_findings(fail_on):
+        raise PlanFailsError
+
+
+def _require_baseline(baseline: Path | None, *, update: bool, passes: bool) -> None:
+    """Refuse options of a baseline that is not named, and to update one that cannot be written."""
+    if baseline is None and (update or passes):
+        raise BusplanError(f"{'--update-baseline' if update else '--pass-on-unmatched'}: needs --baseline FILE")
+    if update and passes:
+        raise BusplanError("--pass-on-unmatched: goes without --update-baseline")
+    if update and baseline is not None:
+        require_changeable(baseline)
+
+
+def _require_apart(
+    sources: "Sequence[ProfileSource]",
+    recording: Path | None,
+    *,
+    output: Path | None,
+    baseline: Path | None,
+    updated: bool,
+) -> None:
+    read = [source.path for source in sources if source.failure is None]
+    read += [] if recording is None else [recording]
+    if baseline is not None and not updated:
+        read.append(baseline)
+    require_apart({"--output": output, "--baseline": baseline if updated else None}, inputs=read)
+
+
+@contextmanager
+def _executor(number: int) -> "Iterator[Executor | None]":
+    """Worker processes; None for this one."""
+    if number <= 1:
+        yield None
+        return
+    from busplan.cli.workers import workers
+
+    with workers(number) as crew:
+        yield crew
+
+
+def _read_baseline(path: Path, *, needed: bool) -> "Baseline | None":
+    """The recorded baseline; None if there is no file yet and none is needed."""
+    from busplan.gate.baseline import load_baseline
+
+    return load_baseline(path) if needed or path.exists() else None
+
+
+def _update_baseline(path: Path, sources: "Sequence[ProfileSource]", report: "CheckReport", *, quiet: bool) -> None:
+    """Record the checked profiles; others that are still there keep their record."""
+    from busplan.gate.baseline import MODELS, Baseline, Record, write_baseline
+
+    new = Baseline({}, MODELS, path)
+    names = [new.name_of(source) for source in sources]
+    checked = zip(names, report.files, strict=True)
+    now = {name: Record(file.figures, file.keys) for name, file in checked if file.fit is not None}
+    with changing(path):
+        # Read again: another run may have changed it since the check began.
+        old = _read_baseline(path, needed=False) or new
+        gone = old.without_profile(names)
+        kept = {name: record for name, record in old.profiles.items() if old.is_current and name not in gone}
+        rewrite(path, write_baseline({**kept, **now}).encode())
+    if not quiet:
+        say(f"recorded {plural(len(now), 'profile')} in {path}")
+    if gone:
+        say(f"warning: {path}: dropped {', '.join(gone)}: no such profile any more")
+    left = [name for name in old.profiles if not old.is_current and name not in (*now, *gone)]
+    if left:
+        say(f"warning: {path}: dropped {', '.join(left)}, recorded by other timing models; check them, too")
+
+
+def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -> None:
+    """Write the report; without a format, as a person at a terminal or a program behind a pipe reads it best."""
+    name = format_ or ("full" if output is None and is_terminal() else "concise")
+    chosen = FORMATS[name]
+    if output is not None or chosen.reader != "people":
+        write_document(chosen.write(report), output, quiet=True)
+    else:
+        emit_text(chosen.write(report, width=columns() if is_styled() else None))
+    if chosen.repeats:
+        say(*FORMATS["concise"].write(report).splitlines())
+
+
+@takes_changes(words="Of both profiles.")
+def diff_command(
+    a: Annotated[
+        str,
+        typer.Argument(
+            metavar="A",
+            help="The profile to compare with: a file, a shipped name, - for standard input, or REV:path for a file "
+            "as it stood in a git revision, as HEAD~1:profiles/line.toml; the path starts at the current folder.",
+            autocompletion=complete_profile,
+            show_default=False,
+        ),
+    ],
+    b: Annotated[
+        str,
+        typer.Argument(
+            metavar="B", help="The profile to judge, likewise.", autocompletion=complete_profile, show_default=False
+        ),
+    ],
+    changes: KeyChanges = NO_CHANGES,
+    timing_model: TimingModelOption = "both",
+    fail_on_regression: Annotated[
+        bool, typer.Option("--fail-on-regression", help="Exit 1 when a figure of B is worse.")
+    ] = False,
+    tolerance: Annotated[
+        float | None,
+        option(
+            "--tolerance PERCENT",
+            "With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
+        ),
+    ] = None,
+    all_: AllOption = False,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Tell what changed between two profiles, and what that does to every figure.
+
+    A sentence has both verdicts and says in what B is better or worse. Below it stand the keys whose values differ,
+    defaults applied, and the figures of capacity that differ, with B - A and its share of A. Settings and what
+    describes them (period, nodes, gap count, time available, a single term) are neither better nor worse. JSON and CSV
+    list equal figures, too. Times are in us. Markdown is for a pull request. Exits 0 with any figures; with
+    --fail-on-regression 1 when any figure is worse, under any timing model. --timing-model leaves figures out, but
+    never the verdict. Which key cost what is told by check, against its baseline.
+
+    Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
+    """
+    allowed = _tolerance(tolerance, wanted=fail_on_regression)
+    with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
+        from busplan.profile.edit import load_revision
+        from busplan.questions.diff import diff
+
+        first, second = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
+        difference = diff(first, second, timing_model=chosen_model(timing_model), arguments=(a, b))
+        give(difference.report())
+        regressions = difference.regression_words(tolerance_percent=allowed)
+    if fail_on_regression and regressions:
+        say(regressions)
+        raise PlanFailsError
+
+
+def _tolerance(percent: float | None, *, wanted: bool) -> float:
+    if percent is None:
+        return 0.0
+    if not wanted:
+        raise BusplanError("--tolerance: goes with --fail-on-regression")
+    if not (isfinite(percent) and percent >= 0):
+        raise BusplanError(f"--tolerance {percent:g}: must be 0 or more, in percent")
+    return percent
+
+
+def complete_code(incomplete: str) -> list[str]:
+    """Complete the code of a rule for the shell."""
+    from busplan.gate.rules import all_rules
+
+    return [code for code in all_rules() if code.startswith(incomplete)]
+
+
+def rule_command(
+    code: Annotated[
+        str | None,
+        typer.Argument(
+            help="Code or name of a rule, as BP101 or syntax.  [default: all of them]", autocompletion=complete_code
+        ),
+    ] = None,
+    all_: AllOption = False,
+    format_: FormatOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Explain a rule of `busplan check`: what is wrong, why it matters, and how to mend it.
+
+    Without a code it lists all rules with their severity. Exits 0.
+
+    Example: busplan rule BP110
+    """
+    with answer(format_, output, is_whole=all_) as give:
+        from busplan.gate.rules import rule_answer
+
+        give(rule_answer(code))
+
+
+def schema_command() -> None:
+    """Print the JSON Schema of profiles (draft 2020-12), with every description and unit.
+
+    With this file beside a profile, editors that read `#:schema ./busplan.schema.json` at its top complete and check
+    it. Exits 0.
+
+    Example: busplan schema > busplan.schema.json
+    """
+    from busplan.english import to_json
+    from busplan.profile.kinds import profile_schema
+
+    emit_document(to_json(profile_schema()))

@@ -1,0 +1,246 @@
+"""Where profiles come from: shipped ones, files, folders, and standard input."""
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from busplan.errors import BusplanError
+from busplan.profile.document import MAX_FILE_BYTES, LoadedProfile, decode, read_bytes, validate
+
+SHIPPED_SCHEMA: Final = "#:schema ./busplan.schema.json\n"
+"""First line of a shipped profile: the path is valid only in its folder."""
+
+
+@cache
+def shipped_folder() -> Path:
+    """Folder of the shipped profiles: inside the installed package, or `profiles/` of a source checkout."""
+    package = Path(__file__).resolve().parents[1]
+    installed = package / "_shipped"
+    return installed if installed.is_dir() else package.parents[1] / "profiles"
+
+
+def shipped_names() -> list[str]:
+    """Names of the shipped profiles, sorted."""
+    return sorted(path.stem for path in shipped_folder().glob("*.toml"))
+
+
+def locate(argument: str) -> tuple[Path, str]:
+    """Find the file of a PROFILE argument.
+
+    A shipped name always means the shipped profile, so that the answer does not depend on the working directory.
+    Everything else is a path: ./paper-4ms, paper-4ms.toml, or "-" for standard input.
+
+    Returns
+    -------
+    tuple
+        Path, and name in messages.
+
+    Raises
+    ------
+    BusplanError
+        Neither a shipped name nor an existing file.
+    """
+    if argument == "-":
+        return Path("-"), "<stdin>"
+    shipped = shipped_folder() / f"{argument}.toml"
+    if shipped.stem == argument and os.path.lexists(shipped):
+        return shipped, shipped.name
+    path = _path(argument)
+    if not argument or not os.path.lexists(path):
+        raise BusplanError(_unknown(argument, path))
+    return path, argument
+
+
+def _unknown(argument: str, path: Path) -> str:
+    """Say that there is no such profile, and which one may be meant: a file without its ending, or a near name."""
+    from busplan.english import did_you_mean
+
+    shown = argument or repr(argument)
+    with_ending = path.with_name(f"{path.name}.toml") if path.name else path
+    if argument and os.path.lexists(with_ending):
+        return f"{shown}: no such file; did you mean {argument}.toml?"
+    near = did_you_mean(argument, shipped_names())
+    names = ", ".join(shipped_names())
+    return f"{shown}: no such file, and no shipped profile of that name; shipped are {names}{near and f'; {near}'}"
+
+
+def _path(argument: str) -> Path:
+    """Path of an argument; the file ./- becomes absolute, because "-" means standard input."""
+    path = Path(argument)
+    return path.absolute() if str(path) == "-" else path
+
+
+class MeasurementsFile(NamedTuple):
+    """A file of measurements."""
+
+    path: Path
+    name: str
+    """Name in messages."""
+    shipped: bool
+    """Whether it is the shipped example, with published figures."""
+
+
+def locate_measurements(argument: str) -> MeasurementsFile:
+    """Find the file of a MEASUREMENTS argument.
+
+    An existing file comes first, so that the user's measurements are never mistaken for the shipped example.
+
+    Raises
+    ------
+    BusplanError
+        Neither an existing file nor the name of a shipped example.
+    """
+    if argument == "-":
+        return MeasurementsFile(Path("-"), "<stdin>", shipped=False)
+    if argument and os.path.lexists(argument):
+        return MeasurementsFile(_path(argument), argument, shipped=False)
+    names = sorted(path.name for path in shipped_folder().glob("*.csv"))
+    if argument in names:
+        return MeasurementsFile(shipped_folder() / argument, argument, shipped=True)
+    shown = argument or repr(argument)
+    raise BusplanError(f"{shown}: no such file, and no shipped example of that name; shipped is {', '.join(names)}")
+
+
+def load(argument: str) -> LoadedProfile:
+    """Read and check the profile of a PROFILE argument.
+
+    Parameters
+    ----------
+    argument
+        Shipped name, path, or "-" for standard input.
+
+    Raises
+    ------
+    BusplanError
+        The file does not exist, cannot be read or is not a valid profile; every problem has its place.
+    """
+    path, name = locate(argument)
+    document = decode(read_bytes(path, name=name), name=name)
+    return LoadedProfile(validate(document), document)
+
+
+_CLAIM = re.compile(rb"^(?:\xef\xbb\xbf)?[ \t]*[\"']?schema_version[\"']?[ \t]*=", re.MULTILINE)
+_SKIPPED_FOLDERS = {"node_modules", "__pycache__"}
+
+
+class ProfileSource(NamedTuple):
+    """One profile to read with its name in messages; or a path that leads to none."""
+
+    path: Path
+    name: str
+    failure: str | None = None
+    """Why there is no profile to read."""
+    is_shipped: bool = False
+    """Whether it is a shipped profile, named as such."""
+
+
+class Collection(NamedTuple):
+    """Profiles of a list of paths."""
+
+    sources: tuple[ProfileSource, ...]
+    skipped: tuple[str, ...]
+    """Files without a `schema_version`: TOML files below a folder, and with `skip_others` those that are named."""
+
+
+def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>", skip_others: bool = False) -> Collection:
+    """Find the profiles of a list of paths, each once.
+
+    Parameters
+    ----------
+    arguments
+        Files, folders (every *.toml below that claims a `schema_version`; hidden folders are left out), shipped names,
+        and "-" for standard input.
+    stdin_name
+        Name of standard input in messages.
+    skip_others
+        If True, skip named files that claim no `schema_version`, too; without it they are checked, and refused.
+
+    Returns
+    -------
+    Collection
+        Sources in the order of the arguments, sorted by name in a folder; a path without a profile is a source with a
+        failure. Names are relative to the working folder for files below it.
+    """
+    sources: dict[str, ProfileSource] = {}
+    names: set[str] = set()
+    skipped: list[str] = []
+    for argument in arguments:
+        for source in _meant(argument, stdin_name=stdin_name, skipped=skipped, skip_others=skip_others):
+            key = _place(source.path).as_posix() if source.failure is None else source.failure
+            if key in sources:
+                continue
+            # A shipped profile and a file can have the same name: the second one gets its full path.
+            taken = source.failure is None and source.name in names
+            sources[key] = source._replace(name=source.path.absolute().as_posix()) if taken else source
+            names.add(source.name)
+    return Collection(tuple(sources.values()), tuple(dict.fromkeys(skipped)))
+
+
+def _meant(argument: str, *, stdin_name: str, skipped: list[str], skip_others: bool) -> Iterator[ProfileSource]:
+    """Sources of an argument: a file, or every profile below a folder."""
+    try:
+        path, name = locate(argument)
+        if argument == "-":
+            yield ProfileSource(path, stdin_name)
+        elif name != argument:  # a shipped name, whatever lies in the working folder
+            yield ProfileSource(path, name, is_shipped=True)
+        elif path.is_dir():
+            yield from _below(path, skipped)
+        elif skip_others and path.is_file() and not claims(path):
+            skipped.append(_name(path))
+        else:
+            yield ProfileSource(path, _name(path))
+    except (BusplanError, ValueError) as error:  # ValueError: a NUL in the path
+        yield ProfileSource(Path(argument), argument, str(error))
+
+
+def _place(path: Path) -> Path:
+    """Normal form of a path: relative to the working folder for files below it, otherwise absolute."""
+    if not path.is_absolute() and ".." not in path.parts:
+        return path
+    real = Path(os.path.realpath(path)) if path.name == ".." else Path(os.path.realpath(path.parent), path.name)
+    here = Path.cwd()
+    return real.relative_to(here) if real.is_relative_to(here) else real
+
+
+def _name(path: Path) -> str:
+    """Name of a file: relative to the working folder if it is below it, otherwise as given."""
+    place = _place(path)
+    return (path if place.is_absolute() else place).as_posix()
+
+
+def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
+    """Every profile below a folder, sorted by name, and every folder that cannot be read."""
+    unreadable: list[OSError] = []
+    has_profile = False
+    for root, folders, files in os.walk(folder, onerror=unreadable.append):
+        folders[:] = sorted(name for name in folders if not name.startswith(".") and name not in _SKIPPED_FOLDERS)
+        for name in sorted(files):
+            if not name.endswith(".toml"):
+                continue
+            path = Path(root) / name
+            if claims(path):
+                has_profile = True
+                yield ProfileSource(path, _name(path))
+            else:
+                skipped.append(_name(path))
+    for error in unreadable:
+        name = _name(Path(error.filename))
+        yield ProfileSource(Path(error.filename), name, f"{name}: cannot be read: {error.strerror}")
+    if not has_profile and not unreadable:
+        name = _name(folder)
+        yield ProfileSource(folder, name, f"{name}: no profile below this folder (a *.toml with a schema_version)")
+
+
+def claims(path: Path) -> bool:
+    """Whether a TOML file has a `schema_version`; True if it cannot be read, so that reading it reports the error."""
+    try:
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            return _CLAIM.search(file.read(MAX_FILE_BYTES)) is not None
+    except OSError:
+        return True

@@ -1,0 +1,291 @@
+"""Sentences and documents that several questions share."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from busplan.buses.figure import AVAILABLE, MARGIN, MARGIN_CORRECTED, REQUIRED, UNCERTAINTY, UTILISATION, Figure
+from busplan.buses.limits import Value as BusValue
+from busplan.buses.network import Network
+from busplan.buses.published import parts_tested
+from busplan.elementwise import plain
+from busplan.forms.blocks import (
+    Code,
+    JsonDocument,
+    Part,
+    Record,
+    Report,
+    Sentence,
+    ShownValue,
+    State,
+    Table,
+    TableColumn,
+    TableRow,
+    attribute_value,
+    joined,
+    sentence,
+)
+from busplan.profile.changes import KeyChanges
+from busplan.profile.edit import value_text
+from busplan.questions.fit.certainty import TIME, limits_behind
+from busplan.questions.fit.figures import FitFigures
+from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from busplan.buses.bus import Bus
+
+
+NewValues = Mapping[str, BusValue]
+"""New values of a profile by dotted key."""
+
+
+def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes: bool = True) -> Sentence:
+    """Write each key with its new value and its meaning.
+
+    Parameters
+    ----------
+    changes
+        The new values.
+    meanings
+        Note on a change, by key, for keys that need one.
+    quotes
+        If True, text values are quoted, as in a profile.
+    """
+    return joined(
+        *(
+            Sentence((f"{key} = ", *_part(key, value, quotes), f" ({meanings[key]})" if key in meanings else ""))
+            for key, value in changes.items()
+        ),
+        by=", ",
+    )
+
+
+def change_meanings(bus: "Bus") -> dict[str, str]:
+    """Meaning of a change on the machine, by key, for keys that do not say so."""
+    return {name: key.meaning for name, key in bus.keys.items() if key.meaning}
+
+
+def key_value(key: str, value: object) -> ShownValue:
+    """The new value of one key, with its place in the JSON document."""
+    return ShownValue(value, key)
+
+
+def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
+    if isinstance(value, list):
+        return (value_text(value),)
+    shown = key_value(key, value)
+    return ('"', shown, '"') if quotes and isinstance(value, str) else (shown,)
+
+
+def warning_sentences(network: Network) -> Iterator[Sentence]:
+    """Warnings of a network's own number of nodes, whatever the verdict."""
+    warnings = network.bus.warnings(network, nodes=[int(plain(network.nodes))])
+    return (Sentence((f"Warning: {words}.",), "warns") for words in warnings)
+
+
+def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterator[Sentence]:
+    """Say how the execution time behind the figures is known; nothing without a grade, or where none is in them.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    of_latency
+        Whether the figures are latencies, and not those of the cycle.
+    """
+    grades = execution_grades(network.profile)
+    if grades is not None and network.bus.has_execution(network, of_latency=of_latency):
+        text = f"The execution time behind these figures is {grades}."
+        yield sentence(text, state="warns" if "assumed" in grades else "neutral")
+
+
+def execution_grades(profile: Profile) -> str | None:
+    """Grade of the execution time; where groups differ, each with the groups that have it. None without any."""
+    names: dict[str, list[str]] = {}
+    for alike in profile.alike_nodes:
+        names.setdefault(alike.node.execution.grade or "without a grade", []).append(alike.name)
+    if len(names) == 1:
+        return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
+    return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items()) or None
+
+
+def broken_limits(figures: FitFigures, network: Network) -> list[str]:
+    """Say by how much each limit of the bus is broken, or why it is not shown to be kept."""
+    broken = map(network.bus.limit, limits_behind(figures))
+    if network.groups:
+        network = network._replace(period_us=figures.period_us)
+    return [limit.words(network) for limit in broken if limit is not None]
+
+
+def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
+    """Say which parts of a kind's model published figures set and test; nothing where they test all of it."""
+    tested = parts_tested(bus.evidence_data)
+    kind = f"{bus.title} (kind {bus.kind})"
+    if not tested.parts:
+        yield Sentence((f"No published or measured figure tests the model of {kind}.",))
+    elif tested.untested:
+        said = {"published figures set": tested.set_by, "independent figures test": tested.parts}
+        phrases = (
+            f"{how} {', '.join(f'{part} ({by})' for part, by in parts.items())}" for how, parts in said.items() if parts
+        )
+        yield Sentence((f"Model of {kind}: {'; '.join(phrases)}; not tested: {', '.join(tested.untested)}.",))
+
+
+def not_applicable(network: Network) -> Iterator[Sentence]:
+    """Say which timing models cannot express a profile, and why."""
+    bus = network.bus
+    for model in bus.timing_models:
+        keys = bus.cannot_express(network, model=model.name)
+        if keys:
+            yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
+
+
+def reset_sentence(after: FitFigures | None, network: Network) -> Iterator[Sentence]:
+    """Say that a cycle stops fitting at a bus reset; nothing if it does not."""
+    if after is not None:
+        keys = ", ".join(f"{key} = {value}" for key, value in network.bus.safety.after_reset.items())
+        text = f"After a bus reset, with {keys} until it is set again, the verdict is: {after.verdict}."
+        yield sentence(text, state="warns")
+
+
+def story(figures: FitFigures, network: Network) -> tuple[Part, ...]:
+    """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict.
+
+    Parameters
+    ----------
+    figures
+        The figures.
+    profile
+        The network.
+    """
+    available = attribute_value(AVAILABLE, figures)
+    if figures.fits:
+        used = attribute_value(UTILISATION, figures)._replace(decimals=1)
+        return sentence("{} to spare, {} of {} used", attribute_value(MARGIN, figures), used, available).parts
+    short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
+    reasons = [Sentence((words,)) for words in broken_limits(figures, network)]
+    if TIME in figures.exceeded:
+        reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
+    return joined(*reasons, by=", and ").parts
+
+
+def margin_parts(figures: FitFigures) -> tuple[Part, ...]:
+    """A corrected margin with its uncertainty, as far as that is known.
+
+    Parameters
+    ----------
+    figures
+        Figures under the timing model that decides.
+    """
+    margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
+    return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
+
+
+def safety_record(figures: FitFigures, network: Network) -> Record:
+    """Whether the settings of the bus are safe, by the key of its kind; empty if the kind has none."""
+    safety = network.bus.safety.figure
+    return {} if safety is None else {safety.key: figures.safe}
+
+
+JSON_SCHEMA: Final = 1
+
+
+def document(command: str, **content: object) -> JsonDocument:
+    """JSON document of a command: schema version, command name and content."""
+    return {"schema": JSON_SCHEMA, "command": command, **content}
+
+
+def fields(owner: object, *names: str) -> Record:
+    """Attributes by name as plain data: a tuple becomes a list, and all are None where there is no owner."""
+    values = {name: getattr(owner, name) if owner is not None else None for name in names}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+
+
+def with_profile(name: str, records: Sequence[Record]) -> list[Record]:
+    """Rows for CSV with the profile's name in front, so that tables of several runs can be joined."""
+    return [{"profile": name, **record} for record in records]
+
+
+def parts_by(parts: Mapping[str, str]) -> list[Record]:
+    """Parts of a kind's model that published figures set or test, each with those figures."""
+    return [{"part": part, "by": words} for part, words in parts.items()]
+
+
+def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDocument:
+    """Add the new values by --set to a document, as `changes`; `diff` has other `changes` already."""
+    if not changes.by_set:
+        return dict(content)
+    name = "changes" if "changes" not in content else "changes_of_both"
+    head = {key: content[key] for key in ("schema", "command")}
+    return {**head, name: {change.key: change.value for change in changes.by_set}, **content}
+
+
+def changed_report(report: Report, changes: KeyChanges) -> Report:
+    """Name the --set options in an answer: in a sentence at its top, and in its JSON document."""
+    return report._replace(
+        blocks=(*changes_sentences(changes), *report.blocks),
+        document=changed_document(report.document, changes),
+    )
+
+
+def changes_sentences(changes: KeyChanges) -> list[Sentence]:
+    """Name the --set options in a sentence, because what is computed is not what the file says; empty without them."""
+    options = [Sentence((Code(change.typed),)) for change in changes.by_set]
+    return [joined(Sentence(("With ",)), joined(*options, by=" and "), Sentence((".",)), by="")] if options else []
+
+
+_FIRST_TO_LEAVE: Final = 9
+"""Rank of the equations: a narrow terminal has the figures rather."""
+
+
+class Owner(NamedTuple):
+    """An object with figures: one column."""
+
+    column: TableColumn
+    figures: object
+    """Object that has the figures as attributes."""
+
+
+def figure_table(
+    rows: Iterable[tuple[Figure, int]],
+    owners: Sequence[Owner],
+    *,
+    caption: Sentence,
+    unit: bool = True,
+    hides_equations: bool = False,
+    is_detail: Callable[[Figure], bool] = lambda _figure: False,
+    state: Callable[[Figure, Any], State] = lambda _figure, _figures: "neutral",
+) -> Table:
+    """Table of figures, the owners side by side.
+
+    Parameters
+    ----------
+    rows
+        Figures with their levels.
+    owners
+        One for each column.
+    caption
+        Caption of the table.
+    unit
+        If False, the column of units is left out: the caption says the unit.
+    hides_equations
+        If True, the column of equations and sources is shown only in a whole answer.
+    is_detail
+        Whether the row of a figure is shown only in a whole answer.
+    state
+        State of a figure of an owner's object, beside that of a truth.
+    """
+    equation = TableColumn("eq", kind="words", rank=_FIRST_TO_LEAVE, is_detail=hides_equations)
+    head = [TableColumn("figure", kind="words"), equation]
+    head += [TableColumn("unit", kind="words")] if unit else []
+    shown = []
+    for figure, level in rows:
+        words = (figure.label, figure.reference, figure.column or figure.unit)[: len(head)]
+        values = (_value(figure, owner, state) for owner in owners)
+        shown.append(TableRow((*words, *values), level, is_detail=is_detail(figure)))
+    # Each panel of a narrow terminal says the unit again.
+    return Table((*head, *(owner.column for owner in owners)), tuple(shown), caption, heads=len(head))
+
+
+def _value(figure: Figure, owner: Owner, state: Callable[[Figure, Any], State]) -> ShownValue:
+    value, own = attribute_value(figure, owner.figures), state(figure, owner.figures)
+    return value if own == "neutral" else value._replace(state=own)

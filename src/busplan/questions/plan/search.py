@@ -1,0 +1,563 @@
+"""What a network needs, and the changes that a plan tries for it."""
+
+from bisect import bisect_left
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from decimal import ROUND_CEILING, Context, Decimal
+from itertools import product
+from math import ceil, inf
+from typing import Final, NamedTuple, TypeAlias
+
+from busplan.buses.limits import Cost, Value
+from busplan.buses.network import Network
+from busplan.elementwise import FIT_ROUNDING, plain, within
+from busplan.errors import BusplanError
+from busplan.questions.fit.certainty import TIME, certainty
+from busplan.questions.fit.network import PERIOD, at_period, changed
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, TRANSACTION_KINDS, TransactionKind
+from busplan.sections.machine import AlikeNodes
+from busplan.sections.profile import Profile
+
+_MOST_SLICE_US: Final = 1e12
+"""Longer than any slice of a profile: it keeps quotients finite."""
+
+
+class Need(NamedTuple):
+    """Time that one constraint asks of the slice, or of the period itself."""
+
+    slice_us: float
+    """Length that the slice must have; infinite where none is enough [us]."""
+    key: str
+    """Source of the need: time, the key of a limit of the bus, or a key of the profile."""
+    why: str = ""
+    """Reason that no slice and no period helps, in words."""
+    least_us: float = 0.0
+    """The shortest period, whatever the slice ratio; 0 where any will do [us]."""
+
+    def period_us(self, ratio: float) -> float:
+        """The shortest period that gives what is asked, with a slice ratio [us]."""
+        return max(self.slice_us / ratio, self.least_us)
+
+    def words(self, *, ratio: float, most_us: float) -> str:
+        """Say what is asked, and the longest period there is.
+
+        Parameters
+        ----------
+        ratio
+            Slice ratio [1].
+        most_us
+            The longest period [us].
+        """
+        if self.why:
+            return self.why
+        if self.least_us > self.slice_us / ratio:
+            return f"{self.key} needs a period of {self.least_us:.3f} us, and {most_us:.3f} us is the longest"
+        needs = f"needs a slice of {self.slice_us:.3f} us"
+        who = f"the cycle {needs} to be shown to fit" if self.key == TIME else f"{self.key} {needs}"
+        return f"{who}, and at most {ratio * most_us:.3f} us can be given"
+
+
+class Room(NamedTuple):
+    """A network with as many nodes as a key of [limits] asks the bus to carry."""
+
+    key: str
+    network: Network
+    words: str
+    """How many nodes these are."""
+
+
+def rooms(network: Network) -> Iterator[Room]:
+    """The network with the nodes that [limits] asks the bus to carry: more of each group, the others as they are."""
+    limits = network.profile.limits
+    for alike in network.profile.alike_nodes:
+        more = {"limits.min_spare_nodes": limits.min_spare_nodes}
+        if limits.min_spare_axes is not None and alike.node.axes:
+            more["limits.min_spare_axes"] = ceil(limits.min_spare_axes / int(alike.node.axes))
+        for key, spare in more.items():
+            if spare is not None:
+                nodes = int(alike.nodes) + spare
+                of = f" of {alike.name}" if alike.name else ""
+                yield Room(key, network.asking(alike.name).with_nodes(nodes), f"{nodes} nodes{of}")
+
+
+def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
+    """Needs of a network to be shown to fit, with bias, uncertainty and reserve.
+
+    Time first, and then each limit that asks for a longer period than all before it.
+
+    Parameters
+    ----------
+    network
+        The network; its own period plays no part.
+    is_safe
+        Whether the bus must be set safely, too.
+    """
+    bus = network.bus
+    time = Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
+    yield time
+    least_us = 0.0
+    for limit in bus.limits:
+        if limit.role == "period" or (limit.role == "safety" and not is_safe):
+            continue
+        # A limit that a period cures is asked at the shortest one that the others allow with any slice ratio.
+        at_us = max(time.slice_us, least_us, MIN_STEP_US)
+        at = network if limit.period is None else network._replace(period_us=at_us)
+        if limit.shown.is_broken(at):
+            kept_us = limit.kept_from_us(at)
+            if kept_us == inf:
+                way_out = f" ({limit.way_out})" if limit.way_out else ""
+                yield Need(inf, limit.key, f"{limit.words(at)}{way_out}", inf)
+                return
+            least_us = max(least_us, kept_us)
+            yield Need(0.0, limit.key, least_us=kept_us)
+
+
+def most_asking(needs: Iterable[Need], *, ratio: float) -> Need:
+    """The need that asks for the longest period with a slice ratio, the first of equals."""
+    return max(needs, key=lambda need: need.period_us(ratio))
+
+
+def _of_limits(network: Network) -> Iterator[Need]:
+    """Needs of [limits]: the share of the slice that may be used, and more nodes that must be shown to fit, too."""
+    most, key = network.profile.limits.max_utilisation, "limits.max_utilisation"
+    if most is not None:
+        bus = network.bus
+        required_us = float(bus.cycle(network, model=bus.deciding_model).required_us)
+        us = required_us / most if most * _MOST_SLICE_US > required_us else inf
+        yield Need(us, key, f"{key} = {most:g} leaves no time" if us == inf else "")
+    for room in rooms(network):
+        for need in to_be_shown(room.network):
+            why = need.why and f"{room.key} asks for room for {room.words}: {need.why}"
+            yield need._replace(key=room.key, why=why)
+
+
+def missed_limits(network: Network) -> tuple[Need, ...]:
+    """Needs of [limits] that the slice of a network does not meet; the verdict is not among them."""
+    if not network.groups:
+        return ()
+    return tuple({need.key: need for need in _unmet(_of_limits(network), network)}.values())
+
+
+def unmet(network: Network) -> list[Need]:
+    """Needs that a network does not meet at its own period; empty where every constraint of a plan holds."""
+    limits = network.bus.limits
+    found = [
+        Need(inf, limit.key, limit.words(network))
+        for limit in limits
+        if limit.role == "period" and limit.is_broken(network)
+    ]
+    found += _unmet([*to_be_shown(network), *_of_limits(network)], network)
+    if not found:
+        # What a limit needs of the slice was asked at the shortest period.
+        at = (limit for limit in limits if limit.period is not None and limit.shown.is_broken(network))
+        found = [Need(inf, limit.key, limit.words(network)) for limit in at]
+    return found
+
+
+def _unmet(needs: Iterable[Need], network: Network) -> Iterator[Need]:
+    ratio, period_us = float(plain(network.slice_ratio)), float(plain(network.period_us))
+    return (need for need in needs if not within(need.period_us(ratio), period_us))
+
+
+def longest_period_us(network: Network) -> float:
+    """The longest period that a profile may have and its bus allows [us]."""
+    return min(network.bus.periods.longest_us, MAX_TIME_US)
+
+
+class SmallestPeriod(NamedTuple):
+    """The smallest period at which a network holds every constraint, of those that its bus allows."""
+
+    us: float | None
+    """None if there is none [us]."""
+    need: Need
+    """What asks for it, or why there is none."""
+
+
+_MOST_TRIES: Final = 64
+"""Each try keeps one more limit, so that a few are enough."""
+_NEXT: Final = 1 + 1e-9
+"""A limit that rounding alone breaks is kept a little later."""
+_HALVINGS: Final = 44
+"""Halvings of a period, down to the rounding of floats."""
+
+
+def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool = True) -> SmallestPeriod:
+    """Find the smallest period at which a network is shown to fit.
+
+    Parameters
+    ----------
+    network
+        The network; its own period plays no part.
+    is_safe
+        Whether the bus must be set safely, too.
+    with_limits
+        Whether [limits] must hold, too.
+    """
+    bus, ratio = network.bus, float(plain(network.slice_ratio))
+
+    def most(at: Network) -> Need:
+        more = _of_limits(at) if with_limits else ()
+        return most_asking((*to_be_shown(at, is_safe=is_safe), *more), ratio=ratio)
+
+    def missing(period_us: float) -> Need | None:
+        at = at_period(network, period_us)
+        need = most(at)
+        broken = any(limit.period is not None and limit.shown.is_broken(at) for limit in bus.limits)
+        return need if broken or not within(need.period_us(ratio), period_us) else None
+
+    need = most(network)
+    short_us, found_us = 0.0, _allowed_us(network, need.period_us(ratio))
+    for _ in range(_MOST_TRIES):
+        if found_us > longest_period_us(network):
+            break
+        lacks = missing(found_us)
+        if lacks is None:
+            for _ in range(_HALVINGS if short_us and not bus.periods.us else 0):
+                middle_us = (short_us + found_us) / 2
+                short_us, found_us = (short_us, middle_us) if missing(middle_us) is None else (middle_us, found_us)
+            return SmallestPeriod(found_us, need)
+        need = lacks
+        short_us, found_us = found_us, _allowed_us(network, max(need.period_us(ratio), found_us * _NEXT))
+    why = need.words(ratio=ratio, most_us=longest_period_us(network))
+    return SmallestPeriod(None, need._replace(why=why))
+
+
+def _allowed_us(network: Network, least_us: float) -> float:
+    """The shortest period of at least a time that a bus allows; infinite where there is none [us]."""
+    return float(plain(network.bus.periods.from_us(max(MIN_STEP_US, least_us))))
+
+
+Changes: TypeAlias = Mapping[str, Value]
+"""New values of a profile by dotted key."""
+NODES: Final = "bus.nodes"
+"""Key of the number of nodes, where all are alike."""
+RATIO: Final = "cycle.slice_ratio"
+MOST_RATIO: Final = 0.9
+"""Largest slice ratio that is advised: the host computes in the rest of the period. Chosen."""
+_RATIO_STEPS: Final = 100
+_PERIOD_DIGITS: Final = 3
+"""Significant digits of a period that is advised."""
+_DEFAULT_COSTS: Final = (Cost.REGISTER, Cost.HOST_TIME, Cost.PERIOD)
+_PAYLOADS: Final = tuple(f"{kind}_bytes{part}" for kind in TRANSACTION_KINDS for part in ("", "_per_axis"))
+
+
+class Freedom(NamedTuple):
+    """One thing that a plan may change."""
+
+    name: str
+    label: str
+    cost: Cost
+    keys: tuple[str, ...]
+
+
+class Step(NamedTuple):
+    """A step of a plan: what was freed, and the changes that came nearest."""
+
+    freedom: Freedom | None
+    """None of the network as it is."""
+    changes: Changes
+    """All changes so far by dotted key, those of the last freedom first."""
+    unmet: tuple[Need, ...]
+    """Constraints that do not hold with them."""
+
+
+def freedoms(network: Network) -> tuple[Freedom, ...]:
+    """Everything that may be changed in a network, the cheapest first."""
+    own = [
+        Freedom(setting.name, setting.label, setting.cost, setting.keys) for setting in network.bus.settings(network)
+    ]
+    if network.groups:
+        sections = [f"group.{group.name}" for group in network.profile.group] or ["payload"]
+        payloads = tuple(f"{section}.{key}" for section in sections for key in _PAYLOADS)
+        own += (
+            Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,)),
+            Freedom("payload", "payload", Cost.PAYLOAD, payloads),
+            Freedom("period", "period", Cost.PERIOD, (PERIOD,)),
+        )
+        if network.is_uniform:
+            # Where nodes differ, nobody but the user knows which can go.
+            own.append(Freedom("nodes", "nodes", Cost.NODES, (NODES,)))
+    return tuple(sorted(own, key=lambda freedom: freedom.cost))
+
+
+def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collection[str] = ()) -> tuple[Freedom, ...]:
+    """Freedoms of a plan, the cheapest first.
+
+    Parameters
+    ----------
+    network
+        The network.
+    names
+        Names of freedoms; None for those of the bus's registers, the slice ratio and the period; of a network without a
+        cycle all.
+    kept
+        Keys that were given a value, which stays.
+
+    Raises
+    ------
+    BusplanError
+        The network has no freedom of that name, or its value was given.
+    """
+    known = freedoms(network)
+    still = [freedom for freedom in known if not set(freedom.keys) <= set(kept)]
+    if names is None:
+        return tuple(freedom for freedom in still if freedom.cost in _DEFAULT_COSTS or not network.groups)
+    kind = f"{network.profile.bus.kind} with groups" if network.profile.group else network.profile.bus.kind
+    problems = [
+        f"free {name}: there is nothing of that name to free on a bus of kind {kind}; there are "
+        f"{', '.join(freedom.name for freedom in known)}"
+        for name in names
+        if name not in {freedom.name for freedom in known}
+    ]
+    problems += [
+        f"free {freedom.name}: {' and '.join(key for key in freedom.keys if key in kept)} was given a value, which is "
+        "kept; give one of them"
+        for freedom in known
+        if freedom.name in names and freedom not in still
+    ]
+    if problems:
+        raise BusplanError(*problems)
+    return tuple(freedom for freedom in still if freedom.name in names)
+
+
+def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str] = ()) -> list[Step]:
+    """Change one thing at a time, the cheapest first, until every constraint of a plan holds.
+
+    Of each thing the least change that is enough is taken; where none is, the one that comes nearest, and the next
+    thing is changed beside it. In the end, what is not needed beside the last change is left as it was.
+
+    Parameters
+    ----------
+    network
+        The network.
+    levels
+        Freedoms, the cheapest first.
+    kept
+        Keys that must stay.
+
+    Returns
+    -------
+    list
+        The steps from the network as it is; the last one holds, or nothing of the levels is enough.
+    """
+    steps = [Step(None, {}, tuple(unmet(network)))]
+    changes: list[Changes] = []
+    for freedom in levels:
+        if not steps[-1].unmet:
+            break
+        now = _with(network, changes)
+        nearest, needs = None, list(steps[-1].unmet)
+        for change in _values(freedom, now, kept):
+            if set(change) & set(kept) or (after := _with_one(now, change)) is None:
+                continue
+            still = unmet(after)
+            if not still or _lack(still, after) < _lack(needs, now if nearest is None else _with_one(now, nearest)):
+                nearest, needs = change, still
+            if not still:
+                break
+        changes += [nearest] if nearest else []
+        steps.append(Step(freedom, _together(changes), tuple(needs)))
+    if not steps[-1].unmet and len(changes) > 1:
+        steps[-1] = steps[-1]._replace(changes=_together(_needed(network, changes)))
+    return steps
+
+
+def _needed(network: Network, changes: list[Changes]) -> list[Changes]:
+    """The changes without those that are not needed beside the last, the dearest first."""
+    left = list(changes)
+    for change in changes[-2::-1]:
+        fewer = [other for other in left if other is not change]
+        if not unmet(_with(network, fewer)):
+            left = fewer
+    return left
+
+
+def _together(changes: Sequence[Changes]) -> Changes:
+    return {key: value for change in reversed(changes) for key, value in change.items()}
+
+
+def _with(network: Network, changes: Sequence[Changes]) -> Network:
+    return changed(network, _together(changes)) if changes else network
+
+
+def _with_one(network: Network, change: Changes) -> Network | None:
+    """The network after a change; None where its schema refuses it."""
+    if list(change) == [PERIOD]:
+        return at_period(network, float(change[PERIOD]))
+    try:
+        return changed(network, change)
+    except BusplanError:
+        return None
+
+
+def _lack(needs: Sequence[Need], network: Network | None) -> tuple[int, float]:
+    """How far a network is from all constraints: those that no period mends, and the period for the rest [us]."""
+    if not needs or network is None:
+        return 0, 0.0
+    periods_us = [need.period_us(float(plain(network.slice_ratio))) for need in needs]
+    return periods_us.count(inf), max((us for us in periods_us if us < inf), default=0.0)
+
+
+def _values(freedom: Freedom, network: Network, kept: Collection[str]) -> Iterator[Changes]:
+    """Values of a network, the least change first, beside keys that must stay.
+
+    Where none is enough, what helps most is among them.
+    """
+    match freedom.name:
+        case "slice_ratio":
+            return _ratios(network)
+        case "payload":
+            return _payloads(network, kept)
+        case "period":
+            return _periods(network)
+        case "nodes":
+            return _fewer_nodes(network)
+    return _of_bus(freedom.name, network)
+
+
+def _of_bus(name: str, network: Network) -> Iterator[Changes]:
+    """Values of a setting of the bus, safe for all nodes that [limits] asks for."""
+    largest = max((network, *(room.network for room in rooms(network))), key=lambda each: float(plain(each.nodes)))
+    return (values for setting in network.bus.settings(largest) if setting.name == name for values in setting.values)
+
+
+def _ratios(network: Network) -> Iterator[Changes]:
+    """The smallest slice ratio that gives the time that is needed, and no more than is advised."""
+    own, period_us = float(plain(network.slice_ratio)), float(plain(network.period_us))
+    slice_us = max((need.slice_us for need in unmet(network) if need.slice_us < inf), default=0.0)
+    ratio = min(ceil(_RATIO_STEPS * slice_us / period_us * (1 - FIT_ROUNDING)) / _RATIO_STEPS, MOST_RATIO)
+    if ratio > own:
+        yield {RATIO: ratio}
+
+
+def _payloads(network: Network, kept: Collection[str]) -> Iterator[Changes]:
+    """The largest payload with which all constraints hold, or the smallest one: the larger of read and write is cut."""
+    profile, payloads = network.profile, network.bus.payloads(network)
+    cuts = [_cut(alike, kind) for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS)]
+    step = max(payloads.step_bytes, min((size for key, size in cuts if key not in kept), default=1))
+    most = min(int(network.largest_payload_bytes) - 1, payloads.most_bytes)
+    sizes = [size for size in range(step, most + 1, step) if _within(profile, size, kept)]
+    # No more bytes are needed where fewer are not enough, but where a table of execution times falls.
+    fits = bisect_left(sizes, x=True, key=lambda size: not _holds(network, _within(profile, size, kept)))
+    yield from (
+        (change for size in (sizes[max(fits - 1, 0)], sizes[0]) if (change := _within(profile, size, kept)))
+        if sizes
+        else ()
+    )
+
+
+def _holds(network: Network, change: Changes | None) -> bool:
+    after = _with_one(network, change) if change else None
+    return after is not None and not unmet(after)
+
+
+def _within(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
+    """The change to payloads of so many bytes or less; empty where they are, None where no payload would be left."""
+    changes: dict[str, Value] = {}
+    for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS):
+        over, (key, bytes_cut) = int(alike.bytes_of(kind)) - most_bytes, _cut(alike, kind)
+        if over > 0 and key not in kept:
+            changes[key] = getattr(alike.payload, key.rpartition(".")[2]) - ceil(over / bytes_cut)
+    return changes if all(int(value) > 0 for value in changes.values()) else None
+
+
+def _cut(alike: AlikeNodes, kind: TransactionKind) -> tuple[str, int]:
+    """The key that a payload is cut by, and what a byte of it takes away [bytes]; without axes it is the fixed part."""
+    key, axes = alike.payload_key(kind), int(alike.node.axes)
+    return (key, axes) if axes and key.endswith("_per_axis") else (key.removesuffix("_per_axis"), 1)
+
+
+def _periods(network: Network) -> Iterator[Changes]:
+    """The period nearest to the own one at which all constraints hold: rounded up, or the next that the bus allows."""
+    least = smallest_period(network)
+    if least.us is None:
+        return
+    periods, own_us = network.bus.periods, float(plain(network.period_us))
+    if periods.us:
+        allowed = (us for us in periods.us if us >= least.us)
+        yield from ({PERIOD: us} for us in sorted(allowed, key=lambda us: abs(us - own_us)))
+    else:
+        yield {PERIOD: min(rounded_up(max(least.us, own_us)), MAX_TIME_US)}
+
+
+def rounded_up(us: float) -> float:
+    """A time rounded up to three significant digits, float rounding aside [us].
+
+    Examples
+    --------
+    >>> rounded_up(1087.2), rounded_up(123.4), rounded_up(1100.0)
+    (1090.0, 124.0, 1100.0)
+    """
+    context = Context(prec=_PERIOD_DIGITS, rounding=ROUND_CEILING)
+    return float(context.create_decimal(Decimal(us * (1 - FIT_ROUNDING))))
+
+
+def _fewer_nodes(network: Network) -> Iterator[Changes]:
+    """The most nodes, fewer than now, with which all constraints hold; no constraint is eased by nodes."""
+    counts = range(int(plain(network.nodes)) - 1, 0, -1)
+    place = bisect_left(counts, x=True, key=lambda nodes: _holds(network, {NODES: nodes}))
+    if counts:
+        yield {NODES: counts[min(place, len(counts) - 1)]}
+
+
+class Cure(NamedTuple):
+    """The change after which a network holds every constraint of a plan."""
+
+    changes: Changes | None
+    """New value by dotted key, the dearest change first; empty if nothing is to change, None if no change is enough."""
+    why: str = ""
+    """Reason that no change is enough."""
+
+
+def cure(network: Network, *, kept: Collection[str] = ()) -> Cure:
+    """Find the change that mends a network, with the default freedoms of a plan."""
+    steps = search(network, freed(network, kept=kept), kept=kept)
+    last = steps[-1]
+    return Cure(None, stands_in_the_way(network, last).why) if last.unmet else Cure(last.changes)
+
+
+def stands_in_the_way(network: Network, step: Step) -> Need:
+    """The constraint that a step does not hold, with its words."""
+    after = changed(network, step.changes)
+    ratio = float(plain(after.slice_ratio))
+    need = most_asking(step.unmet, ratio=ratio)
+    return need._replace(why=need.words(ratio=ratio, most_us=float(plain(after.period_us))))
+
+
+def changeable(network: Network) -> tuple[str, ...]:
+    """Default freedoms of a plan, in words, the cheapest first."""
+    return tuple(freedom.label for freedom in freed(network))
+
+
+def nodes_for_axes(profile: Profile, axes: int) -> int:
+    """Nodes that a number of axes takes, with the profile's axes of each node [1].
+
+    Raises
+    ------
+    BusplanError
+        Nodes differ, so that axes do not say how many of which.
+    """
+    if profile.group:
+        own = {alike: int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes}
+        needed = {alike: axes - sum(own.values()) + own[alike] for alike in own if alike.node.axes}
+        each = ", or ".join(
+            f"set {alike.nodes_key}={ceil(of_group / int(alike.node.axes))}"
+            for alike, of_group in needed.items()
+            if of_group > 0
+        )
+        instead = f"say instead: {each}" if each else "set the nodes of a group instead"
+        raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
+    (alike,) = profile.alike_nodes
+    return ceil(axes / int(alike.node.axes))
+
+
+def settings_to_be_carried(network: Network) -> Changes:
+    """The cheapest setting of the bus with which some slice carries the network, where none does now; else empty."""
+
+    def is_carried(trial: Network | None) -> bool:
+        return trial is not None and all(need.period_us(1.0) < inf for need in to_be_shown(trial))
+
+    if is_carried(network):
+        return {}
+    settings = sorted(network.bus.settings(network), key=lambda setting: setting.cost)
+    changes = (dict(values) for setting in settings for values in setting.values)
+    return next((change for change in changes if is_carried(_with_one(network, change))), {})

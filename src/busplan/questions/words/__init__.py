@@ -1,1 +1,0 @@
-"""Sentences, tables and drawings that several questions share."""
