@@ -172,14 +172,14 @@ def test_no_name_breaks_a_format(format_: str) -> None:
         assert not re.search(r"[\x7f-\x9f\u2028]", written)
     if format_ == "junit":
         ET.fromstring(written)
-    if format_ in ("concise", "text", "github"):
+    if format_ in ("concise", "github"):
         assert len(written.splitlines()) == 2 * len(HOSTILE)
 
 
 @pytest.mark.parametrize("format_", FORMATS)
 def test_nothing_at_all_is_still_a_document(format_: str) -> None:
     text = render(report(), file_format=format_)
-    assert (text == "") == (format_ in ("concise", "text", "full", "github"))
+    assert (text == "") == (format_ in ("concise", "full", "github"))
 
 
 # concise and full
