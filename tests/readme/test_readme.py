@@ -87,7 +87,7 @@ def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> No
 
 def test_there_are_blocks_to_check() -> None:
     commands = {command.split()[1] for command, _ in shown_runs()}
-    assert commands >= {"capacity", "latency", "circle-test", "paper", "profiles", "init", "rule"}
+    assert commands >= {"capacity", "latency", "circle-test", "paper", "init", "rule"}
 
 
 def sections(annotation: Any) -> list[type[BaseModel]]:
