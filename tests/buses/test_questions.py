@@ -14,7 +14,7 @@ QUESTIONS = {
     "timeline": ("table", "markdown", "svg"),
     "map": ("markdown", "svg"),
     "report": ("html", "markdown"),
-    "check": ("text", "sarif"),
+    "check": ("concise", "sarif"),
     "explain": ("table", "json"),
     "diff paper-4ms": ("table", "json"),
     "circle-test": ("table",),

@@ -266,7 +266,7 @@ for line in sys.argv[1:]:
 sys.stderr.write(f"\\n{json.dumps(loaded)}")
 """
 WORK = ("busplan.profile", "busplan.questions", "busplan.gate")
-LIGHT = {"busplan.gate", "busplan.gate.report", "busplan.profile", "busplan.profile.changes"}
+LIGHT = {"busplan.gate", "busplan.gate.formats", "busplan.profile", "busplan.profile.changes"}
 """The register of the gate's formats, where the choices of `check --format` are read; and what --set makes."""
 EQUATIONS = ("capacity {}", "latency {}", "capacity {} --format json", "profiles")
 NO_CIRCLE = (
@@ -292,9 +292,9 @@ def test_nothing_is_loaded_before_it_is_needed(run: Run, tmp_path: Path) -> None
     # Typer reads the program's own options before a command's, and takes pydantic for it.
     assert not loaded[helps[-1]] & {"numpy", "rich", "tomllib", "tomli_w", "resvg_py"}
     assert not {name for name in loaded[helps[-1]] - LIGHT if name.startswith(WORK)}
-    # The equations need no numpy, and nobody waits for it; only a faulty profile needs its places.
+    # The equations need no numpy, and nobody waits for it.
     assert "pydantic" in loaded[plain[-1]]
-    assert not loaded[plain[len(EQUATIONS) - 1]] & {"numpy", "rich", "tomli_w", "busplan.profile.document"}
+    assert not loaded[plain[len(EQUATIONS) - 1]] & {"numpy", "rich"}
     assert not loaded[plain[-1]] & {"numpy", "scipy", "jinja2", "resvg_py"}
     assert not loaded[rest[0]] & {"jinja2", "resvg_py"}
     assert not loaded[rest[1]] & {"pyarrow", "resvg_py", "distributed"}

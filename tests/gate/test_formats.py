@@ -21,8 +21,9 @@ from busplan.buses.rule import RuleProblem
 from busplan.forms import csv_rows, html, markdown, terminal
 from busplan.forms.blocks import Sentence
 from busplan.gate.finding import Finding, finding_of
+from busplan.gate.formats import FORMATS
 from busplan.gate.gate import FileResult, Fit, check_document
-from busplan.gate.report import FORMATS, CheckReport, check_report, concise, full
+from busplan.gate.report import CheckReport, check_report, concise, full
 from busplan.gate.rules import all_rules
 from busplan.profile.document import Document, Spot
 from busplan.profile.kinds import profile_schema

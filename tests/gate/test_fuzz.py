@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 from busplan.errors import PlacedError
 from busplan.gate.baseline import Record
 from busplan.gate.finding import Finding
+from busplan.gate.formats import FORMATS
 from busplan.gate.gate import FileResult, check_document, unreadable
-from busplan.gate.report import FORMATS, CheckReport
+from busplan.gate.report import CheckReport
 from busplan.gate.rules import all_rules
 from busplan.profile.document import decode
 from busplan.profile.sources import shipped_folder

@@ -10,8 +10,9 @@ import pytest
 
 import busplan
 from busplan.errors import PlacedError
+from busplan.gate.formats import FORMATS
 from busplan.gate.gate import FileResult, check_document, unreadable
-from busplan.gate.report import FORMATS, CheckReport
+from busplan.gate.report import CheckReport
 from busplan.gate.rules import all_rules, cycle_rules
 from busplan.profile.document import MAX_FILE_BYTES, Document, decode
 

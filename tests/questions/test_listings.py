@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 
 import busplan
-from busplan.cli.learn import profiles_report
+from busplan.cli.profiles_report import profiles_report
 from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, ShownValue, Snippet, Table
 from busplan.gate.rules import NEVER_SUPPRESSED, all_rules, rule_report, rules_report

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Final, Literal, NamedTuple
 
-from busplan.buses import network as time_slice
+from busplan.buses import time_slice
 from busplan.sourced import EQUATIONS
 
 Sort = Literal["number", "count", "truth", "word", "words"]

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from busplan.cli.answering import answer, profile_files, require_apart
-from busplan.cli.design import DrawnFormatOption, DrawnOutputOption, drawn_form, plot_form, show_drawn
 from busplan.cli.options import (
     ALL_MODELS,
     AllOption,
@@ -30,6 +29,7 @@ from busplan.cli.options import (
     time_us,
 )
 from busplan.cli.output import PlanFailsError, say
+from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, plot_form, show_drawn
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 from busplan.files import NewFile, document_bytes, new_file

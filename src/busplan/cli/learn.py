@@ -1,6 +1,5 @@
 """Commands that teach: manual, profiles, evidence and paper."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,12 +9,7 @@ from busplan.cli.answering import answer, require_apart
 from busplan.cli.options import AllOption, FormatOption, OutputOption, output_option
 from busplan.cli.output import emit_pages, is_terminal, write_document
 from busplan.cli.progress import progress_bar
-from busplan.english import nouns
 from busplan.errors import BusplanError
-from busplan.forms.blocks import Chapter, Code, Record, Report, Sentence, count_value, sentence
-from busplan.forms.numbers import period_value
-from busplan.questions.base.sentences import document
-from busplan.sections.profile import Profile
 
 
 def complete_topic(incomplete: str) -> list[str]:
@@ -67,44 +61,6 @@ def _contents(headings: dict[str, str]) -> str:
     return f"Topics of the manual; `busplan manual TOPIC` shows one:\n\n{''.join(lines)}"
 
 
-def profiles_report(profiles: Sequence[Profile]) -> Report:
-    """Report of `profiles`: the profiles that every command takes by name.
-
-    Parameters
-    ----------
-    profiles
-        The shipped profiles.
-    """
-    records = [_record(profile) for profile in profiles]
-    return Report(
-        Sentence(("Shipped profiles",)),
-        list(map(_section, records)),
-        document("profiles", profiles=records),
-        records,
-    )
-
-
-def _record(profile: Profile) -> Record:
-    """Name, main figures and description."""
-    return {
-        "name": profile.name,
-        "nodes": sum(alike.nodes for alike in profile.alike_nodes),
-        "period_us": profile.cycle.period_us if profile.has_cycle else None,
-        "timing_model": profile.bus.timing_model,
-        "description": " ".join(profile.description.split()),
-    }
-
-
-def _section(record: Record) -> Chapter:
-    title = sentence(
-        f"{{}}: {{}} {nouns(record['nodes'], 'node')} at {{}}, {record['timing_model']} model leads",
-        Code(record["name"]),
-        count_value(record["nodes"], "nodes"),
-        period_value(record["period_us"]),
-    )
-    return Chapter(title, (Sentence((record["description"],)),))
-
-
 def profiles_command(format_: FormatOption = None, output: OutputOption = None) -> None:
     """List the shipped profiles, which every command takes by name.
 
@@ -113,6 +69,7 @@ def profiles_command(format_: FormatOption = None, output: OutputOption = None) 
     Example: busplan profiles
     """
     with answer(format_, output) as give:
+        from busplan.cli.profiles_report import profiles_report
         from busplan.profile.sources import load, shipped_names
 
         give(profiles_report([load(name).profile for name in shipped_names()]))

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO, Final, Literal, NamedTupl
 import typer
 
 from busplan.cli.answering import give, profile_files, require_apart
-from busplan.cli.design import plot_form
 from busplan.cli.options import (
     VALUES_HELP,
     AllOption,
@@ -26,6 +25,7 @@ from busplan.cli.options import (
     takes_changes,
 )
 from busplan.cli.output import emit_document, refuse_terminal, say
+from busplan.cli.pictures import plot_form
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow

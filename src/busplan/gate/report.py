@@ -2,11 +2,11 @@
 
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path, PurePath
 from textwrap import wrap
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 from unicodedata import category, east_asian_width
 from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -472,27 +472,3 @@ def _finding_row(located: Located) -> list[str]:
     place = code(f"{located.path}:{finding.line}:{finding.column}")
     words = [escaped(f"{finding.code} {finding.rule}"), finding.severity, escaped(finding.problem)]
     return [place, *words, "<br>".join(mending)]
-
-
-class GateFormat(NamedTuple):
-    """A format of the gate's report."""
-
-    write: Callable[..., str]
-    """Function from a report to its text. That of a format for people takes the `width` of a terminal, too."""
-    reader: Literal["people", "programs", "builds"]
-    """Who reads it. Only what people read is in the encoding of the terminal; all else is UTF-8."""
-    repeats: bool = False
-    """If True, the concise lines go to standard error, too: GitHub shows ten annotations of a severity in a step."""
-
-
-FORMATS: Final[dict[str, GateFormat]] = {
-    "concise": GateFormat(concise, "people"),
-    "full": GateFormat(full, "people"),
-    "json": GateFormat(json, "programs"),
-    "github": GateFormat(github, "builds", repeats=True),
-    "gitlab": GateFormat(gitlab, "builds"),
-    "junit": GateFormat(junit, "builds"),
-    "sarif": GateFormat(sarif, "builds"),
-    "markdown": GateFormat(markdown_report, "builds"),
-}
-"""Every format by its name, in the order of the help."""

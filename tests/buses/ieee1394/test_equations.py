@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.buses import network as time_slice
+from busplan.buses import time_slice
 from busplan.buses.ieee1394 import equations as eq
 
 PAPER_CLOCK = 393.216

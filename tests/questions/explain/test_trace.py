@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.buses import network as time_slice
+from busplan.buses import time_slice
 from busplan.buses.ieee1394 import equations
 from busplan.elementwise import Traced, choose, plain, total
 from busplan.questions.explain.derivation import formula_of, formula_text, inputs, lines

@@ -40,7 +40,8 @@ from busplan.buses.ethercat.frames import (
 )
 from busplan.buses.figure import NONPERIODIC
 from busplan.buses.limits import EventKind
-from busplan.buses.network import Group, Network, Rate, time_slice_us
+from busplan.buses.network import Group, Network, Rate
+from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, larger, named, plain, rounded_up, square_root, total
 
 _SUM = LATENCY_TABLE[-1].key

@@ -33,7 +33,8 @@ from busplan.buses.ieee1394.transactions import (
     ways,
 )
 from busplan.buses.limits import EventKind
-from busplan.buses.network import Group, Network, time_slice_us
+from busplan.buses.network import Group, Network
+from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, smaller, total
 from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
 

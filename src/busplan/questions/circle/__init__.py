@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, VERDICT, Figure, by, by_key
-from busplan.buses.network import required_time_slice_us, time_slice_us
+from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing

@@ -8,7 +8,8 @@ from typing import Final, Literal, NamedTuple, Protocol
 from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.limits import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Bound, Limit
-from busplan.buses.network import Network, time_slice_us
+from busplan.buses.network import Network
+from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total, within
 
 TIME: Final = "time"

@@ -10,7 +10,8 @@ from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
 from busplan.buses.figure import BIAS, CERTAINTY, MARGIN_CORRECTED, SAFE_MIN_PERIOD, SAFE_REQUIRED, UNCERTAINTY
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
-from busplan.buses.network import Network, required_time_slice_us, time_slice_us
+from busplan.buses.network import Network
+from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, existing, larger, plain, rounded_up, smaller, total
 from busplan.questions.fit.certainty import (
     FITS,

@@ -1,0 +1,36 @@
+"""Formats of the gate's report; what writes them, `busplan.gate.report`, loads when it is asked."""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Final, Literal, NamedTuple
+
+
+class GateFormat(NamedTuple):
+    """A format of the gate's report."""
+
+    function: str
+    """Function of `busplan.gate.report`: a report to its text. That of a format for people takes the `width` of a
+    terminal, too."""
+    reader: Literal["people", "programs", "builds"]
+    """Who reads it. Only what people read is in the encoding of the terminal; all else is UTF-8."""
+    repeats: bool = False
+    """If True, the concise lines go to standard error, too: GitHub shows ten annotations of a severity in a step."""
+
+    @property
+    def write(self) -> Callable[..., str]:
+        """Function that writes a report."""
+        function: Callable[..., str] = getattr(import_module("busplan.gate.report"), self.function)
+        return function
+
+
+FORMATS: Final[dict[str, GateFormat]] = {
+    "concise": GateFormat("concise", "people"),
+    "full": GateFormat("full", "people"),
+    "json": GateFormat("json", "programs"),
+    "github": GateFormat("github", "builds", repeats=True),
+    "gitlab": GateFormat("gitlab", "builds"),
+    "junit": GateFormat("junit", "builds"),
+    "sarif": GateFormat("sarif", "builds"),
+    "markdown": GateFormat("markdown_report", "builds"),
+}
+"""Every format by its name, in the order of the help."""
