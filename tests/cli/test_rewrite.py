@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from busplan import files
-from busplan.cli import gate as rewrite
+from busplan.cli import rewrite
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]
