@@ -54,7 +54,7 @@ class Verdict:
     period_us: float
     """None of a network without a cycle."""
     deciding: CapacityFigures
-    """Figures of the timing model that decides, whatever was asked for."""
+    """Figures of the timing model that decides, asked for or not."""
     others: tuple[CapacityFigures, ...]
     """Figures of the other models that were asked for."""
     broken_limits: tuple[str, ...]
@@ -66,20 +66,20 @@ class Verdict:
     after_reset: FitFigures | None
     """Figures after a bus reset; None unless the cycle is shown to fit now and not after the reset."""
     assumptions: tuple[HeavyAssumption, ...]
-    """What carries much of the cycle or of its uncertainty, and is assumed."""
+    """Assumptions that carry much of the cycle or of its uncertainty."""
     left_out: tuple[LeftOut, ...]
-    """What could add time to the cycle, and is not set."""
+    """Keys not set that could add time to the cycle."""
     premises: tuple[str, ...]
-    """What the verdict rests on that no key says."""
+    """Premises of the verdict that no key says."""
     bus_lines: tuple[tuple[str, str], ...]
     """Lines of a card that only this kind of bus has."""
     warnings: tuple[str, ...]
-    """What holds whatever the verdict."""
+    """Warnings that hold whatever the verdict."""
     change: Change | None
     """The change that mends what is wrong, or that carries one more node where the bus is full; None where there is
     room, or no change is enough."""
     no_change: str
-    """Reason that no change is given where one was looked for."""
+    """Why there is no change, where one was looked for."""
 
     @property
     def models_agree(self) -> bool | None:
@@ -158,14 +158,14 @@ def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple
             target = changed(network, {NODES: now.safe_nodes + 1})
         except BusplanError as error:
             return None, str(error)
-    found = cure(target)
-    if found.changes is None:
-        return None, found.why
-    after = changed(target, found.changes)
+    mending = cure(target)
+    if mending.changes is None:
+        return None, mending.why
+    after = changed(target, mending.changes)
     model = network.bus.deciding_model
     most = safe_nodes(after)[0] if after.is_uniform else None
     axes = None if most is None else most * int(after.profile.node.axes)
-    return Change(found.changes, int(plain(target.nodes)), figures(after, model=model), most, axes), ""
+    return Change(mending.changes, int(plain(target.nodes)), figures(after, model=model), most, axes), ""
 
 
 _FIGURES: Final = 3
@@ -204,8 +204,8 @@ def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
 
 def card_text(card: Card) -> str:
     """The verdict in one line: what the card says, label by label."""
-    said = "; ".join(f"{label}: {sentence_text(words)}" for label, words in card.lines)
-    return f"{sentence_text(card.subject)}: {card.verdict.text}. {said}."
+    lines = "; ".join(f"{label}: {sentence_text(words)}" for label, words in card.lines)
+    return f"{sentence_text(card.subject)}: {card.verdict.text}. {lines}."
 
 
 def _word(verdict: Verdict) -> Words:
@@ -270,8 +270,12 @@ def _fastest(verdict: Verdict) -> Sentence:
     if fastest is None or fastest.us is None:
         return Sentence((f"none: {fastest.need.why if fastest else ''}",), "fails")
     limited = "" if fastest.need.key == TIME else f", limited by {fastest.need.key}"
-    is_listed = bool(verdict.network.bus.periods.us)
-    return Sentence((f"{period(fastest.us if is_listed else _up(fastest.us, doubt_us))}{limited}",))
+    period_us = fastest.us
+    if not verdict.network.bus.periods.us:
+        # Rounded up to the digits that its doubt allows; a listed period stays as it is.
+        scale = 10.0 ** _decimals(period_us, doubt_us)
+        period_us = ceil(period_us * scale * (1 - FIT_ROUNDING)) / scale
+    return Sentence((f"{period(period_us)}{limited}",))
 
 
 def _room(verdict: Verdict) -> Iterator[_Line]:
@@ -323,10 +327,10 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
 
 def _but(verdict: Verdict) -> Iterator[_Line]:
     """What speaks against the verdict at its period: another model, a bus reset, a warning."""
-    for other in verdict.contradicting:
-        needed_us = _us(other.required_us, verdict.deciding.uncertainty_us)
-        needed = f"{needed_us} us needed of {_us(other.available_us, None)}"
-        yield f"{other.timing_model} model", Sentence((f"says otherwise, {needed}, but does not decide",), "warns")
+    for opposed in verdict.contradicting:
+        needed_us = _us(opposed.required_us, verdict.deciding.uncertainty_us)
+        needed = f"{needed_us} us needed of {_us(opposed.available_us, None)}"
+        yield f"{opposed.timing_model} model", Sentence((f"says otherwise, {needed}, but does not decide",), "warns")
     if verdict.after_reset is not None:
         after_reset = verdict.network.bus.safety.after_reset
         keys = ", ".join(f"{key} = {value}" for key, value in after_reset.items())
@@ -349,9 +353,9 @@ def _doubts(verdict: Verdict) -> Iterator[_Line]:
 
 def _tested(verdict: Verdict) -> str:
     tested = parts_tested(verdict.network.bus.evidence_data)
-    known = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
+    parts = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
     never = f"never measured: {', '.join(tested.untested)}" if tested.untested and verdict.network.groups else ""
-    return "; ".join(filter(None, (known, never))) or "no published figures"
+    return "; ".join(filter(None, (parts, never))) or "no published figures"
 
 
 def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
@@ -371,12 +375,6 @@ def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
 def _us(us: float, doubt_us: float | None) -> str:
     """A time in digits that its doubt allows."""
     return f"{us:.{_decimals(us, doubt_us)}f}"
-
-
-def _up(us: float, doubt_us: float | None) -> float:
-    """A time rounded up to the digits that its doubt allows."""
-    scale: float = 10.0 ** _decimals(us, doubt_us)
-    return ceil(us * scale * (1 - FIT_ROUNDING)) / scale
 
 
 def _decimals(us: float, doubt_us: float | None) -> int:

@@ -54,7 +54,7 @@ def _blocks(answer: CapacityAnswer) -> Iterator[Block]:
 
 
 def capacity_table(answer: CapacityAnswer) -> Table:
-    """Figures of all periods, the timing models side by side; what does not decide is detail.
+    """Figures of all periods, the timing models side by side; figures that do not decide are details.
 
     Parameters
     ----------
@@ -63,17 +63,17 @@ def capacity_table(answer: CapacityAnswer) -> Table:
     """
     network = answer.verdicts[0].network
     profile, bus = network.profile, network.bus
-    setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network)),) if words)
+    setup = ", ".join(bus.setup_words(network))
     counts = bus.counted(network)
     caption = sentence(
-        f"{', '.join(f'{{}} {nouns(number, noun)}' for number, noun in counts)}{setup}",
+        f"{', '.join(f'{{}} {nouns(number, noun)}' for number, noun in counts)}{setup and f'; {setup}'}",
         *(count_value(number, nouns(2, noun)) for number, noun in counts),
     )
     owners = list(_owners(answer))
     rows, shown = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)], _DECIDES
     if not profile.has_cycle:
-        found = [figures.values() for figures in answer.results]
-        rows = [row for row in rows if any(values[row[0].key] is not None for values in found)]
+        results = [figures.values() for figures in answer.results]
+        rows = [row for row in rows if any(values[row[0].key] is not None for values in results)]
         shown |= {figure.key for figure in bus.figures.table}
     shown |= {term.key for figures in answer.results for term in figures.terms if term.us}
     return figure_table(
@@ -180,7 +180,7 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
 
 
 def capacity_records(answer: CapacityAnswer) -> list[Record]:
-    """One row for each period and timing model; what each group has for itself stands in columns of its name."""
+    """One row for each period and timing model; figures of a group are in columns of its name."""
     return [
         {
             **figures.by_key(),
@@ -190,19 +190,16 @@ def capacity_records(answer: CapacityAnswer) -> list[Record]:
     ]
 
 
-def _results(answer: CapacityAnswer) -> Iterator[Record]:
-    """As the rows, with a list of groups where the profile has some."""
-    for figures in answer.results:
-        record: Record = figures.by_key()
-        yield {**record, "groups": [vars(group) for group in figures.groups]} if figures.groups else record
-
-
 def capacity_document(answer: CapacityAnswer) -> JsonDocument:
     """Document of `busplan capacity --format json`."""
+    results = [
+        {**figures.by_key(), **({"groups": list(map(vars, figures.groups))} if figures.groups else {})}
+        for figures in answer.results
+    ]
     return document(
         "capacity",
         profile=answer.profile.name,
-        results=list(_results(answer)),
+        results=results,
         verdicts=list(map(_verdict, answer.verdicts)),
     )
 

@@ -1,6 +1,7 @@
 """Sensitivity of the margin: the effect of each small change, and the next bottleneck after the first."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.cycle import BusCycle, Term
@@ -14,7 +15,6 @@ from busplan.forms.blocks import (
     Block,
     Cell,
     Chart,
-    JsonDocument,
     Record,
     Report,
     Sentence,
@@ -55,7 +55,7 @@ class NextLimit(NamedTuple):
     """Limit of the nodes of one group now, and the next limit after it; the other groups stay as they are."""
 
     group: str
-    """Empty where all nodes are alike."""
+    """Empty where all nodes are group."""
     safe_nodes: int
     """Most nodes that are shown to fit."""
     limited_by: str
@@ -97,19 +97,20 @@ def next_bottleneck(network: Network) -> NextBottleneck:
     cycle = bus.cycle(network, model=bus.deciding_model)
     binding = _largest(cycle)
     cycles = (bus.cycle(relieved, model=bus.deciding_model) for relieved in _relieved(network))
-    without = next((cycle for cycle in cycles if not _of(cycle, binding.key)), None)
+    without = next(
+        (cycle for cycle in cycles if not any(plain(term.us) for term in cycle.terms if term.key == binding.key)), None
+    )
+    limits = []
+    for group in network.names:
+        nodes, limit = safe_nodes(network, group=group)
+        limits.append(NextLimit(group, nodes, limit, *safe_nodes(network, group=group, without=limit)))
     return NextBottleneck(
-        limits=tuple(_next_limit(network, name) for name in network.names),
+        limits=tuple(limits),
         binding_term=binding,
         is_gone=without is not None,
         next_binding_term=_largest(without or cycle, but=binding.key),
         next_margin_corrected_us=None if without is None else plain(certainty(without).margin_corrected_us),
     )
-
-
-def _next_limit(network: Network, group: str) -> NextLimit:
-    nodes, limit = safe_nodes(network, group=group)
-    return NextLimit(group, nodes, limit, *safe_nodes(network, group=group, without=limit))
 
 
 def _relieved(network: Network) -> Iterator[Network]:
@@ -122,10 +123,6 @@ def _relieved(network: Network) -> Iterator[Network]:
 
 def _largest(cycle: BusCycle, *, but: str = "") -> Term:
     return max((term for term in cycle.terms if term.key != but), key=lambda term: plain(term.us))
-
-
-def _of(cycle: BusCycle, key: str) -> float:
-    return next(plain(term.us) for term in cycle.terms if term.key == key)
 
 
 _EXECUTION_SHARE: Final = 0.1
@@ -151,17 +148,18 @@ class Perturbed(NamedTuple):
 def perturbed(network: Network) -> Iterator[Perturbed]:
     """Make every small change of a network, one at a time.
 
-    Those of every kind of bus are 10 % more execution time, a node and an axis more of each group, four bytes more of
-    every payload, and a bus reset; a kind has its own before the last.
+    Every kind of bus has 10 % more execution time, one node and one axis more of each group, four bytes more of every
+    payload, and a bus reset; changes of one kind alone come before the reset.
     """
     bus = network.bus
     yield _slower(network, if_nothing="" if bus.has_execution(network) else "no execution time is on the bus")
-    yield from (_one_node_more(network, alike) for alike in network.alike)
-    yield from (_one_axis_more(network, alike) for alike in network.alike)
+    yield from (_one_node_more(network, group) for group in network.alike)
+    yield from (_one_axis_more(network, group) for group in network.alike)
     yield _more_bytes(network)
-    own = bus.perturbations(network)
-    reset = Perturbation("a bus reset", bus.safety.after_reset, if_nothing="it is set so already")
-    yield from (_with_keys(network, change) for change in (*own, *((reset,) if bus.safety.after_reset else ())))
+    yield from (_with_keys(network, change) for change in bus.perturbations(network))
+    if bus.safety.after_reset:
+        reset = Perturbation("a bus reset", bus.safety.after_reset, if_nothing="it is set so already")
+        yield _with_keys(network, reset)
 
 
 def _slower(network: Network, *, if_nothing: str) -> Perturbed:
@@ -178,17 +176,17 @@ def _slower(network: Network, *, if_nothing: str) -> Perturbed:
     return Perturbed(label, "execution_us", before, after, network._replace(groups=groups), if_nothing)
 
 
-def _one_node_more(network: Network, alike: AlikeNodes) -> Perturbed:
-    more = alike.nodes + 1
-    then = network.asking(alike.name).with_nodes(more)
-    return Perturbed(f"one node more{_in(alike)}", alike.nodes_key, alike.nodes, more, then, "")
+def _one_node_more(network: Network, group: AlikeNodes) -> Perturbed:
+    more = group.nodes + 1
+    then = network.asking(group.name).with_nodes(more)
+    return Perturbed(f"one node more{_in(group)}", group.nodes_key, group.nodes, more, then, "")
 
 
-def _one_axis_more(network: Network, alike: AlikeNodes) -> Perturbed:
-    key, axes = alike.node_key("axes"), alike.node.axes + 1
+def _one_axis_more(network: Network, group: AlikeNodes) -> Perturbed:
+    key, axes = group.node_key("axes"), group.node.axes + 1
     then, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
-    note = unknown or ("" if alike.payload.follows_axes else "no payload follows the axes")
-    return Perturbed(f"one axis more per node{_in(alike)}", key, axes - 1, axes, then, note)
+    note = unknown or ("" if group.payload.follows_axes else "no payload follows the axes")
+    return Perturbed(f"one axis more per node{_in(group)}", key, axes - 1, axes, then, note)
 
 
 def _more_bytes(network: Network) -> Perturbed:
@@ -231,8 +229,8 @@ def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:
         return None, f"not known: {error}"
 
 
-def _in(alike: AlikeNodes) -> str:
-    return f" in {alike.name}" if alike.name else ""
+def _in(group: AlikeNodes) -> str:
+    return f" in {group.name}" if group.name else ""
 
 
 def _common_value(values: Iterable[Any]) -> Any:
@@ -323,11 +321,10 @@ def _effect(cause: Perturbed, now: Standing, network: Network) -> Effect:
     if cause.network is not None:
         then = standing(cause.network)
         change_us = then.margin_corrected_us - now.margin_corrected_us
-    note = ""
-    if not change_us:
-        note = "; ".join(
-            filter(None, (cause.note, *(() if cause.network is None else _nearer(network, cause.network))))
-        )
+    notes = [] if change_us else [cause.note]
+    if cause.network is not None and not change_us:
+        notes += _nearer(network, cause.network)
+    note = "; ".join(filter(None, notes))
     return Effect(cause.change, cause.key, cause.before, cause.after, change_us, then, note)
 
 
@@ -389,7 +386,8 @@ def next_bottleneck_sentence(bottlenecks: NextBottleneck, network: Network) -> S
     network
         The network.
     """
-    term, behind = (_term(term, network) for term in (bottlenecks.binding_term, bottlenecks.next_binding_term))
+    labels = by_key(network.bus.figures.terms)
+    term, behind = (labels[term.key].label for term in (bottlenecks.binding_term, bottlenecks.next_binding_term))
     term_us, behind_us, margin_us = (
         ShownValue(us, key, "us", 3)
         for us, key in (
@@ -417,10 +415,6 @@ def _limit(limit: NextLimit) -> Sentence:
         count_value(limit.safe_nodes, SAFE_NODES.key),
         count_value(limit.next_safe_nodes, "next_safe_nodes"),
     )
-
-
-def _term(term: Term, network: Network) -> str:
-    return by_key(network.bus.figures.terms)[term.key].label
 
 
 def next_bottleneck_record(bottleneck: NextBottleneck, network: Network) -> Record:
@@ -460,17 +454,29 @@ _DIGITS = 4
 def sensitivity_report(answer: CapacityAnswer) -> Report:
     """Report of `capacity --sensitivity`."""
     report, sensitivities = capacity_report(answer), answer.sensitivities
+    verdicts = [
+        {
+            **verdict,
+            "sensitivity": [_record(effect, sensitivity.network) for effect in sensitivity.effects],
+            "next_bottleneck": next_bottleneck_record(sensitivity.next_bottleneck, sensitivity.network),
+        }
+        for verdict, sensitivity in zip(report.document["verdicts"], sensitivities, strict=True)
+    ]
+    rows = [
+        {
+            "period_us": sensitivity.network.profile.cycle.period_us,
+            "timing_model": sensitivity.timing_model,
+            **_record(effect, sensitivity.network),
+        }
+        for sensitivity in sensitivities
+        for effect in sensitivity.effects
+    ]
     return report._replace(
-        blocks=(*report.blocks, *_of_periods(sensitivities)),
-        document=_document(report.document, sensitivities),
-        records=with_profile(answer.profile.name, [row for sensitivity in sensitivities for row in _rows(sensitivity)]),
+        blocks=(*report.blocks, *chain.from_iterable(map(sensitivity_blocks, sensitivities))),
+        document={**report.document, "verdicts": verdicts},
+        records=with_profile(answer.profile.name, rows),
         is_card_enough=False,
     )
-
-
-def _of_periods(sensitivities: Sequence[Sensitivity]) -> Iterator[Block]:
-    for sensitivity in sensitivities:
-        yield from sensitivity_blocks(sensitivity)
 
 
 def sensitivity_blocks(sensitivity: Sensitivity) -> Iterator[Block]:
@@ -544,11 +550,8 @@ def _verdict(then: Standing | None, network: Network) -> Cell:
     why = list(limits_behind(then))
     if not why and then.verdict == FITS and not then.safe:
         why = [f"unsafe {network.bus.safety.setting}"]
-    return Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if _is_well(then) else "fails")
-
-
-def _is_well(standing: Standing) -> bool:
-    return standing.verdict == FITS and standing.safe
+    is_well = then.verdict == FITS and then.safe
+    return Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if is_well else "fails")
 
 
 def _headline(sensitivity: Sensitivity) -> Sentence:
@@ -584,33 +587,10 @@ def _capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
-def _document(whole: Mapping[str, Any], sensitivities: Sequence[Sensitivity]) -> JsonDocument:
-    """That of `capacity`, with more in each verdict."""
-    verdicts = [
-        {
-            **verdict,
-            "sensitivity": [_record(effect, sensitivity.network) for effect in sensitivity.effects],
-            "next_bottleneck": next_bottleneck_record(sensitivity.next_bottleneck, sensitivity.network),
-        }
-        for verdict, sensitivity in zip(whole["verdicts"], sensitivities, strict=True)
-    ]
-    return {**whole, "verdicts": verdicts}
-
-
-def _rows(sensitivity: Sensitivity) -> Iterator[Record]:
-    """One row for each change."""
-    for effect in sensitivity.effects:
-        yield {
-            "period_us": sensitivity.network.profile.cycle.period_us,
-            "timing_model": sensitivity.timing_model,
-            **_record(effect, sensitivity.network),
-        }
-
-
 def _record(effect: Effect, network: Network) -> Record:
     then = effect.then
     safety = network.bus.safety.figure
-    own: dict[str, Any] = {} if safety is None else {safety.key: None if then is None else then.safe}
+    safe: dict[str, Any] = {} if safety is None else {safety.key: None if then is None else then.safe}
     return {
         "change": effect.change,
         "key": effect.key,
@@ -618,6 +598,6 @@ def _record(effect: Effect, network: Network) -> Record:
         "to": effect.after,
         "margin_change_us": effect.margin_change_us,
         **fields(then, "margin_corrected_us", "uncertainty_us", "verdict", "exceeded", "not_shown"),
-        **own,
+        **safe,
         "note": effect.note or None,
     }
