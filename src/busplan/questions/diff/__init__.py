@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import isclose, isfinite
 from typing import Any, Final, Literal, TypeAlias, TypeGuard
 
-from busplan.buses import figure as known
+from busplan.buses import figure as register
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.buses.network import Network
@@ -204,12 +204,12 @@ def diff(
 
 
 def _given(side: ProfileLike) -> tuple[str, Network]:
-    """One side as it was given, and its network."""
+    """Name of one side as it was given, and its network."""
     if isinstance(side, Profile):
         return side.name, network_of(side)
-    return os.fspath(side), network_of(load_revision(argument(side)).profile) if isinstance(
-        side, str
-    ) else load_network(side)
+    if isinstance(side, str):
+        return side, network_of(load_revision(argument(side)).profile)
+    return os.fspath(side), load_network(side)
 
 
 def _models(timing_model: Models, a: Network, b: Network) -> tuple[str, ...]:
@@ -228,9 +228,9 @@ def _side(name: str, network: Network) -> DiffSide:
 
 
 def _keys(a: Profile, b: Profile) -> Iterator[KeyDifference]:
-    of_a, of_b = dotted_keys(a), dotted_keys(b)
-    for key in dict.fromkeys((*of_a, *of_b)):
-        value_a, value_b = of_a.get(key), of_b.get(key)
+    keys_a, keys_b = dotted_keys(a), dotted_keys(b)
+    for key in dict.fromkeys((*keys_a, *keys_b)):
+        value_a, value_b = keys_a.get(key), keys_b.get(key)
         if value_a is None or value_b is None or value_a.value != value_b.value:
             yield KeyDifference(key, value_a, value_b)
 
@@ -243,11 +243,11 @@ def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
     """
     setup = by_key(figure for bus in buses for figure in bus.figures.setup)
     return (
-        *(known.TIMING_MODEL, known.VERDICT, known.PERIOD, known.NODES, known.AXES),
+        *(register.TIMING_MODEL, register.VERDICT, register.PERIOD, register.NODES, register.AXES),
         *setup.values(),
-        *(known.AVAILABLE, known.TIME_SLICE),
-        *(known.MARGIN_CORRECTED, known.UNCERTAINTY, known.BIAS, known.SAFE_NODES, known.SAFE_AXES),
-        *(known.SAFE_LIMITED_BY, known.SAFE_MIN_PERIOD),
+        *(register.AVAILABLE, register.TIME_SLICE),
+        *(register.MARGIN_CORRECTED, register.UNCERTAINTY, register.BIAS, register.SAFE_NODES, register.SAFE_AXES),
+        *(register.SAFE_LIMITED_BY, register.SAFE_MIN_PERIOD),
     )
 
 
@@ -256,23 +256,23 @@ def cycle_figures(*buses: Bus) -> tuple[Figure, ...]:
 
     A single term is neither good nor bad: only their sum counts.
     """
-    own = by_key(figure for bus in buses for figure in bus.figures.compared)
+    of_kind = by_key(figure for bus in buses for figure in bus.figures.compared)
     terms = by_key(figure._replace(better="neither") for bus in buses for figure in bus.figures.terms)
     return (
-        *(known.FITS, known.MARGIN, known.UTILISATION, known.REQUIRED),
+        *(register.FITS, register.MARGIN, register.UTILISATION, register.REQUIRED),
         *terms.values(),
-        *(known.MAX_NODES, known.MAX_AXES, known.LIMITED_BY, known.MIN_PERIOD),
-        *own.values(),
-        known.BINDING_TERM,
+        *(register.MAX_NODES, register.MAX_AXES, register.LIMITED_BY, register.MIN_PERIOD),
+        *of_kind.values(),
+        register.BINDING_TERM,
     )
 
 
 def _figures(a: DiffSide, b: DiffSide, models: Sequence[str]) -> Iterator[ComparedFigure]:
     buses = (a.network.bus, b.network.bus)
     groups = tuple(dict.fromkeys(group.name for side in (a, b) for group in side.profile.group))
-    plan = (*plan_figures(*buses), *_of_groups(groups, known.SAFE_NODES))
+    plan = (*plan_figures(*buses), *_of_groups(groups, register.SAFE_NODES))
     yield from _compared("plan", plan, a.deciding, b.deciding)
-    cycle = (*cycle_figures(*buses), *_of_groups(groups, known.MAX_NODES))
+    cycle = (*cycle_figures(*buses), *_of_groups(groups, register.MAX_NODES))
     if buses[0] is not buses[1]:
         yield from _compared("deciding", cycle, a.deciding, b.deciding)
         return
@@ -281,14 +281,14 @@ def _figures(a: DiffSide, b: DiffSide, models: Sequence[str]) -> Iterator[Compar
 
 
 def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:
-    """A figure that each group has for itself."""
+    """A figure of each group."""
     for name in names:
         yield figure._replace(key=f"group.{name}.{figure.key}", label=f"{figure.label} of {name}")
 
 
 def _by_key(figures: CapacityFigures) -> _Figures:
     """Figures of one profile by key, those of its groups among them."""
-    keys = (known.SAFE_NODES.key, known.MAX_NODES.key)
+    keys = (register.SAFE_NODES.key, register.MAX_NODES.key)
     groups = {f"group.{group.name}.{key}": getattr(group, key) for group in figures.groups for key in keys}
     return {**figures.values(), **groups}
 
@@ -325,16 +325,16 @@ def _judgement(measure: Figure, a: Any, b: Any, *, noise: float) -> Judgement:
 
 def _rank(measure: Figure, value: Any) -> float | None:
     """A figure as a number that ranks it; None if it has no rank. True ranks above False."""
-    if measure.key == known.VERDICT.key and value is not None:
+    if measure.key == register.VERDICT.key and value is not None:
         return -float(VERDICTS.index(value))
     return float(value) if isinstance(value, int | float) else None
 
 
-def _share(change: float | None, of: Any, *, noise: float) -> float | None:
-    """A change as a share of the absolute value of a figure; None if that value is only rounding."""
-    if change is None or abs(of) <= noise:
+def _share(change: float | None, before: Any, *, noise: float) -> float | None:
+    """A change as a share of the absolute value before; None if that value is only rounding."""
+    if change is None or abs(before) <= noise:
         return None
-    share = change / abs(of)
+    share = change / abs(before)
     return share if isfinite(share) else None
 
 

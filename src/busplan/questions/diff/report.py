@@ -25,7 +25,7 @@ from busplan.forms.numbers import MISSING, figure_text, sentence_text
 from busplan.profile.edit import value_text
 from busplan.profile.kinds import KeyValue
 from busplan.questions.base.sentences import document, fields
-from busplan.questions.diff import ComparedFigure, DiffAnswer, DiffSide, Judgement, KeyDifference
+from busplan.questions.diff import ComparedFigure, DiffAnswer, DiffSide, Judgement
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
 from busplan.questions.fit.network import model_names
 
@@ -64,17 +64,36 @@ _CONTEXT: Final = 8
 
 def diff_report(answer: DiffAnswer) -> Report:
     """Report of `diff`."""
-    said, records = _sentence(answer), [_figure_record(figure) for figure in answer.figures]
+    summary = _sentence(answer)
+    records = [
+        {
+            "part": compared.part,
+            "figure": compared.figure.key,
+            "better": compared.figure.better,
+            **fields(compared, "a", "b", "difference", "relative_difference", "judgement"),
+        }
+        for compared in answer.figures
+    ]
+    changes = [
+        {
+            "key": change.key,
+            "a": change.a and change.a.value,
+            "a_source": "absent" if change.a is None else change.a.source,
+            "b": change.b and change.b.value,
+            "b_source": "absent" if change.b is None else change.b.source,
+        }
+        for change in answer.keys
+    ]
     return Report(
         Sentence(("Changes from ", Code(answer.a.argument), " to ", Code(answer.b.argument))),
-        tuple(_blocks(answer, said)),
+        tuple(_blocks(answer, summary)),
         document(
             "diff",
             a=_side_record(answer.a),
             b=_side_record(answer.b),
-            text=sentence_text(said),
+            text=sentence_text(summary),
             same=answer.same,
-            changes=[_key_record(change) for change in answer.keys],
+            changes=changes,
             figures=records,
         ),
         records,
@@ -108,8 +127,8 @@ def _verdict(side: DiffSide) -> str:
         *([] if side.deciding.safe else [f"its {bus.safety.setting} is not safe"]),
         *([f"it misses {listed(side.missed_limits, 'and')}"] if side.missed_limits else []),
     ]
-    said = word if word in (FITS, DOES_NOT_FIT) else f"is {word}"
-    return f"{said}{', but' if word == FITS else ', and'} {' and '.join(buts)}" if buts else said
+    verdict = word if word in (FITS, DOES_NOT_FIT) else f"is {word}"
+    return f"{verdict}{', but' if word == FITS else ', and'} {' and '.join(buts)}" if buts else verdict
 
 
 def _judged(answer: DiffAnswer, judgement: Judgement) -> str:
@@ -128,8 +147,8 @@ def _names(answer: DiffAnswer, figures: Sequence[ComparedFigure]) -> list[str]:
     return [f"{label} ({of[0]})" if len(of) == 1 and of[0] in models else label for label, of in parts.items()]
 
 
-def _blocks(answer: DiffAnswer, said: Sentence) -> Iterator[Block]:
-    yield said
+def _blocks(answer: DiffAnswer, summary: Sentence) -> Iterator[Block]:
+    yield summary
     if answer.keys:
         rows = (
             TableRow(
@@ -154,16 +173,16 @@ def _cell(key: str, value: KeyValue | None, opposite: KeyValue | None) -> Cell:
     """One side of a difference; the other side decides which part or how many digits of a long value are shown."""
     if value is None:
         return MISSING
-    own, beside = value.value, None if opposite is None else opposite.value
+    here, there = value.value, None if opposite is None else opposite.value
     shown: ShownValue | Code | str
-    if own is None:
+    if here is None:
         shown = "none"
-    elif isinstance(own, int | float) and not isinstance(own, bool):
-        shown = ShownValue(own, key)
-        if own != beside and figure_text(shown) == figure_text(shown._replace(value=beside)):
+    elif isinstance(here, int | float) and not isinstance(here, bool):
+        shown = ShownValue(here, key)
+        if here != there and figure_text(shown) == figure_text(shown._replace(value=there)):
             shown = shown._replace(digits=_ALL_DIGITS)
     else:
-        shown = Code(excerpt(value_text(own), "" if beside is None else value_text(beside)))
+        shown = Code(excerpt(value_text(here), "" if there is None else value_text(there)))
     return shown if value.source == "file" else Sentence((shown, " (default)"))
 
 
@@ -197,24 +216,4 @@ def _side_record(side: DiffSide) -> Record:
         "timing_model": side.profile.bus.timing_model,
         "verdict": side.verdict,
         "missed_limits": list(side.missed_limits),
-    }
-
-
-def _key_record(change: KeyDifference) -> Record:
-    """A difference as plain data, both values in full."""
-    return {
-        "key": change.key,
-        "a": change.a and change.a.value,
-        "a_source": "absent" if change.a is None else change.a.source,
-        "b": change.b and change.b.value,
-        "b_source": "absent" if change.b is None else change.b.source,
-    }
-
-
-def _figure_record(compared: ComparedFigure) -> Record:
-    return {
-        "part": compared.part,
-        "figure": compared.figure.key,
-        "better": compared.figure.better,
-        **fields(compared, "a", "b", "difference", "relative_difference", "judgement"),
     }

@@ -112,19 +112,19 @@ def explain(
     network = load_network(profile)
     if figure is None:
         given = {"period_us": period_us, "timing_model": timing_model, "transaction": transaction}
-        asked = [name for name, value in given.items() if value is not None]
-        if asked:
-            raise BusplanError(f"{listed(asked, 'and')}: goes with a figure, as busplan explain PROFILE required_us")
+        names = [name for name, value in given.items() if value is not None]
+        if names:
+            raise BusplanError(f"{listed(names, 'and')}: goes with a figure, as busplan explain PROFILE required_us")
         return ExplainAnswer(
             network.profile, assumptions=assumptions(network), figures=tuple(explained_figures(network))
         )
     if not isinstance(figure, str):
         raise BusplanError(f'figure {figure!r}: expected a key of the JSON, as "required_us"')
     transactions: list[str] | None = None if transaction is None else one_or_several(transaction, name="transaction")
-    known = latency_names(network)
+    labels = latency_names(network)
     for name in transactions or ():
-        if name not in known:
-            raise BusplanError(f"transaction {name!r}: expected {listed([*map(repr, known)], 'or')}")
+        if name not in labels:
+            raise BusplanError(f"transaction {name!r}: expected {listed([*map(repr, labels)], 'or')}")
     derivations = derive(
         at_periods(network, None if period_us is None else one_or_several(period_us, name="period_us")),
         figure,

@@ -27,11 +27,12 @@ _ATOM: Final = 4
 _MOST_TERMS: Final = 24
 """Operands of a sum that is written out."""
 _SHOWN_TERMS: Final = 3
-"""First operands that are written of a longer one."""
+"""Operands of a longer sum that are written, from its first."""
 _MOST_DIGITS: Final = 17
 """Digits that distinguish any two floats."""
 _SUPPORTS: Final = 1e-4
 """Largest relative error of a written difference, caused by the digits that it does not show."""
+_MOST_HINTS: Final = 3
 
 
 def against(left: float, sign: str, right: float) -> str:
@@ -82,7 +83,12 @@ def formula_text(operand: Number, *, in_numbers: bool) -> str:
     >>> formula_text(delay, in_numbers=False), formula_text(delay, in_numbers=True), delay.value
     ('0.25 (N + 1)', '0.25 * (2 + 1)', 0.75)
     """
-    operand = _unwrapped(operand)
+    # An expression without a name that was chosen stands for the choice.
+    while isinstance(operand, Traced) and operand.operation == CHOSEN:
+        chosen = operand.parts[0]
+        if not isinstance(chosen, Traced) or chosen.symbol:
+            break
+        operand = chosen
     if isinstance(operand, Traced) and not operand.operation:
         return operand.numbers if in_numbers else operand.formula
     if in_numbers and isinstance(operand, Traced) and all(_is_atom(part) for part in operand.parts):
@@ -94,16 +100,6 @@ def formula_text(operand: Number, *, in_numbers: bool) -> str:
     return _written(operand, in_numbers=in_numbers, top=True)[0]
 
 
-def _unwrapped(operand: Number) -> Number:
-    """Replace a choice by the chosen operand, if that is an expression without a name."""
-    while isinstance(operand, Traced) and operand.operation == CHOSEN:
-        won = operand.parts[0]
-        if not isinstance(won, Traced) or won.symbol:
-            break
-        operand = won
-    return operand
-
-
 def _written(operand: Number, *, in_numbers: bool, top: bool = False) -> tuple[str, int]:
     """Text of an operand, and its operator precedence."""
     if not isinstance(operand, Traced):
@@ -112,10 +108,10 @@ def _written(operand: Number, *, in_numbers: bool, top: bool = False) -> tuple[s
     if not top and (operand.symbol or not operand.operation):
         return _atom(short(operand.value) if in_numbers or not operand.symbol else operand.symbol)
     if operand.operation == CHOSEN:
-        won = operand.parts[0]
-        if isinstance(won, Sourced) and not in_numbers:
-            return _atom(won.symbol or won.meaning)
-        return _written(won, in_numbers=in_numbers)
+        chosen = operand.parts[0]
+        if isinstance(chosen, Sourced) and not in_numbers:
+            return _atom(chosen.symbol or chosen.meaning)
+        return _written(chosen, in_numbers=in_numbers)
     terms = _chained(operand)
     if len(terms) > _MOST_TERMS:
         return _shortened(operand.operation, terms, in_numbers=in_numbers)
@@ -217,12 +213,9 @@ CommandName = Literal["capacity", "latency"]
 _Numbers = Mapping[str, Traced]
 
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
-"""From the weakest to the strongest; "given" values are choices, not knowledge."""
+"""Grades from the weakest to the strongest; "given" values are choices, not knowledge."""
 _BESIDE: Final = MappingProxyType({MARGIN_CORRECTED.key: (UNCERTAINTY,)})
 """Figures that are derived beside another: a margin says nothing without its uncertainty."""
-
-
-_MOST_HINTS: Final = 3
 
 
 class Step(NamedTuple):
@@ -298,19 +291,18 @@ def derive(
         There is no such figure, no equation leads to it, or an option does not apply to it.
     """
     network = networks[0]
-    command, figures, named = wanted(name, network)
+    command, figures, wanted_transactions = wanted(name, network)
     if transactions is not None and command != "latency":
         keys = (f"latency.{figure.key}" for figure in figures if figure.key in figures_of(network.bus)["latency"])
         instead = next((f"; {key} has" for key in keys), "")
         raise BusplanError(f"{name}: a figure of {command}, which has no transactions{instead}")
-    found = [
-        derivation
-        for at in networks
-        for derivation in _at_period(at, command, figures, timing_models, transactions or named)
-    ]
-    if not found:
+    transactions = transactions or wanted_transactions
+    derivations = tuple(
+        derivation for at in networks for derivation in _at_period(at, command, figures, timing_models, transactions)
+    )
+    if not derivations:
         raise BusplanError(_why_none(network, command, figures[0], timing_models))
-    return tuple(found)
+    return derivations
 
 
 def _at_period(
@@ -326,23 +318,23 @@ def _at_period(
     numbers = {model: numbers_of(network, command, model=model) for model in models}
     for transaction, figure in product(transactions or numbers[models[0]], figures):
         for model in timing_models or [deciding if figure in CERTAINTY else leading]:
-            known = numbers[model][transaction]
+            traced = numbers[model][transaction]
             for shown in (figure, *_BESIDE.get(figure.key, ())):
-                if shown.key in known:
-                    yield _derivation(network, known[shown.key], command, shown, model, transaction or None)
+                if shown.key in traced:
+                    yield _derivation(network, traced[shown.key], command, shown, model, transaction or None)
 
 
 def _derivation(
     network: Network, number: Traced, command: CommandName, figure: Figure, model: str, transaction: str | None
 ) -> Derivation:
     register = figures_of(network.bus)
-    known = {**register["latency"], **register["capacity"], **register[command]}
+    figures = {**register["latency"], **register["capacity"], **register[command]}
     steps = []
     for line in lines(number):
-        own = figure if line is number else known.get(line.key, Figure(line.key, line.key, "", ""))
+        result = figure if line is number else figures.get(line.key, Figure(line.key, line.key, "", ""))
         formula, numbers = (_INFINITE.sub("none", formula_text(line, in_numbers=way)) for way in (False, True))
-        symbol = own.symbol if line is number else line.symbol
-        steps.append(Step(own.key, symbol, own.reference, formula, numbers, _existing(line.value), own.unit))
+        symbol = result.symbol if line is number else line.symbol
+        steps.append(Step(result.key, symbol, result.reference, formula, numbers, _existing(line.value), result.unit))
     period_us = value_of(network.period_us) if network.groups else None
     value = _existing(number.value)
     return Derivation(command, figure, model, transaction, period_us, value, tuple(steps), tuple(inputs(number)))
@@ -388,16 +380,18 @@ def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[st
     Returns
     -------
     dict
-        What is infinite does not exist.
+        Numbers; an infinite one does not exist.
     """
     # Traced for each command: a number keeps the name that it is given first.
     network = network_of(traced_profile(network.profile))
     cycle = network.bus.cycle(network, model=model)
-    known = figures_of(network.bus)[command]
+    figures = figures_of(network.bus)[command]
     if command == "capacity":
-        return {"": _known(_of_capacity(cycle, is_decided=model == network.bus.deciding_model), known)}
+        return {"": _traced(_of_capacity(cycle, is_decided=model == network.bus.deciding_model), figures)}
     return {
-        latency.label: _known({"payload_bytes": latency.payload_bytes, "nodes": network.nodes, **latency.phases}, known)
+        latency.label: _traced(
+            {"payload_bytes": latency.payload_bytes, "nodes": network.nodes, **latency.phases}, figures
+        )
         for latency in cycle.latencies()
     }
 
@@ -418,12 +412,12 @@ def _of_capacity(cycle: BusCycle, *, is_decided: bool) -> dict[str, Number | Non
     return numbers
 
 
-def _known(numbers: Mapping[str, Number | None], known: Mapping[str, Figure]) -> dict[str, Traced]:
-    """Numbers of the known figures, each with its symbol; None is left out."""
+def _traced(numbers: Mapping[str, Number | None], figures: Mapping[str, Figure]) -> dict[str, Traced]:
+    """Numbers of the figures by key, each with its symbol; None is left out."""
     return {
-        key: _named(number, key, known[key].symbol)
+        key: _named(number, key, figures[key].symbol)
         for key, number in numbers.items()
-        if key in known and number is not None
+        if key in figures and number is not None
     }
 
 
@@ -439,13 +433,11 @@ def _named(number: Number, key: str, symbol: str) -> Traced:
 def explained_figures(network: Network) -> list[tuple[CommandName, Figure]]:
     """Every figure of a network that an equation leads to, with its command, in the order of their documents."""
     models = {leading_model(network), network.bus.deciding_model}
-    found: list[tuple[CommandName, Figure]] = []
+    explained: list[tuple[CommandName, Figure]] = []
     for command, figures in figures_of(network.bus).items():
-        known = set[str]().union(
-            *(keys for model in models for keys in numbers_of(network, command, model=model).values())
-        )
-        found += [(command, figure) for key, figure in figures.items() if key in known]
-    return found
+        traced = [keys for model in models for keys in numbers_of(network, command, model=model).values()]
+        explained += [(command, figure) for key, figure in figures.items() if any(key in keys for keys in traced)]
+    return explained
 
 
 def latency_names(network: Network) -> tuple[str, ...]:
@@ -492,20 +484,20 @@ def wanted(name: str, network: Network) -> Wanted:
             if figures := tuple(figure for figure in register[command].values() if is_meant(figure)):
                 return Wanted(command, figures)
     labels = latency_names(network)
-    asked = tuple(label for label in labels if _letters(name) in map(_letters, (label, *label.split())))
-    if asked or (name and name in network.names):
-        return Wanted("latency", (_main_latency(network.bus),), asked or None)
+    transactions = tuple(label for label in labels if _letters(name) in map(_letters, (label, *label.split())))
+    if transactions or (name and name in network.names):
+        # All other figures of `latency` lead to this one.
+        main = (
+            network.bus.figures.deadlines[0]
+            if network.bus.figures.deadlines
+            else network.bus.figures.latency_table[-1].key
+        )
+        return Wanted("latency", (register["latency"][main],), transactions or None)
     raise BusplanError(f"{name or repr(name)}: no such figure{_hint(name, network)} one, explain lists them")
 
 
-def _main_latency(bus: Bus) -> Figure:
-    """The figure of `latency` that all others lead to."""
-    key = bus.figures.deadlines[0] if bus.figures.deadlines else bus.figures.latency_table[-1].key
-    return by_key(bus.figures.latency)[key]
-
-
 def _names(figure: Figure) -> set[str]:
-    """What else a figure is called: as in tables, and beside the other terms."""
+    """Other names of a figure: in tables, and beside the other terms."""
     return {_letters(figure.label), _letters(term_name(figure.key))}
 
 
@@ -517,9 +509,9 @@ def _hint(name: str, network: Network) -> str:
     names = {_letters(label): label for label in (*network.names, *latency_names(network))}
     for _, figure in explained_figures(network):
         names |= {**dict.fromkeys(_names(figure), figure.key), _letters(figure.key): figure.key}
-    asked = _letters(name.rpartition(".")[2])
-    near = [word for word in names if word.startswith(asked)] + get_close_matches(asked, names, cutoff=0.5)
-    close = dict.fromkeys(names[word] for word in near if asked)
+    key = _letters(name.rpartition(".")[2])
+    near = [word for word in names if word.startswith(key)] + get_close_matches(key, names, cutoff=0.5)
+    close = dict.fromkeys(names[word] for word in near if key)
     return f", did you mean {listed([*close][:_MOST_HINTS], 'or')}? Without" if close else "; without"
 
 
@@ -541,18 +533,18 @@ def assumptions(network: Network) -> tuple[Input, ...]:
     limited = network_of(traced_profile(profile))
     numbers: list[Number] = []
     for model in model_names(network):
-        known = numbers_of(network, "capacity", model=model)[""]
-        numbers += [known[key] for key in ("required_us", "available_us", "safe_required_us") if key in known]
+        traced = numbers_of(network, "capacity", model=model)[""]
+        numbers += [traced[key] for key in ("required_us", "available_us", "safe_required_us") if key in traced]
     for limit in bus.limits:
         if limit.role != "safety":
             numbers += (limit.bound.value(limited), limit.bound.most(limited), limit.bound.uncertainty(limited))
     by_name: dict[str, Input] = {}
     for given in inputs(Traced(None, parts=tuple(numbers))):
         by_name.setdefault(given.name, given)
-    executions = tuple(alike.node_key("execution.") for alike in profile.alike_nodes)
+    executions = tuple(group.node_key("execution.") for group in profile.alike_nodes)
 
     def rank(given: Input) -> int:
-        """Place of its grade; behind all of them for a choice."""
+        """Place of the grade of an input; a choice comes after all of them."""
         if given.grade != "given":
             return _GRADES.index(given.grade)
         is_time = given.name.startswith(executions) and not given.name.endswith(choosing_keys(bus))

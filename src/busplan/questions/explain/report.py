@@ -35,7 +35,7 @@ _INPUTS: Final = (
     TableColumn("grade", kind="words", rank=3, leaves="below"),
     TableColumn("source", kind="words", rank=4, leaves="below", wraps=True),
 )
-"""Columns of an input: what it is, and how well it is known."""
+"""Columns of an input, and of how well it is known."""
 _SYMBOL: Final = TableColumn("symbol", kind="words", rank=1, leaves="below")
 _MEANING: Final = TableColumn("meaning", kind="words", rank=5, leaves="below", wraps=True)
 _FIGURES: Final = (
@@ -50,7 +50,7 @@ def assumptions_report(
     profile: Profile, assumptions: Sequence[Input], figures: Sequence[tuple[CommandName, Figure]]
 ) -> Report:
     """Report of `explain PROFILE`: what the verdict rests on, and the figures that can be explained."""
-    rests_on = (TableRow((*_input_cells(given), given.meaning)) for given in assumptions)
+    inputs = (TableRow((*_input_cells(given), given.meaning)) for given in assumptions)
     rows = (
         TableRow((command, Code(figure.key), figure.reference, figure.unit, figure.meaning))
         for command, figure in figures
@@ -63,7 +63,7 @@ def assumptions_report(
     return Report(
         Sentence(("The figures of ", Code(profile.name))),
         (
-            Table((*_INPUTS, _MEANING), tuple(rests_on), caption, stacks=True),
+            Table((*_INPUTS, _MEANING), tuple(inputs), caption, stacks=True),
             Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True),
         ),
         document(
@@ -113,12 +113,12 @@ def explain_report(name: str, derivations: Sequence[Derivation]) -> Report:
     return Report(
         Sentence(("Where ", Code(", ".join(figures)), " of ", Code(name), " comes from")),
         tuple(_sections(name, derivations)),
-        document("explain", profile=name, derivations=[_derivation(derivation) for derivation in derivations]),
+        document("explain", profile=name, derivations=list(map(_record, derivations))),
         with_profile(name, [record for derivation in derivations for record in _step_records(derivation)]),
     )
 
 
-def _derivation(derivation: Derivation) -> Record:
+def _record(derivation: Derivation) -> Record:
     return {
         "command": derivation.command,
         "figure": derivation.figure.key,
@@ -148,8 +148,8 @@ def _sections(name: str, derivations: Iterable[Derivation]) -> Iterator[Chapter]
     first: dict[tuple[Input, ...], Derivation] = {}
     for derivation in derivations:
         earlier = first.setdefault(derivation.inputs, derivation)
-        below = _inputs(derivation) if earlier is derivation else _same_inputs(earlier)
-        yield _section(derivation, name, below)
+        same = f"It starts from the same inputs as {earlier.figure.key}, {_of(earlier)}."
+        yield _section(derivation, name, _inputs(derivation) if earlier is derivation else Sentence((same,)))
 
 
 def _of(derivation: Derivation) -> str:
@@ -157,12 +157,8 @@ def _of(derivation: Derivation) -> str:
     return f"{f'{derivation.transaction}, ' if derivation.transaction else ''}{derivation.timing_model} model"
 
 
-def _same_inputs(earlier: Derivation) -> Sentence:
-    return Sentence((f"It starts from the same inputs as {earlier.figure.key}, {_of(earlier)}.",))
-
-
 def _section(derivation: Derivation, name: str, below: Block) -> Chapter:
-    """The result, its meaning, every step to it, and what stands below them: the inputs."""
+    """The result, its meaning, every step to it, and the inputs below them."""
     figure = derivation.figure
     period = () if derivation.period_us is None else (" at ", period_value(derivation.period_us))
     result = _result(derivation.value, figure.key, figure.unit)
@@ -178,9 +174,9 @@ def _result(value: object, key: str, unit: str) -> ShownValue | Words:
 def _step(step: Step) -> CalculationStep:
     """A line in symbols and one in numbers; a line that repeats its neighbour is left out."""
     result = _result(step.value, step.key, step.unit)
-    said = result.text if isinstance(result, Words) else figure_text(result)
-    formula = "" if step.formula in (step.symbol, said) else step.formula
-    numbers = "" if step.numbers in (formula, short(step.value), said) else step.numbers
+    text = result.text if isinstance(result, Words) else figure_text(result)
+    formula = "" if step.formula in (step.symbol, text) else step.formula
+    numbers = "" if step.numbers in (formula, short(step.value), text) else step.numbers
     return CalculationStep(step.reference, step.symbol, formula, numbers, result)
 
 
