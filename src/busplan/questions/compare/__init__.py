@@ -31,10 +31,9 @@ class SafeAxes(NamedTuple):
 
     period_us: float
     axes: int | None
-    """Of all nodes; where nodes are in groups, with more nodes of one group, the others as they are. None where the
-    machine has no axes."""
+    """Axes of all nodes; where nodes are in groups, one group gets more nodes. None where the machine has no axes."""
     nodes: int
-    """Of the nodes that are counted [1]."""
+    """Nodes that are counted [1]."""
     limited_by: str
     """Key of the limit that keeps them from being more."""
 
@@ -44,14 +43,14 @@ class MachineOnKind(NamedTuple):
 
     network: Network
     is_own: bool
-    """Whether this is the kind of the profile, which stays as it is."""
+    """Whether this is the kind of the profile, where the machine stays as it is."""
     assumed: tuple[AssumedKey, ...]
     left_out: tuple[str, ...]
     """Keys and sections that the profile sets and this kind does not have."""
     figures: FitFigures
     """Under the timing model that decides, at the profile's period."""
     after_reset: FitFigures | None
-    """After a bus reset, where it is shown to fit as it is set and not then."""
+    """Figures after a bus reset; None unless it is shown to fit now and not after the reset."""
     safe: SafeAxes
     """At the profile's period."""
     smallest: SmallestPeriod
@@ -66,15 +65,13 @@ class MachineOnKind(NamedTuple):
 
     @property
     def assumed_host(self) -> tuple[AssumedKey, ...]:
-        """Assumptions about the host's own time, of its own profile, too; with any it has no rank."""
+        """Assumptions about the host's own time, those of the profile included; a machine with any has no rank."""
         key = self.network.bus.key_of("host")
         inputs = [given(self.profile, key)] if self.is_own and key else []
-        own = (
-            AssumedKey(known.name, known.value, "profile")
-            for known in inputs
-            if known.grade == "assumed" and known.value
+        of_profile = (
+            AssumedKey(host.name, host.value, "profile") for host in inputs if host.grade == "assumed" and host.value
         )
-        return (*own, *(assumed for assumed in self.assumed if assumed.key == key))
+        return (*of_profile, *(assumed for assumed in self.assumed if assumed.key == key))
 
 
 class NotOnKind(NamedTuple):
@@ -123,11 +120,11 @@ def checked_kinds(names: Sequence[str], *, option: str) -> tuple[str, ...]:
     BusplanError
         No kind of bus has the name, or there is no name.
     """
-    known = kind_names()
+    kinds = kind_names()
     for name in names or [""]:
-        if name not in known:
-            near = did_you_mean(name, known)
-            raise BusplanError(f"{option} {name}: no kind of bus; there are {', '.join(known)}{near and f'; {near}'}")
+        if name not in kinds:
+            near = did_you_mean(name, kinds)
+            raise BusplanError(f"{option} {name}: no kind of bus; there are {', '.join(kinds)}{near and f'; {near}'}")
     return tuple(dict.fromkeys(names))
 
 
@@ -141,15 +138,16 @@ def compared_kinds(network: Network, *, kinds: Sequence[str] | None = None) -> K
     kinds
         Names of kinds, from `checked_kinds`; all without it, the network's own first.
     """
-    own = network.bus.kind
-    names = tuple(kinds) if kinds is not None else (own, *(kind for kind in kind_names() if kind != own))
+    names = kinds if kinds is not None else dict.fromkeys((network.bus.kind, *kind_names()))
     machines = [_on_kind(network, name) for name in names]
     smallest = [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
     periods_us = _curve_periods(network.profile.cycle.period_us, smallest)
     return KindComparison(
         network,
         tuple(
-            machine if isinstance(machine, NotOnKind) else machine._replace(curve=_curve(machine, periods_us))
+            machine
+            if isinstance(machine, NotOnKind)
+            else machine._replace(curve=tuple(most_safe_axes(at_period(machine.network, us)) for us in periods_us))
             for machine in machines
         ),
     )
@@ -165,7 +163,7 @@ def _on_kind(network: Network, kind: str) -> MachineOnKind | NotOnKind:
     needed = {} if is_own else settings_to_be_carried(on_kind)
     if needed:
         tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
-        assumed = (*tried, *(each for each in assumed if each.key not in needed))
+        assumed = (*tried, *(assumption for assumption in assumed if assumption.key not in needed))
         on_kind = changed(on_kind, needed)
     rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
     capacity = figures(on_kind, model=on_kind.bus.deciding_model)
@@ -197,7 +195,7 @@ def most_safe_axes(network: Network) -> SafeAxes:
     nodes, limit = safe_nodes(network, group=varied.name)
     node_axes = int(varied.node.axes)
     axes_beside = sum(
-        int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes if alike.name != varied.name
+        int(group.nodes) * int(group.node.axes) for group in profile.alike_nodes if group.name != varied.name
     )
     axes = None if not node_axes else axes_beside + nodes * node_axes if nodes else 0
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
@@ -210,10 +208,6 @@ def _curve_periods(own_us: float, smallest_us: Sequence[float | None]) -> tuple[
     every = ceil((last - first + 1) / _MOST_POINTS)
     round_us = (_ROUND_US * 2.0**power for power in range(first, last + 1) if power % every == 0)
     return tuple(sorted({own_us, *(us for us in round_us if MIN_STEP_US <= us <= MAX_TIME_US)}))
-
-
-def _curve(machine: MachineOnKind, periods_us: Sequence[float]) -> tuple[SafeAxes, ...]:
-    return tuple(most_safe_axes(at_period(machine.network, period_us)) for period_us in periods_us)
 
 
 def fitting(comparison: KindComparison) -> Iterator[MachineOnKind]:

@@ -44,7 +44,7 @@ from busplan.questions.base.sentences import (
 )
 from busplan.questions.compare import KindComparison, MachineOnKind, NotOnKind, SafeAxes, fitting
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
-from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.fit.network import network_of
 
 _INKS: Final[tuple[Ink, ...]] = ("request", "contention", "work", "sync", "acknowledge", "response", "reserve")
 """Colours of the curves; each has a letter, too."""
@@ -66,7 +66,7 @@ def compare_drawing(comparison: KindComparison, *, title: str) -> Drawing:
     own_axes = int(plain(network_of(comparison.profile).axes))
     points = [point for machine in compared for point in machine.curve]
     periods_us, top = sorted({point.period_us for point in points}), max(point.axes or 1 for point in points)
-    own = Entry("own", f"this machine: {period(own_us)}, {plural(own_axes, 'axis')}", shape="line")
+    machine_now = Entry("own", f"this machine: {period(own_us)}, {plural(own_axes, 'axis')}", shape="line")
     marks = letters(machine.profile.bus.kind.upper() for machine in compared)
     plot = Curves(
         logarithmic("period, logarithmic", periods_us[0], periods_us[-1], period, at=periods_us, own=own_us),
@@ -75,21 +75,18 @@ def compare_drawing(comparison: KindComparison, *, title: str) -> Drawing:
             _curve(machine, mark, _INKS[number % len(_INKS)])
             for number, (machine, mark) in enumerate(zip(compared, marks, strict=True))
         ),
-        (Guide(own, x=own_us), *([Guide(own, y=own_axes)] if own_axes else [])),
+        (Guide(machine_now, x=own_us), *([Guide(machine_now, y=own_axes)] if own_axes else [])),
     )
     return Drawing(title, (Panel(plot),), description=CAPTION)
 
 
 def _curve(machine: MachineOnKind, mark: str, ink: Ink) -> Curve:
-    """A point for each period that carries an axis: none has no place on the scale."""
+    """A point for each period that carries an axis; no axes have no place on a logarithmic scale."""
     points = [(point.period_us, point.axes) for point in machine.curve if point.axes]
-    own, none, title = (
-        " (this profile)" if machine.is_own else "",
-        "" if points else ": none",
-        bus_of(machine.profile).title,
-    )
+    title = machine.network.bus.title
+    label = f"{title}{' (this profile)' if machine.is_own else ''}{'' if points else ': none'}"
     return Curve(
-        Entry(ink, f"{title}{own}{none}", mark, "line"),
+        Entry(ink, label, mark, "line"),
         tuple(points),
         tuple(f"{title}: {plural(axes, 'axis')} at {period(us)}" for us, axes in points),
     )
@@ -118,17 +115,14 @@ def compare_document(comparison: KindComparison) -> JsonDocument:
 
 
 def compare_records(comparison: KindComparison) -> list[Record]:
-    """One row for each kind, for CSV: of the lists the keys."""
-    return with_profile(comparison.profile.name, [_flat(record) for record in map(_bus_record, comparison.kinds)])
-
-
-def _flat(record: Record) -> Record:
-    flat = {key: value for key, value in record.items() if key not in {"curve", "assumed"}}
-    return {
-        **flat,
-        **{key: [row["part"] for row in record[key]] for key in ("set_by", "tested")},
-        "assumed": [row["key"] for row in record["assumed"]],
-    }
+    """One row for each kind, for CSV, with the keys of its lists."""
+    rows = []
+    for record in map(_bus_record, comparison.kinds):
+        lists = {key: [row["part"] for row in record[key]] for key in ("set_by", "tested")}
+        assumed = [row["key"] for row in record.pop("assumed")]
+        del record["curve"]
+        rows.append({**record, **lists, "assumed": assumed})
+    return with_profile(comparison.profile.name, rows)
 
 
 def _bus_record(machine: MachineOnKind | NotOnKind) -> Record:
@@ -181,14 +175,14 @@ def notes(comparison: KindComparison) -> Iterator[Sentence]:
             why = "; ".join(machine.why)
             yield Sentence((f"{kind_named(machine.kind).title} cannot have this machine: {why}.",), "warns")
         else:
-            said = [
+            sentences = [
                 *_obstacles(machine),
                 *reset_sentence(machine.after_reset, machine.network),
+                *_execution(machine, comparison.network),
+                *evidence_sentence(machine.network.bus),
             ]
-            said += _execution(machine, comparison.network)
-            said += evidence_sentence(machine.network.bus)
-            if said:
-                yield joined(Sentence((f"{machine.network.bus.title}:",)), *said)
+            if sentences:
+                yield joined(Sentence((f"{machine.network.bus.title}:",)), *sentences)
     yield from _left_out(comparison)
 
 
@@ -200,13 +194,9 @@ def _left_out(comparison: KindComparison) -> Iterator[Sentence]:
             titles.setdefault(machine.left_out, []).append(machine.network.bus.title)
     for left_out, names in titles.items():
         keys = joined(*(Sentence((Code(key),)) for key in left_out), by=", ")
-        rates = " Data at a slower rate go in every cycle there." if any(map(_is_rate, left_out)) else ""
+        has_rate = any(key.startswith(("group.", "payload.")) and key.endswith(".every") for key in left_out)
+        rates = " Data at a slower rate go in every cycle there." if has_rate else ""
         yield Sentence((f"Left out on {listed(names, 'and')}: ", *keys.parts, f".{rates}"))
-
-
-def _is_rate(key: str) -> bool:
-    """Whether a key is the rate of a group, or of all nodes."""
-    return key.startswith(("group.", "payload.")) and key.endswith(".every")
 
 
 def _obstacles(machine: MachineOnKind) -> Iterator[Sentence]:
@@ -221,17 +211,16 @@ def _obstacles(machine: MachineOnKind) -> Iterator[Sentence]:
 
 def _execution(machine: MachineOnKind, network: Network) -> Iterator[Sentence]:
     """Meaning of the profile's execution times on other kinds."""
-    bus, own = machine.network.bus, network.bus
-    owns_any = own.has_execution(network)
     if machine.is_own:
         return
+    bus, title, is_in_profile = machine.network.bus, network.bus.title, network.bus.has_execution(network)
     if not bus.has_execution(machine.network):
-        if owns_any:
+        if is_in_profile:
             yield Sentence(("No execution time is in its cycle.",))
         return
-    said = f"Execution times are assumed to be as long as on {own.title}; here they are: {bus.starter.base}"
-    none = "" if owns_any else f"; no execution time is in the cycle of {own.title} as this profile sets it"
-    yield Sentence((f"{said}{none}.",))
+    assumed = f"Execution times are assumed to be as long as on {title}; here they are: {bus.starter.base}"
+    none = "" if is_in_profile else f"; no execution time is in the cycle of {title} as this profile sets it"
+    yield Sentence((f"{assumed}{none}.",))
 
 
 _COLUMNS: Final = (
@@ -297,12 +286,12 @@ def _best(comparison: KindComparison) -> Iterator[Sentence]:
     ranked = [machine for machine in comparison.compared if not machine.assumed_host]
     shortest = [(machine.smallest.us, machine) for machine in ranked if machine.smallest.us is not None]
     if shortest:
-        us, machine = min(shortest, key=lambda each: each[0])
+        us, machine = min(shortest, key=lambda pair: pair[0])
         value = ShownValue(us, "smallest_period_us", "us", 3)
         yield sentence(f"The smallest period is {{}} on {machine.network.bus.title}.", value)
     most = [(machine.safe.axes, machine) for machine in ranked if machine.safe.axes]
     if most:
-        axes, machine = max(most, key=lambda each: each[0])
+        axes, machine = max(most, key=lambda pair: pair[0])
         yield sentence(
             f"The most axes at {{}} are {{}} on {machine.network.bus.title}.",
             period_value(comparison.profile.cycle.period_us),

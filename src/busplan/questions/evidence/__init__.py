@@ -156,14 +156,14 @@ def sections_of(bus: Bus, data: str, *, progress: Progress | None = None) -> Ite
 def _rows(table: _Table) -> Iterator[Row]:
     """Each row by each of its methods."""
     for content in table.rows:
-        own = {key: value for key, value in content.items() if key != "methods"}
+        shared = {key: value for key, value in content.items() if key != "methods"}
         for method in content.get("methods", table.methods):
             with _placed(f"row {content.get('quantity')!r}"):
-                yield _checked(Row, _joined(table.model_extra or {}, own, method))
+                yield _checked(Row, _joined(table.model_extra or {}, shared, method))
 
 
 def _joined(*parts: Mapping[str, Any]) -> dict[str, Any]:
-    """All keys, a later part's before an earlier one's; `set` and `given` key by key."""
+    """All keys, each from the last part that has it; `set` and `given` are joined key by key."""
     joined: dict[str, Any] = {}
     for part in parts:
         for key, value in part.items():
@@ -231,7 +231,7 @@ class _Case:
         elif source == "circle":
             value = getattr(self._circle, key, None)
         elif source:
-            transactions = {f"latency.{each.name}": each.phases for each in self._cycle.latencies()}
+            transactions = {f"latency.{latency.name}": latency.phases for latency in self._cycle.latencies()}
             value = transactions.get(source, {}).get(key)
         else:
             value = self._figures.values().get(name)
@@ -249,7 +249,7 @@ class _Case:
 
 def _comparison(title: str, row: Row, case: Callable[[Row], _Case]) -> Comparison:
     with _placed(f"row {row.quantity!r}"):
-        own, divisor = case(row), row.share_of
+        computed, divisor = case(row), row.share_of
         if row.divided_by is not None:
             below = _checked(Row, _joined(row.model_dump(exclude={"divided_by"}), row.divided_by))
             divisor = divisor * case(below).sum_of(below)
@@ -258,10 +258,10 @@ def _comparison(title: str, row: Row, case: Callable[[Row], _Case]) -> Compariso
             row.quantity,
             row.unit,
             None if row.published is None else _divided(row.published, row.share_of),
-            row.method or f"{own.model} model",
-            _divided(own.sum_of(row), divisor),
+            row.method or f"{computed.model} model",
+            _divided(computed.sum_of(row), divisor),
             row.grade,
-            None if row.doubt is None else _divided(own.uncertainty(row.doubt), divisor),
+            None if row.doubt is None else _divided(computed.uncertainty(row.doubt), divisor),
         )
 
 
@@ -347,7 +347,7 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
     if kind not in (None, *kind_names()):
         raise BusplanError(f"{kind}: no such kind of bus; there are {', '.join(kind_names())}")
 
-    def known(name: str, *only: str) -> KindEvidence:
+    def of_kind(name: str, *only: str) -> KindEvidence:
         bus = kind_named(name)
         sections = (
             section for data in only or bus.evidence_data for section in sections_of(bus, data, progress=progress)
@@ -355,5 +355,5 @@ def evidence(kind: str | None = None, *, paper: bool = False, progress: Progress
         return KindEvidence(name, bus.title, parts_tested(bus.evidence_data), tuple(sections))
 
     if paper:
-        return EvidenceAnswer((known(*_PAPER),), paper=True)
-    return EvidenceAnswer(tuple(map(known, kind_names() if kind is None else (kind,))))
+        return EvidenceAnswer((of_kind(*_PAPER),), paper=True)
+    return EvidenceAnswer(tuple(map(of_kind, kind_names() if kind is None else (kind,))))

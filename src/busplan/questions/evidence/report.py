@@ -29,7 +29,7 @@ _RESIDUAL_DECIMALS: Final = 4
 
 
 def evidence_report(kinds: Sequence[KindEvidence], *, paper: bool = False) -> Report:
-    """Report of `evidence`: kind by kind, and which have none. That of `paper` is the tables of its one kind.
+    """Report of `evidence`, kind by kind; the report of `paper` is the tables of its one kind.
 
     Parameters
     ----------
@@ -38,17 +38,18 @@ def evidence_report(kinds: Sequence[KindEvidence], *, paper: bool = False) -> Re
     paper
         Whether it is the report of `paper`.
     """
+    records = _records(kinds, paper=paper)
     title = "Published figures beside" if paper else "What others have published or measured, beside"
     return Report(
         Sentence((f"{title} computed {'ones' if paper else 'figures'}",)),
         tuple(_blocks(kinds, paper=paper)),
-        _document(kinds, paper=paper),
-        _records(kinds, paper=paper),
+        _document(kinds, records, paper=paper),
+        records,
     )
 
 
 def _records(kinds: Sequence[KindEvidence], *, paper: bool) -> list[Record]:
-    """One row for each figure and method; beside the paper with kind and data file in front."""
+    """One row for each figure and method; rows of `evidence` begin with kind and data file."""
     return [
         {
             **({} if paper else {"kind": kind.kind, "data": section.data}),
@@ -62,8 +63,8 @@ def _records(kinds: Sequence[KindEvidence], *, paper: bool) -> list[Record]:
     ]
 
 
-def _document(kinds: Sequence[KindEvidence], *, paper: bool) -> JsonDocument:
-    known: JsonDocument = {
+def _document(kinds: Sequence[KindEvidence], records: list[Record], *, paper: bool) -> JsonDocument:
+    parts: JsonDocument = {
         "kinds": [kind.kind for kind in kinds],
         "without": [kind.kind for kind in kinds if not kind.sections],
         "set_by": [{"kind": kind.kind, **part} for kind in kinds for part in parts_by(kind.tested.set_by)],
@@ -72,9 +73,9 @@ def _document(kinds: Sequence[KindEvidence], *, paper: bool) -> JsonDocument:
     }
     return document(
         "paper" if paper else "evidence",
-        **({} if paper else known),
+        **({} if paper else parts),
         notes={section.title: section.note for kind in kinds for section in kind.sections},
-        figures=_records(kinds, paper=paper),
+        figures=records,
     )
 
 
@@ -93,12 +94,10 @@ def _table(comparisons: Sequence[Comparison]) -> Table:
     for comparison in comparisons:
         rows.setdefault(comparison.quantity, {})[comparison.method] = comparison
     columns = (
-        *(
-            TableColumn("figure", kind="words", wraps=True),
-            TableColumn("unit", kind="words"),
-            TableColumn("published"),
-            TableColumn("grade", kind="words"),
-        ),
+        TableColumn("figure", kind="words", wraps=True),
+        TableColumn("unit", kind="words"),
+        TableColumn("published"),
+        TableColumn("grade", kind="words"),
         *(
             column
             for method in methods
