@@ -92,7 +92,9 @@ def converted(profile: Profile, kind: str) -> Conversion:
             # Whoever measured it did so on the other bus.
             nodes["execution"]["grade"] = "assumed"
     raised, empty = _with_payloads(machine)
-    new_profile = profile_of(_merged(machine, new))
+    # Where both have a key, its value is that of the new bus.
+    merged = {**machine, **{name: {**machine.get(name, {}), **table} for name, table in new.items()}}
+    new_profile = profile_of(merged)
     given = [*raised, *(AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}")]
     return Conversion(new_profile, (*given, *_defaults(new_profile)), (*left_out, *empty))
 
@@ -151,13 +153,13 @@ def _common(data: TomlTable) -> tuple[TomlTable, tuple[str, ...]]:
     common = _part(data, [Profile], "", rest)
     nodes = data["bus"].get(_NODES)
     common["bus"] = {} if nodes is None else {_NODES: nodes}
-    said = {f"bus.{key}" for key in (_NODES, _SHOWN_FIRST)}
-    return common, tuple(key for key in rest if key not in said)
+    kept = {f"bus.{key}" for key in (_NODES, _SHOWN_FIRST)}
+    return common, tuple(key for key in rest if key not in kept)
 
 
 def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: str, rest: list[str]) -> TomlTable:
     """The keys of a table that any of the models has; the others are added to the rest."""
-    known: TomlTable = {}
+    kept: TomlTable = {}
     for name, value in table.items():
         fields = [model.model_fields[name] for model in models if name in model.model_fields]
         inner = [model for field in fields for model in models_of(field.annotation)]
@@ -165,27 +167,22 @@ def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: s
         if not fields:
             rest.append(f"{prefix}{name}")
         elif isinstance(value, Mapping):
-            known[name] = _part(value, inner, f"{prefix}{name}.", rest)
+            kept[name] = _part(value, inner, f"{prefix}{name}.", rest)
         elif tables is not None:
-            known[name] = [
+            kept[name] = [
                 _part(named_table, inner, f"{prefix}{name}.{table_name}.", rest)
                 for table_name, named_table in tables.items()
             ]
         else:
-            known[name] = value
-    return known
-
-
-def _merged(machine: TomlTable, new: TomlTable) -> TomlTable:
-    """Merge two profiles section by section; the value of a key of both is that of the new bus."""
-    return {**machine, **{name: {**machine.get(name, {}), **section} for name, section in new.items()}}
+            kept[name] = value
+    return kept
 
 
 def _defaults(profile: Profile) -> Iterator[AssumedKey]:
     """Keys that only the kind of a profile has, and that the profile leaves to their defaults."""
-    _, own = _common(profile.model_dump())
+    _, names = _common(profile.model_dump())
     for key, entry in dotted_keys(profile).items():
-        is_own = any(key == name or key.startswith(f"{name}.") for name in own)
+        is_own = any(key == name or key.startswith(f"{name}.") for name in names)
         # Keys without a value and empty arrays are left out.
         if is_own and entry.source == "default" and entry.value is not None and entry.value != ():
             yield AssumedKey(key, entry.value, "default")

@@ -265,16 +265,16 @@ class Document:
 
     @cached_property
     def grades(self) -> dict[str, Grade]:
-        """Grades that comments give values, by dotted key: that of a table is for all its keys."""
+        """Grades in comments, by dotted key; the grade of a table is for all its keys."""
         from busplan.profile.kinds import named_path  # loads pydantic
 
         grades: dict[str, Grade] = {}
-        known: dict[int, Any] = {}
+        names: dict[int, Any] = {}
         for path in self.places:
             offset = self.comments_beside.get(path, self.comments_beside.get(path[:-1]))
             match = None if offset is None else GRADING.match(self.text, offset)
             if match is not None:
-                grades[".".join(map(str, named_path(self.data(), path, known)))] = cast("Grade", match[1])
+                grades[".".join(map(str, named_path(self.data(), path, names)))] = cast("Grade", match[1])
         return grades
 
     def nearest(self, path: "KeyPath") -> "KeyPath":
@@ -321,8 +321,9 @@ class Document:
 
     @cached_property
     def _data(self) -> TomlTable:
-        long_key = self._long_key()
-        if long_key:
+        # A key is on one line, so count dots first: that is much faster than the search.
+        may_be_long = any(line.count(".") >= _MAX_KEY_PARTS for line in self.text.split("\n"))
+        if may_be_long and (long_key := re.search(_LONG_KEY, self.text)):
             raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
         # Lines end in LF here: what is left of CR CR LF is no line end, and tomllib would take it for one.
         if "\r\n" in self.text:
@@ -334,12 +335,6 @@ class Document:
             raise self.syntax_error(_first_deep_bracket(self.text), message) from None
         except ValueError as error:
             raise self._refusal(error) from None
-
-    def _long_key(self) -> re.Match[str] | None:
-        # A key is on one line, so count dots first: that is much faster than the search.
-        if all(line.count(".") < _MAX_KEY_PARTS for line in self.text.split("\n")):
-            return None
-        return re.search(_LONG_KEY, self.text)
 
     def _refusal(self, error: ValueError) -> PlacedError:
         match = re.match(_TOMLLIB_MESSAGE, str(error))

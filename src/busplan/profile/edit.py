@@ -122,10 +122,10 @@ def _graded(text: str, profile: Profile) -> str:
     if not has_comment_grades(profile):
         return text
     document = Document("", text)
-    known: dict[int, Any] = {}
+    names: dict[int, Any] = {}
     lines = text.split("\n")
     for path, place in document.places.items():
-        grade = comment_grade(profile, ".".join(map(str, named_path(document.data(), path, known))))
+        grade = comment_grade(profile, ".".join(map(str, named_path(document.data(), path, names))))
         # A string of several lines has no room beside its key, and is no value that has a grade.
         if grade is not None and place.value_start > place.key_end and not text.startswith('"""', place.value_start):
             lines[document.lines.line_and_column(place.key_start)[0] - 1] += f"  # {grade}"
@@ -222,8 +222,8 @@ def _git(argument: str, folder: Path, *command: str, names: str = "") -> bytes:
         raise BusplanError(f"{argument}: git cannot be run: {error.strerror}") from None
     # A warning means that git may have chosen another revision: an ambiguous name, or a reflog that is too short.
     if done.returncode or done.stderr:
-        said = printable(" ".join(done.stderr.decode(errors="backslashreplace").split()))
-        raise BusplanError(f"{argument}: no file of that name; of REV:path git says: {said or 'nothing'}")
+        message = printable(" ".join(done.stderr.decode(errors="backslashreplace").split()))
+        raise BusplanError(f"{argument}: no file of that name; of REV:path git says: {message or 'nothing'}")
     return done.stdout
 
 
@@ -293,7 +293,10 @@ def edited_file(
             table.pop(last, None)
         else:
             table[last] = value
-    _require_profile(name, data)
+    try:
+        validate(Document(name, tomli_w.dumps(data)))
+    except PlacedError as error:
+        raise BusplanError(*(f"{name}: with the changes, {problem.message}" for problem in error.placed)) from None
     after = _texts(data)
     # Set keys before removing keys: new lines must not follow the comment of a removed line.
     changed = {key: after.get(key) for key in {**after, **before} if after.get(key) != before.get(key)}
@@ -339,13 +342,6 @@ def _reads_to(text: str, wanted: dict[str, str]) -> bool:
         return _texts(tomllib.loads(text)) == wanted
     except tomllib.TOMLDecodeError:
         return False
-
-
-def _require_profile(name: str, data: dict[str, Any]) -> None:
-    try:
-        validate(Document(name, tomli_w.dumps(data)))
-    except PlacedError as error:
-        raise BusplanError(*(f"{name}: with the changes, {problem.message}" for problem in error.placed)) from None
 
 
 def _encoded(text: str, *, like: bytes) -> bytes:
@@ -423,9 +419,9 @@ def _with_line(document: Document, path: KeyPath, value: str) -> str:
         if any(isinstance(part, int) for part in table):
             raise _LayoutError("there is no section of a group to write to")
         return f"{_whole_lines(text)}\n[{'.'.join(map(str, table))}]\n{line}"
-    own = [place for key, place in document.places.items() if key[:-1] == table and place.value_start > place.key_end]
+    lines = [place for key, place in document.places.items() if key[:-1] == table and place.value_start > place.key_end]
     header = [_header(document, table)] if table else []  # every profile has keys above its sections
-    last = max(header + own, key=lambda place: place.value_end)
+    last = max(header + lines, key=lambda place: place.value_end)
     start, end = _line_start(text, last.key_start), _line_end(text, last.value_end)
     return f"{_whole_lines(text[:end])}{_indent(text, start)}{line}{text[end:]}"
 

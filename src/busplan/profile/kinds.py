@@ -63,9 +63,9 @@ def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
     >>> keys["bus.nodes"], keys["servo.y.drive_lag_us"].source
     (KeyValue(value=2, source='file'), 'default')
     """
-    said = dict(flat(profile.model_dump(exclude_unset=True)))
+    in_file = dict(flat(profile.model_dump(exclude_unset=True)))
     whole = profile.model_dump(exclude=None if profile.has_cycle else {"cycle"})
-    return {key: KeyValue(value, "file" if key in said else "default") for key, value in flat(whole)}
+    return {key: KeyValue(value, "file" if key in in_file else "default") for key, value in flat(whole)}
 
 
 def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
@@ -189,8 +189,8 @@ def holder(data: dict[str, Any], key: str, *, name: str | None = None) -> tuple[
     if not isinstance(table, dict):
         tables = named_tables(table)
         why = f"{sections[-1]} is a value, not a section"
-        known = f"give the name of one, as {sections[-1]}.{next(iter(tables))}.{last}" if tables else why
-        raise BusplanError(f"{name or key}: no such key; {known}")
+        hint = f"give the name of one, as {sections[-1]}.{next(iter(tables))}.{last}" if tables else why
+        raise BusplanError(f"{name or key}: no such key; {hint}")
     return table, last
 
 
@@ -344,8 +344,8 @@ def profile_schema() -> dict[str, Any]:
     chosen = [
         {"if": _has_kind({"const": kind}), "then": references[model, "validation"]} for kind, model in kinds.items()
     ]
-    known = _has_kind({"description": "Kind of bus", "enum": list(kinds)}, description="The bus")
-    return {"$schema": _DIALECT, "type": "object", **known, "allOf": chosen, **definitions}
+    any_kind = _has_kind({"description": "Kind of bus", "enum": list(kinds)}, description="The bus")
+    return {"$schema": _DIALECT, "type": "object", **any_kind, "allOf": chosen, **definitions}
 
 
 def _has_kind(allowed: dict[str, Any], **more: str) -> dict[str, Any]:

@@ -80,7 +80,10 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
     >>> parse_measurements(b"payload_bytes,latency_us\n4,48.7\n", name="bench.csv")[0].latency_us
     48.7
     """
-    rows = list(_rows(_decoded(content, name=name)))
+    if len(content) > MAX_MEASUREMENTS_BYTES:
+        message = f"the file is larger than {MAX_MEASUREMENTS_BYTES:,} bytes; give fewer repetitions"
+        raise PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
+    rows = list(_rows(text_of(content, name=name, wanted="save it as CSV in UTF-8")))
     if not rows:
         raise PlacedError(name, (PlacedProblem(1, 1, "missing-key", f"no header; {_EXPECTED}"),))
     line, header = rows[0]
@@ -122,13 +125,6 @@ def measurements_below(
     return measurements
 
 
-def _decoded(content: bytes, *, name: str) -> str:
-    if len(content) > MAX_MEASUREMENTS_BYTES:
-        message = f"the file is larger than {MAX_MEASUREMENTS_BYTES:,} bytes; give fewer repetitions"
-        raise PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
-    return text_of(content, name=name, wanted="save it as CSV in UTF-8")
-
-
 def _rows(text: str) -> Iterator[tuple[int, list[MeasuredCell]]]:
     """Lines with values, and their numbers."""
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
@@ -168,12 +164,10 @@ def _header_problems(line: int, header: Sequence[MeasuredCell]) -> Iterator[Plac
             yield problem(cell, f"column {_shown(cell.text)}: {_meant(cell.text)}")
     for name in REQUIRED_COLUMNS:
         # A column with another name or unit has its own message already.
-        if name not in names and not any(_is_about(column, name) for column in names if column not in _COLUMNS):
+        if name not in names and not any(
+            column.strip().lower().startswith(name.partition("_")[0]) for column in names if column not in _COLUMNS
+        ):
             yield problem(header[0], f"column {name} is missing; {_EXPECTED}", "missing-key")
-
-
-def _is_about(written: str, name: str) -> bool:
-    return written.strip().lower().startswith(name.partition("_")[0])
 
 
 def _meant(written: str) -> str:
@@ -184,11 +178,11 @@ def _meant(written: str) -> str:
         name = next(column for column in _COLUMNS if column.startswith(quantity))
         unit = match["unit"].strip(" _-.,()[]/")
         units = _SIZES if quantity == "payload" else _TIMES
-        own = name.rpartition("_")[2]
+        right_unit = name.rpartition("_")[2]
         if units.get(unit):
-            return f"its unit looks like {unit}; give {own} in a column {name} ({units[unit]})"
-        if unit in units or unit == own:
-            return f"call it {name} if it is in {own}"
+            return f"its unit looks like {unit}; give {right_unit} in a column {name} ({units[unit]})"
+        if unit in units or unit == right_unit:
+            return f"call it {name} if it is in {right_unit}"
     close = get_close_matches(written.lower(), _COLUMNS, n=1)
     return f"unknown; did you mean {close[0]}?" if close else f"unknown; {_EXPECTED}"
 
@@ -300,11 +294,11 @@ def _given_rows(given: object, name: str) -> tuple[list[Any], list[tuple[Any, ..
                 )
         return columns, [tuple(row[column] for column in columns) for row in rows]
     values = [tuple(_plain(row)) if isinstance(_plain(row), list | tuple) else () for row in rows]
-    known = (*REQUIRED_COLUMNS, *OPTIONAL_COLUMNS)
+    columns = [*REQUIRED_COLUMNS, *OPTIONAL_COLUMNS]
     size = len(values[0])
-    if not len(REQUIRED_COLUMNS) <= size <= len(known):
+    if not len(REQUIRED_COLUMNS) <= size <= len(columns):
         raise BusplanError(f"{name}: {_EXPECTED_TABLE}")
-    return list(known[:size]), values
+    return columns[:size], values
 
 
 def _given_cells(values: Iterable[object]) -> list[MeasuredCell]:

@@ -82,28 +82,29 @@ def findings(error: ValidationError | None, data: dict[str, Any]) -> Iterator[Ke
         One for each problem, in pydantic's order.
     """
     of_keys = () if error is None else (*_validated(error, data), *_of_nodes(data))
-    known: dict[int, Any] = {}
+    names: dict[int, Any] = {}
     for finding in dict.fromkeys((*of_keys, *_unknown_kind(data))):
-        yield finding._replace(named=named_path(data, finding.path, known))
+        yield finding._replace(named=named_path(data, finding.path, names))
 
 
 def _of_nodes(data: dict[str, Any]) -> Iterator[KeyFinding]:
     """Problems of how a profile says its nodes: the model looks for them only where there are no others."""
     bus, model = data.get("bus"), profile_model(kind_of(data))
-    said = {name for name in data if name in model.model_fields}
+    present = {name for name in data if name in model.model_fields}
     if not isinstance(bus, dict) or "nodes" in bus or kind_of(data) is None:
-        said.add("bus.nodes")  # or nobody can tell
-    for problem in model.nodes_problems(said):
+        present.add("bus.nodes")  # or nobody can tell
+    for problem in model.nodes_problems(present):
         if problem.key != "bus.nodes" or (isinstance(bus, dict) and kind_of(data) is not None):
             yield _of_problem(problem, (), model)
 
 
 def _of_problem(problem: Problem, path: KeyPath, model: type[BaseModel]) -> KeyFinding:
     """Finding of a problem that a validator of ours reports at a path."""
-    own = (*path, *_parsed(problem.key)) if problem.key else path
+    if problem.key:
+        path = (*path, *(int(part) if part.isdigit() else part for part in problem.key.split(".")))
     if problem.message != MISSING:
-        return KeyFinding(own, problem.message, problem.kind, shows_value=problem.kind != "missing-key")
-    return KeyFinding(own, _missing(*_path(own, model)), problem.kind, shows_value=False)
+        return KeyFinding(path, problem.message, problem.kind, shows_value=problem.kind != "missing-key")
+    return KeyFinding(path, _missing(*_path(path, model)), problem.kind, shows_value=False)
 
 
 def _validated(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFinding]:
@@ -167,10 +168,6 @@ def _tags(path: KeyPath, section: type[BaseModel]) -> list[str]:
     ]
 
 
-def _parsed(key: str) -> KeyPath:
-    return tuple(int(part) if part.isdigit() else part for part in key.split("."))
-
-
 def _expected(details: ErrorDetails) -> str:
     """Message for an error of one value."""
     kind, context = details["type"], details.get("ctx", {})
@@ -214,11 +211,11 @@ def _unknown(path: KeyPath, section: type[BaseModel]) -> str:
     instead = getattr(section, "removed", {}).get(path[-1])
     if instead is not None:
         return f"removed key: {instead}"
-    known = list(section.model_fields)
-    close = get_close_matches(str(path[-1]), known, n=1)
+    names = list(section.model_fields)
+    close = get_close_matches(str(path[-1]), names, n=1)
     if close:
         return f"unknown key; did you mean {close[0]}?"
-    return f"unknown key; known here: {', '.join(known)}"
+    return f"unknown key; known here: {', '.join(names)}"
 
 
 def refusal(error: ValidationError | None, data: dict[str, Any], document: Document) -> PlacedError:

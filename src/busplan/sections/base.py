@@ -130,18 +130,16 @@ def value_at(section: Section, key: str) -> Any:
 
 _KEPT: Final = 8
 """Most tuples of tables whose names are kept."""
-_known: Final[dict[int, tuple[tuple[Any, ...], dict[str, Any]]]] = {}
+_named: Final[dict[int, tuple[tuple[Any, ...], dict[str, Any]]]] = {}
 """Tables of a tuple by name, with the tuple, which so keeps its identity: there may be thousands to look up in."""
 
 
 def _by_name(tables: tuple[Any, ...]) -> dict[str, Any]:
-    known = _known.get(id(tables))
-    if known is None:
-        if len(_known) >= _KEPT:
-            _known.clear()
-        by_name = {table.name: table for table in reversed(tables) if hasattr(table, "name")}
-        known = _known[id(tables)] = tables, by_name
-    return known[1]
+    if id(tables) not in _named:
+        if len(_named) >= _KEPT:
+            _named.clear()
+        _named[id(tables)] = tables, {table.name: table for table in reversed(tables) if hasattr(table, "name")}
+    return _named[id(tables)][1]
 
 
 TransactionKind = Literal["read", "write"]

@@ -183,8 +183,8 @@ class ServoSection(AxisKeys):
 
     def axis_keys(self, axis: Literal["x", "y"]) -> dict[str, Any]:
         """Keys of an axis by name, its own before those of both."""
-        own: AxisOverride = getattr(self, axis)
-        return self.model_dump(include=set(AxisKeys.model_fields)) | own.model_dump(exclude_none=True)
+        override: AxisOverride = getattr(self, axis)
+        return self.model_dump(include=set(AxisKeys.model_fields)) | override.model_dump(exclude_none=True)
 
     def grade_of(self, key: str) -> ServoGrade:
         """Grade of the value of a key.
@@ -194,8 +194,8 @@ class ServoSection(AxisKeys):
         key
             Its name in [servo], [servo.x] and [servo.y].
         """
-        own: ServoGrade | None = getattr(self.grades, key, None)
-        return own or self.grade
+        grade: ServoGrade | None = getattr(self.grades, key, None)
+        return grade or self.grade
 
     @property
     def grades_given(self) -> tuple[ServoGrade, ...]:

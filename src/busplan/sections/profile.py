@@ -98,7 +98,7 @@ class Profile(Section):
 
     @property
     def has_cycle(self) -> bool:
-        """Whether it has nodes, and so a cycle; a kind of bus may have networks without."""
+        """Whether the network has nodes, and so a cycle."""
         return True
 
     @classmethod
@@ -112,15 +112,15 @@ class Profile(Section):
         """
         for key in OF_ALIKE_NODES:
             if "group" in said and key in said:
-                own = ", as group.NAME.nodes" if key == "bus.nodes" else ""
-                yield Problem(f"each [[group]] has its own{own}; remove one of the two", key=key, kind="inconsistent")
+                where = ", as group.NAME.nodes" if key == "bus.nodes" else ""
+                yield Problem(f"each [[group]] has its own{where}; remove one of the two", key=key, kind="inconsistent")
             elif "group" not in said and key not in said:
                 yield Problem(MISSING, key=key, kind="missing-key")
 
     @model_validator(mode="after")
     def _nodes_are_said_once(self) -> Self:
-        said = {name for name in self.model_fields_set if getattr(self, name) not in (None, ())}
-        problems = list(self.nodes_problems(said | ({"bus.nodes"} if self.bus.nodes is not None else set())))
+        present = {name for name in self.model_fields_set if getattr(self, name) not in (None, ())}
+        problems = list(self.nodes_problems(present | ({"bus.nodes"} if self.bus.nodes is not None else set())))
         names = [group.name for group in self.group]
         problems += (
             Problem("there is a group of this name", key=f"group.{place}.name", kind="inconsistent")
@@ -136,13 +136,13 @@ class Profile(Section):
         unknown = [
             Problem(
                 f"{sum_}is outside the execution table, {execution.range_bytes}: measure it and add it to "
-                f'{alike.node_key("execution")}, or use kind = "linear"',
+                f'{nodes.node_key("execution")}, or use kind = "linear"',
                 key=key,
                 kind="execution-unknown",
             )
-            for place, alike in enumerate(self.alike_nodes)
-            if isinstance(execution := alike.node.execution, TableExecution)
-            for key, size, sum_ in _payloads(alike, place)
+            for place, nodes in enumerate(self.alike_nodes)
+            if isinstance(execution := nodes.node.execution, TableExecution)
+            for key, size, sum_ in _payloads(nodes, place)
             if not execution.covers(size)
         ]
         if unknown:
@@ -150,9 +150,9 @@ class Profile(Section):
         return self
 
 
-def _payloads(alike: AlikeNodes, place: int) -> Iterator[tuple[str, int, str]]:
+def _payloads(nodes: AlikeNodes, place: int) -> Iterator[tuple[str, int, str]]:
     """Key of each payload, its bytes, and a word on how they add up where the key does not hold all of them."""
-    section = f"group.{place}" if alike.name else "payload"
+    section = f"group.{place}" if nodes.name else "payload"
     for kind in TRANSACTION_KINDS:
-        key, size = alike.payload.key_of(kind), int(alike.bytes_of(kind))
+        key, size = nodes.payload.key_of(kind), int(nodes.bytes_of(kind))
         yield f"{section}.{key}", size, (f"makes {size} bytes, which " if key.endswith("_per_axis") else "")
