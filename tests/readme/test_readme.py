@@ -87,7 +87,7 @@ def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> No
 
 def test_there_are_blocks_to_check() -> None:
     commands = {command.split()[1] for command, _ in shown_runs()}
-    assert commands >= {"capacity", "latency", "circle-test", "paper", "profiles", "init", "rule"}
+    assert commands >= {"capacity", "latency", "circle-test", "explain", "paper", "plan", "sweep", "init", "rule"}
 
 
 def sections(annotation: Any) -> list[type[BaseModel]]:
@@ -241,13 +241,13 @@ DOCUMENTS = {
     "check": "paper-optimal-gap nowhere.toml --no-circle",
     "rule": "BP101",
     "diff": "paper-1ms paper-optimal-gap",
-    "plan": "paper-1ms --axes 400 --no-circle",
+    "plan": "paper-1ms --axes 400",
     "sweep": "paper-4ms --vary bus.nodes=1:2 --circle --jobs 1",
     "calibrate": "paper-two-node table-1.csv",
     "measured": f"ethercat-servo-8 {ROOT}/tests/questions/measured/files/capture.pcapng --quantile 0.9",
     "timeline": "paper-4ms",
     "map": "paper-4ms --x axes=4,6",
-    "compare": "paper-4ms --circle",
+    "compare": "paper-4ms",
     "evidence": "ieee1394",
     "paper": "",
     "profiles": "",
