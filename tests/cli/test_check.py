@@ -19,7 +19,7 @@ CLEAN = (ROOT / "tests/gate/examples/BP001/valid.toml").read_text(encoding="utf-
 WARNS = CLEAN.replace('"optimal"', "63")
 FAILS = CLEAN.replace("period_us = 4000", "period_us = 300")
 BROKEN = CLEAN.replace("nodes = 2", "nodes = ")
-FORMATS = ("concise", "full", "text", "json", "github", "gitlab", "junit", "sarif", "markdown")
+FORMATS = ("concise", "full", "json", "github", "gitlab", "junit", "sarif", "markdown")
 
 Run = subprocess.CompletedProcess[str]
 Busplan = Callable[..., Run]
@@ -153,7 +153,7 @@ def test_the_environment_sets_the_default_format(busplan: Busplan, folder: Path)
         return busplan(*arguments, cwd=folder, variables={"BUSPLAN_FORMAT": form})
 
     assert json.loads(call("check", "p", form="json").stdout)["command"] == "check"
-    text = call("check", "p", "--format", "text", form="json").stdout
+    text = call("check", "p", "--format", "concise", form="json").stdout
     assert text == busplan("check", "p", cwd=folder).stdout == call("check", "p", form="").stdout
     run = call("check", "p", form="yaml")
     assert (run.returncode, run.stdout) == (2, "")

@@ -22,7 +22,7 @@ PROFILE, OTHER, FAULTY, FAILING, MEASURED = (
     f"{EVIL}.csv",
 )
 SHIPPED = Path(__file__).parents[2] / "profiles"
-GATE_FORMATS = ("text", "full", "json", "github", "gitlab", "junit", "sarif")
+GATE_FORMATS = ("concise", "full", "json", "github", "gitlab", "junit", "sarif")
 
 
 @pytest.fixture(scope="module")

@@ -91,10 +91,8 @@ def mixed() -> CheckReport:
 
 
 def test_a_format_loads_alone() -> None:
-    # The old name of concise is the one name too many.
-    assert FORMATS["text"] == FORMATS["concise"]
-    assert len({one.write for one in FORMATS.values()}) == len(FORMATS) - 1 == 8
-    assert [name for name, one in FORMATS.items() if one.reader == "people"] == ["concise", "full", "text"]
+    assert len({one.write for one in FORMATS.values()}) == len(FORMATS) == 8
+    assert [name for name, one in FORMATS.items() if one.reader == "people"] == ["concise", "full"]
     # Each in a process of its own, which has loaded what none of them goes without.
     code = (
         "import os, sys; from busplan.gate.formats import FORMATS\n"
@@ -191,14 +189,14 @@ def test_no_name_breaks_a_format(format_: str) -> None:
         assert not re.search(r"[\x7f-\x9f\u2028]", written)
     if format_ == "junit":
         ET.fromstring(written)
-    if format_ in ("concise", "text", "github"):
+    if format_ in ("concise", "github"):
         assert len(written.splitlines()) == 2 * len(HOSTILE)
 
 
 @pytest.mark.parametrize("format_", FORMATS)
 def test_nothing_at_all_is_still_a_document(format_: str) -> None:
     text = render(report(), file_format=format_)
-    assert (text == "") == (format_ in ("concise", "text", "full", "github"))
+    assert (text == "") == (format_ in ("concise", "full", "github"))
 
 
 # concise and full

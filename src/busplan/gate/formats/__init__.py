@@ -27,7 +27,6 @@ class GateFormat(NamedTuple):
 FORMATS: Final[dict[str, GateFormat]] = {
     "concise": GateFormat("text", "concise", "people"),
     "full": GateFormat("text", "full", "people"),
-    "text": GateFormat("text", "concise", "people"),
     "json": GateFormat("documents", "json", "programs"),
     "github": GateFormat("builds", "github", "builds", repeats=True),
     "gitlab": GateFormat("documents", "gitlab", "builds"),
