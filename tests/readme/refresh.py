@@ -1,4 +1,4 @@
-"""Write what the program prints today into the README and the manual: output blocks, tables, the example profile.
+"""Write what the program prints today into the README and the manual: output blocks, tables, example profile, picture.
 
     python tests/readme/refresh.py
 
@@ -58,3 +58,4 @@ if __name__ == "__main__":
     tests = checks()
     for path, page in tests.PAGES.items():
         path.write_text(refreshed(page, tests), encoding="utf-8")
+    output_of(f"busplan map gantry-24 -o {tests.FOLDER / 'gantry-24.svg'}")
