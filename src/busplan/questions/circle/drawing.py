@@ -406,15 +406,15 @@ def _curve(curve: Stretch, up: Ruler, row: CircleRow, *, per_um: float) -> Curve
 
 
 def _ranking(row: CircleRow, rows: Sequence[CircleRow], scales: Scales) -> Panel | None:
-    """What each error source takes from the largest error, largest first.
+    """Part of the largest error that each source takes, the largest part first.
 
     Periods whose table followed the circle share a scale; the others share a second.
     """
     if not row.result.contributions:
         return None
     unit = scales.unit
-    alike = [drawn for drawn in rows if drawn.run.diverged == row.run.diverged]
-    taken = [source.removed_mm * 1e3 * unit.per_um for drawn in alike for source in drawn.result.contributions or ()]
+    on_scale = [drawn for drawn in rows if drawn.run.diverged == row.run.diverged]
+    taken = [source.removed_mm * 1e3 * unit.per_um for drawn in on_scale for source in drawn.result.contributions or ()]
     lanes = []
     for source in row.result.contributions:
         value = source.removed_mm * 1e3 * unit.per_um

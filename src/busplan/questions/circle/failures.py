@@ -209,7 +209,7 @@ class Failure(NamedTuple):
 
     @property
     def is_of_bus(self) -> bool:
-        """Whether the bus fails, and not the circle."""
+        """Whether a limit of the bus fails, not the circle."""
         return bool(self.said) or self.name in _OF_TIME
 
     def document(self) -> dict[str, Any]:
@@ -227,8 +227,8 @@ class Failure(NamedTuple):
         if self.said:
             yield self.said
             return
-        known = _WITHOUT_TURN if self.name == CONTOUR_MEASURES[-1] and self.value is None else self.name
-        saying, value, limit = _FAILURES[known], self.value or 0.0, self.limit or 0.0
+        key = _WITHOUT_TURN if self.name == CONTOUR_MEASURES[-1] and self.value is None else self.name
+        saying, value, limit = _FAILURES[key], self.value or 0.0, self.limit or 0.0
         limit_key = saying.limit_key or self.name
         numbers = {
             "value": Stated(value, saying.key or self.name.removeprefix("min_"), saying.unit, saying.decimals),
@@ -262,7 +262,7 @@ def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
 
     Parameters
     ----------
-    profile
+    network
         The network.
     capacity
         Its figures under the timing model that decides.
