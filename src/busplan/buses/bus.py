@@ -129,7 +129,7 @@ class Bus(ABC):
         return (int(plain(network.nodes)), "node"), (int(plain(network.axes)), "axis")
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - most charge all alike
-        """Say whose way on the wire the times of each node count."""
+        """Say which way on the wire the times of each node include."""
         return "every node alike"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none

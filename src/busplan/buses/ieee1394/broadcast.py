@@ -77,13 +77,13 @@ class Idle(NamedTuple):
     """Idle bus before a request of the host, or after the last request [us]."""
 
     gap_us: Number
-    """The arbitration reset gap."""
+    """Arbitration reset gap."""
     host_us: Number
-    """The host's own time beyond it."""
+    """Host's own time beyond the gap."""
 
     @property
     def us(self) -> Number:
-        """Both."""
+        """Gap and host's time together."""
         return self.gap_us + self.host_us
 
 

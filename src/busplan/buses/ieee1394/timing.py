@@ -284,7 +284,11 @@ def delays(link: Link, *, model: PacketTiming, alone: Number, shared: Delays | N
         The delays over other hops of the bus, where they have been computed: delay of a hop and gaps are the same.
     """
     clock_mbit_s = alike(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
-    hop_us = _hop_us(link, clock_mbit_s) if shared is None else shared.hop_us
+    if shared is None:
+        phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
+        hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")
+    else:
+        hop_us = shared.hop_us
     arbitration_us = equations.arbitration_phase_us(
         link.hops, hop_us=hop_us, gap_count=link.gap_count, gap_clock_mbit_s=clock_mbit_s
     )
@@ -298,11 +302,6 @@ def delays(link: Link, *, model: PacketTiming, alone: Number, shared: Delays | N
         alone,
     )
     return Delays(hop_us, arbitration_us, acknowledge_us, gaps)
-
-
-def _hop_us(link: Link, clock_mbit_s: Number) -> Number:
-    phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
-    return named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")
 
 
 def transaction(
