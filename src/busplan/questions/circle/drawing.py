@@ -43,11 +43,11 @@ TOLERANCE: Final = Entry("tolerance", "tolerance of the largest error", shape="l
 
 
 class LengthUnit(NamedTuple):
-    """Unit that lengths are written in."""
+    """Unit of written lengths."""
 
     name: str
     per_um: float
-    """How many of it are 1 um."""
+    """Number of units in 1 um."""
 
     def text(self, length_um: float) -> str:
         """Write a round length with its unit."""
@@ -135,7 +135,7 @@ class ErrorRange(NamedTuple):
 
     @property
     def largest_um(self) -> float:
-        """Its end that is further from zero, without its sign."""
+        """End further from zero, without its sign."""
         return max(abs(self.bottom_um), abs(self.top_um))
 
     @property
