@@ -70,8 +70,8 @@ def kind_called(word: str, *, option: str = "") -> str:
     if _plain(word) in kinds:
         return kinds[_plain(word)]
     near = did_you_mean(_plain(word), kinds)
-    said = f"{option} {word}".strip()
-    raise BusplanError(f"{said}: no kind of bus; there are {', '.join(kind_names())}{near and f'; {near}'}")
+    argument = f"{option} {word}".strip()
+    raise BusplanError(f"{argument}: no kind of bus; there are {', '.join(kind_names())}{near and f'; {near}'}")
 
 
 def _plain(name: str) -> str:

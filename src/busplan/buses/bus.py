@@ -51,20 +51,20 @@ class Bus(ABC):
     also_called: ClassVar[tuple[str, ...]] = ()
     """Further names that users type; case, spaces and punctuation do not count."""
     timing_models: ClassVar[tuple[TimingModel, ...]]
-    """In the order reports show them."""
+    """Timing models in the order in which reports show them."""
     deciding_model: ClassVar[str]
     """The conservative timing model, which always gives the verdict."""
     figures: ClassVar[BusFigures]
     safety: ClassVar[Safety] = Safety()
     limits: ClassVar[tuple[Limit, ...]]
-    """In the order in which they are reported; at least one grows with the nodes."""
+    """Limits in the order in which they are reported; at least one grows with the nodes."""
     periods: ClassVar[Periods] = ANY_PERIOD
     """Communication periods that it allows; if not all, it has the limit and the rule of `buses.limits`."""
     starter: ClassVar[Starter]
     """Defaults of a new profile."""
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
-    """In the order of the cycle."""
+    """Kinds of event in the order of the cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
     """Stretches that several events make together."""
     rate_keys: ClassVar[tuple[str, ...]] = ()
@@ -129,7 +129,7 @@ class Bus(ABC):
         return (int(plain(network.nodes)), "node"), (int(plain(network.axes)), "axis")
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - most charge all alike
-        """Say whose way on the wire the times of each node count."""
+        """Say which way on the wire the times of each node include."""
         return "every node alike"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none

@@ -24,7 +24,7 @@ class Term(NamedTuple):
     """A part of the cycle. All terms add up to what the cycle needs."""
 
     key: str
-    """Of its figure."""
+    """Key of its figure."""
     us: Number
     rests_on: str = ""
     """Dotted key of the profile that it comes from; empty unless it is a single key."""
@@ -47,12 +47,12 @@ class BusEvent(NamedTuple):
     label: str
     """Name, and who is at work."""
     node: int | None = None
-    """Whose it is where it is laid out, from 1; None for what belongs to all."""
+    """Node number, from 1, where the cycle is laid out; None for an event of the whole bus."""
     transaction: str | None = None
-    """The stretch that it belongs to: the key of an `EventKind`. Where nodes take turns, an event without it is no
-    node's own."""
+    """Stretch that the event belongs to: key of an `EventKind`. Where nodes take turns, an event without it belongs to
+    no node."""
     packet: str | None = None
-    """Which packet of the transaction it belongs to."""
+    """Packet of the transaction that the event belongs to."""
     rests_on: str = ""
     """Dotted key of the profile that it comes from; empty unless it is a single key."""
     rounds: Rounds = ALL
@@ -67,15 +67,15 @@ class Run(NamedTuple):
     times: Number | None = None
     """Rounds [1]; None for a single round."""
     group: int | None = None
-    """Place of the group of nodes that take turns, each with as many rounds; None for what belongs to all."""
+    """Place of the group whose nodes take turns, each with the same number of rounds; None for the whole bus."""
     laid_out: Callable[[Number], Iterable[BusEvent]] | None = None
-    """From the number of a round, from 0, to its events where a timeline shows them finer, or where rounds differ.
+    """Function of the number of a round, from 0, to its events: finer ones for a timeline, or of rounds that differ.
 
-    Over all rounds they add up to `events`. Of rounds that differ, it takes a mean number, too.
+    Over all rounds they add up to `events`. If rounds differ, the number may be a mean, too.
     """
 
     def events_us(self) -> Iterator[tuple[str, Number]]:
-        """Each event that is not off, as its term and what it takes [us]."""
+        """Term and duration of each event that is not off [us]."""
         return ((event.term, event.us) for event in self.events if not is_off(event.us))
 
     def counted_us(self, times: Number) -> Iterator[tuple[str, Number]]:
@@ -194,7 +194,7 @@ class BusCycle(ABC):
         keys: dict[str, set[str]] = {}
         for event in chain.from_iterable(run.events for run in self.runs):
             keys.setdefault(event.term, set()).add(event.rests_on)
-        alone = {term: min(own) for term, own in keys.items() if len(own) == 1}
+        alone = {term: min(causes) for term, causes in keys.items() if len(causes) == 1}
         return tuple(Term(key, us, alone.get(key, "")) for key, us in self.by_term.items())
 
     @property
@@ -266,9 +266,9 @@ class BusCycle(ABC):
         """The events of each round, which nothing interrupts; of plain numbers only."""
         for run in self.runs:
             count = 1 if run.times is None else int(plain(run.times))
-            first, each = self._turns(run)
+            first, rounds = self._turns(run)
             for number in range(count):
-                yield _round(run, number, None if run.group is None else first + number // each)
+                yield _round(run, number, None if run.group is None else first + number // rounds)
 
     def _turns(self, run: Run) -> tuple[int, int]:
         """First node of a run, and the rounds that each of its nodes has; of plain numbers."""
@@ -287,9 +287,9 @@ class BusCycle(ABC):
         """
         arrived_us, now_us = None, 0.0
         for run in self.runs:
-            first, each = self._turns(run)
+            first, rounds = self._turns(run)
             count = 1 if run.times is None else int(plain(run.times))
-            last = (node - first + 1) * each - 1 if run.group is not None else count - 1
+            last = (node - first + 1) * rounds - 1 if run.group is not None else count - 1
             if 0 <= last < count:
                 until_us = _until_us(run, last, self.command_events)
                 if until_us is not None:

@@ -338,9 +338,9 @@ class BusFigures(NamedTuple):
     """Figures of a kind of bus, and where answers show them."""
 
     terms: tuple[Figure, ...]
-    """One for each term, in the order of the wire."""
+    """Figures of the terms, in the order of the wire."""
     capacity: tuple[Figure, ...]
-    """Of `capacity`, in the order of its document: see `capacity_figures`."""
+    """Figures of `capacity`, in the order of its document: see `capacity_figures`."""
     setup: tuple[Figure, ...] = ()
     """Figures that say how the bus is set."""
     headings: tuple[str, ...] = ()
@@ -354,7 +354,7 @@ class BusFigures(NamedTuple):
     phases: tuple[Figure, ...] = ()
     """Rows of the table of `latency`, where they are not the terms."""
     latency_document: tuple[Figure, ...] = ()
-    """Of `latency`, in the order of its document, where it has more than those rows."""
+    """Figures of `latency`, in the order of its document, where it has more than those rows."""
     has_many_transactions: bool = False
     """Whether the table of `latency` has a row for each transaction, and a column for each figure."""
     deadlines: tuple[str, str] | None = None
@@ -367,7 +367,7 @@ class BusFigures(NamedTuple):
 
     @property
     def latency(self) -> tuple[Figure, ...]:
-        """Of `latency`, in the order of its document."""
+        """Figures of `latency`, in the order of its document."""
         return self.latency_document or (TIMING_MODEL, TRANSACTION, NODES, *self.latency_table)
 
     def term_label(self, name: str | None) -> str:

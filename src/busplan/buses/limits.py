@@ -23,7 +23,7 @@ class TimingModel(NamedTuple):
     name: str
     meaning: str
     error: str = "how far the bus is from this timing model is not known"
-    """Its error in words, where no bias of it is known."""
+    """Error of the model in words, where its bias is not known."""
 
 
 class Safety(NamedTuple):
@@ -58,7 +58,7 @@ class Key(NamedTuple):
     chooses: bool = False
     """Whether its word selects a formula, so that a derivation has it among its inputs."""
     role: KeyRole | None = None
-    """Part of the machine that it stands for, where other kinds have a key for it, too."""
+    """Part of the machine that the key gives, where other kinds have a key for it, too."""
 
 
 class EventKind(NamedTuple):
@@ -69,7 +69,7 @@ class EventKind(NamedTuple):
     reference: str
     """Number of the equation that its time comes from, or where else it comes from."""
     mark: str
-    """Its character in a terminal."""
+    """Character of the event in a terminal."""
     ink: Ink
 
 
@@ -78,7 +78,7 @@ IDLE: Final = EventKind("idle", "idle", MARGIN.reference, "~", "idle")
 
 
 COVERAGE: Final = 2
-"""Expanded by it, a standard uncertainty covers at least 95 %, on one side (JCGM 100, 6.2)."""
+"""Coverage factor k: k standard uncertainties cover at least 95 %, on one side (JCGM 100, 6.2)."""
 KEPT, NOT_SHOWN_KEPT, BROKEN = range(3)
 """Verdicts on a limit, the better first."""
 
@@ -213,7 +213,7 @@ class Starter(NamedTuple):
     base: str = "what a node does in each cycle"
     """Meaning of execution.base_us."""
     more: str = ""
-    """Commented lines at its end."""
+    """Commented lines at the end of the profile."""
 
     def section(self, host: str | None = None) -> str:
         """Section [bus] with the lines of a host, by default of `host`."""
@@ -252,7 +252,7 @@ class Setting(NamedTuple):
     values: tuple[Mapping[str, Value], ...]
     """Values that this network could have and has not yet, safe and the smallest change first: new values by key."""
     reason: str = ""
-    """Why there is none."""
+    """Reason for no values."""
 
 
 class Perturbation(NamedTuple):
@@ -277,12 +277,12 @@ class PayloadRange(NamedTuple):
 
 
 class PacketTime(NamedTuple):
-    """What is not the execution in a measured latency [us]."""
+    """Part of a measured latency that is not the execution [us]."""
 
     us: float
     """Time of the packets."""
     shortest_us: float = 0.0
-    """The bus waits so long whatever the node does: a shorter execution cannot be told from a latency."""
+    """Shortest execution that a latency shows: the bus waits this long, whatever the node does."""
 
 
 class MeasuredLatencies(NamedTuple):

@@ -26,7 +26,7 @@ SYMBOLS.update(
 
 
 class Rate(NamedTuple):
-    """Of a group whose data go in every n-th cycle; of plain numbers."""
+    """Rate of a group whose data go in every n-th cycle; of plain numbers."""
 
     every: int
     """n [1]."""
@@ -44,7 +44,7 @@ def common_multiple(rates: Iterable[Rate]) -> int:
 
 
 def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int, ...]]:
-    """Cycles of the common multiple by which groups are due in them, in the order of their first.
+    """Numbers of the cycles in which the same groups are due, within the common multiple of all rates.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int
     numbers: dict[tuple[bool, ...], list[int]] = {}
     for number in range(1, common_multiple(rates) + 1):
         numbers.setdefault(tuple(rate.is_due(number) for rate in rates), []).append(number)
-    return {due: tuple(each) for due, each in numbers.items()}
+    return {due: tuple(cycles) for due, cycles in numbers.items()}
 
 
 class Group(NamedTuple):
@@ -90,7 +90,7 @@ class Group(NamedTuple):
 
     @property
     def every(self) -> Number:
-        """Its data go in every n-th cycle: n [1]."""
+        """Cycles from one with the data of the group to the next: n [1]."""
         number: Number = getattr(self.said.payload, "every", 1)
         return number
 
@@ -102,7 +102,7 @@ class Group(NamedTuple):
     @property
     def name(self) -> str:
         """Name of the group, or names of its members; empty for the nodes of [node]."""
-        return " and ".join(alike.name for alike in self.members or (self.said,))
+        return " and ".join(nodes.name for nodes in self.members or (self.said,))
 
     def key(self, name: str) -> str:
         """Dotted key of what the profile says of its nodes.
@@ -158,7 +158,7 @@ class Network(NamedTuple):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the profile's groups, in the order of the chain; a single empty name for the nodes of [node]."""
-        return tuple(alike.name for alike in self.alike)
+        return tuple(nodes.name for nodes in self.alike)
 
     @property
     def alike(self) -> tuple[AlikeNodes, ...]:
@@ -173,7 +173,7 @@ class Network(NamedTuple):
     @property
     def asked_nodes(self) -> AlikeNodes:
         """The nodes that `with_nodes` changes the number of."""
-        return next(alike for alike in self.alike if alike.name == self.asked)
+        return next(nodes for nodes in self.alike if nodes.name == self.asked)
 
     def with_nodes(self, nodes: Number) -> "Network":
         """The same network with another number of nodes in the group that it is asked for.
@@ -187,7 +187,7 @@ class Network(NamedTuple):
 
     def _with_nodes(self, group: Group, nodes: Number) -> Group:
         members = group.members or (group.said,)
-        if all(alike.name != self.asked for alike in members):
+        if all(member.name != self.asked for member in members):
             return group
-        unasked = [alike.nodes for alike in members if alike.name != self.asked]
+        unasked = [member.nodes for member in members if member.name != self.asked]
         return group._replace(nodes=total((nodes, *unasked)) if unasked else nodes)

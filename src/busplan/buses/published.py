@@ -83,14 +83,14 @@ def parts_tested(names: Sequence[str]) -> Tested:
     """
 
     def parts(table: str) -> dict[str, str]:
-        return {part: _words(name, part, own) for name in names for part, own in published(name).get(table, {}).items()}
+        return {part: _words(name, part, row) for name in names for part, row in published(name).get(table, {}).items()}
 
     untested = (part for name in names for part in published(name).get("untested", ()))
     return Tested(parts("set_by"), parts("tested"), tuple(untested))
 
 
-def _words(name: str, part: str, own: Mapping[str, Any]) -> str:
+def _words(name: str, part: str, row: Mapping[str, Any]) -> str:
     """Words of a part; {count} is the length of the list `of` [table, key], or the rows of evidence of the part."""
-    table, key = own.get("of", ("", ""))
-    words: str = own["words"].format(count=len(published(name)[table][key] if table else rows_of(name, part)))
+    table, key = row.get("of", ("", ""))
+    words: str = row["words"].format(count=len(published(name)[table][key] if table else rows_of(name, part)))
     return words

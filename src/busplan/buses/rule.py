@@ -19,7 +19,7 @@ class Mending(NamedTuple):
     """Mending of a problem."""
 
     help: str = ""
-    """In words."""
+    """Advice in words."""
     cure: tuple[str, ...] = ()
     """Lines of TOML, each a key with the value that mends it."""
 
@@ -137,8 +137,8 @@ def margin(figures: RuleFigures) -> str:
     value = told_apart(figures.margin_corrected_us, 0.0)[0]
     if figures.uncertainty_us is None:
         return f"margin {value} us, no bias or uncertainty known"
-    said = f"{value} +/- {figures.uncertainty_us:.1f} us"
-    return f"margin {said}, no bias known" if figures.bias_us is None else f"corrected margin {said}"
+    interval = f"{value} +/- {figures.uncertainty_us:.1f} us"
+    return f"margin {interval}, no bias known" if figures.bias_us is None else f"corrected margin {interval}"
 
 
 CLOCK_TOLERANCE: Final = Sourced(
@@ -156,7 +156,7 @@ _ROUNDING: Final = 1e-9
 SURE: Final = 3.29 / 2
 """Expanded uncertainties (k = 2) from its plan on which a figure is outside it: k = 3.29, 99.9 % of a normal error."""
 Sense = Literal["equal", "at most", "at least", "shown"]
-"""How a recorded figure is within its plan; shown: it has none."""
+"""Way in which a recorded figure is within its plan; shown: nothing is planned."""
 RecordedVerdict = Literal["within", "not shown", "outside"]
 """Whether a figure is within its plan, beside it by no more than the doubt allows or hidden, or surely outside."""
 

@@ -111,7 +111,7 @@ def _with_rates(machine: TomlTable, profile: Profile, left_out: tuple[str, ...],
 
 
 def _say_payloads(machine: TomlTable, profile: Profile) -> None:
-    """Say payloads in bytes that the profile says in keys of its kind alone."""
+    """Give payloads in bytes where the profile gives them only in keys of its own kind."""
     for place, nodes in enumerate(profile.alike_nodes):
         section = machine["group"][place] if nodes.name else machine["payload"]
         for kind, key in zip(TRANSACTION_KINDS, _SIZES, strict=True):
@@ -158,7 +158,7 @@ def _common(data: TomlTable) -> tuple[TomlTable, tuple[str, ...]]:
 
 
 def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: str, rest: list[str]) -> TomlTable:
-    """The keys of a table that any of the models has; the others are added to the rest."""
+    """Keys of a table that any of the models has; adds the others to the rest."""
     kept: TomlTable = {}
     for name, value in table.items():
         fields = [model.model_fields[name] for model in models if name in model.model_fields]

@@ -359,7 +359,7 @@ def _first_deep_bracket(text: str) -> int:
 
 
 MAX_FILE_BYTES: Final = 2_000_000
-"""Some 10,000 messages of a CAN network with their comments; a larger file is something else."""
+"""Largest profile: some 10,000 messages of a CAN network with their comments."""
 PERIOD_KEY: Final = "cycle.period_us"
 _KINDS: Final = ("bus", "bus.kind")
 """Keys whose change may ask for tables of another kind of bus."""

@@ -29,7 +29,7 @@ class AlikeNodes(NamedTuple):
     """Nodes that are alike, as a profile says them: in a section [[group]], or in [node] and [payload]."""
 
     name: str
-    """Of the group; empty for the nodes of [node]."""
+    """Name of the group; empty for the nodes of [node]."""
     nodes: Any
     """Number of nodes [1]."""
     node: Any

@@ -77,13 +77,13 @@ class Idle(NamedTuple):
     """Idle bus before a request of the host, or after the last request [us]."""
 
     gap_us: Number
-    """The arbitration reset gap."""
+    """Arbitration reset gap."""
     host_us: Number
-    """The host's own time beyond it."""
+    """Host's own time beyond the gap."""
 
     @property
     def us(self) -> Number:
-        """Both."""
+        """Gap and host's time together."""
         return self.gap_us + self.host_us
 
 
@@ -196,8 +196,14 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     def hub_us(self) -> Number:
         """The read of the hub: request, acknowledge, concatenated block and its acknowledge [us]."""
-        own, sent = self.delays, self.packets
-        return own.arbitration_us + sent.hub_request_us + own.acknowledge_us + sent.hub_block_us + own.acknowledge_us
+        delays, sent = self.delays, self.packets
+        return (
+            delays.arbitration_us
+            + sent.hub_request_us
+            + delays.acknowledge_us
+            + sent.hub_block_us
+            + delays.acknowledge_us
+        )
 
     @cached_property
     def write_us(self) -> Number:
@@ -244,7 +250,7 @@ class BroadcastCycle(CycleWithStarts):
 
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The query, at which the nodes sample, each broadcast, the read of the hub, and the write."""
-        own, sent, waits_us = self.delays, self.packets, self.first_wait_us
+        delays, sent, waits_us = self.delays, self.packets, self.first_wait_us
         yield BusEvent("sync", "sync_us", self.query_us, "query to all nodes")
         for place, group in enumerate(self.network.groups):
             part = partial(_part, "read", "response")
@@ -262,16 +268,16 @@ class BroadcastCycle(CycleWithStarts):
             partial(_part, *of) for of in (("read", "request"), ("read", "response"), ("write", "request"))
         )
         read_hub = (
-            request("arbitration", "arbitration", own.arbitration_us, "host arbitration"),
+            request("arbitration", "arbitration", delays.arbitration_us, "host arbitration"),
             request("request_data", "data", sent.hub_request_us, "host request to the hub"),
-            request("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge"),
+            request("acknowledge", "acknowledge", delays.acknowledge_us, "hub acknowledge"),
             response("response_data", "data", sent.hub_block_us, "hub's block of all data"),
-            response("acknowledge", "acknowledge", own.acknowledge_us, "host acknowledge"),
+            response("acknowledge", "acknowledge", delays.acknowledge_us, "host acknowledge"),
         )
         write_hub = (
-            write("arbitration", "arbitration", own.arbitration_us, "host arbitration"),
+            write("arbitration", "arbitration", delays.arbitration_us, "host arbitration"),
             write("request_data", "data", sent.write_us, "commands to all nodes"),
-            write("acknowledge", "acknowledge", own.acknowledge_us, "hub acknowledge"),
+            write("acknowledge", "acknowledge", delays.acknowledge_us, "hub acknowledge"),
         )
         yield Run((*_waits(self.hub_wait, "before the hub is read"), *read_hub))
         yield Run((*_waits(self.idle, "after the hub's block"), *write_hub))
@@ -279,13 +285,13 @@ class BroadcastCycle(CycleWithStarts):
 
     def _phases(self) -> tuple[dict[str, Number], dict[str, Number]]:
         """The phases of the read of all data, from the query to the host, and of the write of all commands."""
-        own, sent, gaps = self.delays, self.packets, self.delays.gaps
+        delays, sent, gaps = self.delays, self.packets, self.delays.gaps
         common: dict[str, Number] = {
             **dict.fromkeys(("query_us", "boards_us", "hub_wait_us"), 0.0),
             "hops": self.link.hops,
             "gap_count": self.link.gap_count,
-            "arbitration_us": own.arbitration_us,
-            "acknowledge_us": own.acknowledge_us,
+            "arbitration_us": delays.arbitration_us,
+            "acknowledge_us": delays.acknowledge_us,
             "hold_us": 0.0,
             "execution_us": 0.0,
             "worst_extra_us": 0.0,
@@ -303,10 +309,10 @@ class BroadcastCycle(CycleWithStarts):
             "response_bytes": BLOCK_READ_RESPONSE_OVERHEAD_BYTES + hub_block_bytes(self.network),
             "request_data_us": sent.hub_request_us,
             "response_data_us": sent.hub_block_us,
-            "request_us": own.arbitration_us + sent.hub_request_us,
+            "request_us": delays.arbitration_us + sent.hub_request_us,
             "response_us": sent.hub_block_us,
-            "request_and_acknowledge_us": own.arbitration_us + sent.hub_request_us + own.acknowledge_us,
-            "response_and_acknowledge_us": sent.hub_block_us + own.acknowledge_us,
+            "request_and_acknowledge_us": delays.arbitration_us + sent.hub_request_us + delays.acknowledge_us,
+            "response_and_acknowledge_us": sent.hub_block_us + delays.acknowledge_us,
             "latency_us": read_us,
             "latency_with_gaps_us": read_us + gaps.both_us,
             "idle_us": self.node_waits_us + self.hub_wait.gap_us + self.idle.gap_us,
@@ -318,7 +324,7 @@ class BroadcastCycle(CycleWithStarts):
             "response_bytes": 0,
             "request_data_us": sent.write_us,
             "response_data_us": 0.0,
-            "request_us": own.arbitration_us + sent.write_us,
+            "request_us": delays.arbitration_us + sent.write_us,
             "response_us": 0.0,
             "request_and_acknowledge_us": write_us,
             "response_and_acknowledge_us": 0.0,

@@ -112,26 +112,26 @@ class CycleWithStarts(BusCycle):
         shared
             The delays over other hops of the bus, where they have been computed.
         """
-        own = delays(link, model=TIMING_MODELS[self.model], alone=self.network.nodes == 1, shared=shared)
+        named_delays = delays(link, model=TIMING_MODELS[self.model], alone=self.network.nodes == 1, shared=shared)
         for key, number in (
-            ("arbitration_us", own.arbitration_us),
-            ("acknowledge_us", own.acknowledge_us),
-            ("subaction_gap_us", own.gaps.subaction_us),
-            ("arbitration_reset_gap_us", own.gaps.arbitration_reset_us),
-            ("gaps_us", own.gaps.both_us),
+            ("arbitration_us", named_delays.arbitration_us),
+            ("acknowledge_us", named_delays.acknowledge_us),
+            ("subaction_gap_us", named_delays.gaps.subaction_us),
+            ("arbitration_reset_gap_us", named_delays.gaps.arbitration_reset_us),
+            ("gaps_us", named_delays.gaps.both_us),
         ):
             named(number, key, LATENCY_SYMBOLS[key])
-        return own
+        return named_delays
 
     @cached_property
     def cycle_start_us(self) -> Number:
         """Cost of a cycle start: it destroys idle time already run, and goes at S100 [us]."""
-        own, link = self.delays, self.link
+        delays, link = self.delays, self.link
         data_us = equations.data_phase_us(
-            link.hops, hop_us=own.hop_us, packet_bytes=CYCLE_START_BYTES, data_rate_mbit_s=DATA_RATE_MBIT_S["S100"]
+            link.hops, hop_us=delays.hop_us, packet_bytes=CYCLE_START_BYTES, data_rate_mbit_s=DATA_RATE_MBIT_S["S100"]
         )
         isochronous_us: Number = self.network.profile.bus.isochronous_us
-        return own.gaps.arbitration_reset_us + own.arbitration_us + data_us + isochronous_us
+        return delays.gaps.arbitration_reset_us + delays.arbitration_us + data_us + isochronous_us
 
     def starts(self, others_us: Number) -> Number:
         """Number of cycle starts in a cycle whose other terms take some time [1].
@@ -165,12 +165,12 @@ class CycleWithStarts(BusCycle):
         return self.starts(self._others_us) if self._has_starts else 0
 
     def written(self) -> Iterator[BusEvent | Run]:
-        """All but the cycle starts: these go between its rounds, and their number rests on it."""
+        """All events but the cycle starts, whose number depends on them and which go between the rounds."""
         yield from self.schedule()
         retries: Number = self.network.profile.cycle.retries
         if self.model != "paper" and not is_off(retries):
-            own, longest_us = self.delays, self.longest_request_us
-            retry_us = own.arbitration_us + longest_us + own.acknowledge_us + own.gaps.arbitration_reset_us
+            delays, longest_us = self.delays, self.longest_request_us
+            retry_us = delays.arbitration_us + longest_us + delays.acknowledge_us + delays.gaps.arbitration_reset_us
             yield Run((BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request"),), retries)
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
@@ -193,12 +193,12 @@ class CycleWithStarts(BusCycle):
         return extra_us + more * self.cycle_start_us
 
     def taking_us(self, group: Group) -> float:
-        """Nothing after a split write, which holds the execution; else the node executes beside the bus [us]."""
+        """0 after a split write, which contains the execution; otherwise the node executes beside the bus [us]."""
         is_split = group.node.write_response == "split" and not is_broadcast(self.network)
         return 0.0 if is_split else super().taking_us(group)
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """One, or more where a node has not executed its command when the next synchronous packet comes."""
+        """1, or more if a node has not executed its command when the next synchronous packet comes."""
         if not at_sync:
             return 0
         behind_us = max(self.taking_us(group) for group in self.network.groups)
@@ -218,11 +218,11 @@ class CycleWithStarts(BusCycle):
 
     @property
     def is_known(self) -> bool:
-        """Whether bias and doubts of the model are known: those of `standard`, which decides, are."""
+        """Whether bias and doubts of the model are known: only those of `standard`, which decides."""
         return self.model == "standard"
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """Host time, where the profile does not say it."""
+        """The host's time, if the profile does not give it."""
         return () if self.network.profile.host.transaction_us else (LeftOut("host time", "host.transaction_us"),)
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
@@ -279,16 +279,16 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def _exchange(self, place: int, kind: TransactionKind, hops: Number | None, *, suffix: str = "") -> Exchange:
         """The transaction of a group by its place, with a node at some hops or, without them, on the mean."""
-        network, own = self.network, charges_own_hops(self.network)
-        link = self.link._replace(hops=self._ways[place].mean if hops is None else hops) if own else self.link
-        common = self._own_delays(link) if own else self.delays
+        network, has_way = self.network, charges_own_hops(self.network)
+        link = self.link._replace(hops=self._ways[place].mean if hops is None else hops) if has_way else self.link
+        common = self._own_delays(link) if has_way else self.delays
         return exchange(network, network.groups[place], kind, model=self.model, link=link, common=common, suffix=suffix)
 
     def _own_delays(self, link: Link) -> Delays:
         """Delays over a node's own hops; its arbitration goes to the root, which may be any node."""
-        own = self.delays_of(link, self.delays)
+        node_delays = self.delays_of(link, self.delays)
         is_at_host = self.network.profile.bus.root == "host"
-        return own if is_at_host else own._replace(arbitration_us=self.delays.arbitration_us)
+        return node_delays if is_at_host else node_delays._replace(arbitration_us=self.delays.arbitration_us)
 
     @cached_property
     def sync_us(self) -> Number:
@@ -301,11 +301,11 @@ class Ieee1394Cycle(CycleWithStarts):
             sync = self.network.profile.cycle.sync
             ping_us: Number = sync.ping_us + sync.ping_per_node_us * (self.network.nodes - 1)
             return ping_us
-        own, link = self.delays, self.link
+        delays, link = self.delays, self.link
         data_us = equations.data_phase_us(
-            link.hops, hop_us=own.hop_us, packet_bytes=SYNC_PACKET_BYTES, data_rate_mbit_s=link.data_rate_mbit_s
+            link.hops, hop_us=delays.hop_us, packet_bytes=SYNC_PACKET_BYTES, data_rate_mbit_s=link.data_rate_mbit_s
         )
-        return own.arbitration_us + data_us + own.gaps.arbitration_reset_us
+        return delays.arbitration_us + data_us + delays.gaps.arbitration_reset_us
 
     @property
     def longest_request_us(self) -> Number:
@@ -316,7 +316,7 @@ class Ieee1394Cycle(CycleWithStarts):
         """The synchronous packet, and each transaction of every node."""
         yield BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")
         for kind in TRANSACTION_KINDS:
-            for place, transaction in enumerate(each for each in self.exchanges if each.kind == kind):
+            for place, transaction in enumerate(sent for sent in self.exchanges if sent.kind == kind):
                 yield Run(transaction.parts, transaction.nodes, place, partial(self._laid_out, transaction, place))
 
     def _laid_out(self, transaction: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
@@ -368,8 +368,8 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def _longest(self, kind: TransactionKind) -> dict[str, Number]:
         """The longest of each phase, over the reads or writes with the farthest node of each group."""
-        each = [transaction.phases for transaction in self._farthest if transaction.kind == kind]
-        return {key: reduce(larger, (getattr(phases, key) for phases in each)) for key in _SHOWN}
+        all_phases = [transaction.phases for transaction in self._farthest if transaction.kind == kind]
+        return {key: reduce(larger, (getattr(phases, key) for phases in all_phases)) for key in _SHOWN}
 
     @cached_property
     def _farthest(self) -> tuple[Exchange, ...]:

@@ -18,7 +18,6 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.timing import TIMING_MODELS
 from busplan.buses.ieee1394.transactions import residual
-from busplan.buses.network import Network
 from busplan.buses.published import published
 from busplan.elementwise import plain
 
@@ -38,18 +37,14 @@ def equation_15_constant_us(_cycle: object, *, nodes: int, gap_count: int, overh
 
 def host_for_gain_us(cycle: Ieee1394Cycle, *, gain: float) -> float:
     """The host's own time in each call with which the schedules differ by some factor, by halves [us]."""
-    low_us, high_us = 0.0, 1000.0
+    profile, low_us, high_us = cycle.network.profile, 0.0, 1000.0
     for _ in range(50):
         middle_us = (low_us + high_us) / 2
-        network = _with_host(cycle.network, middle_us)
+        host = profile.host.model_copy(update={"transaction_us": middle_us})
+        network = cycle.network._replace(profile=profile.model_copy(update={"host": host}))
         one_by_one, broadcast = (kind(network, cycle.model).required_us for kind in (Ieee1394Cycle, BroadcastCycle))
         low_us, high_us = (low_us, middle_us) if one_by_one >= gain * broadcast else (middle_us, high_us)
     return high_us
-
-
-def _with_host(network: Network, transaction_us: float) -> Network:
-    host = network.profile.host.model_copy(update={"transaction_us": transaction_us})
-    return network._replace(profile=network.profile.model_copy(update={"host": host}))
 
 
 def gap_counts_met(_cycle: object, *, derived: bool) -> int:

@@ -57,8 +57,8 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
             'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
             'calibrate with cycle.schedule = "individual"'
         )
-    said = next(alike for alike in network.alike if alike.name == group)
-    answer, key = getattr(said.node, f"{kind}_response"), said.node_key(f"{kind}_response")
+    nodes = next(nodes for nodes in network.alike if nodes.name == group)
+    answer, key = getattr(nodes.node, f"{kind}_response"), nodes.node_key(f"{kind}_response")
     if answer != "split":
         raise BusplanError(
             f'{key} = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
@@ -69,7 +69,7 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
         model=TIMING_MODELS[model],  # type: ignore[index]
         link=farthest_link(network, group),
         payload_bytes=payload_bytes,
-        overhead_bytes=said.payload.overhead_bytes,
+        overhead_bytes=nodes.payload.overhead_bytes,
         responder=Responder(0.0),
     )
     return PacketTime(plain(phases.latency_us), plain(phases.subaction_gap_us))
@@ -92,12 +92,6 @@ def _gap_count(network: Network) -> Setting:
         return empty._replace(reason=f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m")
     safe = plain(safe_gap_count(hops_of(network)))
     return empty if gap_count_of(network) == safe else empty._replace(values=({key: safe},))
-
-
-def _schedule(network: Network) -> Setting:
-    """The other way to read and write all nodes."""
-    schedule = "individual" if is_broadcast(network) else "broadcast"
-    return Setting("schedule", "schedule", Cost.SCHEDULE, ("cycle.schedule",), ({"cycle.schedule": schedule},))
 
 
 def _responses(network: Network) -> Setting:
@@ -176,7 +170,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:
         """Keys that the paper's equations have no term for."""
         profile = network.profile
-        own = {
+        paper_has_not = {
             "bus.cycle_master": profile.bus.cycle_master,
             "bus.phy_delay_us": profile.bus.phy_delay_us is not None,
             "bus.charge_hops": profile.bus.charge_hops != "farthest",
@@ -184,11 +178,11 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             "cycle.retries": profile.cycle.retries,
             "host.transaction_us": profile.host.transaction_us,
         }
-        for alike in network.alike:
-            own[alike.node_key("read_response")] = alike.node.read_response != "split"
-            own[alike.node_key("write_response")] = alike.node.write_response != "split"
-            own[alike.node_key("execution.worst_extra_us")] = alike.node.execution.worst_extra_us
-        return tuple(key for key, is_set in own.items() if is_set) if model == "paper" else ()
+        for nodes in network.alike:
+            paper_has_not[nodes.node_key("read_response")] = nodes.node.read_response != "split"
+            paper_has_not[nodes.node_key("write_response")] = nodes.node.write_response != "split"
+            paper_has_not[nodes.node_key("execution.worst_extra_us")] = nodes.node.execution.worst_extra_us
+        return tuple(key for key, is_set in paper_has_not.items() if is_set) if model == "paper" else ()
 
     def latency_subject(self, network: Network) -> str:
         """Say whose latency it is."""
@@ -206,7 +200,9 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The gap count, one register in each node, how the nodes answer, and the other schedule."""
-        return (_gap_count(network), _responses(network), _schedule(network))
+        key, schedule_name = "cycle.schedule", "individual" if is_broadcast(network) else "broadcast"
+        schedule = Setting("schedule", "schedule", Cost.SCHEDULE, (key,), ({key: schedule_name},))
+        return (_gap_count(network), _responses(network), schedule)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """One hop, one busy retry, and a slower host."""
@@ -227,7 +223,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         )
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Whole quadlets up to the largest packet of the speed."""
+        """Payloads of whole quadlets, up to the largest packet of the speed."""
         speed = network.profile.bus.speed
         return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), carrier=speed)
 
@@ -249,12 +245,12 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """An unsafe gap count, and cables that the table does not hold for."""
         bus, warnings = network.profile.bus, []
         limit = "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
-        for asked in [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]:
-            if not self.is_safe(asked):
-                hops, given = hops_of(asked), gap_count_of(asked)
+        for sized in [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]:
+            if not self.is_safe(sized):
+                hops, given = hops_of(sized), gap_count_of(sized)
                 warnings.append(
                     f"gap count {given} is unsafe for {plural(int(plain(hops)), 'hop')} "
-                    f"({plural(int(plain(asked.nodes)), 'node')}); "
+                    f"({plural(int(plain(sized.nodes)), 'node')}); "
                     f"the smallest safe one is {safe_gap_count(hops)}{limit}"
                 )
                 break

@@ -137,10 +137,12 @@ def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
 def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More nodes than one bus has addresses for."""
     if "nodes" in subject.deciding.exceeded:
-        each = subject.profile.alike_nodes
-        nodes = sum(group.nodes for group in each)
+        groups = subject.profile.alike_nodes
+        nodes = sum(group.nodes for group in groups)
         yield RuleProblem(
-            each[-1].nodes_key, f"{nodes} nodes are over the {MAX_NODES:g} of one bus", "put the others on a second bus"
+            groups[-1].nodes_key,
+            f"{nodes} nodes are over the {MAX_NODES:g} of one bus",
+            "put the others on a second bus",
         )
 
 
@@ -180,8 +182,8 @@ def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
-    for alike, kind in product(subject.profile.alike_nodes, TRANSACTION_KINDS):
-        yield alike.payload_key(kind), int(alike.bytes_of(kind))
+    for nodes, kind in product(subject.profile.alike_nodes, TRANSACTION_KINDS):
+        yield nodes.payload_key(kind), int(nodes.bytes_of(kind))
 
 
 def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:

@@ -206,13 +206,13 @@ class Phases(NamedTuple):
     request_bytes: Number
     response_bytes: Number
     arbitration_us: Number
-    """Of either packet that arbitrates."""
+    """Arbitration of a packet that arbitrates."""
     request_data_us: Number
     response_data_us: Number
     request_us: Number
     response_us: Number
     acknowledge_us: Number
-    """Of either packet that is acknowledged."""
+    """Acknowledge of a packet that is acknowledged."""
     hold_us: Number
     execution_us: Number
     worst_extra_us: Number
@@ -284,27 +284,24 @@ def delays(link: Link, *, model: PacketTiming, alone: Number, shared: Delays | N
         The delays over other hops of the bus, where they have been computed: delay of a hop and gaps are the same.
     """
     clock_mbit_s = alike(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
-    hop_us = _hop_us(link, clock_mbit_s) if shared is None else shared.hop_us
+    if shared is None:
+        phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
+        hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")
+    else:
+        hop_us = shared.hop_us
     arbitration_us = equations.arbitration_phase_us(
         link.hops, hop_us=hop_us, gap_count=link.gap_count, gap_clock_mbit_s=clock_mbit_s
     )
     acknowledge_us = equations.acknowledge_us(equations.acknowledge_phase_us(link.hops, hop_us=hop_us))
-    gaps = _gaps(link, clock_mbit_s, alone) if shared is None else shared.gaps
-    return Delays(hop_us, arbitration_us, acknowledge_us, gaps)
-
-
-def _hop_us(link: Link, clock_mbit_s: Number) -> Number:
-    phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
-    return named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")
-
-
-def _gaps(link: Link, clock_mbit_s: Number, alone: Number) -> Gaps:
-    return Gaps(
+    if shared is not None:
+        return Delays(hop_us, arbitration_us, acknowledge_us, shared.gaps)
+    gaps = Gaps(
         equations.subaction_gap_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
         equations.arbitration_reset_gap_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
         equations.gaps_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
         alone,
     )
+    return Delays(hop_us, arbitration_us, acknowledge_us, gaps)
 
 
 def transaction(

@@ -175,14 +175,14 @@ class Ways(NamedTuple):
     """Cable hops between the host and the nodes of a group that each node is charged [1]."""
 
     first: Number
-    """Of the first node of the group."""
+    """Hops of the first node of the group."""
     mean: Number
-    """Of the nodes of the group, on the mean. What grows with the hops grows by the same with each."""
+    """Mean hops of the nodes of the group. Times are linear in the hops, so the mean gives their sum."""
     last: Number
-    """Of the last node of the group."""
+    """Hops of the last node of the group."""
 
     def of_node(self, place: Number) -> Number:
-        """Of the node at a place in its group, from 0; at the mean of places the mean of their hops."""
+        """Hops of the node at a place in its group, from 0; at the mean place the mean hops."""
         return self.first if self.first is self.last else self.first + place
 
 
@@ -196,10 +196,10 @@ def ways(network: Network) -> tuple[Ways, ...]:
     for group in network.groups:
         mean = (group.nodes + 1) / 2
         before = chain[-1].last if chain else None
-        own = Ways(1, mean, group.nodes)
+        way = Ways(1, mean, group.nodes)
         if before is not None:
-            own = Ways(before + 1, before + mean, before + group.nodes)
-        chain.append(own._replace(mean=named(own.mean, "hops", f"H_mean{group.name and f',{group.name}'}")))
+            way = Ways(before + 1, before + mean, before + group.nodes)
+        chain.append(way._replace(mean=named(way.mean, "hops", f"H_mean{group.name and f',{group.name}'}")))
     return tuple(chain)
 
 
@@ -285,17 +285,10 @@ def exchange(
         common=common,
     )
     uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
-    phases = _with_names(phases, suffix)
+    if isinstance(phases.latency_us, Traced):
+        names = {key: f"{LATENCY_SYMBOLS[key]}{suffix}" for key in phases._fields}
+        phases = Phases(**{key: named(us, key, names[key]) for key, us in phases._asdict().items()})
     return Exchange(kind, group, link, size, responder, uncertainty_us, phases, tuple(_parts(kind, phases, answer)))
-
-
-def _with_names(phases: Phases, suffix: str) -> Phases:
-    """The same phases, each with its symbol if they are traced numbers."""
-    if not isinstance(phases.latency_us, Traced):
-        return phases
-    return Phases(
-        **{key: named(value, key, f"{LATENCY_SYMBOLS[key]}{suffix}") for key, value in phases._asdict().items()}
-    )
 
 
 Who = Literal["host", "node"]
@@ -350,14 +343,14 @@ def _gap(kind: str, us: float, label: str) -> BusEvent:
 
 
 def _added_up(phases: Phases) -> _Divided:
-    """Both gaps after the transaction."""
+    """Model `paper`: both gaps come after the transaction."""
     sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
     subaction = _gap("subaction_gap", sub_us, "subaction gap")
     return (), (subaction, _gap("arbitration_reset_gap", reset_us, "arbitration reset gap"))
 
 
 def _by_idle_period(exchanged: Exchange) -> _Divided:
-    """The gap that each idle period waits for, and what a faster node would take beyond."""
+    """Model `standard`: the gap that each idle period waits for, and the allowance for a faster node."""
     phases = exchanged.phases
     sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
     idle_us = plain(phases.idle_us)
@@ -444,17 +437,17 @@ def of_cycle(
 
         The cycle never falls with either time and has kinks, at which a central difference covers too little.
         """
-        own = exchange.responder
-        if is_off(execution_us if own.answer == "split" else 0.0) and is_off(host_us):
+        responder = exchange.responder
+        if is_off(execution_us if responder.answer == "split" else 0.0) and is_off(host_us):
             return 0.0
-        answer, bound_us = own.answer, own.execution_us + own.worst_extra_us
+        answer, bound_us = responder.answer, responder.execution_us + responder.worst_extra_us
 
         def busy_at(steps: int) -> Number:
             idle_us = between_packets_us(
                 answer,
                 gaps=gaps,
                 execution_us=bound_us + steps * execution_us if steps else bound_us,
-                host_us=own.host_us + steps * host_us if steps else own.host_us,
+                host_us=responder.host_us + steps * host_us if steps else responder.host_us,
             )
             return named(idle_us, "busy_us", f"busy{steps:+d}u" if steps else "busy")
 
@@ -558,7 +551,7 @@ def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ..
     for exchange in exchanges:
         if exchange.responder.answer == "split":
             counts.setdefault(id(exchange.group.node), (exchange.group.node, []))[1].append(2 * exchange.nodes)
-    return tuple((node, named(total(each), "split_halves", "halves")) for node, each in counts.values())
+    return tuple((node, named(total(halves), "split_halves", "halves")) for node, halves in counts.values())
 
 
 def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:

@@ -211,8 +211,8 @@ class Sercos2Cycle(SercosCycle):
     def start_us(self) -> Number:
         """From MST to the first AT [us]."""
         bus = self.network.profile.bus
-        said: Number | None = bus.at_start_us
-        return start_us(bus.data_rate_mbit_s) if said is None else said
+        given_us: Number | None = bus.at_start_us
+        return start_us(bus.data_rate_mbit_s) if given_us is None else given_us
 
     def written(self) -> Iterator[BusEvent | Run]:
         """MST, the telegrams of all drives, the MDT and its records, with the waits and gaps between them."""
@@ -237,8 +237,8 @@ class Sercos2Cycle(SercosCycle):
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """The drives' recovery after the MDT."""
-        said = self.network.profile.bus.recovery_us
-        return () if said else (LeftOut("the recovery of the drives after the MDT", "bus.recovery_us"),)
+        recovery_us = self.network.profile.bus.recovery_us
+        return () if recovery_us else (LeftOut("the recovery of the drives after the MDT", "bus.recovery_us"),)
 
     def figures(self) -> Mapping[str, Number | None]:
         """The data rate, and the data of the MDT."""

@@ -108,7 +108,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         )
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Whole words, as many as a drive can be told to send for each of its axes."""
+        """Payloads of whole words, as many as a drive can be told to send for each of its axes."""
         axes = min((int(plain(group.axes)) for group in network.groups), default=1)
         return PayloadRange(int(WORD_BYTES), int(MOST_DRIVE_BYTES) * max(axes, 1), carrier="a drive's telegram")
 

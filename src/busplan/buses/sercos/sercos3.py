@@ -96,7 +96,7 @@ class Items(NamedTuple):
     pieces: Number
     """Number of pieces [1]."""
     size_bytes: Number
-    """Of each [bytes]."""
+    """Size of each piece [bytes]."""
 
 
 class Filling(NamedTuple):
@@ -105,7 +105,7 @@ class Filling(NamedTuple):
     telegrams: Number
     """Number of telegrams, with the open one [1]."""
     closed_bytes: Number
-    """Data of those before the open one [bytes]."""
+    """Data of the telegrams before the open one [bytes]."""
     open_bytes: Number
     """Data of the open one [bytes]."""
 
@@ -155,11 +155,11 @@ def _with_items(before: Filling, items: Items, next_bytes: Number, name: str) ->
     size_bytes = items.size_bytes
     room = larger(rounded_down((MOST_BYTES - before.open_bytes) / size_bytes), 0)
     here = named(smaller(items.pieces, room), f"fit_{name}", f"k_{name}")
-    each = larger(rounded_down((MOST_BYTES - next_bytes) / size_bytes), 1)
-    more = rounded_up((items.pieces - here) / each)
-    last = items.pieces - here - (more - 1) * each
+    per_telegram = larger(rounded_down((MOST_BYTES - next_bytes) / size_bytes), 1)
+    more = rounded_up((items.pieces - here) / per_telegram)
+    last = items.pieces - here - (more - 1) * per_telegram
     own_bytes = before.open_bytes + here * size_bytes
-    closed_bytes = padded_bytes(own_bytes) + (more - 1) * padded_bytes(next_bytes + each * size_bytes)
+    closed_bytes = padded_bytes(own_bytes) + (more - 1) * padded_bytes(next_bytes + per_telegram * size_bytes)
     open_bytes = choose(more > 0, next_bytes + last * size_bytes, own_bytes)
     return Filling(
         named(before.telegrams + more, f"telegrams_{name}", f"n_{name}"),
@@ -279,7 +279,7 @@ FIGURES: Final = BusFigures(
 
 
 SORTS: Final[dict[TransactionKind, str]] = {"write": "mdt", "read": "at"}
-"""Which telegrams carry a node's payloads, in the order of the cycle."""
+"""Telegrams that carry a node's payloads, in the order of the cycle."""
 
 
 class Telegrams(NamedTuple):

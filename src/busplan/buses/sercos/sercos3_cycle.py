@@ -181,8 +181,8 @@ class Sercos3Cycle(SercosCycle):
         """The channel for other frames, and the devices' least time before the AT."""
         least = LeftOut("the devices' least time before the AT, S-0-1006", "bus.at_start_us")
         channel = LeftOut("the channel for other frames", "cycle.nonperiodic_us")
-        said = ((self.network.profile.bus.at_start_us is not None, least), (self.network.nonperiodic_us, channel))
-        return tuple(left for is_said, left in said if not is_said)
+        terms = ((self.network.profile.bus.at_start_us is not None, least), (self.network.nonperiodic_us, channel))
+        return tuple(term for is_given, term in terms if not is_given)
 
     def figures(self) -> Mapping[str, Number | None]:
         """Numbers of telegrams."""

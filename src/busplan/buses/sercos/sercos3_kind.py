@@ -126,8 +126,8 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The other timing methods, in the order of CoSeMa."""
-        own = network.profile.bus.timing_method
-        values = tuple({_METHOD: method} for method in _METHODS if method != own)
+        current = network.profile.bus.timing_method
+        values = tuple({_METHOD: method} for method in _METHODS if method != current)
         return (Setting("timing_method", "timing method", Cost.SCHEDULE, (_METHOD,), values),)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
@@ -142,7 +142,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         )
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Whole words that four telegrams carry for all devices, no more than one carries for a device."""
+        """Payloads of whole words: four telegrams carry those of all devices, one telegram that of a device."""
         share = int(MOST_TELEGRAMS * MOST_BYTES) // int(plain(network.nodes))
         return PayloadRange(int(WORD_BYTES), min(share, int(MOST_BYTES - CONNECTION_BYTES)), carrier="four telegrams")
 

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
+from string import ascii_letters, digits
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -35,12 +36,9 @@ def shell_word(text: str) -> str:
     if not has_controls(text):
         return shlex.quote(text)
     # Control characters need $'...', which bash, zsh and POSIX 2024 support.
-    return f"$'{''.join(map(_escaped, os.fsencode(text)))}'"
-
-
-def _escaped(byte: int) -> str:
-    character = chr(byte)
-    return character if character.isascii() and (character.isalnum() or character in "/._-+ ") else f"\\x{byte:02x}"
+    plain = f"{ascii_letters}{digits}/._-+ "
+    escaped = (chr(byte) if chr(byte) in plain else f"\\x{byte:02x}" for byte in os.fsencode(text))
+    return f"$'{''.join(escaped)}'"
 
 
 def period_option(period_us: float) -> tuple[str, str]:
@@ -152,12 +150,11 @@ class Answer(ABC):
         return document_bytes(content(self.drawing(), "png"))
 
     def _text(self, form: Form) -> str:
-        """The answer in a form."""
         return self.to_json() if form == "json" else render(self.report(), form)
 
     @abstractmethod
     def report(self) -> Report:
-        """The answer in blocks, which every form but JSON and CSV is made of."""
+        """The answer in blocks, from which every form but JSON and CSV is made."""
 
     def _shown(self) -> Report:
         """The report for a reader in Python."""

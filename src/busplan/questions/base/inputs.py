@@ -169,13 +169,13 @@ def checked_models(timing_model: Models | None, network: Network) -> tuple[str, 
     """
     if timing_model is None:
         return model_names(network)
-    names_asked = one_or_several(timing_model, name="timing_model")
+    models = one_or_several(timing_model, name="timing_model")
     names = [model.name for model in network.bus.timing_models]
-    if len(set(map(str, names_asked))) != len(names_asked) or not set(map(str, names_asked)) <= set(names):
+    if len(set(map(str, models))) != len(models) or not set(map(str, models)) <= set(names):
         raise BusplanError(
             f"timing_model {timing_model!r}: expected {listed([*map(repr, names)], 'or')}, or a list of them, each once"
         )
-    return tuple(known_model(network, name, name="timing_model") for name in names_asked)
+    return tuple(known_model(network, model, name="timing_model") for model in models)
 
 
 def known_model(network: Network, model: str, *, name: str) -> str:
@@ -183,7 +183,7 @@ def known_model(network: Network, model: str, *, name: str) -> str:
 
     Parameters
     ----------
-    profile
+    network
         The network.
     model
         The name.
@@ -273,14 +273,13 @@ def key_changes(values: Mapping[str, object]) -> KeyChanges:
     BusplanError
         Not new values by key, two keys overlap, or TOML cannot write a value.
     """
-    return KeyChanges(tuple(_key_change(key, value) for key, value in values_by_key(values, name="changes").items()))
-
-
-def _key_change(key: str, value: object) -> KeyChange:
-    try:
-        return KeyChange(key, value, text=f"{key}={value_text(value)}")
-    except (TypeError, ValueError):
-        raise BusplanError(f"changes {key}: {value!r} is no value of a profile") from None
+    changes = []
+    for key, value in values_by_key(values, name="changes").items():
+        try:
+            changes.append(KeyChange(key, value, text=f"{key}={value_text(value)}"))
+        except (TypeError, ValueError):
+            raise BusplanError(f"changes {key}: {value!r} is no value of a profile") from None
+    return KeyChanges(tuple(changes))
 
 
 def _changes_of_shipped(profile: Profile) -> KeyChanges | None:

@@ -87,7 +87,7 @@ def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterato
 
     Parameters
     ----------
-    profile
+    network
         The network.
     of_latency
         Whether the figures are latencies, and not those of the cycle.
@@ -101,8 +101,8 @@ def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterato
 def execution_grades(profile: Profile) -> str | None:
     """Grade of the execution time; where groups differ, each with the groups that have it. None without any."""
     names: dict[str, list[str]] = {}
-    for alike in profile.alike_nodes:
-        names.setdefault(alike.node.execution.grade or "without a grade", []).append(alike.name)
+    for group in profile.alike_nodes:
+        names.setdefault(group.node.execution.grade or "without a grade", []).append(group.name)
     if len(names) == 1:
         return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
     return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items()) or None
@@ -123,9 +123,11 @@ def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
     if not tested.parts:
         yield Sentence((f"No published or measured figure tests the model of {kind}.",))
     elif tested.untested:
-        said = {"published figures set": tested.set_by, "independent figures test": tested.parts}
+        sources = {"published figures set": tested.set_by, "independent figures test": tested.parts}
         phrases = (
-            f"{how} {', '.join(f'{part} ({by})' for part, by in parts.items())}" for how, parts in said.items() if parts
+            f"{how} {', '.join(f'{part} ({by})' for part, by in parts.items())}"
+            for how, parts in sources.items()
+            if parts
         )
         yield Sentence((f"Model of {kind}: {'; '.join(phrases)}; not tested: {', '.join(tested.untested)}.",))
 
@@ -154,7 +156,7 @@ def story(figures: FitFigures, network: Network) -> tuple[Part, ...]:
     ----------
     figures
         The figures.
-    profile
+    network
         The network.
     """
     available = attribute_value(AVAILABLE, figures)
@@ -234,7 +236,7 @@ def changes_sentences(changes: KeyChanges) -> list[Sentence]:
 
 
 _FIRST_TO_LEAVE: Final = 9
-"""Rank of the equations: a narrow terminal has the figures rather."""
+"""Rank of the column of equations, which leaves a narrow terminal before the figures do."""
 
 
 class Owner(NamedTuple):
@@ -242,7 +244,7 @@ class Owner(NamedTuple):
 
     column: TableColumn
     figures: object
-    """Object that has the figures as attributes."""
+    """Object with the figures as attributes."""
 
 
 def figure_table(
@@ -287,5 +289,5 @@ def figure_table(
 
 
 def _value(figure: Figure, owner: Owner, state: Callable[[Figure, Any], State]) -> ShownValue:
-    value, own = attribute_value(figure, owner.figures), state(figure, owner.figures)
-    return value if own == "neutral" else value._replace(state=own)
+    value, judged = attribute_value(figure, owner.figures), state(figure, owner.figures)
+    return value if judged == "neutral" else value._replace(state=judged)

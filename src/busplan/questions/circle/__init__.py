@@ -174,7 +174,7 @@ CIRCLE_FIGURES: Final = (
     Figure("contributions", "contributions", "simulation", "what each error source takes of the largest error"),
 )
 CIRCLE_BY_KEY: Final = by_key(CIRCLE_FIGURES)
-"""The same by key."""
+"""Figures of the circle test by key."""
 
 
 class CircleFigures(NamedTuple):
@@ -216,7 +216,7 @@ class CircleFigures(NamedTuple):
     gain_margin_db: float | None
     """The smaller of both axes; None also if no gain makes a loop unstable."""
     crossover_hz: float | None
-    """Of the axis with the smaller phase margin."""
+    """Crossover of the axis with the smaller phase margin."""
     settled: bool | None
     """Whether the loops had settled before the measured turn; None on a trapezoid. Without it no measure is given."""
     mean_contour_error_mm: float | None
@@ -224,7 +224,7 @@ class CircleFigures(NamedTuple):
     radial_deviation_min_mm: float | None
     radial_deviation_max_mm: float | None
     circular_deviation_mm: float | None
-    """About the least-squares centre of a whole turn; None on a trapezoid."""
+    """G about the least-squares centre of a whole turn; None on a trapezoid."""
     radius_deviation_mm: float | None
     centre_offset_mm: tuple[float, float] | None
     constant_speed_deg: float | None

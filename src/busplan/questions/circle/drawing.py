@@ -43,11 +43,11 @@ TOLERANCE: Final = Entry("tolerance", "tolerance of the largest error", shape="l
 
 
 class LengthUnit(NamedTuple):
-    """Unit that lengths are written in."""
+    """Unit of written lengths."""
 
     name: str
     per_um: float
-    """How many of it are 1 um."""
+    """Number of units in 1 um."""
 
     def text(self, length_um: float) -> str:
         """Write a round length with its unit."""
@@ -135,7 +135,7 @@ class ErrorRange(NamedTuple):
 
     @property
     def largest_um(self) -> float:
-        """Its end that is further from zero, without its sign."""
+        """End further from zero, without its sign."""
         return max(abs(self.bottom_um), abs(self.top_um))
 
     @property
@@ -406,15 +406,15 @@ def _curve(curve: Stretch, up: Ruler, row: CircleRow, *, per_um: float) -> Curve
 
 
 def _ranking(row: CircleRow, rows: Sequence[CircleRow], scales: Scales) -> Panel | None:
-    """What each error source takes from the largest error, largest first.
+    """Part of the largest error that each source takes, the largest part first.
 
     Periods whose table followed the circle share a scale; the others share a second.
     """
     if not row.result.contributions:
         return None
     unit = scales.unit
-    alike = [drawn for drawn in rows if drawn.run.diverged == row.run.diverged]
-    taken = [source.removed_mm * 1e3 * unit.per_um for drawn in alike for source in drawn.result.contributions or ()]
+    on_scale = [drawn for drawn in rows if drawn.run.diverged == row.run.diverged]
+    taken = [source.removed_mm * 1e3 * unit.per_um for drawn in on_scale for source in drawn.result.contributions or ()]
     lanes = []
     for source in row.result.contributions:
         value = source.removed_mm * 1e3 * unit.per_um

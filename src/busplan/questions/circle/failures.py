@@ -128,13 +128,13 @@ class Stated(NamedTuple):
     """A number in the message of a failure."""
 
     value: float
-    """In the unit of its key."""
+    """Value in the unit of its key."""
     key: str
     """The figure of the circle test, or the tolerance."""
     unit: str
     """Unit to write it in."""
     decimals: int | None
-    """None for all it has."""
+    """None for all decimals."""
 
     def __str__(self) -> str:
         number = self.value * 1e3 if self.unit == "um" else self.value
@@ -209,7 +209,7 @@ class Failure(NamedTuple):
 
     @property
     def is_of_bus(self) -> bool:
-        """Whether the bus fails, and not the circle."""
+        """Whether a limit of the bus fails, not the circle."""
         return bool(self.said) or self.name in _OF_TIME
 
     def document(self) -> dict[str, Any]:
@@ -227,8 +227,8 @@ class Failure(NamedTuple):
         if self.said:
             yield self.said
             return
-        known = _WITHOUT_TURN if self.name == CONTOUR_MEASURES[-1] and self.value is None else self.name
-        saying, value, limit = _FAILURES[known], self.value or 0.0, self.limit or 0.0
+        key = _WITHOUT_TURN if self.name == CONTOUR_MEASURES[-1] and self.value is None else self.name
+        saying, value, limit = _FAILURES[key], self.value or 0.0, self.limit or 0.0
         limit_key = saying.limit_key or self.name
         numbers = {
             "value": Stated(value, saying.key or self.name.removeprefix("min_"), saying.unit, saying.decimals),
@@ -262,7 +262,7 @@ def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
 
     Parameters
     ----------
-    profile
+    network
         The network.
     capacity
         Its figures under the timing model that decides.
@@ -311,18 +311,17 @@ def circle_failures(profile: Profile, run: CircleRun, *, settled: bool) -> tuple
     ]
     if low:
         low[-1] = low[-1]._replace(more=late)
+    measured = ((name, getattr(run.contour, name), getattr(tolerance, name)) for name in CONTOUR_MEASURES if settled)
+    contour = (
+        Failure(name, value, limit)
+        for name, value, limit in measured
+        if limit is not None and (value is None or value > limit)
+    )
     return (
         *(() if settled else (Failure("not_settled", None, LONGEST_SETTLING_US / 1e6),)),
         # Radial errors do not show this: a table that stands still on the circle has none. Nothing is known of a turn
         # before the loops have settled.
         *(() if run.follows or not settled else (Failure("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)),
         *low,
-        *(_contour_failures(profile, run) if settled else ()),
+        *contour,
     )
-
-
-def _contour_failures(profile: Profile, run: CircleRun) -> Iterator[Failure]:
-    for name in CONTOUR_MEASURES:
-        limit, value = getattr(profile.tolerance, name), getattr(run.contour, name)
-        if limit is not None and (value is None or value > limit):
-            yield Failure(name, value, limit)

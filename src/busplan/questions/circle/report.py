@@ -28,7 +28,7 @@ from busplan.forms.numbers import period, period_value
 from busplan.questions.base.sentences import Owner, document, figure_table, with_profile
 from busplan.questions.circle import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTest
 from busplan.questions.circle.drawing import circle_drawing, largest_mm, magnified
-from busplan.questions.circle.failures import MARGINS, ContourProfile, Stated, drawn_profile
+from busplan.questions.circle.failures import MARGINS, ContourProfile, drawn_profile
 from busplan.questions.circle.roundness import failed_measure, to_attack
 from busplan.sections.profile import Profile
 
@@ -47,7 +47,7 @@ def verdict_words(result: CircleFigures) -> Words:
 
 
 def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
-    """Say whether the circle holds what it must, what it does not hold, and which error source to attack first.
+    """Say which limits the circle holds, which it breaks, and which error source to attack first.
 
     Parameters
     ----------
@@ -131,14 +131,11 @@ def failure_words(result: CircleFigures) -> Sentence:
     result
         The circle test at one period, which fails.
     """
-    phrases = (Sentence(tuple(map(_part, failure.parts()))) for failure in result.failures)
+    phrases = (
+        Sentence(tuple(part if isinstance(part, str) else ShownValue(*part) for part in failure.parts()))
+        for failure in result.failures
+    )
     return joined(*phrases, by=", and ")
-
-
-def _part(part: str | Stated) -> Part:
-    if isinstance(part, str):
-        return part
-    return ShownValue(part.value, part.key, part.unit, part.decimals)
 
 
 def servo_sentence(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:

@@ -110,7 +110,10 @@ def refusals(network: Network) -> tuple[Refused, ...]:
     if not network.groups:
         return (Refused("bus.nodes", "none", "messages alone have no axes that could move"),)
     causes = (*_setpoints_of_several_cycles(network), *_loop_over_the_bus(network))
-    return (*causes, *_of_run(network, is_loop_refused=bool(causes))) if _fits(network) else causes
+    fits = fits_in(deciding_cycle(network).required_us, available_us=available_us(network))
+    if not fits or network.bus.broken(network):
+        return causes
+    return (*causes, *_of_run(network, is_loop_refused=bool(causes)))
 
 
 def require_circle(network: Network) -> None:
@@ -118,7 +121,7 @@ def require_circle(network: Network) -> None:
 
     Parameters
     ----------
-    profile
+    network
         The network, whatever it asks for.
 
     Raises
@@ -150,12 +153,6 @@ def _of_run(network: Network, *, is_loop_refused: bool) -> tuple[Refused, ...]:
     return tuple({cause.name: cause for cause in reversed(causes)}.values())[::-1]
 
 
-def _fits(network: Network) -> bool:
-    """Whether the cycle of a network fits its bus."""
-    required_us = deciding_cycle(network).required_us
-    return bool(fits_in(required_us, available_us=available_us(network))) and not network.bus.broken(network)
-
-
 def _setpoints_of_several_cycles(network: Network) -> Iterator[Refused]:
     """Refuse axes whose set-points do not come in every cycle."""
     key, every = network.bus.setpoints_every(network)
@@ -169,28 +166,29 @@ def _loop_over_the_bus(network: Network) -> Iterator[Refused]:
     period_us, delay_us = network.profile.cycle.period_us, max(loop_delays_us(network))
     most_us = LONGEST_DELAY_PERIODS * period_us
     if delay_us > most_us:
-        known = f"the circle test knows {LONGEST_DELAY_PERIODS} periods"
-        why = f"the bus puts {delay_us:g} us into a loop over it, and {known}"
+        most = f"{LONGEST_DELAY_PERIODS} periods, {most_us:g} us, at most"
+        why = f"the bus puts {delay_us:g} us into a loop over it, and the circle test knows {most}"
         key, profile = network.bus.key_of("pipeline"), network.profile
         less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
-        right = f'{why}, {most_us:g} us, at most; {less}close the loop on the node, servo.loop = "node"'
+        right = f'{why}; {less}close the loop on the node, servo.loop = "node"'
         yield Refused("servo.loop", '"host"', right)
 
 
 def _out_of_order(network: Network) -> Iterator[Refused]:
     """Refuse set-points that would change their order: by what the bus adds, where only that does it."""
     profile, period_us = network.profile, network.profile.cycle.period_us
-    own = Delivery(**parameters_in(profile.delivery, Delivery))
-    if any(unfit_delivery(own, period_us=period_us)):
-        yield from (_at_key(cause, profile) for cause in unfit_delivery(own, period_us=period_us))
+    delivery = Delivery(**parameters_in(profile.delivery, Delivery))
+    causes = [*unfit_delivery(delivery, period_us=period_us)]
+    if causes:
+        yield from (_at_key(cause, profile) for cause in causes)
     elif any(unfit_delivery(delivery_of(network), period_us=period_us)):
-        known = f"which the circle test knows up to half the period, {period_us / 2:g} us, with jitter and skew"
+        most = f"which the circle test knows up to half the period, {period_us / 2:g} us, with jitter and skew"
         if apart_us := skew_us(network):
-            right = f"the last axis then takes its set-points {apart_us:g} us after the first, {known}"
+            right = f"the last axis then takes its set-points {apart_us:g} us after the first, {most}"
             yield Refused(network.bus.key_of("clock"), "false", f"{right}; set it true if the drives have a clock")
         else:
-            added_us = jitter_us(network) - own.jitter_us
-            right = f"the bus adds {added_us:g} us of jitter either way, {known}; a longer period has room"
+            added_us = jitter_us(network) - delivery.jitter_us
+            right = f"the bus adds {added_us:g} us of jitter either way, {most}; a longer period has room"
             yield Refused("cycle.period_us", period_us, right)
 
 
@@ -215,7 +213,7 @@ def _unfit(profile: Profile, axes: Sequence[Axis], settling_us: float | None) ->
 
 
 def _at_key(cause: Refused, profile: Profile, axis: AxisName | None = None) -> Refused:
-    """A cause by the dotted keys of its parameters: those of one axis, where the axis has its own."""
+    """A cause by the dotted keys of its parameters; a key that an axis sets is the key of the axis."""
 
     def key(parameter: str) -> str:
         if axis is not None and parameter in getattr(profile.servo, axis).model_fields_set:
@@ -242,9 +240,11 @@ def axis_of(profile: Profile, name: AxisName) -> Axis:
 
 def delivery_of(network: Network) -> Delivery:
     """How set-points arrive, with the skew and the jitter that the bus adds."""
-    own = network.profile.delivery
-    late = {"skew_us": own.skew_us + skew_us(network), "jitter_us": jitter_us(network)}
-    return Delivery(**parameters_in(own, Delivery) | {key: max(-LARGEST, min(us, LARGEST)) for key, us in late.items()})
+    delivery = network.profile.delivery
+    late = {"skew_us": delivery.skew_us + skew_us(network), "jitter_us": jitter_us(network)}
+    return Delivery(
+        **parameters_in(delivery, Delivery) | {key: max(-LARGEST, min(us, LARGEST)) for key, us in late.items()}
+    )
 
 
 def move_of(profile: Profile, settling_us: float | None) -> Move:

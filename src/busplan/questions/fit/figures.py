@@ -112,7 +112,8 @@ def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_
     most: dict[int, Number] = {}
     for index in sorted(range(len(limits)), key=lambda index: limits[index].is_slow):
         # One above the ceiling, so that a limit that allows the ceiling is not taken for the limit that sets it.
-        most[index] = _most_within(limits[index], network, cached_network, int(_greatest(nodes)) + 1)
+        most_left = int(nodes.max() if hasattr(nodes, "max") else plain(nodes))
+        most[index] = _most_within(limits[index], network, cached_network, most_left + 1)
         nodes = smaller(nodes, most[index])
     first: Number = len(limits) - 1  # time, if no limit binds
     for index in reversed(range(len(limits))):
@@ -121,7 +122,7 @@ def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_
 
 
 _VALUE_COST: Final = 30
-"""Operations that the value of a limit takes for each element, roughly; a comparison takes one."""
+"""Rough number of operations for the value of a limit, for each element; a comparison takes one."""
 
 
 def _most_within(limit: Limit, network: Network, cached_network: Callable[[int], Network], ceiling: int) -> Number:
@@ -132,11 +133,11 @@ def _most_within(limit: Limit, network: Network, cached_network: Callable[[int],
     """
     over = limit.is_broken(cached_network(ceiling))
     elements = _size(over)
-    if not _any(over):
+    if not (over.any() if hasattr(over, "any") else over):
         return ceiling
     if elements > 1:
-        asked = _size(limit.bound.least_value(network.with_nodes(1)))
-        counted = ceiling * (asked * _VALUE_COST + elements)
+        varying = _size(limit.bound.least_value(network.with_nodes(1)))
+        counted = ceiling * (varying * _VALUE_COST + elements)
         if counted <= ceiling.bit_length() * elements * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))
             return total(choose(is_over, 0, 1) for is_over in broken)
@@ -152,16 +153,8 @@ def _size(number: Number) -> int:
     return int(getattr(number, "size", 1))
 
 
-def _any(conditions: Number) -> bool:
-    return bool(conditions.any() if hasattr(conditions, "any") else conditions)
-
-
-def _greatest(number: Number) -> float:
-    return float(number.max()) if hasattr(number, "max") else plain(number)
-
-
 COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
-"""Figures that each group has for itself; where all nodes are alike, they are those of the whole."""
+"""Figures of each group; where all nodes are alike, figures of the whole."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +165,7 @@ class GroupCapacity:
     """Empty where all nodes are alike."""
     nodes: int
     axes: int
-    """Of all its nodes."""
+    """Axes of all its nodes."""
     max_nodes: int
     """Most nodes that fit."""
     max_axes: int
@@ -222,7 +215,7 @@ class FitFigures:
     """This and the figures below exist for the timing model that decides."""
     margin_corrected_us: float | None
     uncertainty_us: float | None
-    """None also where it is unknown."""
+    """None also where U is unknown."""
     safe_required_us: float | None
     safe_min_period_us: float | None
     not_shown: tuple[str, ...] | None
@@ -269,22 +262,22 @@ def capacity_figures(network: Network, *, model: str) -> CapacityFigures:
     """Whether a network fits its own period under one timing model, and how many nodes would."""
     fit = figures(network, model=model)
     counts = node_counts(network, model=model)
-    alike = counts[0] if counts and not counts[0].name else None
-    whole = {} if alike is None else {key: getattr(alike, key) for key in COUNTS}
-    return CapacityFigures(**vars(fit), counts=counts, groups=counts if alike is None else (), **whole)
+    if not counts or counts[0].name:
+        return CapacityFigures(**vars(fit), counts=counts, groups=counts)
+    return CapacityFigures(**vars(fit), counts=counts, **{key: getattr(counts[0], key) for key in COUNTS})
 
 
 def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
     """How many nodes of each group fit a network's period, and are shown to fit; of all where they are alike."""
     decides = model == network.bus.deciding_model
     counts = []
-    for alike in network.profile.alike_nodes:
-        most, limit = largest_nodes(network, model=model, group=alike.name)
-        safe, safe_limit = safe_nodes(network, group=alike.name) if decides else (None, None)
-        nodes, axes = int(alike.nodes), alike.node.axes
+    for group in network.profile.alike_nodes:
+        most, limit = largest_nodes(network, model=model, group=group.name)
+        safe, safe_limit = safe_nodes(network, group=group.name) if decides else (None, None)
+        nodes, axes = int(group.nodes), group.node.axes
         safe_axes = None if safe is None else axes * safe
         counts.append(
-            GroupCapacity(alike.name, nodes, nodes * axes, most, axes * most, limit, safe, safe_axes, safe_limit)
+            GroupCapacity(group.name, nodes, nodes * axes, most, axes * most, limit, safe, safe_axes, safe_limit)
         )
     return tuple(counts)
 

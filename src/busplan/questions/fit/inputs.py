@@ -61,23 +61,23 @@ def given(profile: Profile, key: str) -> Input:
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
     bus = bus_of(profile)
-    # What is off by default is nobody's measurement, and a word that chooses is none.
+    # A default of zero is no measurement, nor is a word that chooses a formula.
     is_no_measurement = (not is_set and not value) or _chooses(profile, key)
     grade = "given" if own_grade is None or is_no_measurement else own_grade
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
-    alike_key, group = _of_one_table(profile, key)
-    known = bus.keys.get(alike_key, Key())
-    default = known.default
+    common_key, group = _of_one_table(profile, key)
+    bus_key = bus.keys.get(common_key, Key())
+    default = bus_key.default
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
     by_comment = comment_grade(profile, key) if is_set and grade == "given" else None
     if by_comment is not None:
         grade, source = by_comment, f"{source}; graded by its comment"
     else:
-        grade = known.grade or grade
+        grade = bus_key.grade or grade
     # A plain number shows no unit.
     unit = "" if unit == "1" else unit
-    symbol = _SYMBOLS.get(alike_key) or known.symbol or SYMBOLS.get(name) or name
+    symbol = _SYMBOLS.get(common_key) or bus_key.symbol or SYMBOLS.get(name) or name
     symbol = f"{symbol},{group}" if group else symbol
     return Input(symbol, key, value, unit, grade, source, description)
 
@@ -89,9 +89,9 @@ def traced(profile: Profile, key: str) -> Traced:
 
 
 def traced_profile(profile: Profile) -> Profile:
-    """Return a copy with traced numbers in all keys that the cycle may depend on, unvalidated.
+    """Return an unvalidated copy with traced values in all keys that the cycle may depend on.
 
-    So are words that choose between numbers.
+    These are numbers, and words that choose a formula.
     """
     values: dict[str, object] = {}
     for key in cycle_keys(profile):
@@ -99,11 +99,11 @@ def traced_profile(profile: Profile) -> Profile:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if is_number or (isinstance(value, str) and _chooses(profile, key)):
             values[key] = traced(profile, key)
-    for alike in profile.alike_nodes:
-        execution, key = alike.node.execution, alike.node_key(_TABLE)
+    for group in profile.alike_nodes:
+        execution, key = group.node.execution, group.node_key(_TABLE)
         if isinstance(execution, TableExecution):
             table = GivenTable(execution.time_us)
-            symbol = f"table,{alike.name}" if alike.name else "table"
+            symbol = f"table,{group.name}" if group.name else "table"
             table.given = given(profile, key)._replace(symbol=symbol, value=f"{len(execution.time_us)} points")
             values[key] = table
     return with_all_unchecked(profile, values)
@@ -111,20 +111,19 @@ def traced_profile(profile: Profile) -> Profile:
 
 def _chooses(profile: Profile, key: str) -> bool:
     """Whether a key is text-valued and selects a formula."""
-    own = choosing_keys(bus_of(profile))
-    return any(key == alike.node_key(name) for alike in profile.alike_nodes for name in own)
+    names = choosing_keys(bus_of(profile))
+    return any(key == group.node_key(name) for group in profile.alike_nodes for name in names)
 
 
 def choosing_keys(bus: Bus) -> tuple[str, ...]:
     """Text-valued keys of a node that select a formula."""
-    own = (name.removeprefix("node.") for name, key in bus.keys.items() if key.chooses)
-    return ("execution.grade", *own)
+    return ("execution.grade", *(name.removeprefix("node.") for name, key in bus.keys.items() if key.chooses))
 
 
 def _of_one_table(profile: Profile, key: str) -> tuple[str, str]:
-    """The key without the name of its table, where a key has several, and that name.
+    """The key without the name of its table, and that name.
 
-    That of a group is as it is where all nodes are alike.
+    A key of a group becomes the key of a profile whose nodes are all alike.
     """
     section, _, rest = key.partition(".")
     if not isinstance(getattr(profile, section), tuple):
@@ -149,24 +148,24 @@ _EXECUTION: Final = "execution"
 _ENDLESS: Final = 1e12
 """A bit rate at which nothing takes time [kbit/s]."""
 _Share = tuple[tuple[str, ...], float, str]
-"""Keys, what they carry [1], and of what."""
+"""Keys, the share that they carry [1], and the whole."""
 
 
 class HeavyAssumption(NamedTuple):
     """An assumed key, or the assumed execution times together, which carry much of a cycle."""
 
     keys: tuple[str, ...]
-    """Dotted keys: one, or the section of the execution time of each group, which are taken to err together."""
+    """Dotted keys: one, or the section of each group's execution time, as these err together."""
     carries: str
-    """Its shares, in words that begin with the verb."""
+    """The shares in words, with the verb first."""
 
     @property
     def is_execution(self) -> bool:
-        """Whether these are execution times."""
+        """Whether the keys are execution times."""
         return self.keys[0].endswith(f".{_EXECUTION}")
 
     def covers(self, key: str) -> bool:
-        """Whether a key is among these, or in one of these sections."""
+        """Whether a key is one of `keys`, or in a section among them."""
         return any(key == covered or key.startswith(f"{covered}.") for covered in self.keys)
 
 
@@ -177,7 +176,7 @@ def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssu
     ----------
     figures
         Figures under the timing model that decides.
-    profile
+    network
         The network.
     """
     profile = network.profile
@@ -186,16 +185,16 @@ def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssu
         ((doubt.key,), float(doubt.us) ** 2 / variance, "the variance") for doubt in figures.doubts if variance
     ]
     shares += [((term.rests_on,), plain(term.us) / figures.required_us, "the required time") for term in figures.terms]
-    # What is no key has no grade, and execution times are no term or doubt of one key.
+    # Only keys have a grade; execution times are no term or doubt of one key.
     shares = [share for share in shares if share[1] > _MUCH and _is_assumed(profile, share[0][0])]
     shares += _of_execution(figures, network, variance)
     shares += _of_rates(figures, network)
-    said: dict[tuple[str, ...], list[str]] = {}
+    carried: dict[tuple[str, ...], list[str]] = {}
     for keys, share, whole in shares:
         if share > _MUCH:
-            said.setdefault(keys, []).append(f"{share:.0%} of {whole}")
-    verbs = {keys: "carries" if len(keys) == 1 else "together carry" for keys in said}
-    return tuple(HeavyAssumption(keys, f"{verbs[keys]} {' and '.join(carried)}") for keys, carried in said.items())
+            carried.setdefault(keys, []).append(f"{share:.0%} of {whole}")
+    verbs = {keys: "carries" if len(keys) == 1 else "together carry" for keys in carried}
+    return tuple(HeavyAssumption(keys, f"{verbs[keys]} {' and '.join(words)}") for keys, words in carried.items())
 
 
 def _is_assumed(profile: Profile, key: str) -> bool:
@@ -203,9 +202,13 @@ def _is_assumed(profile: Profile, key: str) -> bool:
 
 
 def _of_execution(figures: RuleFigures, network: Network, variance: float) -> list[_Share]:
-    """Shares of the assumed execution times: what of its terms goes without them, and their part of the variance."""
+    """Shares of the assumed execution times: the time that the terms lose without them, and their variance."""
     network, bus = network._replace(period_us=figures.period_us), network.bus
-    assumed = [group for group in network.groups if _counts(group, network)]
+    assumed = [
+        group
+        for group in network.groups
+        if group.node.execution.grade == "assumed" and bus.has_execution(network._replace(groups=(group,)))
+    ]
     if not assumed:
         return []
     without = network._replace(groups=tuple(_at_once(group) if group in assumed else group for group in network.groups))
@@ -224,7 +227,7 @@ def assumed_rates(network: Network) -> tuple[str, ...]:
 
 
 def _of_rates(figures: RuleFigures, network: Network) -> Iterator[_Share]:
-    """Shares of the assumed bit rates: what of the required time, or without a cycle of the load, goes without them."""
+    """Shares of the assumed bit rates: the required time, or without a cycle the load, that an endless rate saves."""
     bus = network.bus
     for key in assumed_rates(network):
         endless = network_of(with_unchecked(network.profile, key, _ENDLESS))
@@ -233,11 +236,6 @@ def _of_rates(figures: RuleFigures, network: Network) -> Iterator[_Share]:
             yield (key,), 1 - plain(cycle.required_us) / figures.required_us, "the required time"
         elif (load := bus.limit("load")) is not None:
             yield (key,), 1 - plain(load.bound.value(endless)) / plain(load.bound.value(network)), "the load"
-
-
-def _counts(group: Group, network: Network) -> bool:
-    is_assumed = group.node.execution.grade == "assumed"
-    return is_assumed and network.bus.has_execution(network._replace(groups=(group,)))
 
 
 def _at_once(group: Group) -> Group:

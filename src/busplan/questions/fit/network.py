@@ -21,8 +21,8 @@ def bus_of(profile: Profile) -> Bus:
 
 
 def varied_nodes(profile: Profile) -> AlikeNodes:
-    """The nodes whose number axes are counted by: all where they are alike, otherwise the group of the most axes."""
-    return max(profile.alike_nodes, key=lambda alike: int(alike.nodes * alike.node.axes))
+    """The nodes whose number varies when axes are counted: all that are alike, or the group of the most axes."""
+    return max(profile.alike_nodes, key=lambda group: int(group.nodes * group.node.axes))
 
 
 def network_of(profile: Profile) -> Network:
@@ -35,8 +35,8 @@ def network_of(profile: Profile) -> Network:
     """
     cycle = profile.cycle
     groups = tuple(_group(members) for members in _side_by_side(profile.alike_nodes))
-    asked = None if profile.group else ""
-    return Network(profile, bus_of(profile), groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us, asked)
+    varied = None if profile.group else ""
+    return Network(profile, bus_of(profile), groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us, varied)
 
 
 def at_period(network: Network, period_us: Number) -> Network:
@@ -56,14 +56,14 @@ def changed(network: Network, changes: Mapping[str, object]) -> Network:
 
 
 def _group(members: Sequence[AlikeNodes]) -> Group:
-    said = members[0]
-    execution = said.node.execution
-    read_bytes, write_bytes = (said.bytes_of(kind) for kind in TRANSACTION_KINDS)
+    first = members[0]
+    execution = first.node.execution
+    read_bytes, write_bytes = (first.bytes_of(kind) for kind in TRANSACTION_KINDS)
     read_us, write_us = execution.execution_us(read_bytes), execution.execution_us(write_bytes)
     return Group(
-        said=said,
-        nodes=said.nodes if len(members) == 1 else total(member.nodes for member in members),
-        axes=said.node.axes,
+        said=first,
+        nodes=first.nodes if len(members) == 1 else total(member.nodes for member in members),
+        axes=first.node.axes,
         read_bytes=read_bytes,
         write_bytes=write_bytes,
         read_execution_us=read_us,
@@ -76,7 +76,7 @@ def _group(members: Sequence[AlikeNodes]) -> Group:
 
 
 def _side_by_side(groups: Sequence[AlikeNodes]) -> list[list[AlikeNodes]]:
-    """Put neighbours that are alike in all but name and number together: then their cycle is that of a uniform bus."""
+    """Join neighbours that differ only in name and number, so that their cycle is that of a uniform bus."""
     runs: list[list[AlikeNodes]] = []
     for group in groups:
         # Groups at slower rates go in cycles of their own.
@@ -151,8 +151,8 @@ def model_names(network: Network) -> tuple[str, ...]:
 
 def leading_model(network: Network) -> str:
     """Name of the timing model whose figures lead: the profile's own, or the one that decides where that cannot."""
-    own: str = network.profile.bus.timing_model
-    return own if own in model_names(network) else network.bus.deciding_model
+    model: str = network.profile.bus.timing_model
+    return model if model in model_names(network) else network.bus.deciding_model
 
 
 def without_execution(network: Network) -> Network:
