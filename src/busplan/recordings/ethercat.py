@@ -196,7 +196,10 @@ class _Reader:
                 "without it, and record again"
             )
         if len(self._masters) > 1:
-            named = ", ".join(f"{_address(value)} ({plural(count, 'frame')})" for value, count in self._masters.items())
+            named = ", ".join(
+                f"{address.to_bytes(6, 'big').hex(':')} ({plural(count, 'frame')})"
+                for address, count in self._masters.items()
+            )
             raise BusplanError(
                 f"{path}: has frames of {len(self._masters)} masters: {named}; keep the frames of one, as in Wireshark "
                 "with the filter eth.src"
@@ -267,7 +270,3 @@ def _datagrams_of(layout: bytes) -> tuple[Datagram, ...]:
         Datagram(part[0] - 1, int.from_bytes(part[1:5], "little"), int.from_bytes(part[5:7], "little"))
         for part in parts
     )
-
-
-def _address(value: int) -> str:
-    return value.to_bytes(6, "big").hex(":")

@@ -48,17 +48,17 @@ def response_us(
 
 def load(_cycle: object, *, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> float:
     """Share of the bus that messages take [1]."""
-    each = streams(_messages(bit_rate_kbit_s, payload_bytes, period_us), is_stuffed=True)
-    return float(sum(own.frame_us / own.period_us for own in each))
+    traffic = streams(_messages(bit_rate_kbit_s, payload_bytes, period_us), is_stuffed=True)
+    return float(sum(stream.frame_us / stream.period_us for stream in traffic))
 
 
 def _messages(bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> Traffic:
     """Messages alone by payload [bytes] and period [us], in the order of identifiers."""
-    each = (
+    messages = (
         Message(f"{place}", place, size, us, jitter_us=0.0, deadline_us=us)
         for place, (size, us) in enumerate(zip(payload_bytes, period_us, strict=True))
     )
-    return Traffic(bit_rate_kbit_s=bit_rate_kbit_s, messages=tuple(each))
+    return Traffic(bit_rate_kbit_s=bit_rate_kbit_s, messages=tuple(messages))
 
 
 FUNCTIONS: Final = {function.__name__: function for function in (stuffed, frame_bits, fd_frame_bits, response_us, load)}

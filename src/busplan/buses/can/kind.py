@@ -174,7 +174,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         """Say whose response time it is."""
         if not network.groups:
             return ", ".join(("worst case of every message", *self.setup_words(network)))
-        return ", ".join((f"worst case of SYNC, of the last PDO of {_all_nodes(network)}", *self.setup_words(network)))
+        nodes = "all nodes" if network.is_uniform else "each group"
+        return ", ".join((f"worst case of SYNC, of the last PDO of {nodes}", *self.setup_words(network)))
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
         """A response time ends when the frame has arrived, and begins when it is queued."""
@@ -237,10 +238,6 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         from busplan.buses.can.recorded import recorded  # a single command asks for it, and numpy loads
 
         return recorded(network, path, share=share, progress=progress)
-
-
-def _all_nodes(network: Network) -> str:
-    return "all nodes" if network.is_uniform else "each group"
 
 
 BUS: Final = Can()
