@@ -49,3 +49,13 @@ def test_a_period_at_its_limit_allows_for_rounding_and_no_more() -> None:
     ):
         (figures,) = busplan.capacity(profile, period_us=period_us, timing_model="paper").results
         assert (figures.fits, figures.margin_us < 0) == (fits, not fits)
+
+
+def test_a_load_at_its_limit_allows_for_rounding_and_no_more() -> None:
+    profile = busplan.load_profile("can-servo-8")
+    load = busplan.capacity(profile, timing_model="worst-stuffing").results[0].own["bus_load"]
+    assert isinstance(load, float)
+    for most, is_broken in ((load, False), (nextafter(load, 0), False), (load * (1 - 3e-11), True)):
+        limited = busplan.load_profile(profile, changes={"limits": {"max_load": most}})
+        (figures,) = busplan.capacity(limited, timing_model="worst-stuffing").results
+        assert ("load" in figures.exceeded) == is_broken
