@@ -460,10 +460,9 @@ def compare_command(
     """Put the machine of a profile on each kind of bus: verdict, smallest period, most axes.
 
     The machine is the part of a profile that every kind has: nodes and axes, bytes, execution times and period.
-    On its own kind the profile stays as it is. On another kind it gets the bus and the slice ratio of a new
-    profile, which are assumed; keys that only its own kind has are left out, and named. The smallest period [us] is the
-    one at which this machine is shown to fit; the most axes are those at the profile's period. Exits 0 with any
-    verdict.
+    On its own kind the profile stays as it is. On another kind it gets the bus of a new profile, which is assumed; keys
+    that only its own kind has are left out, and named. The smallest period [us] is the one at which this machine is
+    shown to fit; the most axes are those at the profile's period. Exits 0 with any verdict.
 
     Example: busplan compare gantry-24
     """
