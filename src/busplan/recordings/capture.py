@@ -4,6 +4,7 @@ Libraries such as dpkt give stamps of pcapng as floats, whose steps are 240 ns b
 master. So the few fields of a record are read here.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -139,15 +140,15 @@ def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress)
             return
 
 
-class _Walker:
+class _Walker(ABC):
     """Reader of records one behind the other."""
 
     is_broken = False
     """Whether a record cannot be: no further one can be found."""
 
+    @abstractmethod
     def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
         """Start, size and stamp of each whole packet, and the bytes used."""
-        raise NotImplementedError
 
 
 class _Pcap(_Walker):

@@ -44,7 +44,6 @@ from busplan.questions.base.sentences import (
 )
 from busplan.questions.compare import KindComparison, MachineOnKind, NotOnKind, SafeAxes, fitting
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
-from busplan.questions.fit.network import network_of
 
 _INKS: Final[tuple[Ink, ...]] = ("request", "contention", "work", "sync", "acknowledge", "response", "reserve")
 """Colours of the curves; each has a letter, too."""
@@ -63,7 +62,7 @@ def compare_drawing(comparison: KindComparison, *, title: str) -> Drawing:
         Its message in a sentence.
     """
     compared, own_us = comparison.compared, comparison.profile.cycle.period_us
-    own_axes = int(plain(network_of(comparison.profile).axes))
+    own_axes = int(plain(comparison.network.axes))
     points = [point for machine in compared for point in machine.curve]
     periods_us, top = sorted({point.period_us for point in points}), max(point.axes or 1 for point in points)
     machine_now = Entry("own", f"this machine: {period(own_us)}, {plural(own_axes, 'axis')}", shape="line")

@@ -28,7 +28,7 @@ from busplan.questions.plan.search import (
     Changes,
     Freedom,
     Need,
-    Step,
+    PlanStep,
     freed,
     freedoms,
     most_asking,
@@ -247,7 +247,7 @@ def _plan(profile: Profile, wanted: KeyChanges, names: Sequence[str] | None) -> 
     )
 
 
-def _option(goal: Network, step: Step, number: int) -> Option:
+def _option(goal: Network, step: PlanStep, number: int) -> Option:
     after = changed(goal, step.changes)
     model, ratio = after.bus.deciding_model, float(after.profile.cycle.slice_ratio)
     label = _AS_IT_IS if step.freedom is None else step.freedom.label

@@ -249,7 +249,7 @@ class Freedom(NamedTuple):
     keys: tuple[str, ...]
 
 
-class Step(NamedTuple):
+class PlanStep(NamedTuple):
     """A step of a plan: what was freed, and the changes that came nearest."""
 
     freedom: Freedom | None
@@ -319,7 +319,7 @@ def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collect
     return tuple(freedom for freedom in still if freedom.name in names)
 
 
-def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str] = ()) -> list[Step]:
+def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str] = ()) -> list[PlanStep]:
     """Change one thing at a time, the cheapest first, until every constraint of a plan holds.
 
     Of each thing the least change that is enough is taken; where none is, the one that comes nearest, and the next
@@ -339,7 +339,7 @@ def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str]
     list
         The steps from the network as it is; the last one holds, or nothing of the levels is enough.
     """
-    steps = [Step(None, {}, tuple(unmet(network)))]
+    steps = [PlanStep(None, {}, tuple(unmet(network)))]
     changes: list[Changes] = []
     for freedom in levels:
         if not steps[-1].unmet:
@@ -355,7 +355,7 @@ def search(network: Network, levels: Sequence[Freedom], *, kept: Collection[str]
             if not still:
                 break
         changes += [nearest] if nearest else []
-        steps.append(Step(freedom, _together(changes), tuple(needs)))
+        steps.append(PlanStep(freedom, _together(changes), tuple(needs)))
     if not steps[-1].unmet and len(changes) > 1:
         steps[-1] = steps[-1]._replace(changes=_together(_needed(network, changes)))
     return steps
@@ -515,7 +515,7 @@ def cure(network: Network, *, kept: Collection[str] = ()) -> Cure:
     return Cure(None, stands_in_the_way(network, last).why) if last.unmet else Cure(last.changes)
 
 
-def stands_in_the_way(network: Network, step: Step) -> Need:
+def stands_in_the_way(network: Network, step: PlanStep) -> Need:
     """The constraint that a step does not hold, with its words."""
     after = changed(network, step.changes)
     ratio = float(plain(after.slice_ratio))

@@ -104,7 +104,7 @@ _ON_FIRST_SCREEN: Final = {"capacity": Card, "map": Chart}
 """Blocks of an answer that stand on the first screen already."""
 
 
-def _folded(section: "Section") -> Chapter:
+def _folded(section: "PageSection") -> Chapter:
     shown = _ON_FIRST_SCREEN.get(section.key, ())
     blocks = [block for block in _whole(section.report.blocks) if not isinstance(block, shown)]
     return Chapter(Sentence((section.title,)), (*blocks, Command(section.command)), section.key, is_folded=True)
@@ -141,7 +141,7 @@ def _comparison(profiles: "Sequence[ReportedProfile]") -> Table:
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """One answer on a page."""
 
     key: str
@@ -160,7 +160,7 @@ class ReportedProfile:
     changes: KeyChanges
     """Changes of its file by options."""
     verdict: Verdict
-    sections: tuple[Section, ...]
+    sections: tuple[PageSection, ...]
     """Its answers, that of `capacity` first."""
     missing: tuple[str, ...]
     """Why an answer is not among them that its reader expects."""
@@ -170,7 +170,7 @@ class ReportedProfile:
         """The network."""
         return self.verdict.network
 
-    def section(self, key: str) -> Section | None:
+    def section(self, key: str) -> PageSection | None:
         """The answer of a name."""
         return next((section for section in self.sections if section.key == key), None)
 
@@ -279,26 +279,28 @@ def _reported(
     more = ("--sensitivity",) if profile.has_cycle else ()
     missing: list[str] = []
 
-    def sections() -> Iterator[Section]:
-        yield Section("capacity", "Every figure of the cycle", command("capacity", *more), bus.report())
+    def sections() -> Iterator[PageSection]:
+        yield PageSection("capacity", "Every figure of the cycle", command("capacity", *more), bus.report())
         if profile.has_cycle:
-            yield Section("map", "What fits, and what limits it", command("map"), map_(profile).report())
+            yield PageSection("map", "What fits, and what limits it", command("map"), map_(profile).report())
         latencies = latency(profile).report()
-        yield Section("latency", "How long data take", command("latency", takes_period=False), latencies)
+        yield PageSection("latency", "How long data take", command("latency", takes_period=False), latencies)
         if profile.has_cycle:
             try:
                 events = timeline(profile).report()
             except BusplanError as error:  # more nodes than can be laid out
                 missing.append(f"The cycle is not drawn: {error}.")
             else:
-                yield Section("timeline", "The cycle to scale", command("timeline"), events)
+                yield PageSection("timeline", "The cycle to scale", command("timeline"), events)
         if _asks_for_circle(profile, circle):
             if refused := _circle_refused(profile):
                 missing.append(f"The circle test cannot be run: {refused}.")
             else:
                 test = circle_test(profile, contributions=True, progress=progress).report()
-                yield Section("circle", "The circle", command("circle-test", "--contributions"), test)
-        yield Section("explain", "What it rests on", command("explain", takes_period=False), explain(profile).report())
+                yield PageSection("circle", "The circle", command("circle-test", "--contributions"), test)
+        yield PageSection(
+            "explain", "What it rests on", command("explain", takes_period=False), explain(profile).report()
+        )
 
     answers = tuple(sections())
     return ReportedProfile(argument, changes, bus.verdicts[0], answers, tuple(missing))
