@@ -426,7 +426,7 @@ def test_its_rule_and_its_limit_are_found_and_listed(run: Run, ring: Path) -> No
 
 
 def test_its_verdict_says_that_no_figure_of_others_tests_it(run: Run, ring: Path) -> None:
-    words = "No published or measured figure tests the model of Token ring (kind ring)."
+    words = "Token ring (kind ring): checked against no published figures."
     assert run("evidence", "ring", cwd=ring.parent).stdout == f"{words}\n"
     found = json.loads(run("evidence", "ring", "--format", "json", cwd=ring.parent).stdout)
     assert (found["without"], found["figures"]) == (["ring"], [])

@@ -80,8 +80,8 @@ def test_what_is_left_out_untested_and_in_the_way_is_said_of_each_kind() -> None
     assert "No period is shown to fit: a PDO of 40 bytes" in note
     assert "Left out on CAN: bus.speed, bus.gap_count, bus.charge_hops, group.io.write_response." in lines_of(GANTRY)
     assert "Execution times are assumed to be as long as on IEEE 1394; here they are: from SYNC to a queued" in note
-    assert "Model of CAN (kind can): published figures set expected load (8 frames that hardware" in note
-    assert note.endswith("; not tested: the cycle.")
+    assert "Checked against lengths of classical frames (2 sizes), " in note
+    assert note.endswith("; never measured: the cycle.")
     reset = "After a bus reset, with bus.gap_count = 63 until it is set again, the verdict is: not shown to fit."
     assert any(line.startswith(f"IEEE 1394: {reset}") for line in lines_of(GANTRY))
     assert [one["verdict_after_reset"] for one in GANTRY.to_dict()["buses"]] == ["not shown to fit", None]

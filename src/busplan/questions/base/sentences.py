@@ -116,20 +116,12 @@ def broken_limits(figures: FitFigures, network: Network) -> list[str]:
     return [limit.words(network) for limit in broken if limit is not None]
 
 
-def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
-    """Say which parts of a kind's model published figures set and test; nothing where they test all of it."""
+def checked_against(bus: "Bus", *, has_cycle: bool = True) -> str:
+    """Parts of a kind's model that published figures test, and those that none does."""
     tested = parts_tested(bus.evidence_data)
-    kind = f"{bus.title} (kind {bus.kind})"
-    if not tested.parts:
-        yield Sentence((f"No published or measured figure tests the model of {kind}.",))
-    elif tested.untested:
-        sources = {"published figures set": tested.set_by, "independent figures test": tested.parts}
-        phrases = (
-            f"{how} {', '.join(f'{part} ({by})' for part, by in parts.items())}"
-            for how, parts in sources.items()
-            if parts
-        )
-        yield Sentence((f"Model of {kind}: {'; '.join(phrases)}; not tested: {', '.join(tested.untested)}.",))
+    parts = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
+    never = f"never measured: {', '.join(tested.untested)}" if tested.untested and has_cycle else ""
+    return "; ".join(filter(None, (parts, never))) or "no published figures"
 
 
 def not_applicable(network: Network) -> Iterator[Sentence]:

@@ -7,14 +7,13 @@ from typing import Final
 
 from busplan.buses.cycle import LeftOut
 from busplan.buses.network import Network
-from busplan.buses.published import parts_tested
 from busplan.buses.rule import contradicts
 from busplan.elementwise import FIT_ROUNDING, plain
 from busplan.english import listed, nouns, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
 from busplan.forms.numbers import period, sentence_text
-from busplan.questions.base.sentences import change_meanings, settings_sentence
+from busplan.questions.base.sentences import change_meanings, checked_against, settings_sentence
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, limits_behind
 from busplan.questions.fit.figures import (
     CapacityFigures,
@@ -319,7 +318,8 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
         yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in verdict.left_out)),))
     if verdict.premises:
         yield "rests on", Sentence(("; ".join(verdict.premises),))
-    yield "checked against", Sentence((_tested(verdict),))
+    has_cycle = bool(verdict.network.groups)
+    yield "checked against", Sentence((checked_against(verdict.network.bus, has_cycle=has_cycle),))
     for model in bus.timing_models:
         if missing := bus.cannot_express(network, model=model.name):
             yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
@@ -349,13 +349,6 @@ def _doubts(verdict: Verdict) -> Iterator[_Line]:
         (error,) = (model.error for model in network.bus.timing_models if model.name == figures.timing_model)
         uncertainty = ", no uncertainty given" if figures.uncertainty_us is None else ""
         yield "bias", Sentence((f"none corrected{uncertainty}: {error}",))
-
-
-def _tested(verdict: Verdict) -> str:
-    tested = parts_tested(verdict.network.bus.evidence_data)
-    parts = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
-    never = f"never measured: {', '.join(tested.untested)}" if tested.untested and verdict.network.groups else ""
-    return "; ".join(filter(None, (parts, never))) or "no published figures"
 
 
 def uncertainty_parts(figures: CapacityFigures) -> list[Record]:

@@ -34,8 +34,8 @@ from busplan.forms.numbers import period, period_value, sentence_text
 from busplan.profile.conversion import AssumedKey
 from busplan.profile.edit import short_text
 from busplan.questions.base.sentences import (
+    checked_against,
     document,
-    evidence_sentence,
     execution_sentence,
     fields,
     parts_by,
@@ -178,10 +178,9 @@ def notes(comparison: KindComparison) -> Iterator[Sentence]:
                 *_obstacles(machine),
                 *reset_sentence(machine.after_reset, machine.network),
                 *_execution(machine, comparison.network),
-                *evidence_sentence(machine.network.bus),
+                Sentence((f"Checked against {checked_against(machine.network.bus)}.",)),
             ]
-            if sentences:
-                yield joined(Sentence((f"{machine.network.bus.title}:",)), *sentences)
+            yield joined(Sentence((f"{machine.network.bus.title}:",)), *sentences)
     yield from _left_out(comparison)
 
 

@@ -17,7 +17,7 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
 )
-from busplan.questions.base.sentences import document, evidence_sentence, parts_by
+from busplan.questions.base.sentences import checked_against, document, parts_by
 from busplan.questions.evidence import Comparison, KindEvidence
 
 _DIGITS: Final = 5
@@ -82,7 +82,8 @@ def _document(kinds: Sequence[KindEvidence], records: list[Record], *, paper: bo
 def _blocks(kinds: Sequence[KindEvidence], *, paper: bool) -> Iterator[Block]:
     for kind in kinds:
         if not paper:
-            yield from evidence_sentence(kind_named(kind.kind))
+            bus = kind_named(kind.kind)
+            yield Sentence((f"{bus.title} (kind {bus.kind}): checked against {checked_against(bus)}.",))
         for section in kind.sections:
             yield Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(section.comparisons)))
 
