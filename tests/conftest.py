@@ -346,11 +346,15 @@ def refused(run: Run) -> Callable[..., str]:
 def on_terminal(run: Run, request: pytest.FixtureRequest) -> Callable[..., tuple[int, str]]:
     """Run the program with a terminal for its standard output and error; gives exit code and what the terminal got.
 
-    In this process, as `run` does, unless a process is asked for.
+    In this process, as `run` does, unless a process is asked for, which may have the keyboard, too.
     """
 
     def call(
-        *arguments: str, cwd: Path, env: Mapping[str, str] | None = None, process: bool = False
+        *arguments: str,
+        cwd: Path,
+        env: Mapping[str, str] | None = None,
+        process: bool = False,
+        keyboard: bool = False,
     ) -> tuple[int, str]:
         ours, theirs = pty.openpty()
         shown = bytearray()
@@ -363,7 +367,7 @@ def on_terminal(run: Run, request: pytest.FixtureRequest) -> Callable[..., tuple
                     check=False,
                     cwd=cwd,
                     env=environment(**(env or {})),
-                    stdin=subprocess.DEVNULL,
+                    stdin=theirs if keyboard else subprocess.DEVNULL,
                     stdout=theirs,
                     stderr=theirs,
                     timeout=300,
