@@ -52,6 +52,6 @@ def test_the_papers_can_system_spends_its_time_in_the_host() -> None:
 
 def test_a_verdict_says_what_nobody_has_tested(run: Callable[..., CompletedProcess[str]]) -> None:
     bounds = "bounds of their stuff bits (8 frames that hardware counted)"
-    words = f"{bounds}, response times (two worked examples); {{}}: the cycle"
-    for never, command in (("never measured", ("capacity", "can-servo-8")), ("not tested", ("evidence", "can"))):
-        assert words.format(never) in " ".join(run(*command).stdout.split())
+    words = f"{bounds}, response times (two worked examples); never measured: the cycle"
+    for command in (("capacity", "can-servo-8"), ("evidence", "can")):
+        assert words in " ".join(run(*command).stdout.split())
