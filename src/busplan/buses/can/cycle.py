@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, partial, reduce
-from itertools import islice
 from math import inf
 from typing import Final, Literal
 
-from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, TERMS, bit_us, frame_us, payload_us
+from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, TERMS, bit_us, payload_us
 from busplan.buses.can.frames import (
     LOOP,
     NAMES,
@@ -112,24 +111,19 @@ class CanCycle(BusCycle):
         """SYNC, PDOs and other messages."""
         return traffic_of(self.network)
 
-    @cached_property
-    def _wire(self) -> dict[str, Number]:
-        keys = ("identifier_bits", "bit_rate_kbit_s", "data_bit_rate_kbit_s")
-        return {key: getattr(self.traffic, key) for key in keys}
-
-    def _frame_us(self, data_bytes: Number, **wire: Number) -> Number:
-        return frame_us(data_bytes, **(self._wire | wire), is_stuffed=self.is_stuffed)
-
-    def _message_us(self, message: Message) -> Number:
-        us = self._frame_us(
-            message.payload_bytes,
-            identifier_bits=message.identifier_bits,
-            data_bit_rate_kbit_s=message.data_bit_rate_kbit_s,
-        )
-        return named(us, f"{message.name}_us", f"C,{message.name}")
+    def _frame_us(self, data_bytes: Number, form: Traffic | Message | None = None) -> Number:
+        """Time of a frame of the cycle, or of a message [us]."""
+        return self.traffic.frame_us(data_bytes, form or self.traffic, is_stuffed=self.is_stuffed)
 
     def _pdo_us(self, pdos: Pdos) -> Number:
-        pdo_us = payload_us(pdos.payload_bytes, frame_bytes=pdos.frame_bytes, **self._wire, is_stuffed=self.is_stuffed)
+        pdo_us = payload_us(
+            pdos.payload_bytes,
+            frame_bytes=pdos.frame_bytes,
+            identifier_bits=self.traffic.identifier_bits,
+            bit_rate_kbit_s=self.traffic.bit_rate_kbit_s,
+            data_bit_rate_kbit_s=self.traffic.data_bit_rate_kbit_s,
+            is_stuffed=self.is_stuffed,
+        )
         return named(pdo_us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
 
     @cached_property
@@ -140,20 +134,16 @@ class CanCycle(BusCycle):
     @cached_property
     def _messages(self) -> tuple[tuple[Message, Number], ...]:
         """All other messages, each with the time of its frame."""
-        if self.traffic.is_ordered:
-            us = (stream.frame_us for stream in self._streams if stream.is_message)
-            return tuple(zip(self.traffic.messages, us, strict=True))
-        return tuple((message, self._message_us(message)) for message in self.traffic.messages)
-
-    @property
-    def _streams(self) -> tuple[Stream, ...]:
-        return streams(self.traffic, is_stuffed=self.is_stuffed)
+        return tuple(
+            (message, named(self._frame_us(message.payload_bytes, message), f"{message.name}_us", f"C,{message.name}"))
+            for message in self.traffic.messages
+        )
 
     @cached_property
     def _before(self) -> tuple[tuple[Message, Number, Number], ...]:
         """Messages that may go before the last PDO, each with the time of its frame, and whether it does."""
-        each = ((message, us, self._goes_before_last(message)) for message, us in self._messages)
-        return tuple(one for one in each if one[2] is not False)
+        messages = ((message, us, self._goes_before_last(message)) for message, us in self._messages)
+        return tuple(message for message in messages if message[2] is not False)
 
     @cached_property
     def sync_us(self) -> Number:
@@ -217,9 +207,8 @@ class CanCycle(BusCycle):
     def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
         """Some of the frames of lower priorities: before SYNC, before the feedback, or behind it."""
         waited = waits(self.traffic, plain(self._on_bus_us), self._due, is_stuffed=self.is_stuffed)
-        for message in islice(waited.blocks(), first, end):
-            label = f"message {message.name} of a lower priority"
-            yield blocking._replace(us=plain(message.frame_us), label=label)
+        for message in waited.blocks()[first:end]:
+            yield blocking._replace(us=message.frame_us, label=f"message {message.name} of a lower priority")
 
     @cached_property
     def _own(self) -> dict[str, Number]:
@@ -248,8 +237,7 @@ class CanCycle(BusCycle):
         extra_us
             By how much the rest takes longer [us].
         """
-        is_own = is_off(extra_us)
-        blocking_us, counts = self._own_waits if is_own else self._waits_beside(self._on_bus_us + extra_us)
+        blocking_us, counts = self._own_waits if is_off(extra_us) else self._waits_beside(self._on_bus_us + extra_us)
         return blocking_us + total(count * us for count, (_, us, _) in zip(counts, self._before, strict=True))
 
     @cached_property
@@ -263,7 +251,11 @@ class CanCycle(BusCycle):
         others_us = named(others_us, "others_us", "others")
 
         def figure(key: str, words: str) -> Number:
-            return self.traffic.ask(partial(_waits, self.is_stuffed, key, self._due), others_us, words=words)
+            def of(traffic: Traffic, others_us: Number) -> Number:
+                number: Number = getattr(waits(traffic, others_us, self._due, is_stuffed=self.is_stuffed), key)
+                return number
+
+            return self.traffic.ask(of, others_us, words=words)
 
         words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
         lasts_us = named(figure("lasts_us", words), "busy_us", "w")
@@ -294,8 +286,14 @@ class CanCycle(BusCycle):
     @cached_property
     def _last(self) -> Number:
         """The largest identifier of SYNC and all PDOs."""
-        sent, words = self.traffic.without_times(), "the largest identifier of SYNC and all PDOs"
-        return named(sent.ask(partial(_last, self._due), words=words), "last_identifier", "id_last")
+
+        def last(traffic: Traffic) -> Number:
+            cyclic = [stream for stream in streams(traffic, is_stuffed=True) if not stream.is_message]
+            identifier: Number = last_identifier(cyclic if self._due is None else sent_in(cyclic, self._due))
+            return identifier
+
+        identifier = self.traffic.ask(last, words="the largest identifier of SYNC and all PDOs")
+        return named(identifier, "last_identifier", "id_last")
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """Growth of the cycle if its nodes take longer: more messages may arrive, too [us]."""
@@ -421,53 +419,56 @@ class CanCycle(BusCycle):
         return super().loop_periods(at_sync=at_sync) + int(plain(self.network.profile.bus.pipeline_cycles))
 
     def sync_jitter_us(self) -> Number:
-        """Half of what messages may hold SYNC up [us]."""
-        return self.sync_spread_us / 2
+        """Half of what messages may hold SYNC up; infinite where that has no end, 0 where no SYNC is sent [us]."""
 
-    @cached_property
-    def sync_spread_us(self) -> Number:
-        """Delay of SYNC by other messages, B + I [us]; infinite where it has no end, 0 where no SYNC is sent."""
+        def held_up_us(traffic: Traffic) -> Number:
+            worst = sync_response(traffic, is_stuffed=self.is_stuffed)
+            return choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)
+
         if not self.traffic.has_cycle:
             return 0.0
-        if self.traffic.is_ordered:
-            worst = sync_response(self.traffic, is_stuffed=self.is_stuffed)
-            return choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)
-        blocking_us, interference_us = self._waits_of(0, SYNC)
-        return named(blocking_us + interference_us, "sync_spread_us", "B + I")
-
-    def _figure(self, place: int, key: str, words: str) -> Number:
-        """A figure of the stream at a place among those that end a PDO or a message."""
-        return self.traffic.ask_points(partial(_phase, self.is_stuffed, place, key), words=words)
-
-    def _waits_of(self, place: int, name: str) -> tuple[Number, Number]:
-        """Blocking and interference of such a stream [us]."""
-        blocks, before = self._counted(place)
-        blocking = f"the longest frame of a lower priority than {name}{blocks}"
-        interference = f"frames of higher priorities before {name}, in its worst instance{before}"
-        return (
-            named(self._figure(place, "blocking_us", blocking), "blocking_us", "B"),
-            named(self._figure(place, "interference_us", interference), "interference_us", "I"),
-        )
+        return self.traffic.ask(held_up_us, words="frames before SYNC, B + I") / 2
 
     def _phases(self, place: int, name: str) -> dict[str, Number]:
-        """Figures of such a stream; of no arrays."""
-        figure = partial(self._figure, place)
-        jitter_us = figure("jitter_us", f"how late {name} may be queued")
-        frame_us_ = figure("frame_us", f"the last frame of {name}")
-        blocking_us, interference_us = self._waits_of(place, name)
+        """Figures of the stream at a place among those that end a PDO or a message; of no arrays."""
+
+        def figure(key: str, words: str) -> Number:
+            def of(traffic: Traffic) -> float:
+                stream, worst = responses(traffic, is_stuffed=self.is_stuffed)[place]
+                if key in Stream._fields or key == "last":
+                    number: float = getattr(stream, key)
+                else:
+                    number = getattr(worst, key) if worst.us < inf else inf
+                return number
+
+            return self.traffic.ask(of, words=words)
+
+        # A derivation says which frames were counted.
+        point, words = self.traffic.point, ("", "")
+        if isinstance(point, Traced):
+            words = counted(self.traffic.at(point.value), place, is_stuffed=self.is_stuffed)
+        blocks, before = (f": {frames}" if frames else "" for frames in words)
+        frame_us = figure("frame_us", f"the last frame of {name}")
         instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")
         period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
         periods = instance
         if any(value_of(message.burst) > 1 for message in self.traffic.messages if message.name == name):
             burst = named(figure("burst", f"frames of {name} that may come at once"), "burst", "b")
             periods = instance - burst + 1
-        backlog_us = choose(instance < inf, instance * frame_us_ - periods * period_us, instance)
         parts_us = {
-            "jitter_us": named(jitter_us, "jitter_us", "J"),
-            "blocking_us": blocking_us,
-            "interference_us": interference_us,
-            "backlog_us": named(backlog_us, "backlog_us", "q (C - T)"),
-            "frame_us": named(frame_us_, "frame_us", "C"),
+            "jitter_us": named(figure("jitter_us", f"how late {name} may be queued"), "jitter_us", "J"),
+            "blocking_us": named(
+                figure("blocking_us", f"the longest frame of a lower priority than {name}{blocks}"), "blocking_us", "B"
+            ),
+            "interference_us": named(
+                figure("interference_us", f"frames of higher priorities before {name}, in its worst instance{before}"),
+                "interference_us",
+                "I",
+            ),
+            "backlog_us": named(
+                choose(instance < inf, instance * frame_us - periods * period_us, instance), "backlog_us", "q (C - T)"
+            ),
+            "frame_us": named(frame_us, "frame_us", "C"),
             "execution_us": 0.0,
             "pipeline_us": 0.0,
         }
@@ -478,13 +479,6 @@ class CanCycle(BusCycle):
             instance=instance,
             deadline_us=figure("deadline_us", f"deadline of {name}"),
         )
-
-    def _counted(self, place: int) -> Iterator[str]:
-        """The frames that a derivation of a response says were counted: the one that blocks, and those before it."""
-        at, words = self.traffic.place, ("", "")
-        if isinstance(at, Traced):
-            words = counted(self.traffic.at(at.value), place, is_stuffed=self.is_stuffed)
-        return (f": {one}" if one else "" for one in words)
 
 
 def _numbered(parts_us: Mapping[str, Number], **figures: Number) -> dict[str, Number]:
@@ -508,28 +502,6 @@ def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Nu
     return slowest_us + uncertainties * doubt_us
 
 
-def _waits(is_stuffed: bool, key: str, due: frozenset[str] | None, traffic: Traffic, others_us: Number) -> Number:
-    """One figure of what a cycle waits for."""
-    number: Number = getattr(waits(traffic, others_us, due, is_stuffed=is_stuffed), key)
-    return number
-
-
 def _of_all(message: Message, number: Number) -> Number:
     """A number of a message, of all nodes that send it."""
     return number if is_off(message.senders - 1) else message.senders * number
-
-
-def _last(due: frozenset[str] | None, traffic: Traffic) -> Number:
-    cyclic = [stream for stream in streams(traffic, is_stuffed=True) if not stream.is_message]
-    last: Number = last_identifier(cyclic if due is None else sent_in(cyclic, due))
-    return last
-
-
-def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:
-    """One figure of the stream at a place among those that end a PDO or a message, and of its response.
-
-    It is infinite where it does not exist.
-    """
-    own, worst = responses(traffic, is_stuffed=is_stuffed)[place]
-    said: float = getattr(own, key) if hasattr(own, key) else getattr(worst, key) if worst.us < inf else inf
-    return said
