@@ -4,16 +4,18 @@ from array import array
 from collections.abc import Container, Iterator, Sequence
 from functools import cache, lru_cache
 from importlib import import_module
-from itertools import chain
 from math import ceil, inf, isclose
 from types import ModuleType
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from busplan.buses.can import response
 from busplan.buses.can.equations import MOST_BLOCKS, bit_us
 from busplan.buses.can.frames import NAMES, SYNC, Points, Stream, Traffic, last_place, streams
-from busplan.elementwise import choose, from_rows, plain, rows, shape_of, smaller, total
+from busplan.elementwise import choose, plain, smaller, total
 from busplan.english import first_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 
@@ -103,11 +105,10 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
         [choose(blocks, message.frame_us, 0.0) for message, blocks in lower],
         *([getattr(message, key) for message in messages] for key in _OF_MESSAGES),
     )
-    shape = shape_of(chain.from_iterable(columns))
-    lasts, blocking = rows([0.0], shape), rows([0.0], shape)
-    _compute("cycle_waits", most, *(rows(column, shape) for column in columns), results=(lasts, blocking))
-    may_block = tuple(message for message, blocks in lower if blocks is not False)
-    return Waits(from_rows(lasts, 0, shape), from_rows(blocking, 0, shape), may_block, most)
+    shape, arrays = _arrays(*columns, [0.0], [0.0])
+    _computing().cycle_waits(most, *arrays)
+    lasts_us, blocking_us = (_points(array, 0, shape) for array in arrays[-2:])
+    return Waits(lasts_us, blocking_us, tuple(message for message, blocks in lower if blocks is not False), most)
 
 
 _OF_MESSAGES: Final = ("identifiers", "burst", "period_us", "jitter_us", "deadline_us")
@@ -310,21 +311,22 @@ def _worst(
     onces_us = [
         [stream.burst_us + (stream.name in start.late) * stream.frames_us for stream in ranked] for start in starts
     ]
-    shape = shape_of(chain.from_iterable((*columns, *jitters_us, *onces_us)))
-    results = [rows([-inf] * len(answered), shape) for _ in range(4)]
-    for once_us, jitter_us in zip(onces_us, jitters_us, strict=True):
-        _compute(
-            "responses",
+    shape, arrays = _arrays(*columns, *onces_us, *jitters_us, *[[-inf] * len(answered)] * 4)
+    shared, results = arrays[: len(columns)], arrays[-4:]
+    for number in range(len(columns), len(columns) + len(starts)):
+        _computing().responses(
             array("q", [rank_of[number] for number in answered]),
             array("q", group),
             array("d", [stream.block for stream in ranked]),
-            *(rows(column, shape) for column in (*columns, once_us, jitter_us)),
+            *shared,
+            arrays[number],
+            arrays[number + len(starts)],
             array("d", [0.0] * (len(ranked) + 1)),
             array("d", [0.0] * len(groups)),
-            results=results,
+            *results,
         )
     for place, number in enumerate(answered):
-        blocked_us, late, wait_us, us = (from_rows(result, place, shape) for result in results)
+        blocked_us, late, wait_us, us = (_points(result, place, shape) for result in results)
         instance = (late if shape else int(plain(late))) + sent[number].burst - 1
         interference_us = wait_us - blocked_us - instance * sent[number].frame_us
         yield number, Response(blocked_us, instance, interference_us, us)
@@ -335,17 +337,27 @@ def _token(number: Points) -> float:
     return number if isinstance(number, int | float) else id(number)
 
 
-def _compute(name: str, *numbers: Any, results: Sequence[Any]) -> None:
-    """Write the results of a function of `response` into rows that are there."""
-    if (compiled := _compiled()) is not None:
-        getattr(compiled, name)(*numbers, *results)
-        return
-    lists = [result.tolist() for result in results]
-    getattr(response, name)(*(number if isinstance(number, int) else number.tolist() for number in numbers), *lists)
-    for result, points in zip(results, lists, strict=True):
-        for point, row in enumerate(points):
-            for place, number in enumerate(row):
-                result[point, place] = number
+def _arrays(*columns: Sequence[Points]) -> tuple[tuple[int, ...], list["NDArray[Any]"]]:
+    """Shape of the points of all columns together, and each column as an array with a row for each point."""
+    import numpy as np  # noqa: PLC0415 - only what waits for messages loads it
+
+    shape = np.broadcast_shapes(*{getattr(number, "shape", ()) for column in columns for number in column})
+    if not shape:
+        return shape, [np.array([column], dtype=float) for column in columns]
+    return shape, [
+        np.stack([np.broadcast_to(number, shape).ravel() for number in column], axis=1).astype(float)
+        for column in columns
+    ]
+
+
+def _points(results: "NDArray[Any]", place: int, shape: tuple[int, ...]) -> Points:
+    """The number at a place of the row of each point."""
+    return results[:, place].reshape(shape) if shape else results[0, place].item()
+
+
+def _computing() -> Any:
+    """`response`, compiled where it can be."""
+    return _compiled() or response
 
 
 @cache
