@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, partial, reduce
+from itertools import chain
 from math import inf
 from typing import Final, Literal
 
@@ -98,8 +99,8 @@ class CanCycle(BusCycle):
         """Groups whose PDOs are in it."""
         if self.number is None:
             return self.network.groups
-        both = zip(self.network.groups, self.rates, strict=True)
-        return tuple(group for group, rate in both if rate.is_due(self.number))
+        groups = zip(self.network.groups, self.rates, strict=True)
+        return tuple(group for group, rate in groups if rate.is_due(self.number))
 
     @cached_property
     def _due(self) -> frozenset[str] | None:
@@ -115,21 +116,22 @@ class CanCycle(BusCycle):
         """Time of a frame of the cycle, or of a message [us]."""
         return self.traffic.frame_us(data_bytes, form or self.traffic, is_stuffed=self.is_stuffed)
 
-    def _pdo_us(self, pdos: Pdos) -> Number:
-        pdo_us = payload_us(
-            pdos.payload_bytes,
-            frame_bytes=pdos.frame_bytes,
-            identifier_bits=self.traffic.identifier_bits,
-            bit_rate_kbit_s=self.traffic.bit_rate_kbit_s,
-            data_bit_rate_kbit_s=self.traffic.data_bit_rate_kbit_s,
-            is_stuffed=self.is_stuffed,
-        )
-        return named(pdo_us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
-
     @cached_property
     def _pdos(self) -> tuple[tuple[Pdos, Number], ...]:
         """All PDOs, each with its time."""
-        return tuple((pdos, self._pdo_us(pdos)) for pdos in self.traffic.pdos)
+
+        def time(pdos: Pdos) -> Number:
+            us = payload_us(
+                pdos.payload_bytes,
+                frame_bytes=pdos.frame_bytes,
+                identifier_bits=self.traffic.identifier_bits,
+                bit_rate_kbit_s=self.traffic.bit_rate_kbit_s,
+                data_bit_rate_kbit_s=self.traffic.data_bit_rate_kbit_s,
+                is_stuffed=self.is_stuffed,
+            )
+            return named(us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
+
+        return tuple((pdos, time(pdos)) for pdos in self.traffic.pdos)
 
     @cached_property
     def _messages(self) -> tuple[tuple[Message, Number], ...]:
@@ -158,50 +160,45 @@ class CanCycle(BusCycle):
 
     def _frames(self, kind: TransactionKind) -> Iterator[Run]:
         """All PDOs of one direction, node by node; a timeline shows their frames."""
-        name, own = NAMES[kind], (pair for pair in self._pdos if pair[0].kind == kind)
-        for number, (pdos, us) in enumerate(own):
-            if self._due is not None and pdos.group not in self._due:
-                continue
-            pdo = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
-            yield Run((pdo,), pdos.pdos, number, partial(self._of_pdo, pdo, pdos))
+        name = NAMES[kind]
+        for number, (pdos, us) in enumerate(pair for pair in self._pdos if pair[0].kind == kind):
+            if self._due is None or pdos.group in self._due:
+                event = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
+                yield Run((event,), pdos.pdos, number, partial(self._of_pdo, event, pdos))
 
-    def _of_pdo(self, pdo: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
-        return (pdo._replace(us=self._frame_us(size)) for size in frame_sizes(pdos))
+    def _of_pdo(self, event: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
+        return (event._replace(us=self._frame_us(size)) for size in frame_sizes(pdos))
 
     @cached_property
-    def _opening(self) -> tuple[Run, ...]:
-        """SYNC, and the wait for the slowest feedback."""
+    def _parts(self) -> tuple[tuple[Run, ...], ...]:
+        """SYNC and the wait for feedback; feedback and the host; commands and the wait for their execution."""
         sync = BusEvent("sync", "cycle_sync_us", self.sync_us, "SYNC")
-        wait = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest feedback")
-        return Run((sync,)), Run((wait,))
-
-    @cached_property
-    def _feedback(self) -> tuple[Run, ...]:
-        """All feedback, and the host."""
+        ready = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest feedback")
         host_us = self.traffic.host_us if self._groups else 0.0
         host = BusEvent("host", "cycle_host_us", host_us, "host", rests_on="bus.host_us")
-        return (*self._frames("read"), Run((host,)))
-
-    @cached_property
-    def _commands(self) -> tuple[Run, ...]:
-        """All commands, and the wait for the slowest execution."""
-        slowest = "wait for the slowest execution of a command"
-        return (*self._frames("write"), Run((BusEvent("wait", "cycle_wait_us", self._wait_us("write"), slowest),)))
+        executed_us = self._wait_us("write")
+        executed = BusEvent("wait", "cycle_wait_us", executed_us, "wait for the slowest execution of a command")
+        return (
+            (Run((sync,)), Run((ready,))),
+            (*self._frames("read"), Run((host,))),
+            (*self._frames("write"), Run((executed,))),
+        )
 
     def written(self) -> Iterator[BusEvent | Run]:
         """The cycle node by node, with other messages as late for the commands as they can be."""
         if not self.traffic.has_cycle:
             return
-        blocking_us, counts = self._own_waits
+        opening, feedback, commands = self._parts
+        blocking_us, counts = self._waits
         blocking = BusEvent("blocking", "cycle_blocking_us", blocking_us, "messages of a lower priority")
         yield Run((blocking,), laid_out=lambda _: self._blocks(blocking, 0, 1))
-        yield from self._opening
+        yield from opening
         yield Run((), laid_out=lambda _: self._blocks(blocking, 1, 2))
-        yield from self._feedback
+        yield from feedback
         yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
         for count, (message, us, _) in zip(counts, self._before, strict=True):
             yield Run((BusEvent("message", "cycle_interference_us", us, f"message {message.name}"),), count)
-        yield from self._commands
+        yield from commands
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
@@ -211,23 +208,23 @@ class CanCycle(BusCycle):
             yield blocking._replace(us=message.frame_us, label=f"message {message.name} of a lower priority")
 
     @cached_property
-    def _own(self) -> dict[str, Number]:
-        """The terms without those of other messages."""
+    def _terms(self) -> dict[str, Number]:
+        """Time of the terms without those of other messages [us]."""
         keys = ("cycle_sync_us", "cycle_wait_us", "cycle_feedback_us", "cycle_host_us", "cycle_command_us")
         if not self.traffic.has_cycle:
             return dict.fromkeys(keys, 0.0)
-        return summed((*self._opening, *self._feedback, *self._commands), keys)
+        return summed(chain.from_iterable(self._parts), keys)
 
     @cached_property
     def by_term(self) -> Mapping[str, Number]:
         """Time of each term, by its key [us]."""
-        rest = (run for run in self.runs if not any(event.term in self._own for event in run.events))
-        return summed(rest, (figure.key for figure in TERMS)) | self._own
+        rest = (run for run in self.runs if not any(event.term in self._terms for event in run.events))
+        return summed(rest, (figure.key for figure in TERMS)) | self._terms
 
     @cached_property
     def _on_bus_us(self) -> Number:
         """From SYNC to the end of the last command, without other messages [us]."""
-        return total((self._own | {"cycle_wait_us": self._wait_us("read")}).values())
+        return total((self._terms | {"cycle_wait_us": self._wait_us("read")}).values())
 
     def _waits_us(self, extra_us: Number) -> Number:
         """Blocking by frames of lower priorities, and interference by those of higher ones [us].
@@ -237,11 +234,11 @@ class CanCycle(BusCycle):
         extra_us
             By how much the rest takes longer [us].
         """
-        blocking_us, counts = self._own_waits if is_off(extra_us) else self._waits_beside(self._on_bus_us + extra_us)
+        blocking_us, counts = self._waits if is_off(extra_us) else self._waits_beside(self._on_bus_us + extra_us)
         return blocking_us + total(count * us for count, (_, us, _) in zip(counts, self._before, strict=True))
 
     @cached_property
-    def _own_waits(self) -> tuple[Number, tuple[Number, ...]]:
+    def _waits(self) -> tuple[Number, tuple[Number, ...]]:
         return self._waits_beside(self._on_bus_us + 0.0)
 
     def _waits_beside(self, others_us: Number) -> tuple[Number, tuple[Number, ...]]:
@@ -266,21 +263,20 @@ class CanCycle(BusCycle):
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
         for message, _, goes_before in self._before:
-            each = rounded_up((window_us + message.jitter_us) / message.period_us)
-            count = _of_all(message, each if is_off(message.burst - 1) else each + message.burst - 1)
-            yield choose(goes_before, count, 0)
+            of_node = rounded_up((window_us + message.jitter_us) / message.period_us)
+            of_node = of_node if is_off(message.burst - 1) else of_node + message.burst - 1
+            yield choose(goes_before, _of_all(message, of_node), 0)
 
     def _goes_before_last(self, message: Message) -> Number:
         """Whether a message goes before the last of SYNC and all PDOs."""
-        bits = message.identifier_bits, self.traffic.identifier_bits
-        if bits[0] is bits[1]:
+        if message.identifier_bits is self.traffic.identifier_bits:
             return message.identifier <= self._last
 
         def is_before(*numbers: float) -> bool:
-            identifier, own_bits, last, last_bits = map(int, numbers)
-            return bool(place(identifier, own_bits) <= place(last, last_bits))
+            identifier, bits, last, last_bits = map(int, numbers)
+            return bool(place(identifier, bits) <= place(last, last_bits))
 
-        numbers = message.identifier, bits[0], self._last, bits[1]
+        numbers = message.identifier, message.identifier_bits, self._last, self.traffic.identifier_bits
         return pointwise(is_before, *numbers, words="the first 11 bits decide, then the base frame goes first")
 
     @cached_property
@@ -347,7 +343,7 @@ class CanCycle(BusCycle):
 
     @property
     def _in_cycle_us(self) -> Number:
-        return self.sync_us + self._own["cycle_feedback_us"] + self._own["cycle_command_us"]
+        return self.sync_us + self._terms["cycle_feedback_us"] + self._terms["cycle_command_us"]
 
     @property
     def _mean_us(self) -> Number:
@@ -378,18 +374,21 @@ class CanCycle(BusCycle):
         load = ("load", words)
         if not self._messages:
             return (load,)
-        each = message_responses(self.traffic, is_stuffed=self.is_stuffed)
-        latest, worst = max(each, key=lambda pair: plain(pair[1].us) / plain(pair[0].deadline_us))
+        answers = message_responses(self.traffic, is_stuffed=self.is_stuffed)
+        latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)
         if worst.us == inf:
             return load, ("latest message", f"{latest.name}, without a worst-case response time")
         return load, ("latest message", f"{latest.name}, {_short(worst.us)} us of {_short(latest.deadline_us)}")
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
-        ends = ((SYNC, ""), *((pdos.name, pdos.group) for pdos in self.traffic.pdos)) if self.traffic.has_cycle else ()
-        names = (*ends, *((message.name, "") for message in self.traffic.messages))
-        each = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
-        return (*each, *((BusLatency(LOOP, None, self._loop()),) if self.traffic.has_cycle else ()))
+        cycle = ((SYNC, ""), *((pdos.name, pdos.group) for pdos in self.traffic.pdos)) if self.traffic.has_cycle else ()
+        names = (*cycle, *((message.name, "") for message in self.traffic.messages))
+        loop = (BusLatency(LOOP, None, self._loop()),) if cycle else ()
+        return (
+            *(BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names)),
+            *loop,
+        )
 
     def _loop(self) -> dict[str, Number]:
         """Parts of the way from SYNC to the last executed command that rests on it."""
@@ -494,12 +493,13 @@ def _short(number: float) -> str:
 
 def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Number:
     """The slowest execution of a group's nodes, with some standard uncertainties [us]."""
-    own = group.read_execution_us if kind == "read" else group.write_execution_us
-    slowest_us = own + group.worst_extra_us
-    if not uncertainties:
-        return slowest_us
-    doubt_us = group.read_uncertainty_us if kind == "read" else group.write_uncertainty_us
-    return slowest_us + uncertainties * doubt_us
+    execution_us, doubt_us = (
+        (group.read_execution_us, group.read_uncertainty_us)
+        if kind == "read"
+        else (group.write_execution_us, group.write_uncertainty_us)
+    )
+    slowest_us = execution_us + group.worst_extra_us
+    return slowest_us + uncertainties * doubt_us if uncertainties else slowest_us
 
 
 def _of_all(message: Message, number: Number) -> Number:
