@@ -15,7 +15,6 @@ from busplan.buses.ethercat.equations import (
     BYTE_US,
     DATAGRAM_BYTES,
     GAP_BYTES,
-    device_us,
     frame_bytes,
     sending_us,
 )
@@ -304,7 +303,7 @@ class _Seen:
             yield from (of_trip, of_master) if host_us else (of_trip,)
             return
         doubts = [
-            *(plain(device_us(doubt.one_way_us)) for doubt in devices_doubts(self.network)),
+            *(plain(doubt.us) for doubt in devices_doubts(self.network)),
             plain(planned.process_bytes) * BYTE_BIAS_UNCERTAINTY_US,
             plain(bus.master_doubt_us),
             self.stamp_us * _TWO_STAMPS,
