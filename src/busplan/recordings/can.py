@@ -2,7 +2,6 @@
 
 import logging
 import zlib
-from array import array
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -21,6 +20,11 @@ from busplan.progress import Progress
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, Quantile, ahead, grid
 
 _EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
+_ROW: Final = Struct("<dIQBB")
+_ROW_FIELDS: Final = np.dtype(
+    [("stamp_s", "<f8"), ("identifier", "<u4"), ("data", "<u8"), ("dlc", "u1"), ("flags", "u1")]
+)
+"""A frame while a log is read."""
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader", b"(": "CanutilsLogReader"}
 """Readers of python-can, by the first bytes of a file."""
 _FORMATS: Final = "candump -l, Vector's ASC and BLF, PEAK's TRC"
@@ -165,21 +169,13 @@ class _Log:
     """Frames read so far."""
 
     def __init__(self) -> None:
-        self._times, self._identifiers, self._data = array("d"), array("I"), array("Q")
-        self._sizes, self._flags = array("B"), array("B")
+        self._rows = bytearray()
         self._channels: Counter[object] = Counter()
         self._errors = 0
         self.broken = ""
 
     def read(self, messages: Iterator[Any], report: Callable[[], None]) -> None:
         """Take all messages in."""
-        times, identifiers, data, sizes, flags = (
-            self._times.append,
-            self._identifiers.append,
-            self._data.append,
-            self._sizes.append,
-            self._flags.append,
-        )
         number, last_s = 0, None
         for message in messages:
             number += 1
@@ -192,19 +188,21 @@ class _Log:
             _require_frame(message, last_s)
             last_s = message.timestamp
             self._channels[message.channel] += 1
-            times(last_s)
-            identifiers(message.arbitration_id)
-            data(int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"))
-            sizes(message.dlc)
-            fd = message.is_fd
+            is_fd = message.is_fd
             # CAN FD has no remote frames: what a log marks so has data that it lost.
-            remote = message.is_remote_frame and not fd
-            switched = fd and message.bitrate_switch
-            flags(message.is_extended_id * _EXTENDED | remote * _REMOTE | fd * _FD | switched * _SWITCHED)
+            is_remote = message.is_remote_frame and not is_fd
+            is_switched = is_fd and message.bitrate_switch
+            self._rows += _ROW.pack(
+                last_s,
+                message.arbitration_id,
+                int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"),
+                message.dlc,
+                message.is_extended_id * _EXTENDED | is_remote * _REMOTE | is_fd * _FD | is_switched * _SWITCHED,
+            )
 
     def frames(self, path: Path) -> CanFrames:
         """All frames as arrays."""
-        if not self._times:
+        if not self._rows:
             why = f" ({self.broken})" if self.broken else ""
             errors = f" but {plural(self._errors, 'error frame')}" if self._errors else ""
             raise BusplanError(f"{path}: has no CAN frame{errors}{why}")
@@ -213,20 +211,18 @@ class _Log:
                 f"{channel} ({plural(count, 'frame')})" for channel, count in self._channels.most_common()
             )
             raise BusplanError(f"{path}: has frames of {len(self._channels)} channels: {named}; keep those of one bus")
-        stamps = np.frombuffer(self._times, dtype=np.float64)
-        identifiers = np.frombuffer(self._identifiers, dtype=np.uint32).astype(np.int64)
-        flags = np.frombuffer(self._flags, dtype=np.uint8)
-        sizes = np.frombuffer(self._sizes, dtype=np.uint8).astype(np.int64)
+        rows = np.frombuffer(self._rows, dtype=_ROW_FIELDS)
+        stamps, flags = rows["stamp_s"], rows["flags"]
+        identifiers, sizes = rows["identifier"].astype(np.int64), rows["dlc"].astype(np.int64)
         codes = np.where(sizes < _LONG_BYTES[0], sizes, 10 + np.searchsorted(_LONG_BYTES[:-1], sizes))
         extended, remote, fd, switched = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD, _SWITCHED))
-        data = np.frombuffer(self._data, dtype=np.uint64)
         return CanFrames(
             float(stamps[0]),
             (stamps - stamps[0]) * 1e6,
             identifiers,
             extended,
             np.where(fd, sizes, np.minimum(sizes, _CLASSICAL_BYTES)),
-            np.where(fd, 0, written_bits(identifiers, extended, remote, codes, data)),
+            np.where(fd, 0, written_bits(identifiers, extended, remote, codes, rows["data"])),
             fd,
             switched,
             int(np.count_nonzero(remote)),
