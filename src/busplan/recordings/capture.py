@@ -63,10 +63,8 @@ class CaptureNotes:
     """What a file has beside its packets."""
 
     packets: int = 0
-    other_links: int = 0
-    """Packets of interfaces that are no Ethernet."""
-    without_time: int = 0
-    """Packets in records without a stamp, or with a stamp that is no time."""
+    left_out: int = 0
+    """Packets of interfaces that are no Ethernet, without a stamp, or with a stamp that is no time."""
     dropped: int = 0
     """Packets that the recorder says it dropped; a pcap file does not count them."""
     broken_at: int | None = None
@@ -228,7 +226,7 @@ class _PcapNg(_Walker):
             notes.dropped += dropped if dropped != _NOT_COUNTED else 0
             self._packet(rows, number, high << 32 | low, at + 28, min(kept, size - 32))
         elif kind == _SIMPLE_PACKET:
-            notes.without_time += 1
+            notes.left_out += 1
         elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
             self._interfaces.append(self._interface(content[at + 8 : end]))
         elif kind == _STATISTICS:
@@ -236,17 +234,13 @@ class _PcapNg(_Walker):
             notes.dropped = max(notes.dropped, self._dropped(content[at + 20 : end], _STATISTICS))
 
     def _packet(self, rows: list[tuple[int, int, int]], number: int, ticks: int, at: int, size: int) -> None:
-        if number >= len(self._interfaces):
-            self._notes.other_links += 1
-            return
-        interface = self._interfaces[number]
-        time_ns = ticks * _NS // interface.ticks + interface.offset_ns
-        if interface.link != _ETHERNET:
-            self._notes.other_links += 1
-        elif not 0 <= time_ns < _END_NS:
-            self._notes.without_time += 1
-        else:
-            rows.append((at, size, time_ns))
+        if number < len(self._interfaces):
+            interface = self._interfaces[number]
+            time_ns = ticks * _NS // interface.ticks + interface.offset_ns
+            if interface.link == _ETHERNET and 0 <= time_ns < _END_NS:
+                rows.append((at, size, time_ns))
+                return
+        self._notes.left_out += 1
 
     def _dropped(self, options: bytes, kind: int) -> int:
         """Packets that the options of a block say were dropped."""

@@ -411,8 +411,7 @@ class _Seen:
             yield f"{plural(self.trips.unsent, 'frame')} returned without having been seen to be sent."
         if frames.cut:
             yield f"Left out: {plural(frames.cut, 'EtherCAT frame')} that the recorder cut; record whole packets."
-        left_out = frames.others + notes.other_links + notes.without_time
-        if left_out:
+        if left_out := frames.others + notes.left_out:
             yield f"Left out: {plural(left_out, 'packet')} of other protocols or interfaces, or without a time."
         if not self.bad_stamps and self.short:
             yield (
