@@ -228,12 +228,6 @@ def test_the_masters_datagrams_leave_the_first_frame_less_room() -> None:
     ]
 
 
-def test_the_removed_key_names_the_new_ones() -> None:
-    for word in ("LRW", "LRD-LWR"):
-        with pytest.raises(BusplanError, match=r'removed key: .*process_data = "LRW-shared".*"LRW-separate"'):
-            busplan.load_profile(profile(), changes={"bus.command": word})
-
-
 @pytest.mark.parametrize(
     ("jitter_us", "verdict", "key"),
     # Taken at 20 + 10.56 + 0.45 + 40 us and J, doubted by twice the master's 10 us; nobody says how much of its 20 us

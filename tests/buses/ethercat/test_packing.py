@@ -27,7 +27,7 @@ def one_by_one(
 ) -> list[tuple[float, tuple[int, ...]]]:
     """Bytes and devices of each frame."""
     runs = frames_of(devices, datagrams=datagrams, first_bytes=first_bytes)
-    return [(plain(frame_bytes(run.datagrams_bytes)), tuple(held)) for run in runs for held in run.each()]
+    return [(plain(frame_bytes(run.datagrams_bytes)), tuple(held)) for run in runs for held in run.by_frame()]
 
 
 def datagram(data: bytes) -> bytes:

@@ -11,11 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses import kind_named
-from busplan.buses.ethercat.frames import Unit, starts
 from busplan.buses.ethercat.section import EthercatProfile
 from busplan.errors import BusplanError
-from busplan.questions.fit.network import network_of
+from tests.oracles.ethercat_recording import first_cycles
 
 BYTE_US: Final = 0.08
 E_BUS_US: Final = 2 * 0.1507
@@ -74,10 +72,19 @@ def written_us(groups: Sequence[Rated], first: Sequence[int], *, clocks: bool) -
     return [way_us + BYTE_US * sum(frames_of_cycle(groups, first, cycle, clocks=clocks)) for cycle in cycles]
 
 
-def placed(groups: Sequence[Rated], units: str) -> tuple[int, ...]:
-    return starts(
-        [Unit(every, nodes, read + write) for every, nodes, read, write in groups], is_spread=units == "spread"
-    )
+def placed(groups: Sequence[Rated], units: str) -> list[int]:
+    """First cycle of each group, from 0, as the emulated master places them."""
+    sizes = [nodes * (read + write) for _, nodes, read, write in groups]
+    return first_cycles([{"every": every} for every, *_ in groups], sizes, is_spread=units == "spread")
+
+
+def seen(groups: Sequence[Rated], units: str = "spread") -> list[int]:
+    """First cycle of each group, from 0, as a timeline lists the cycles."""
+    cycles = busplan.timeline(profile(groups, units=units)).to_dict()["distinct_cycles"]
+    names = [f"g{place}" for place in range(len(groups))]
+    return [
+        min(number for cycle in cycles if name in cycle["groups"] for number in cycle["numbers"]) - 1 for name in names
+    ]
 
 
 def deciding(one: busplan.Profile) -> Any:
@@ -158,15 +165,15 @@ def test_units_of_one_rate_are_spread_within_a_third_of_the_most_even(sizes: lis
         return max(sum(size for size, own in zip(sizes, first, strict=True) if own == cycle) for cycle in range(every))
 
     best = min(map(fullest, product(range(every), repeat=len(sizes))))
-    assert best <= fullest(starts([Unit(every, 1, size) for size in sizes], is_spread=True)) <= best * 4 / 3
+    assert best <= fullest(seen([(every, 1, size, 0) for size in sizes])) <= best * 4 / 3
 
 
 def test_units_of_several_rates_find_the_gaps_of_each_other() -> None:
-    faster_last = [Unit(4, 1, 8), Unit(4, 1, 8), Unit(2, 1, 6), Unit(1, 1, 5)]
-    assert starts(faster_last, is_spread=True) == (1, 3, 0, 0)
-    assert starts(faster_last, is_spread=False) == (0, 0, 0, 0)
+    faster_last = [(4, 1, 8, 0), (4, 1, 8, 0), (2, 1, 6, 0), (1, 1, 5, 0)]
+    assert seen(faster_last) == [1, 3, 0, 0]
+    assert seen(faster_last, "together") == [0, 0, 0, 0]
     # The last one goes where no cycle gets over 11, although there are more bytes in those cycles together.
-    assert starts([Unit(2, 1, 6), Unit(4, 1, 10), Unit(4, 1, 1), Unit(6, 1, 5)], is_spread=True) == (0, 1, 3, 0)
+    assert seen([(2, 1, 6, 0), (4, 1, 10, 0), (4, 1, 1, 0), (6, 1, 5, 0)]) == [0, 1, 3, 0]
 
 
 def test_a_rate_of_1_is_what_no_rate_is() -> None:
@@ -180,11 +187,8 @@ def test_a_rate_of_1_is_what_no_rate_is() -> None:
     assert deciding(one).own["mean_utilisation"] == deciding(one).utilisation
 
 
-def test_neighbours_that_are_alike_have_cycles_of_their_own() -> None:
-    found = deciding(profile([(2, 20, 60, 0), (2, 20, 60, 0)]))
-    assert found.own["process_bytes"] == 20 * 60
-    assert len(network_of(profile([(2, 20, 60, 0), (2, 20, 60, 0)])).groups) == 2
-    assert len(network_of(profile([(1, 20, 60, 0), (1, 20, 60, 0)])).groups) == 1
+def test_neighbours_with_the_same_keys_have_cycles_of_their_own() -> None:
+    assert deciding(profile([(2, 20, 60, 0), (2, 20, 60, 0)])).own["process_bytes"] == 20 * 60
 
 
 def test_a_sweep_has_what_each_profile_has() -> None:
@@ -205,14 +209,6 @@ def test_a_node_of_a_slower_group_has_its_own_period_to_finish_in() -> None:
     slow: dict[str, object] = {"group.g1.execution.base_us": 700.0}
     assert deciding(busplan.load_profile(profile([(1, 4, 20, 12), (3, 4, 20, 12)]), changes=slow)).fits
     assert "node" in deciding(busplan.load_profile(profile([(1, 4, 20, 12), (2, 4, 20, 12)]), changes=slow)).exceeded
-
-
-def test_a_device_that_is_not_in_the_fullest_cycle_has_its_command_with_its_own() -> None:
-    one = profile([(1, 1, 100, 0), (2, 1, 400, 0), (2, 1, 200, 0)])
-    cycle = kind_named("ethercat").cycle(network_of(one), model="last-byte")
-    sent_us = [BYTE_US * (52 + size) for size in (500, 500, 300)]
-    found = [cycle.arrival_us(device) for device in (1, 2, 3)]
-    assert found == pytest.approx([20 + us + device * E_BUS_US / 2 for device, us in enumerate(sent_us, start=1)])
 
 
 def test_latencies_of_a_slower_group_are_of_its_own_period() -> None:
