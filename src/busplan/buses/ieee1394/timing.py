@@ -235,7 +235,7 @@ def _packet_bytes(kind: TransactionKind, payload_bytes: Number) -> tuple[Number,
 
 
 class Phases(NamedTuple):
-    """Every phase of a transaction [us]; the equation behind each stands in `busplan.buses.ieee1394.figures`.
+    """Every phase of a transaction [us], in the order of `busplan.buses.ieee1394.figures`, with the equation of each.
 
     Phases that the answer does not have are 0: a unified answer has no response, only a split answer an execution time.
     """
@@ -246,21 +246,21 @@ class Phases(NamedTuple):
     """Arbitration of a packet that arbitrates."""
     request_data_us: Number
     response_data_us: Number
-    request_us: Number
-    response_us: Number
     acknowledge_us: Number
     """Acknowledge of a packet that is acknowledged."""
+    request_us: Number
+    response_us: Number
+    request_and_acknowledge_us: Number
     hold_us: Number
     execution_us: Number
-    worst_extra_us: Number
-    latency_us: Number
-    request_and_acknowledge_us: Number
     response_and_acknowledge_us: Number
+    latency_us: Number
     subaction_gap_us: Number
     arbitration_reset_gap_us: Number
     gaps_us: Number
     latency_with_gaps_us: Number
     """T_lant + T_sum."""
+    worst_extra_us: Number
     idle_us: Number
     host_us: Number
     transaction_us: Number
@@ -344,21 +344,21 @@ def transaction(
         arbitration_us=delays.arbitration_us,
         request_data_us=request_data_us,
         response_data_us=response_data_us,
+        acknowledge_us=acknowledge_us,
         request_us=request_us,
         response_us=response_us,
-        acknowledge_us=acknowledge_us,
+        request_and_acknowledge_us=equations.request_and_acknowledge_us(request_us, acknowledge_us=acknowledge_us),
         hold_us=hold_us,
         execution_us=execution_us,
-        worst_extra_us=worst_extra_us,
-        latency_us=latency_us,
-        request_and_acknowledge_us=equations.request_and_acknowledge_us(request_us, acknowledge_us=acknowledge_us),
         response_and_acknowledge_us=equations.response_and_acknowledge_us(
             response_us, acknowledge_us=response_acknowledge_us
         ),
+        latency_us=latency_us,
         subaction_gap_us=gaps.subaction_us,
         arbitration_reset_gap_us=gaps.arbitration_reset_us,
         gaps_us=gaps.both_us,
         latency_with_gaps_us=latency_us + gaps.both_us,
+        worst_extra_us=worst_extra_us,
         idle_us=idle.idle_us,
         host_us=idle.host_us,
         transaction_us=latency_us + worst_extra_us + idle.idle_us + idle.host_us,
