@@ -86,25 +86,11 @@ class BroadcastCycle(CycleWithStarts):
     """
 
     @cached_property
-    def hub(self) -> Phases:
-        """The read of the hub's block, whose answer is concatenated."""
-        responder = Responder(0.0, "concatenated", host_us=self.host_us)
-        return self._transaction("read", hub_block_bytes(self.network), responder)
-
-    @cached_property
-    def write(self) -> Phases:
-        """The write of all commands to the hub, which its acknowledge answers."""
-        responder = Responder(0.0, "unified", host_us=self.host_us)
-        return self._transaction("write", write_block_bytes(self.network), responder)
-
-    def _transaction(self, kind: TransactionKind, payload_bytes: Number, responder: Responder) -> Phases:
-        return transaction(kind, model=self.model, delays=self.delays, payload_bytes=payload_bytes, responder=responder)
-
-    @property
-    def host_us(self) -> Number:
-        """The host's own time before each of its requests [us]."""
-        host_us: Number = self.network.profile.host.transaction_us
-        return host_us
+    def query_us(self) -> Number:
+        """The query with its acknowledge [us]."""
+        data_us = self.delays.data_us(QUADLET_WRITE_REQUEST_BYTES)
+        query_us = self.delays.arbitration_us + data_us + self.delays.acknowledge_us
+        return named(query_us, "query_us", "T_query")
 
     @property
     def _is_isochronous(self) -> bool:
@@ -167,13 +153,6 @@ class BroadcastCycle(CycleWithStarts):
         """
         return self.delays.data_us(BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + _with_quadlet(group.read_bytes))
 
-    @cached_property
-    def query_us(self) -> Number:
-        """The query with its acknowledge [us]."""
-        data_us = self.delays.data_us(QUADLET_WRITE_REQUEST_BYTES)
-        query_us = self.delays.arbitration_us + data_us + self.delays.acknowledge_us
-        return named(query_us, "query_us", "T_query")
-
     @property
     def node_waits_us(self) -> Number:
         """Idle bus before all broadcasts [us]."""
@@ -185,6 +164,21 @@ class BroadcastCycle(CycleWithStarts):
         each_us = self.gap_us + self.arbitration_us
         sent_us = total(group.nodes * (each_us + self.broadcast_us(group)) for group in self.network.groups)
         return named(self.first_wait_us + sent_us + self.slot_waits_us, "boards_us", "T_boards")
+
+    @cached_property
+    def hub(self) -> Phases:
+        """The read of the hub's block, whose answer is concatenated."""
+        responder = Responder(0.0, "concatenated", host_us=self.host_us)
+        return self._transaction("read", hub_block_bytes(self.network), responder)
+
+    @cached_property
+    def write(self) -> Phases:
+        """The write of all commands to the hub, which its acknowledge answers."""
+        responder = Responder(0.0, "unified", host_us=self.host_us)
+        return self._transaction("write", write_block_bytes(self.network), responder)
+
+    def _transaction(self, kind: TransactionKind, payload_bytes: Number, responder: Responder) -> Phases:
+        return transaction(kind, model=self.model, delays=self.delays, payload_bytes=payload_bytes, responder=responder)
 
     @cached_property
     def hub_wait(self) -> Idle:
@@ -206,6 +200,12 @@ class BroadcastCycle(CycleWithStarts):
         """After the read of the hub, and after the write."""
         return self._idle(self.host_us)
 
+    @property
+    def host_us(self) -> Number:
+        """The host's own time before each of its requests [us]."""
+        host_us: Number = self.network.profile.host.transaction_us
+        return host_us
+
     def _idle(self, host_us: Number, *, late_us: Number = 0.0) -> Idle:
         """Idle bus before a request of the host, whose own time overlaps the gap."""
         gap_us = self.delays.gaps.arbitration_reset_us
@@ -216,22 +216,21 @@ class BroadcastCycle(CycleWithStarts):
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The query, at which the nodes sample, each broadcast, the read of the hub, and the write."""
         delays, hub, waits_us = self.delays, self.hub, self.first_wait_us
+        request, response, write = (
+            partial(_part, *packet) for packet in (("read", "request"), ("read", "response"), ("write", "request"))
+        )
         yield BusEvent("sync", "sync_us", self.query_us, "query to all nodes")
         for place, group in enumerate(self.network.groups):
-            part = partial(_part, "read", "response")
-            wait, next_us = part("node_wait", "idle", waits_us, "wait of the node"), self.slot_wait_us(group)
+            wait, next_us = response("node_wait", "idle", waits_us, "wait of the node"), self.slot_wait_us(group)
             events = (
-                part("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast"),
+                response("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast"),
                 wait._replace(rounds=FIRST),
                 wait._replace(us=next_us, rounds=BUT_FIRST),
-                part("arbitration", "arbitration", self.arbitration_us, "node arbitration"),
-                part("response_data", "data", self.broadcast_us(group), "node broadcast"),
+                response("arbitration", "arbitration", self.arbitration_us, "node arbitration"),
+                response("response_data", "data", self.broadcast_us(group), "node broadcast"),
             )
             yield Run(events, group.nodes, place)
             waits_us = next_us
-        request, response, write = (
-            partial(_part, *of) for of in (("read", "request"), ("read", "response"), ("write", "request"))
-        )
         read_hub = (
             request("arbitration", "arbitration", delays.arbitration_us, "host arbitration"),
             request("request_data", "data", hub.request_data_us, "host request to the hub"),
