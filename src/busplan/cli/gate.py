@@ -149,7 +149,7 @@ def check_command(
     if quantile != 1 and recording is None:
         raise BusplanError("--quantile: goes with --recording FILE")
     _require_baseline(baseline, update=update_baseline, passes=pass_on_unmatched)
-    if update_baseline and changes.each:
+    if update_baseline and changes.entries:
         raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
     from busplan.gate.check import check
     from busplan.profile.sources import collect

@@ -221,7 +221,7 @@ def _pdos_each(payload: Any, axes: Number) -> Number:
 
 def pdos_of(group: Group) -> Number:
     """PDOs of all nodes of a group in either direction [1]."""
-    return group.nodes * _pdos_each(group.said.payload, group.axes)
+    return group.nodes * _pdos_each(group.payload, group.axes)
 
 
 _last: tuple[Network, Traffic] | None = None
@@ -234,9 +234,9 @@ def traffic_of(network: Network) -> Traffic:
         senders = [
             _Senders(
                 group.name,
-                group.said.payload,
+                group.payload,
                 pdos_of(group),
-                _pdos_each(group.said.payload, group.axes),
+                _pdos_each(group.payload, group.axes),
                 (group.read_bytes, group.write_bytes),
                 group.read_execution_us + group.worst_extra_us,
             )
@@ -249,12 +249,12 @@ def traffic_of(network: Network) -> Traffic:
 def traffic_of_profile(profile: Any) -> Traffic:
     """Traffic of a profile with plain numbers, each of its groups by itself."""
     senders = []
-    for nodes in profile.alike_nodes:
+    for nodes in profile.node_groups:
         payloads_bytes = tuple(nodes.bytes_of(kind) for kind in TRANSACTION_KINDS)
         each, execution = _pdos_each(nodes.payload, nodes.node.axes), nodes.node.execution
         read_us = execution.execution_us(payloads_bytes[0]) + execution.worst_extra_us
         senders.append(_Senders(nodes.name, nodes.payload, nodes.nodes * each, each, payloads_bytes, read_us))
-    return _traffic(profile, senders, profile.cycle.period_us, sum(alike.nodes for alike in profile.alike_nodes))
+    return _traffic(profile, senders, profile.cycle.period_us, sum(alike.nodes for alike in profile.node_groups))
 
 
 def host_us(bus: Any) -> Number:

@@ -37,7 +37,7 @@ def settings(network: Network) -> tuple[Setting, ...]:
     network
         The network, of plain numbers.
     """
-    several = any(nodes.node.axes > 1 for nodes in network.alike)
+    several = any(nodes.node.axes > 1 for nodes in network.profile.node_groups)
     is_fd = network.profile.bus.data_bit_rate_kbit_s is not None
     return (
         *((_pdo_per(network),) if several else ()),
@@ -49,9 +49,14 @@ def settings(network: Network) -> tuple[Setting, ...]:
 
 def _pdo_per(network: Network) -> Setting:
     """PDOs of each axis, where a node has several: its parameters map them."""
-    keys = {nodes.name: f"group.{nodes.name}.pdo_per" if nodes.name else "payload.pdo_per" for nodes in network.alike}
+    keys = {
+        nodes.name: f"group.{nodes.name}.pdo_per" if nodes.name else "payload.pdo_per"
+        for nodes in network.profile.node_groups
+    }
     several = {
-        keys[nodes.name]: "axis" for nodes in network.alike if nodes.payload.pdo_per == "node" and nodes.node.axes > 1
+        keys[nodes.name]: "axis"
+        for nodes in network.profile.node_groups
+        if nodes.payload.pdo_per == "node" and nodes.node.axes > 1
     }
     reason = "" if several else "each axis has one already"
     values = (several,) if several else ()
@@ -202,14 +207,14 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     def payloads(self, network: Network) -> PayloadRange:
         """Whole bytes up to four frames."""
         largest = min(pdos.most_bytes for pdos in traffic_of(network).pdos)
-        each = min((plain(group.axes) for group in network.groups if group.said.payload.pdo_per == "axis"), default=1)
+        each = min((plain(group.axes) for group in network.groups if group.payload.pdo_per == "axis"), default=1)
         return PayloadRange(1, largest * max(int(each), 1), carrier="four frames")
 
     def setpoints_every(self, network: Network) -> tuple[str, int]:
         """Those of the group with axes whose PDOs go most often."""
         with_axes = [group for group in network.groups if plain(group.axes)] or network.groups
-        said = min((group.said for group in with_axes), key=lambda nodes: int(plain(nodes.payload.every)))
-        return f"group.{said.name}.every" if said.name else "payload.every", int(plain(said.payload.every))
+        fastest = min(with_axes, key=lambda group: int(plain(group.every))).members[0]
+        return f"group.{fastest.name}.every" if fastest.name else "payload.every", int(plain(fastest.payload.every))
 
     def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
         """Nodes and axes; of a network without them its messages."""
@@ -223,7 +228,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         """The bit rate, or both of CAN FD, and PDOs that are not in every cycle."""
         bus = network.profile.bus
         data = "" if bus.data_bit_rate_kbit_s is None else f", {bus.data_bit_rate_kbit_s:g} kbit/s of data"
-        rates = ((nodes.name, int(plain(nodes.payload.every))) for nodes in network.alike)
+        rates = ((nodes.name, int(plain(nodes.payload.every))) for nodes in network.profile.node_groups)
         seldom = (f"PDOs {name and f'of {name} '}every {every} cycles" for name, every in rates if every > 1)
         return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}", *seldom)
 

@@ -31,7 +31,6 @@ from busplan.buses.ethercat.equations import (
 from busplan.buses.network import Group, Network, Rate, numbers_by_due
 from busplan.elementwise import (
     Number,
-    alike,
     choose,
     is_everywhere,
     is_off,
@@ -44,6 +43,7 @@ from busplan.elementwise import (
     smaller,
     square_root,
     total,
+    traced_with,
 )
 from busplan.errors import BusplanError
 
@@ -96,7 +96,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     """
     devices = [_with_data(group) for group in devices if not is_everywhere(group.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
-    headers = total([alike(DATAGRAM_BYTES, devices[0].number)] * datagrams)
+    headers = total([traced_with(DATAGRAM_BYTES, devices[0].number)] * datagrams)
     free: Number = 0.0
     frames: Number = 0
     present: Number = 0.0
@@ -432,9 +432,11 @@ def housekeeping_bytes(network: Network) -> Number:
     """The datagrams that the master adds to the first frame, those of distributed clocks among them [bytes]."""
     bus = network.profile.bus
     if bus.housekeeping_bytes is not None:
-        return total(datagram_bytes(alike(size, network.nodes)) for size in bus.housekeeping_bytes)
+        return total(datagram_bytes(traced_with(size, network.nodes)) for size in bus.housekeeping_bytes)
     tables = (HOUSEKEEPING_BYTES, CLOCK_BYTES) if bus.distributed_clocks else (HOUSEKEEPING_BYTES,)
-    added = [alike(table[bus.master or UNNAMED], network.nodes) for table in tables if table[bus.master or UNNAMED]]
+    added = [
+        traced_with(table[bus.master or UNNAMED], network.nodes) for table in tables if table[bus.master or UNNAMED]
+    ]
     if bus.master in STATE_CHECK_BYTES:
         checks_bytes = network.nodes * STATE_CHECK_BYTES[bus.master]
         # Those of many devices fill frames of their own, whose headers count here.
@@ -461,7 +463,7 @@ def frames(network: Network, each: Sequence[Devices]) -> tuple[Frames, ...]:
 def hop(group: Group) -> Hop:
     """Delay of each device of a group, and of the cable to it."""
     node = group.node
-    delay_us = alike(DELAY_US[node.port], group.nodes) if node.delay_us is None else node.delay_us
+    delay_us = traced_with(DELAY_US[node.port], group.nodes) if node.delay_us is None else node.delay_us
     return Hop(group.nodes, device_us(delay_us), cable_us(node.cable_m))
 
 

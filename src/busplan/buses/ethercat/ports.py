@@ -16,7 +16,7 @@ from busplan.elementwise import plain
 from busplan.english import plural
 from busplan.recordings.ethercat import Latch
 from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, expanded, grid
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.machine import ProfileGroup
 
 Places = npt.NDArray[np.int64]
 _JUMP: Final = 1.01
@@ -238,7 +238,7 @@ class LineDelays(NamedTuple):
             if own:
                 yield self._figure(own[0], own[-1], alike)
 
-    def _figure(self, first: int, last: int, alike: AlikeNodes | None) -> RecordedFigure:
+    def _figure(self, first: int, last: int, alike: ProfileGroup | None) -> RecordedFigure:
         """Mean delay of some devices."""
         own_us = self.hops_us[first - 2 : last - 1]
         name = f"delay of device {first}" if first == last else f"mean delay of devices {first} to {last}"
@@ -360,11 +360,11 @@ def _span_ns(times_ns: Mapping[int, int]) -> int:
     return span
 
 
-def _alike(network: Network) -> list[AlikeNodes]:
-    return [alike for group in network.groups for alike in group.members or (group.said,)]
+def _alike(network: Network) -> list[ProfileGroup]:
+    return list(network.profile.node_groups)
 
 
-def _planned(alike: AlikeNodes) -> tuple[float, float]:
+def _planned(alike: ProfileGroup) -> tuple[float, float]:
     """Delay of a device one way as planned, and its standard uncertainty [us]."""
     node = alike.node
     if node.delay_us is None:
@@ -372,6 +372,6 @@ def _planned(alike: AlikeNodes) -> tuple[float, float]:
     return plain(node.delay_us), float(MEASURED_DELAY_UNCERTAINTY_US)
 
 
-def _cable_us(alike: AlikeNodes) -> float:
+def _cable_us(alike: ProfileGroup) -> float:
     """Cable to a device one way [us]."""
     return plain(cable_us(alike.node.cable_m)) / 2

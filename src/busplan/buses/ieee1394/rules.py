@@ -137,7 +137,7 @@ def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
 def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More nodes than one bus has addresses for."""
     if "nodes" in subject.deciding.exceeded:
-        groups = subject.profile.alike_nodes
+        groups = subject.profile.node_groups
         nodes = sum(group.nodes for group in groups)
         yield RuleProblem(
             groups[-1].nodes_key,
@@ -152,7 +152,7 @@ def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
         chain = _bus(subject).max_hops is None
         way_out = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if chain else "rewire the tree"
         yield RuleProblem(
-            subject.profile.alike_nodes[-1].nodes_key if chain else "bus.max_hops",
+            subject.profile.node_groups[-1].nodes_key if chain else "bus.max_hops",
             f"{subject.deciding.own['hops']} hops are over the {MAX_HOPS:g} of one bus",
             way_out,
         )
@@ -182,7 +182,7 @@ def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
-    for nodes, kind in product(subject.profile.alike_nodes, TRANSACTION_KINDS):
+    for nodes, kind in product(subject.profile.node_groups, TRANSACTION_KINDS):
         yield nodes.payload_key(kind), int(nodes.bytes_of(kind))
 
 

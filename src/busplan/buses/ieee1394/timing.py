@@ -24,7 +24,7 @@ from busplan.buses.ieee1394.constants import (
     WRITE_RESPONSE_BYTES,
     padded_bytes,
 )
-from busplan.elementwise import Number, alike, choose, is_off, larger, named, smaller, worded
+from busplan.elementwise import Number, choose, is_off, larger, named, smaller, traced_with, worded
 from busplan.sections.base import TransactionKind
 
 Answer = Literal["split", "concatenated", "unified"]
@@ -245,7 +245,7 @@ def _standard_packets(kind: TransactionKind, payload_bytes: Number, _overhead_by
         )
     return PacketSizes(
         request_bytes=choose(is_quadlet, QUADLET_WRITE_REQUEST_BYTES, BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + data_bytes),
-        response_bytes=worded(alike(WRITE_RESPONSE_BYTES, payload_bytes), WRITE_RESPONSE_BYTES.meaning),
+        response_bytes=worded(traced_with(WRITE_RESPONSE_BYTES, payload_bytes), WRITE_RESPONSE_BYTES.meaning),
     )
 
 
@@ -283,7 +283,7 @@ def delays(link: Link, *, model: PacketTiming, alone: Number, shared: Delays | N
     shared
         The delays over other hops of the bus, where they have been computed: delay of a hop and gaps are the same.
     """
-    clock_mbit_s = alike(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
+    clock_mbit_s = traced_with(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
     if shared is None:
         phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
         hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")

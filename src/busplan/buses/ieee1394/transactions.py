@@ -30,7 +30,7 @@ from busplan.buses.ieee1394.timing import (
 )
 from busplan.buses.network import Group, Network
 from busplan.buses.published import Spread, rows_of
-from busplan.elementwise import Number, Traced, alike, choose, is_off, larger, named, plain, total, worded
+from busplan.elementwise import Number, Traced, choose, is_off, larger, named, plain, total, traced_with, worded
 from busplan.sections.base import TransactionKind
 from busplan.sourced import Sourced
 
@@ -139,7 +139,7 @@ def link_of(network: Network, hops: Number | None = None) -> Link:
     """
     bus = network.profile.bus
     return Link(
-        data_rate_mbit_s=alike(DATA_RATE_MBIT_S[bus.speed], network.nodes),
+        data_rate_mbit_s=traced_with(DATA_RATE_MBIT_S[bus.speed], network.nodes),
         gap_count=named(gap_count_of(network), "gap_count", "g"),
         hops=named(hops_of(network), "hops", "H") if hops is None else hops,
         cable_length_m=bus.cable_length_m,
@@ -279,7 +279,7 @@ def exchange(
         model=TIMING_MODELS[model],
         link=link,
         payload_bytes=size,
-        overhead_bytes=group.said.payload.overhead_bytes,
+        overhead_bytes=group.payload.overhead_bytes,
         responder=responder,
         alone=network.nodes == 1,
         common=common,
@@ -541,7 +541,7 @@ def _hop_delays(exchange: Exchange, network: Network) -> Number:
 
 def _phy_doubt_us(delays: Number, link: Link) -> Number:
     """Standard uncertainty of some PHY delays [us]; 0 where the profile gives them."""
-    half_width_us = alike(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
+    half_width_us = traced_with(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
     return delays * half_width_us / _RECTANGULAR
 
 
@@ -574,5 +574,5 @@ def _measured_at(node: Any) -> Number:
 
 def _gap_term_us(measured: Number, gap_count: Number, symbol: str) -> Number:
     """Half of what the gap term changes from the gap count that was measured to the gap count in force: d [us]."""
-    ticks = alike(ARBITRATION_GAP_TICKS, gap_count) / 2
+    ticks = traced_with(ARBITRATION_GAP_TICKS, gap_count) / 2
     return named(ticks * (measured - gap_count) / BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)

@@ -9,7 +9,7 @@ from busplan.buses.limits import Periods
 from busplan.buses.network import Group, Network
 from busplan.buses.sercos import shared as sercos
 from busplan.buses.sercos.shared import DELAYS, word_bytes
-from busplan.elementwise import Number, alike, choose, larger, named, rounded_down, rounded_up, smaller
+from busplan.elementwise import Number, choose, larger, named, rounded_down, rounded_up, smaller, traced_with
 from busplan.sections.base import TransactionKind
 from busplan.sourced import Sourced, constants
 
@@ -311,7 +311,7 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
         "write" for MDT, "read" for AT.
     """
     is_in_all = network.profile.bus.hot_plug_field == "all"
-    first_bytes = alike(HOT_PLUG_BYTES, network.nodes)
+    first_bytes = traced_with(HOT_PLUG_BYTES, network.nodes)
     if kind == "write":
         first_bytes = first_bytes + EXTENDED_BYTES + (ALIGNED_BYTES if is_in_all else 0)
     return Telegrams(

@@ -541,7 +541,7 @@ def assumptions(network: Network) -> tuple[Input, ...]:
     by_name: dict[str, Input] = {}
     for given in inputs(Traced(None, parts=tuple(numbers))):
         by_name.setdefault(given.name, given)
-    executions = tuple(group.node_key("execution.") for group in profile.alike_nodes)
+    executions = tuple(group.node_key("execution.") for group in profile.node_groups)
 
     def rank(given: Input) -> int:
         """Place of the grade of an input; a choice comes after all of them."""

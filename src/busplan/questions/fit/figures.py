@@ -60,7 +60,7 @@ def largest_nodes(network: Network, *, model: str, group: str = "") -> tuple[int
     ----------
     Paper, equations (1)-(11), with (11) solved for N.
     """
-    network = network.asking(group)
+    network = network.varying(group)
     return _with_key(network, limits_with_time(network, model=model))
 
 
@@ -83,7 +83,7 @@ def safe_nodes(network: Network, *, group: str = "", without: str | None = None)
     tuple
         Number of nodes [1], and the key of the limit.
     """
-    network = network.asking(group)
+    network = network.varying(group)
     return _with_key(network, [limit for limit in limits_to_be_safe(network) if limit.key != without])
 
 
@@ -271,7 +271,7 @@ def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
     """How many nodes of each group fit a network's period, and are shown to fit; of all where they are alike."""
     decides = model == network.bus.deciding_model
     counts = []
-    for group in network.profile.alike_nodes:
+    for group in network.profile.node_groups:
         most, limit = largest_nodes(network, model=model, group=group.name)
         safe, safe_limit = safe_nodes(network, group=group.name) if decides else (None, None)
         nodes, axes = int(group.nodes), group.node.axes

@@ -348,4 +348,4 @@ class CommonMultiple:
 
 def _names(groups: Sequence[Group]) -> tuple[str, ...]:
     """Names of groups of the profile."""
-    return tuple(alike.name for group in groups for alike in group.members or (group.said,) if alike.name)
+    return tuple(member.name for group in groups for member in group.members if member.name)
