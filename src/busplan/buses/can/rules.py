@@ -20,7 +20,7 @@ from busplan.buses.can.frames import (
     traffic_of_profile,
 )
 from busplan.buses.can.waiting import message_responses
-from busplan.buses.limits import NODE_LIMIT, Bound, Limit
+from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, larger, plain, pointwise, total, within
@@ -186,26 +186,30 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",
-        Bound(lambda network: total(pdos_of(group) for group in network.groups), lambda _network: MOST_NODES),
+        lambda network: total(pdos_of(group) for group in network.groups),
+        lambda _network: MOST_NODES,
         way_out=f"a second bus has {MOST_NODES:g} more",
     ),
     Limit(
         "payload",
         _payload_words,
-        Bound(_largest_pdo, _most_bytes),
+        _largest_pdo,
+        _most_bytes,
         way_out="a smaller payload would do",
     ),
     Limit(
         "range",
         "identifier {value:.0f} is over {most:.0f}, the largest of {bus.identifier_bits} bits",
-        Bound(_largest_identifier, _most_identifier),
+        _largest_identifier,
+        _most_identifier,
         way_out="smaller identifiers, or those of 29 bits, have room",
         is_slow=True,
     ),
     Limit(
         "identifiers",
         lambda network: first_of([words for _, words in _collisions_in_words(traffic_of(network))], 1),
-        Bound(_collisions, lambda _network: 0),
+        _collisions,
+        lambda _network: 0,
         way_out="identifiers further apart have room",
         has_rule=True,
         is_slow=True,
@@ -213,7 +217,8 @@ LIMITS: Final = (
     Limit(
         "load",
         _load_words,
-        Bound(_load, lambda network: network.profile.limits.max_load),
+        _load,
+        lambda network: network.profile.limits.max_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         period=lambda _bound, network: CanCycle(network, WORST).load_period_us,
         has_rule=True,
@@ -221,9 +226,10 @@ LIMITS: Final = (
     Limit(
         "deadline",
         lambda network: _all_late(traffic_of(network)),
-        Bound(_deadline, lambda _network: 1),
+        _deadline,
+        lambda _network: 1,
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
-        period=lambda _bound, network: _kept_from_us(network),
+        period=lambda _limit, network: _kept_from_us(network),
         has_rule=True,
         is_slow=True,
     ),

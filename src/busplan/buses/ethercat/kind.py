@@ -33,7 +33,6 @@ from busplan.buses.ethercat.frames import data_bytes, datagrams, devices, layout
 from busplan.buses.limits import (
     NODE_LIMIT,
     NOT_SHOWN_KEPT,
-    Bound,
     Cost,
     Key,
     Limit,
@@ -74,24 +73,21 @@ def _late_command_us(network: Network) -> Number:
 def _words(network: Network) -> str:
     """Say when the last command comes, and whether it is late only if all of the master's time is before the wire."""
     value_us, doubt_us, most_us = (
-        plain(us) for us in (_late_command_us(network), SYNC0.bound.uncertainty(network), SYNC0.bound.most(network))
+        plain(us) for us in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
     )
-    is_split = SYNC0.bound.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
+    is_split = SYNC0.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
     where = ", all of bus.master_us before the wire" if is_split else ""
     return f"the last command comes at {value_us:.1f} +/- {doubt_us:.1f} us{where}, SYNC0 at {most_us:.1f} us"
 
 
-SYNC0: Final = Limit(
+SYNC0: Final = share_of_period(
     "sync0",
     _words,
-    *share_of_period(
-        _late_command_us,
-        share=sync0_share,
-        doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,
-        perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
-    ),
+    us=_late_command_us,
+    share=sync0_share,
+    doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,
+    perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
     way_out="a larger bus.sync_shift moves SYNC0 back",
-    has_rule=True,
 )
 """A command must be in every device before SYNC0."""
 LIMITS: Final = (
@@ -99,19 +95,22 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} devices are over the {most:.0f} addresses of a segment",
-        Bound(lambda network: network.nodes, lambda _network: MOST_DEVICES),
+        lambda network: network.nodes,
+        lambda _network: MOST_DEVICES,
         way_out=f"a second segment has {MOST_DEVICES:g} more",
     ),
     Limit(
         "payload",
         "a device of {value:.0f} bytes is over the {most:.0f} bytes of a frame, and no device is split",
-        Bound(_largest_device, lambda network: room_bytes(datagrams(network))),
+        _largest_device,
+        lambda network: room_bytes(datagrams(network)),
         way_out="a smaller payload would do",
     ),
     Limit(
         "cable",
         "a cable of {value:g} m is over the {most:g} m of 100BASE-TX",
-        Bound(_longest_cable, lambda _network: MOST_CABLE_M),
+        _longest_cable,
+        lambda _network: MOST_CABLE_M,
         way_out="a device between would do",
     ),
     SYNC0,

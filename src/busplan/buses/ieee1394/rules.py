@@ -25,7 +25,7 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
-from busplan.buses.limits import Bound, Limit
+from busplan.buses.limits import Limit
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, margin, told_apart
 from busplan.elementwise import Number
@@ -51,55 +51,60 @@ LIMITS: Final = (
     Limit(
         "payload",
         "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        Bound(lambda network: network.largest_payload_bytes, _most_payload),
+        lambda network: network.largest_payload_bytes,
+        _most_payload,
         way_out="a faster bus or a smaller payload would do",
         has_rule=True,
     ),
     Limit(
         "nodes",
         "{value:.0f} nodes are over the {most:.0f} of one bus",
-        Bound(lambda network: network.nodes, lambda _network: MAX_NODES),
+        lambda network: network.nodes,
+        lambda _network: MAX_NODES,
         way_out=f"a second bus has {MAX_NODES:g} more",
         has_rule=True,
     ),
     Limit(
         "hops",
         "{value:.0f} hops are over the {most:.0f} of one bus",
-        Bound(hops_of, lambda _network: MAX_HOPS),
+        hops_of,
+        lambda _network: MAX_HOPS,
         way_out=f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes",
         has_rule=True,
     ),
     Limit(
         "broadcasting nodes",
         "{value:.0f} nodes are over the {most:.0f} that a hub collects data of",
-        Bound(
-            lambda network: network.nodes if is_broadcast(network) else 0,
-            lambda network: MAX_BROADCAST_NODES if is_broadcast(network) else inf,
-        ),
+        lambda network: network.nodes if is_broadcast(network) else 0,
+        lambda network: MAX_BROADCAST_NODES if is_broadcast(network) else inf,
         way_out=_ONE_BY_ONE,
     ),
     Limit(
         "hub block",
         "the hub's block of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        Bound(lambda network: hub_block_bytes(network) if is_broadcast(network) else 0, _most_payload),
+        lambda network: hub_block_bytes(network) if is_broadcast(network) else 0,
+        _most_payload,
         way_out=f"less read from each node, or {_ONE_BY_ONE}",
     ),
     Limit(
         "write block",
         "the write of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        Bound(lambda network: write_block_bytes(network) if is_broadcast(network) else 0, _most_payload),
+        lambda network: write_block_bytes(network) if is_broadcast(network) else 0,
+        _most_payload,
         way_out=f"less written to each node, or {_ONE_BY_ONE}",
     ),
     Limit(
         "cycle starts",
         "a cycle start takes {value:.3f} us, over {most:.3f} us: no time is left for the nodes until the next one",
-        Bound(_cycle_start_us, lambda _network: CYCLE_US - LEAST_ASYNCHRONOUS_US),
+        _cycle_start_us,
+        lambda _network: CYCLE_US - LEAST_ASYNCHRONOUS_US,
         way_out="less bus.isochronous_us, or no cycle master, leaves time",
     ),
     Limit(
         "gap table",
         "gap count {most:.0f} is unsafe for the hops; the smallest safe one is {value:.0f}",
-        Bound(lambda network: safe_gap_count(hops_of(network)), gap_count_of),
+        lambda network: safe_gap_count(hops_of(network)),
+        gap_count_of,
         way_out=f"for cables of more than {REFERENCE_CABLE_M:g} m none is known to be safe",
         role="safety",
     ),

@@ -5,7 +5,6 @@ from typing import ClassVar, Final
 
 from busplan.buses.limits import (
     NODE_LIMIT,
-    Bound,
     Key,
     Limit,
     PayloadRange,
@@ -42,13 +41,15 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} drives are over the {most:.0f} of a ring",
-        Bound(lambda network: network.nodes, lambda _network: MOST_DRIVES),
+        lambda network: network.nodes,
+        lambda _network: MOST_DRIVES,
         way_out=f"a second ring has {MOST_DRIVES:g} more",
     ),
     Limit(
         "payload",
         "the MDT has {value:.0f} bytes of data, over {most:.0f}",
-        Bound(lambda network: Sercos2Cycle(network, NONE).mdt_bytes, lambda _network: MOST_MDT_BYTES),
+        lambda network: Sercos2Cycle(network, NONE).mdt_bytes,
+        lambda _network: MOST_MDT_BYTES,
         way_out="a smaller payload or a second ring would do",
     ),
 )

@@ -6,7 +6,6 @@ from typing import ClassVar, Final
 
 from busplan.buses.limits import (
     NODE_LIMIT,
-    Bound,
     Cost,
     Key,
     Limit,
@@ -60,19 +59,22 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} devices are over the {most:.0f} of a network",
-        Bound(lambda network: network.nodes, lambda _network: MOST_DEVICES),
+        lambda network: network.nodes,
+        lambda _network: MOST_DEVICES,
         way_out=f"a second network has {MOST_DEVICES:g} more",
     ),
     Limit(
         "payload",
         "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
-        Bound(_largest_telegram, lambda _network: MOST_BYTES),
+        _largest_telegram,
+        lambda _network: MOST_BYTES,
         way_out="a smaller payload would do",
     ),
     Limit(
         "telegrams",
         "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
-        Bound(_most_telegrams, lambda _network: MOST_TELEGRAMS),
+        _most_telegrams,
+        lambda _network: MOST_TELEGRAMS,
         way_out="a smaller payload or a second network would do",
     ),
 )

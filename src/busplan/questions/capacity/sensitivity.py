@@ -331,10 +331,9 @@ def _effect(cause: Perturbed, now: Standing, network: Network) -> Effect:
 def _nearer(network: Network, changed: Network) -> Iterator[str]:
     """Say how much nearer a change comes to limits that are times, each with its doubt as a shown verdict has it."""
     for limit in network.bus.limits:
-        if limit.bound.doubt is None:
+        if limit.doubt is None:
             continue
-        bound = limit.bound
-        left_us, then_us = (plain(bound.most(of)) - plain(bound.shown.value(of)) for of in (network, changed))
+        left_us, then_us = (plain(limit.most(of)) - plain(limit.shown.value(of)) for of in (network, changed))
         if then_us < left_us and left_us > 0:
             yield f"it takes {left_us - then_us:.1f} us of the {left_us:.1f} us before the limit of {limit.key}"
         elif then_us < left_us:

@@ -278,8 +278,8 @@ def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
         *(
             Failure(
                 limit.key,
-                existing(limit.bound.value(network)),
-                existing(limit.bound.most(network)),
+                existing(limit.value(network)),
+                existing(limit.most(network)),
                 limit.words(network),
             )
             for limit in broken

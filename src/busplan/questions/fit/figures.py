@@ -136,7 +136,7 @@ def _most_within(limit: Limit, network: Network, cached_network: Callable[[int],
     if not (over.any() if hasattr(over, "any") else over):
         return ceiling
     if elements > 1:
-        varying = _size(limit.bound.least_value(network.with_nodes(1)))
+        varying = _size(limit.least_value(network.with_nodes(1)))
         counted = ceiling * (varying * _VALUE_COST + elements)
         if counted <= ceiling.bit_length() * elements * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))
@@ -434,8 +434,8 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     period_us = bus.periods.from_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
         if limit.period is not None and not limit.is_slow:
-            bound = limit.bound.shown if is_shown else limit.bound.nominal
-            period_us = larger(period_us, bus.periods.from_us(limit.period(bound, network)))
+            kept = limit.shown if is_shown else limit.nominal
+            period_us = larger(period_us, bus.periods.from_us(kept.shortest_period_us(network)))
     return period_us
 
 

@@ -235,7 +235,7 @@ def _of_rates(figures: RuleFigures, network: Network) -> Iterator[_Share]:
             cycle = bus.cycle(endless._replace(period_us=figures.period_us), model=figures.timing_model)
             yield (key,), 1 - plain(cycle.required_us) / figures.required_us, "the required time"
         elif (load := bus.limit("load")) is not None:
-            yield (key,), 1 - plain(load.bound.value(endless)) / plain(load.bound.value(network)), "the load"
+            yield (key,), 1 - plain(load.value(endless)) / plain(load.value(network)), "the load"
 
 
 def _at_once(group: Group) -> Group:

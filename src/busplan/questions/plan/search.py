@@ -102,7 +102,7 @@ def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
         at_us = max(time.slice_us, least_us, MIN_STEP_US)
         at = network if limit.period is None else network._replace(period_us=at_us)
         if limit.shown.is_broken(at):
-            kept_us = limit.kept_from_us(at)
+            kept_us = plain(limit.shown.shortest_period_us(at))
             if kept_us == inf:
                 way_out = f" ({limit.way_out})" if limit.way_out else ""
                 yield Need(inf, limit.key, f"{limit.words(at)}{way_out}", inf)
