@@ -317,7 +317,7 @@ def diff_command(
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
     with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
-        from busplan.profile.edit import load_revision
+        from busplan.profile.sources import load_revision
         from busplan.questions.diff import diff
 
         first, second = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))

@@ -220,10 +220,6 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         """Nodes and axes; of a network without them its messages."""
         return super().counted(network) if network.groups else ((len(network.profile.message), "message"),)
 
-    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
-        """Say what each frame is charged."""
-        return "every frame with the stuff bits of its length"
-
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The bit rate, or both of CAN FD, and PDOs that are not in every cycle."""
         bus = network.profile.bus

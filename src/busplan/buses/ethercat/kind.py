@@ -288,10 +288,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         each = 1 if layout(network) == SHARED else 2
         return PayloadRange(1, int(room_bytes(datagrams(network)) / each), carrier="a frame")
 
-    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
-        """Say that the last byte passes all devices."""
-        return "the last byte through all devices and back"
-
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The layout of process data, the frames, and the clocks."""
         count = int(plain(self.cycle(network, model=LAST_BYTE).packing.frames))

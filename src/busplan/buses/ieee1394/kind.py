@@ -227,7 +227,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         speed = network.profile.bus.speed
         return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), carrier=speed)
 
-    def way_charged(self, network: Network) -> str:
+    def path_words(self, network: Network) -> str:
         """Say whose hops each node is charged."""
         if is_broadcast(network):
             return "every packet at the hops of the farthest"
