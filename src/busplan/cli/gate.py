@@ -149,7 +149,7 @@ def check_command(
     if quantile != 1 and recording is None:
         raise BusplanError("--quantile: goes with --recording FILE")
     _require_baseline(baseline, update=update_baseline, passes=pass_on_unmatched)
-    if update_baseline and changes.each:
+    if update_baseline and changes.entries:
         raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
     from busplan.gate.check import check
     from busplan.profile.sources import collect
@@ -317,7 +317,7 @@ def diff_command(
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
     with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
-        from busplan.profile.edit import load_revision
+        from busplan.profile.sources import load_revision
         from busplan.questions.diff import diff
 
         first, second = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))

@@ -298,7 +298,7 @@ def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..
 
 def _require_no_period(changes: KeyChanges, text: str) -> None:
     """Refuse periods to compute, such as 4ms, beside a change of the period."""
-    for change in changes.each:
+    for change in changes.entries:
         if change.key == _PERIOD:
             require_separate(change, _PERIOD, typed=f"--period {text}")
 

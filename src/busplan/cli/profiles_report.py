@@ -30,7 +30,7 @@ def _record(profile: Profile) -> Record:
     """Name, main figures and description."""
     return {
         "name": profile.name,
-        "nodes": sum(alike.nodes for alike in profile.alike_nodes),
+        "nodes": sum(alike.nodes for alike in profile.node_groups),
         "period_us": profile.cycle.period_us if profile.has_cycle else None,
         "timing_model": profile.bus.timing_model,
         "description": " ".join(profile.description.split()),

@@ -163,7 +163,7 @@ def sweep_command(
     from busplan.questions.sweep import checked_sweep, computed, require_drawable
 
     loaded, varied = load_changed(profile, changes), parse_axes(vary or [])
-    for change, key in product(changes.each, varied):
+    for change, key in product(changes.entries, varied):
         require_separate(change, key, typed=f"--vary {key}")
     model = chosen_model(timing_model)
     asked = checked_sweep(

@@ -233,7 +233,7 @@ def check_document(
             return FileResult(document.name, profile.name, (), {}, failure="; ".join(error.problems))
         violations += [_placed(document, rule, problem) for rule, problem in beside]
         ran.update(rule.code for rule in RECORDING)
-    if changes.each:
+    if changes.entries:
         # Comments were written for the file as it is: with changes, none counts as without effect.
         ran = set()
     left, of_comments = suppress(violations, document, ran=ran)

@@ -257,7 +257,7 @@ def test_the_paper_cannot_express_it() -> None:
 
 def test_own_hops_are_not_charged_for_what_goes_to_all() -> None:
     assert required_us(DVRK, bus__charge_hops="own") == required_us(DVRK)
-    assert BUS.way_charged(network_of(DVRK)) == "every packet at the hops of the farthest"
+    assert BUS.path_words(network_of(DVRK)) == "every packet at the hops of the farthest"
 
 
 def test_a_command_arrives_at_all_nodes_at_once() -> None:

@@ -18,7 +18,7 @@ from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.buses.network import Group
 from busplan.questions.fit.network import network_of
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.machine import ProfileGroup
 
 ROUNDING_US = 1e-6
 RATES = {"S100": 98.304, "S200": 196.608, "S400": 393.216}
@@ -100,9 +100,9 @@ class Case(NamedTuple):
                 "node": {"axes": 1, "execution": execution, **answers},
             }
         )
-        (said,) = profile.alike_nodes
+        (said,) = profile.node_groups
         network = network_of(profile)._replace(
-            groups=tuple(one._replace(said=said._replace(nodes=one.nodes)) for one in self.groups)
+            groups=tuple(one._replace(members=(said._replace(nodes=one.nodes),)) for one in self.groups)
         )
         return float(Ieee1394Cycle(network, "standard").required_us)
 
@@ -141,7 +141,7 @@ class Case(NamedTuple):
         return starts_us
 
 
-UNSAID = AlikeNodes("", 0, None, None)
+UNSAID = (ProfileGroup("", 0, None, None),)
 
 
 def group(

@@ -82,7 +82,7 @@ def test_latency_of_the_paper_model_leaves_what_both_its_halves_leave(comparison
     # T_exec is derived from the same table, so this is arithmetic and no validation: the report says so.
     whole = chosen(comparisons, "Table I: T_lant, measured", "paper model")
     half = chosen(comparisons, "Table I: T1+T2, measured", "paper model")
-    execution = load("paper-two-node").profile.alike_nodes[0].node.execution
+    execution = load("paper-two-node").profile.node_groups[0].node.execution
     for size, latency_us, first_us, _ in TABLE_1:
         # The response to a write carries no payload: at 4 bytes both halves are 6.0 us, of which 32 bits are payload.
         second_us = latency_us - first_us - execution.execution_us(size)

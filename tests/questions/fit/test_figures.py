@@ -74,7 +74,7 @@ def test_required_time_equals_the_exact_one(
     profile = data.draw(any_profile)
     model = data.draw(st.sampled_from(model_names(network_of(profile))))
     (found,) = busplan.capacity(profile, timing_model=model).results
-    assert found.required_us == pytest.approx(float(exact(profile, model, profile.alike_nodes[0].nodes)), rel=1e-13)
+    assert found.required_us == pytest.approx(float(exact(profile, model, profile.node_groups[0].nodes)), rel=1e-13)
 
 
 @given(data=st.data())
@@ -93,8 +93,8 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     assert ("time" in found.exceeded) == (found.margin_us < 0)
     assert found.margin_us == pytest.approx(found.available_us - found.required_us, abs=1e-9 * found.required_us)
     assert found.utilisation == pytest.approx(found.required_us / found.available_us)
-    assert found.max_axes == profile.alike_nodes[0].node.axes * found.max_nodes
-    assert found.axes == profile.alike_nodes[0].node.axes * found.nodes
+    assert found.max_axes == profile.node_groups[0].node.axes * found.max_nodes
+    assert found.axes == profile.node_groups[0].node.axes * found.nodes
     assert found.time_slice_us * found.nodes == pytest.approx(found.available_us)
     assert values["gaps_us"] == pytest.approx(values["subaction_gap_us"] + values["arbitration_reset_gap_us"])
     assert found.min_period_us is not None
@@ -111,7 +111,7 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     shown_us = found.required_us + found.bias_us + (found.uncertainty_us or 0)
     assert found.safe_required_us == pytest.approx(shown_us)
     assert found.safe_min_period_us == pytest.approx(found.safe_required_us / profile.cycle.slice_ratio)
-    assert found.safe_axes == profile.alike_nodes[0].node.axes * found.safe_nodes
+    assert found.safe_axes == profile.node_groups[0].node.axes * found.safe_nodes
     assert (found.verdict == "fits" and found.safe) == (found.nodes <= found.safe_nodes)
 
 

@@ -35,7 +35,7 @@ def at(profile: busplan.Profile, changes: dict[str, Any]) -> busplan.Profile | N
         found = busplan.load_profile(profile, changes=changes)
         if axes is None:
             return found
-        (alike,) = found.alike_nodes
+        (alike,) = found.node_groups
         nodes, rest = divmod(axes, alike.node.axes)
         return None if rest else busplan.load_profile(found, changes={"bus.nodes": nodes})
     except busplan.BusplanError:
@@ -94,7 +94,7 @@ def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
     found = busplan.map_(profile)
     assert (found.x.key, found.y.key) == (AXES, PERIOD)
     assert found.own is not None
-    (nodes,) = profile.alike_nodes
+    (nodes,) = profile.node_groups
     assert (found.own.x, found.own.y) == (nodes.nodes * nodes.node.axes, profile.cycle.period_us)
     assert max(len(found.x.values), len(found.y.values)) <= 24
     assert list(found.y.values) == sorted(set(found.y.values))

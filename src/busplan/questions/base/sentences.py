@@ -101,10 +101,10 @@ def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterato
 def execution_grades(profile: Profile) -> str | None:
     """Grade of the execution time; where groups differ, each with the groups that have it. None without any."""
     names: dict[str, list[str]] = {}
-    for group in profile.alike_nodes:
+    for group in profile.node_groups:
         names.setdefault(group.node.execution.grade or "without a grade", []).append(group.name)
     if len(names) == 1:
-        return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
+        return profile.node_groups[0].node.execution.grade  # type: ignore[no-any-return]
     return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items()) or None
 
 

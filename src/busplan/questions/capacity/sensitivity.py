@@ -48,7 +48,7 @@ from busplan.questions.fit.certainty import (
 from busplan.questions.fit.figures import safe_nodes
 from busplan.questions.fit.network import changed, network_of, with_execution, with_payloads, without_execution
 from busplan.sections.base import value_at, with_unchecked
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.machine import ProfileGroup
 
 
 class NextLimit(NamedTuple):
@@ -153,8 +153,8 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     """
     bus = network.bus
     yield _slower(network, if_nothing="" if bus.has_execution(network) else "no execution time is on the bus")
-    yield from (_one_node_more(network, group) for group in network.alike)
-    yield from (_one_axis_more(network, group) for group in network.alike)
+    yield from (_one_node_more(network, group) for group in network.profile.node_groups)
+    yield from (_one_axis_more(network, group) for group in network.profile.node_groups)
     yield _more_bytes(network)
     yield from (_with_keys(network, change) for change in bus.perturbations(network))
     if bus.safety.after_reset:
@@ -176,13 +176,13 @@ def _slower(network: Network, *, if_nothing: str) -> Perturbed:
     return Perturbed(label, "execution_us", before, after, network._replace(groups=groups), if_nothing)
 
 
-def _one_node_more(network: Network, group: AlikeNodes) -> Perturbed:
+def _one_node_more(network: Network, group: ProfileGroup) -> Perturbed:
     more = group.nodes + 1
-    then = network.asking(group.name).with_nodes(more)
+    then = network.varying(group.name).with_nodes(more)
     return Perturbed(f"one node more{_in(group)}", group.nodes_key, group.nodes, more, then, "")
 
 
-def _one_axis_more(network: Network, group: AlikeNodes) -> Perturbed:
+def _one_axis_more(network: Network, group: ProfileGroup) -> Perturbed:
     key, axes = group.node_key("axes"), group.node.axes + 1
     then, unknown = _if_known(lambda: network_of(with_unchecked(network.profile, key, axes)))
     note = unknown or ("" if group.payload.follows_axes else "no payload follows the axes")
@@ -229,7 +229,7 @@ def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:
         return None, f"not known: {error}"
 
 
-def _in(group: AlikeNodes) -> str:
+def _in(group: ProfileGroup) -> str:
     return f" in {group.name}" if group.name else ""
 
 
@@ -331,10 +331,9 @@ def _effect(cause: Perturbed, now: Standing, network: Network) -> Effect:
 def _nearer(network: Network, changed: Network) -> Iterator[str]:
     """Say how much nearer a change comes to limits that are times, each with its doubt as a shown verdict has it."""
     for limit in network.bus.limits:
-        if limit.bound.doubt is None:
+        if limit.doubt is None:
             continue
-        bound = limit.bound
-        left_us, then_us = (plain(bound.most(of)) - plain(bound.shown.value(of)) for of in (network, changed))
+        left_us, then_us = (plain(limit.most(of)) - plain(limit.shown.value(of)) for of in (network, changed))
         if then_us < left_us and left_us > 0:
             yield f"it takes {left_us - then_us:.1f} us of the {left_us:.1f} us before the limit of {limit.key}"
         elif then_us < left_us:

@@ -200,7 +200,7 @@ class Failure(NamedTuple):
     name: str
     value: float | None
     limit: float | None
-    said: str = ""
+    message: str = ""
     """Message of a broken limit of the bus; empty for other failures."""
     is_default: bool = False
     """Whether the limit is the default of its key, not set in the profile."""
@@ -210,7 +210,7 @@ class Failure(NamedTuple):
     @property
     def is_of_bus(self) -> bool:
         """Whether a limit of the bus fails, not the circle."""
-        return bool(self.said) or self.name in _OF_TIME
+        return bool(self.message) or self.name in _OF_TIME
 
     def document(self) -> dict[str, Any]:
         """Return it as in the JSON document; a value that does not exist is null, and the text says why."""
@@ -224,8 +224,8 @@ class Failure(NamedTuple):
 
     def parts(self) -> Iterator[str | Stated]:
         """Words and numbers of the message."""
-        if self.said:
-            yield self.said
+        if self.message:
+            yield self.message
             return
         key = _WITHOUT_TURN if self.name == CONTOUR_MEASURES[-1] and self.value is None else self.name
         saying, value, limit = _FAILURES[key], self.value or 0.0, self.limit or 0.0
@@ -278,8 +278,8 @@ def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
         *(
             Failure(
                 limit.key,
-                existing(limit.bound.value(network)),
-                existing(limit.bound.most(network)),
+                existing(limit.value(network)),
+                existing(limit.most(network)),
                 limit.words(network),
             )
             for limit in broken

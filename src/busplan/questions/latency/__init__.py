@@ -121,7 +121,7 @@ def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
     unknown = dict.fromkeys(
         f"payload {size} bytes: outside the execution table of {alike.name or profile.name}, {execution.range_bytes}; "
         "nothing is extrapolated"
-        for alike in profile.alike_nodes
+        for alike in profile.node_groups
         if isinstance(execution := alike.node.execution, TableExecution)
         for size in payloads_bytes
         if not execution.covers(size)

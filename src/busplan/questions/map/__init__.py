@@ -81,7 +81,7 @@ def nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
     >>> nodes_with(12, network_of(load("paper-4ms").profile), nodes_key="bus.nodes")
     3
     """
-    alike = next(alike for alike in network.profile.alike_nodes if alike.nodes_key == nodes_key)
+    alike = next(alike for alike in network.profile.node_groups if alike.nodes_key == nodes_key)
     node_axes = int(alike.node.axes)
     axes_beside = int(plain(network.axes)) - int(alike.nodes) * node_axes
     own = axes - axes_beside if isinstance(axes, int) else 0
@@ -175,7 +175,7 @@ def _periods_of_nodes(network: Network, group: str) -> list[float]:
     bus = network.bus
     most, _ = safe_nodes(at_period(network, min(MAX_TIME_US, bus.periods.longest_us)), group=group)
     counts = np.arange(1, most + 1)
-    cycle = bus.cycle(network.asking(group).with_nodes(counts), model=bus.deciding_model)
+    cycle = bus.cycle(network.varying(group).with_nodes(counts), model=bus.deciding_model)
     needed_us = np.asarray(certainty(cycle).safe_required_us)
     periods_us = shortest_period_us(cycle.network, needed_us, is_shown=True)
     return [float(us) for us in np.broadcast_to(np.asarray(periods_us), counts.shape)]

@@ -119,9 +119,9 @@ def charged(schedule: Schedule) -> Sentence:
     if schedule.number is not None and common.cycles > 1:
         cycle = f"cycle {common.number} of {common.cycles}"
     setup = ", ".join((nouns(nodes, "node"), *schedule.network.bus.setup_words(schedule.network)))
-    way = schedule.network.bus.way_charged(schedule.network)
+    path = schedule.network.bus.path_words(schedule.network)
     return sentence(
-        f"{{}} {setup}; {{}} to {{}} of {cycle}, {way}",
+        f"{{}} {setup}; {{}} to {{}} of {cycle}{path and f', {path}'}",
         count_value(nodes, "nodes"),
         ShownValue(schedule.from_us, "from_us", "", TOTAL.decimals),
         ShownValue(schedule.to_us, "to_us", "us", TOTAL.decimals),
