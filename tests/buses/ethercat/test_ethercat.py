@@ -14,14 +14,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import busplan
-from busplan.buses import kind_named
+from busplan.buses.ethercat.equations import CONSTANTS
 from busplan.buses.ethercat.section import EthercatProfile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.questions.compare import MachineOnKind
-from busplan.questions.evidence import sections_of
-from busplan.questions.fit.circle_refusal import loop_delays_us, skew_us
-from busplan.questions.fit.network import network_of
 
 Run = Callable[..., Any]
 
@@ -64,6 +60,19 @@ def grouped(*groups: dict[str, Any], **bus: Any) -> busplan.Profile:
 def terms(one: busplan.Profile, model: str = "last-byte") -> dict[str, float]:
     (found,) = busplan.capacity(one, timing_model=[model]).results
     return {term.name: plain(term.us) for term in found.terms}
+
+
+def loop_delays_us(own: busplan.Profile, update: str) -> tuple[float, float]:
+    """Bus delay inside the loops of x and y, closed on the host [us]."""
+    changes = {"servo.loop": "host", "servo.update": update}
+    (figures,) = busplan.circle_test(busplan.load_profile(own, changes=changes)).results
+    return figures.delay_x_us, figures.delay_y_us
+
+
+def comparisons() -> list[Any]:
+    """Every published figure of EtherCAT beside the computed one."""
+    (kind,) = busplan.evidence("ethercat").kinds
+    return [comparison for section in kind.sections for comparison in section.comparisons]
 
 
 def test_its_cycle_is_that_by_hand() -> None:
@@ -303,32 +312,28 @@ def test_a_frame_takes_no_sample_that_it_triggers_itself() -> None:
     assert feedback(1.0).phases["frame_wait_us"] == 499
     assert feedback(0.0).phases["end_to_end_us"] == pytest.approx(feedback(1.0).phases["end_to_end_us"])
     for update, periods in (("next_sync", 3), ("on_arrival", 2)):
-        at_once = busplan.load_profile(
-            profile(node__execution__base_us=0.0), changes={"servo.loop": "host", "servo.update": update}
-        )
-        first, last = loop_delays_us(network_of(at_once))
+        first, last = loop_delays_us(profile(node__execution__base_us=0.0), update)
         assert (first // 500, last // 500) == (periods, periods)
 
 
 def test_the_circle_has_the_delay_of_the_loop() -> None:
-    for shift in [0.0, 0.1, 0.3, 0.9]:
-        for pipeline in [0, 1, 2]:
-            one = profile(bus__distributed_clocks=True, bus__sync_shift=shift, bus__pipeline_cycles=pipeline)
-            host = busplan.load_profile(one, changes={"servo.loop": "host"})
-            found = busplan.latency(host, timing_model=["last-byte"]).transactions
-            (loop,) = (each for each in found if each.transaction == "loop")
-            assert loop_delays_us(network_of(host)) == pytest.approx((loop.phases["end_to_end_us"],) * 2)
-            assert loop_delays_us(network_of(one)) == (0, 0)
+    for shift, pipeline in ((0.0, 0), (0.0, 2), (0.3, 1), (0.9, 2)):
+        own = profile(bus__distributed_clocks=True, bus__sync_shift=shift, bus__pipeline_cycles=pipeline)
+        transactions = busplan.latency(own, timing_model=["last-byte"]).transactions
+        (loop,) = (latency for latency in transactions if latency.transaction == "loop")
+        assert loop_delays_us(own, "next_sync") == pytest.approx((loop.phases["end_to_end_us"],) * 2)
 
 
 def test_set_points_reach_the_drives_at_one_time_with_clocks_and_one_after_the_other_without() -> None:
     many = {"payload__read_bytes": 600, "payload__write_bytes": 600}
-    assert skew_us(network_of(profile(bus__distributed_clocks=True, **many))) == 0
     # Two devices have the first frame, the third is behind the second frame; each device on the way adds 0.1507 us.
-    assert skew_us(network_of(profile(**many))) == pytest.approx((52 + 600) * BYTE_US + 2 * 0.1507)
-    arrival = busplan.load_profile(profile(**many), changes={"servo.loop": "host", "servo.update": "on_arrival"})
-    first, last = loop_delays_us(network_of(arrival))
-    assert last - first == pytest.approx((52 + 600) * BYTE_US + 2 * 0.1507)
+    apart_us = (52 + 600) * BYTE_US + 2 * 0.1507
+    skewed = profile(**many, delivery__skew_us=200.0)
+    assert busplan.circle_test(busplan.load_profile(skewed, changes={"bus.distributed_clocks": True})).results
+    with pytest.raises(BusplanError, match=f"the last axis then takes its set-points {apart_us:g} us after the first"):
+        busplan.circle_test(skewed)
+    first, last = loop_delays_us(profile(**many), "on_arrival")
+    assert last - first == pytest.approx(apart_us)
     # Feedback waits for the next frame, the master has one cycle, and the command comes with the first frame and is
     # executed.
     assert first == pytest.approx(1000 + 20 + (52 + 1200) * BYTE_US + 0.1507 + 40)
@@ -422,11 +427,7 @@ PUBLISHED = {
 
 
 def test_published_figures_are_met_within_what_their_sources_leave_open() -> None:
-    found = {
-        (one.quantity, one.method): one.relative_residual
-        for section in sections_of(kind_named("ethercat"), "ethercat")
-        for one in section.comparisons
-    }
+    found = {(row.quantity, row.method): row.relative_residual for row in comparisons()}
     assert set(PUBLISHED) <= set(found)
     for key, tolerance in PUBLISHED.items():
         residual = found[key]
@@ -437,7 +438,7 @@ def test_published_figures_are_met_within_what_their_sources_leave_open() -> Non
 
 
 def test_constants_have_a_source_and_a_grade() -> None:
-    assert all(one.source and one.grade for one in kind_named("ethercat").constants.values())
+    assert all(constant.source and constant.grade for constant in CONSTANTS.values())
 
 
 @pytest.mark.parametrize("figure", ["required_us", "command_us", "frames", "latency.end_to_end_us"])
@@ -465,8 +466,7 @@ def test_devices_without_axes_need_no_execution_time() -> None:
         busplan.load_profile(short, changes={"cycle.period_us": 1000.0}).group[1].execution == whole.group[1].execution
     )
     assert "execution" not in short.group[1].model_fields_set
-    sercos = busplan.compare(short, buses=["ethercat", "sercos3"]).on("sercos3")
-    assert isinstance(sercos, MachineOnKind)
+    sercos: Any = busplan.compare(short, buses=["ethercat", "sercos3"]).on("sercos3")
     assert sercos.figures.verdict == "fits"
     with pytest.raises(BusplanError, match=r"group\.inputs\.execution: missing section"):
         busplan.load_profile(short, changes={"group.inputs.axes": 1})
@@ -517,15 +517,13 @@ def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None
 
 
 def test_frames_are_those_of_eni_files_and_loops_lie_within_u_but_for_one_machine() -> None:
-    each = {
-        one.quantity: one for section in sections_of(kind_named("ethercat"), "ethercat") for one in section.comparisons
-    }
-    frames = [one for name, one in each.items() if name.startswith(("acontis", "KPA"))]
+    by_name = {row.quantity: row for row in comparisons()}
+    frames = [row for name, row in by_name.items() if name.startswith(("acontis", "KPA"))]
     assert len(frames) == 6
-    assert all(abs(one.residual or 0) < 1e-9 for one in frames)
+    assert all(abs(row.residual or 0) < 1e-9 for row in frames)
     # Its file has one device's inputs in a datagram of their own: 12 bytes of header.
-    assert each["TwinCAT, 5 devices"].residual == pytest.approx(-12 * BYTE_US)
-    weighed = {name: abs(one.residual or 0) / one.uncertainty for name, one in each.items() if one.uncertainty}
+    assert by_name["TwinCAT, 5 devices"].residual == pytest.approx(-12 * BYTE_US)
+    weighed = {name: abs(row.residual or 0) / row.uncertainty for name, row in by_name.items() if row.uncertainty}
     assert {name for name, share in weighed.items() if share > 1} == {"7 drives"}
     assert all(share < 0.55 for name, share in weighed.items() if name != "7 drives")
 
