@@ -5,7 +5,7 @@ import sys
 import tomllib
 from bisect import bisect_right
 from codecs import BOM_UTF8
-from collections.abc import KeysView, Sequence
+from collections.abc import KeysView
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -360,7 +360,6 @@ def _first_deep_bracket(text: str) -> int:
 
 MAX_FILE_BYTES: Final = 2_000_000
 """Largest profile: some 10,000 messages of a CAN network with their comments."""
-PERIOD_KEY: Final = "cycle.period_us"
 _KINDS: Final = ("bus", "bus.kind")
 """Keys whose change may ask for tables of another kind of bus."""
 _SOURCE: Final = "_source"
@@ -530,22 +529,6 @@ def _unchanged_tables(profile: Profile, changes: KeysView[str]) -> dict[str, obj
     changed = {key.partition(".")[0] for key in changes}
     values = {name: getattr(profile, name) for name in profile.model_fields_set - changed}
     return {name: value for name, value in values.items() if isinstance(value, tuple)}
-
-
-def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Profile]:
-    """Return a profile at each of some communication periods [us]; without them, as it is.
-
-    Raises
-    ------
-    BusplanError
-        A period that the profile's schema refuses.
-    """
-    if periods_us is None:
-        return [profile]
-    return [
-        override(profile, {PERIOD_KEY: period_us}, origin={PERIOD_KEY: f"period {period_us}"})
-        for period_us in periods_us
-    ]
 
 
 def has_comment_grades(profile: Profile) -> bool:

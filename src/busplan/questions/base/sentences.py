@@ -26,8 +26,8 @@ from busplan.forms.blocks import (
 )
 from busplan.profile.changes import KeyChanges
 from busplan.profile.edit import value_text
-from busplan.questions.fit.certainty import TIME, limits_behind
-from busplan.questions.fit.figures import FitFigures
+from busplan.questions.fit.certainty import TIME
+from busplan.questions.fit.figures import FitFigures, limits_behind
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -108,14 +108,6 @@ def execution_grades(profile: Profile) -> str | None:
     return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items()) or None
 
 
-def broken_limits(figures: FitFigures, network: Network) -> list[str]:
-    """Say by how much each limit of the bus is broken, or why it is not shown to be kept."""
-    broken = map(network.bus.limit, limits_behind(figures))
-    if network.groups:
-        network = network._replace(period_us=figures.period_us)
-    return [limit.words(network) for limit in broken if limit is not None]
-
-
 def checked_against(bus: "Bus", *, has_cycle: bool = True) -> str:
     """Parts of a kind's model that published figures test, and those that none does."""
     tested = parts_tested(bus.evidence_data)
@@ -156,7 +148,7 @@ def story(figures: FitFigures, network: Network) -> tuple[Part, ...]:
         used = attribute_value(UTILISATION, figures)._replace(decimals=1)
         return sentence("{} to spare, {} of {} used", attribute_value(MARGIN, figures), used, available).parts
     short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
-    reasons = [Sentence((words,)) for words in broken_limits(figures, network)]
+    reasons = [Sentence((limit.words(network),)) for limit in limits_behind(figures, network)]
     if TIME in figures.exceeded:
         reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
     return joined(*reasons, by=", and ").parts

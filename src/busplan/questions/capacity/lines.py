@@ -14,13 +14,14 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
 from busplan.forms.numbers import period, sentence_text
 from busplan.questions.base.sentences import change_meanings, checked_against, settings_sentence
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, limits_behind
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
     after_reset,
     capacity_figures,
     figures,
+    limits_behind,
     safe_nodes,
 )
 from busplan.questions.fit.inputs import HeavyAssumption, heavy_assumptions
@@ -125,9 +126,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         period_us=period_us,
         deciding=deciding,
         others=tuple(result for result in results if result is not deciding),
-        broken_limits=tuple(
-            limit.words(network) for key in limits_behind(deciding) if (limit := bus.limit(key)) is not None
-        ),
+        broken_limits=tuple(limit.words(network) for limit in limits_behind(deciding, network)),
         missed_limits=tuple(missed.items()),
         fastest=smallest_period(network, is_safe=False, with_limits=False) if network.groups else None,
         after_reset=after_reset(network, deciding),

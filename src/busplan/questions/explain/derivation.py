@@ -19,8 +19,8 @@ from busplan.english import listed
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import certainty
 from busplan.questions.fit.figures import certainty_numbers, numeric_figures
-from busplan.questions.fit.inputs import choosing_keys, traced_profile
-from busplan.questions.fit.network import leading_model, model_names, network_of
+from busplan.questions.fit.inputs import choosing_keys, traced_network
+from busplan.questions.fit.network import leading_model, model_names
 from busplan.sourced import DIGITS, SYMBOLS, Equation, Input, Sourced, input_of, short
 
 _ATOM: Final = 4
@@ -383,7 +383,7 @@ def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[st
         Numbers; an infinite one does not exist.
     """
     # Traced for each command: a number keeps the name that it is given first.
-    network = network_of(traced_profile(network.profile))
+    network = traced_network(network)
     cycle = network.bus.cycle(network, model=model)
     figures = figures_of(network.bus)[command]
     if command == "capacity":
@@ -530,7 +530,7 @@ def assumptions(network: Network) -> tuple[Input, ...]:
         execution time without a grade comes first: it is a fact, not a choice.
     """
     profile, bus = network.profile, network.bus
-    limited = network_of(traced_profile(profile))
+    limited = traced_network(network)
     numbers: list[Number] = []
     for model in model_names(network):
         traced = numbers_of(network, "capacity", model=model)[""]

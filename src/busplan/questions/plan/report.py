@@ -41,8 +41,8 @@ from busplan.questions.base.sentences import (
     warning_sentences,
     with_profile,
 )
-from busplan.questions.fit.certainty import FITS, limits_behind
-from busplan.questions.fit.figures import COUNTS
+from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.figures import COUNTS, limits_behind
 from busplan.questions.fit.network import PERIOD
 from busplan.questions.plan import Option, PlanAnswer, Relaxation
 from busplan.questions.plan.search import freedoms
@@ -234,7 +234,7 @@ def option_margin(option: Option) -> tuple[ShownValue, ShownValue]:
     margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     # A margin beyond its uncertainty is none of the causes where limits of the bus are.
     beyond_us = (figures.margin_corrected_us or 0.0) - (figures.uncertainty_us or 0.0)
-    is_enough = figures.verdict == FITS or (beyond_us > 0 and limits_behind(figures))
+    is_enough = figures.verdict == FITS or (beyond_us > 0 and limits_behind(figures, option.network))
     return margin._replace(state="neutral" if is_enough else "fails"), doubt
 
 
