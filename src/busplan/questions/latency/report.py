@@ -23,7 +23,6 @@ from busplan.questions.base.sentences import (
     document,
     execution_sentence,
     figure_table,
-    not_applicable,
     warning_sentences,
     with_profile,
 )
@@ -63,7 +62,9 @@ def _blocks(answer: LatencyAnswer) -> Iterator[Block]:
     yield from _deadline_sentence(answer)
     yield from _tables(answer)
     yield Sentence((Code(answer.profile.name), f": {answer.subject}."))
-    yield from not_applicable(network)
+    for model in network.bus.timing_models:
+        if keys := network.bus.cannot_express(network, model=model.name):
+            yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
     yield from execution_sentence(network, of_latency=True)
     broken = (limit.words(network) for network in answer.networks for limit in network.bus.broken(network))
     yield from (Sentence((f"Warning: {words}.",), "warns") for words in dict.fromkeys(broken))

@@ -34,7 +34,6 @@ from busplan.questions.base.sentences import (
     change_meanings,
     document,
     fields,
-    key_value,
     margin_parts,
     reset_sentence,
     settings_sentence,
@@ -278,5 +277,5 @@ def _counted(words: str, value: BusValue) -> str:
 
 
 def _short_value(key: str, value: BusValue) -> ShownValue:
-    shown = key_value(key, value)
+    shown = ShownValue(value, key)
     return shown._replace(unit=period_value(float(value)).unit) if key.endswith("_us") else shown
