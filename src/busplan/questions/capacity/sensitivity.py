@@ -38,11 +38,8 @@ class NextBottleneck(NamedTuple):
     """One for each group of nodes."""
     binding_term: Term
     """The largest term of the cycle."""
-    is_gone: bool
-    """Whether something would take that term out of the cycle. If so, the figures below are of the cycle without it;
-    else they are of the cycle as it is."""
     next_binding_term: Term
-    """The largest of the other terms."""
+    """The largest of the other terms, in a cycle without the largest where something takes that out."""
     next_margin_corrected_us: float | None
     """Corrected margin without the largest term; None where nothing takes it out."""
 
@@ -77,7 +74,6 @@ def next_bottleneck(network: Network) -> NextBottleneck:
     return NextBottleneck(
         limits=tuple(limits),
         binding_term=binding,
-        is_gone=without is not None,
         next_binding_term=_largest(without or cycle, but=binding.key),
         next_margin_corrected_us=None if without is None else plain(certainty(without).margin_corrected_us),
     )

@@ -223,7 +223,7 @@ def _bottleneck_sentence(bottleneck: NextBottleneck, network: Network) -> Senten
     label, label_behind = labels[now.key].label, labels[behind.key].label
     us = ShownValue(now.us, "binding_term_us", "us", _DECIMALS)
     us_behind = ShownValue(behind.us, "next_binding_term_us", "us", _DECIMALS)
-    if bottleneck.is_gone:
+    if bottleneck.next_margin_corrected_us is not None:
         margin = ShownValue(bottleneck.next_margin_corrected_us, "next_margin_corrected_us", "us", _DECIMALS)
         text = (
             f"Next bottleneck: without {label}, now {{}}, the largest term is {label_behind}, {{}}, and the margin {{}}"
