@@ -11,8 +11,8 @@ from busplan.buses.network import Network
 from busplan.elementwise import existing
 from busplan.forms.blocks import Record
 from busplan.questions.circle import CircleTest
-from busplan.questions.fit.certainty import FITS, TIME, limits_behind
-from busplan.questions.fit.figures import FitFigures
+from busplan.questions.fit.certainty import FITS, TIME
+from busplan.questions.fit.figures import FitFigures, limits_behind
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
@@ -267,8 +267,7 @@ def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
     capacity
         Its figures under the timing model that decides.
     """
-    behind = limits_behind(capacity)
-    broken = [limit for limit in network.bus.limits if limit.key in behind]
+    broken = limits_behind(capacity, network)
     late: tuple[Failure, ...] = ()
     if TIME in capacity.exceeded:
         late = (Failure("required_us", capacity.required_us, capacity.available_us),)
