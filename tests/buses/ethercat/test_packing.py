@@ -41,11 +41,11 @@ class Frame(NamedTuple):
     devices: tuple[int, ...]
 
 
-def sent(own: busplan.Profile) -> list[Frame]:
+def sent(plan: busplan.Profile) -> list[Frame]:
     """The frames of a cycle, as its timeline has them."""
     lengths_us: list[float] = []
     devices: dict[int, list[int]] = defaultdict(list)
-    for event in busplan.timeline(own, timing_model="last-byte").cycle_events:
+    for event in busplan.timeline(plan, timing_model="last-byte").cycle_events:
         if event.kind == "overhead":
             lengths_us.append(event.duration_us)
         elif event.kind == "data":
@@ -54,9 +54,9 @@ def sent(own: busplan.Profile) -> list[Frame]:
     return [Frame(round(us / BYTE_US), tuple(devices[number])) for number, us in enumerate(lengths_us, start=1)]
 
 
-def results(own: busplan.Profile) -> tuple[Any, dict[str, float]]:
+def results(plan: busplan.Profile) -> tuple[Any, dict[str, float]]:
     """The result of the deciding model, and the terms of the vendors' [us]."""
-    vendors, last_byte = sorted(busplan.capacity(own).results, key=lambda result: result.timing_model == "last-byte")
+    vendors, last_byte = sorted(busplan.capacity(plan).results, key=lambda result: result.timing_model == "last-byte")
     return last_byte, {term.name: plain(term.us) for term in vendors.terms}
 
 
@@ -122,10 +122,10 @@ GROUPS = st.lists(
 @example([(3, 737, 737)], False, False, 2)
 def test_frames_are_those_of_a_writer(groups: list[Sized], is_shared: bool, clocks: bool, coupler: int) -> None:
     groups = [*groups[:coupler], (20, 0, 0), *groups[coupler:]]
-    own = profile(groups, "LRW-shared" if is_shared else "LRD-LWR", clocks=clocks)
+    plan = profile(groups, "LRW-shared" if is_shared else "LRD-LWR", clocks=clocks)
     frames = written(groups, is_shared=is_shared, clocks=clocks)
-    result, vendors_us = results(own)
-    assert sent(own) == frames
+    result, vendors_us = results(plan)
+    assert sent(plan) == frames
     assert result.own["frames"] == len(frames)
     sending = sum(frame.wire_bytes for frame in frames) * BYTE_US
     assert vendors_us["frames"] + vendors_us["data"] == pytest.approx(sending)
@@ -135,18 +135,18 @@ def test_frames_are_those_of_a_writer(groups: list[Sized], is_shared: bool, cloc
 @settings(max_examples=10)
 @given(st.integers(1, 1486), st.booleans(), st.integers(1, 200))
 def test_a_sweep_and_a_derivation_have_what_each_number_of_devices_has(size: int, clocks: bool, other: int) -> None:
-    own = profile([(1, size, 0), (3, other, 0)], clocks=clocks)
+    plan = profile([(1, size, 0), (3, other, 0)], clocks=clocks)
     nodes = list(range(1, 60))
     swept = busplan.sweep(
-        own, vary={"group.g0.nodes": nodes, "group.g1.read_bytes": [0, other]}, timing_model=["vendors"]
+        plan, vary={"group.g0.nodes": nodes, "group.g1.read_bytes": [0, other]}, timing_model=["vendors"]
     )
     for place in range(0, len(swept["required_us"]), 7):
         changes = {key: swept[key][place].item() for key in ("group.g0.nodes", "group.g1.read_bytes")}
-        (alone,) = busplan.capacity(busplan.load_profile(own, changes=changes), timing_model=["vendors"]).results
+        (alone,) = busplan.capacity(busplan.load_profile(plan, changes=changes), timing_model=["vendors"]).results
         assert swept["required_us"][place] == pytest.approx(alone.required_us, rel=1e-12)
         assert swept["frames"][place] == alone.own["frames"]
-    explained = busplan.explain(own, "required_us", timing_model=["vendors"]).derivations[0]
-    assert explained.value == busplan.capacity(own, timing_model=["vendors"]).results[0].required_us
+    explained = busplan.explain(plan, "required_us", timing_model=["vendors"]).derivations[0]
+    assert explained.value == busplan.capacity(plan, timing_model=["vendors"]).results[0].required_us
 
 
 @pytest.mark.parametrize(("data", "wire"), [(1, 84), (32, 84), (33, 85), (125, 177), (1486, 1538)])
