@@ -4,8 +4,8 @@ Those functions accept arrays, so a profile whose keys hold arrays gives arrays.
 axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are added here.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import cache, partial, reduce
+from collections.abc import Mapping, Sequence
+from functools import cache, reduce
 from math import inf, prod
 from typing import Final, TypeAlias
 
@@ -58,7 +58,6 @@ def figure_table(
     *,
     timing_models: Sequence[str],
     group: str = "",
-    with_counts: bool = True,
     progress: Progress = ignored,
 ) -> Columns:
     """Compute all figures of `capacity` over a grid.
@@ -74,8 +73,6 @@ def figure_table(
     group
         Group of the profile whose nodes vary for the most nodes and axes of the whole, the others as they are; empty
         where all nodes are alike.
-    with_counts
-        Whether there are columns of the most nodes and axes, which take the cycle at other numbers of nodes.
     progress
         Called with the points that are done, and all of them.
 
@@ -87,10 +84,9 @@ def figure_table(
     parts: list[Columns] = []
     done = 0
     for chunk in grid.chunks(CHUNK_POINTS):
-        figures_of = partial(_figures, profile, chunk.values, group=group)
-        columns = [{**chunk.values, **figures_of(model, with_counts=with_counts)} for model in timing_models]
-        names = (name for name in (*grid.axes, *figure_names(network)) if name in columns[0])
-        parts.append({name: _interleaved([own[name] for own in columns], chunk.shape) for name in names})
+        by_model = [{**chunk.values, **_figures(profile, chunk.values, model, group=group)} for model in timing_models]
+        names = (*grid.axes, *figure_names(network))
+        parts.append({name: _interleaved([columns[name] for columns in by_model], chunk.shape) for name in names})
         done += prod(chunk.shape)
         progress(done, grid.points)
     # A part lets go of a column when it is in the table.
@@ -99,33 +95,23 @@ def figure_table(
 
 def _interleaved(by_model: Sequence[Array], shape: tuple[int, ...]) -> Array:
     """Arrays that broadcast to a shape, one for each timing model: point by point, and for each model by model."""
-    return np.stack([np.broadcast_to(own, shape).ravel() for own in by_model], axis=1).ravel()
+    return np.stack([np.broadcast_to(column, shape).ravel() for column in by_model], axis=1).ravel()
 
 
-def _figures(
-    profile: Profile, values: Mapping[str, Array], model: str, *, group: str, with_counts: bool
-) -> dict[str, Array]:
+def _figures(profile: Profile, values: Mapping[str, Array], model: str, *, group: str) -> dict[str, Array]:
     """All figures of a chunk under one timing model; they broadcast to its shape."""
-    for number, (key, own) in enumerate(values.items()):
-        if own.dtype == object and own.size > 1:
+    for place, (key, axis) in enumerate(values.items()):
+        if axis.dtype == object and axis.size > 1:
             # Words among numbers: compute each value by itself and join the results along the axis.
             parts = [
-                _figures(
-                    profile,
-                    {**values, key: np.take(own, [index], axis=number)},
-                    model,
-                    group=group,
-                    with_counts=with_counts,
-                )
-                for index in range(own.size)
+                _figures(profile, {**values, key: np.take(axis, [index], axis=place)}, model, group=group)
+                for index in range(axis.size)
             ]
-            return {name: _joined([part[name] for part in parts], axis=number) for name in parts[0]}
-    figures = _columns(_at(profile, values), model, group=group, with_counts=with_counts)
-    return {name: _with_axes(column, len(values)) for name, column in figures.items()}
-
-
-def _with_axes(column: Array, axes: int) -> Array:
-    return column.reshape((1,) * axes) if column.size == 1 else column
+            return {name: _joined([part[name] for part in parts], axis=place) for name in parts[0]}
+    at_points = {key: axis.item() if axis.size == 1 else axis.astype(float) for key, axis in values.items()}
+    figures = _columns(network_of(with_all_unchecked(profile, at_points)), model, group=group)
+    one = (1,) * len(values)
+    return {name: column.reshape(one) if column.size == 1 else column for name, column in figures.items()}
 
 
 def _joined(parts: list[Array], *, axis: int) -> Array:
@@ -133,15 +119,8 @@ def _joined(parts: list[Array], *, axis: int) -> Array:
     return np.concatenate([np.broadcast_to(part, shape) for part in parts], axis=axis)
 
 
-def _at(profile: Profile, values: Mapping[str, Array]) -> Profile:
-    """Return a copy whose keys hold arrays, unvalidated."""
-    return with_all_unchecked(
-        profile, {key: own.item() if own.size == 1 else own.astype(float) for key, own in values.items()}
-    )
-
-
-def _columns(where: Profile, model: str, *, group: str, with_counts: bool) -> dict[str, Array]:
-    network = network_of(where)
+def _columns(network: Network, model: str, *, group: str) -> dict[str, Array]:
+    """All figures of a network whose keys hold arrays."""
     bus = network.bus
     cycle = bus.cycle(network, model=model)
     figures = numeric_figures(cycle)
@@ -152,40 +131,31 @@ def _columns(where: Profile, model: str, *, group: str, with_counts: bool) -> di
     broken = {**_where(codes, BROKEN), TIME: late}
     numbers = {**figures, **cycle.figures(), **terms, FITS.key: np.logical_not(reduce(np.logical_or, broken.values()))}
     words = {
-        TIMING_MODEL.key: _word(model),
+        TIMING_MODEL.key: _objects([model]),
         "binding_term": _chosen([term.name for term in cycle.terms], _largest([*terms.values()]))
         if network.groups
-        else _word(None),
+        else _objects([None]),
         "exceeded": _sets(broken),
         **(_certainty(cycle, codes) if model == bus.deciding_model else _UNDECIDED),
-        **(_counts(network, limits, model=model, group=group) if with_counts else {}),
+        **_counts(network, limits, model=model, group=group),
     }
     sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
-    return {
-        key: words[key] if key in words else _number(numbers[key], sorts[key])
-        for key in figure_names(network)
-        if with_counts or key.rpartition(".")[2] not in COUNTS
-    }
+    return {key: words[key] if key in words else _number(numbers[key], sorts[key]) for key in figure_names(network)}
 
 
-def _chosen(words: Iterable[object], codes: Array) -> Array:
-    """Words by their place."""
-    chosen: Array = _words(tuple(words))[np.atleast_1d(codes)]
-    return chosen
-
-
-def _word(word: object) -> Array:
-    return _chosen([word], np.zeros(1, int))
-
-
-@cache
-def _words(words: tuple[object, ...]) -> Array:
+def _objects(words: Sequence[object]) -> Array:
     return np.fromiter(words, dtype=object, count=len(words))
+
+
+def _chosen(words: Sequence[object], codes: Array) -> Array:
+    """Words by their place."""
+    chosen: Array = _objects(words)[np.atleast_1d(codes)]
+    return chosen
 
 
 _NO_NUMBER: Final = np.full((), np.nan)
 _UNDECIDED: Final = {
-    figure.key: _word(None) if figure.sort in ("word", "words") else _NO_NUMBER
+    figure.key: _objects([None]) if figure.sort in ("word", "words") else _NO_NUMBER
     for figure in CERTAINTY
     if figure.key not in COUNTS
 }
@@ -203,7 +173,11 @@ def _number(number: Number | None, sort: Sort) -> Array:
 def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str) -> dict[str, Array]:
     """How many nodes fit: of each group, and of the whole where one group varies and the others are as they are."""
     if not network.groups:
-        return {**dict.fromkeys(COUNTS, _NO_NUMBER), "limited_by": _word(None), "safe_limited_by": _word(None)}
+        return {
+            **dict.fromkeys(COUNTS, _NO_NUMBER),
+            "limited_by": _objects([None]),
+            "safe_limited_by": _objects([None]),
+        }
     counts = {name: _counts_of(network.asking(name), limits, model=model) for name in network.names}
     whole = counts[group]
     if network.is_uniform:
@@ -230,7 +204,7 @@ def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict
         "limited_by": _chosen([limit.key for limit in limits], np.asarray(most.limit, int)),
     }
     if model != network.bus.deciding_model:
-        return {**counted, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _word(None)}
+        return {**counted, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _objects([None])}
     to_be_safe = limits_to_be_safe(network)
     # No more nodes are shown to fit than fit.
     safe = most_nodes(network, to_be_safe, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
@@ -256,7 +230,7 @@ def _certainty(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Array
 
 def _where(codes: Mapping[str, Number], code: int) -> dict[str, Array]:
     """Where each limit has a verdict."""
-    return {key: np.equal(np.asarray(own), code) for key, own in codes.items()}
+    return {key: np.equal(np.asarray(place), code) for key, place in codes.items()}
 
 
 def _sets(flags: Mapping[str, Array]) -> Array:
@@ -269,7 +243,7 @@ def _sets(flags: Mapping[str, Array]) -> Array:
 @cache
 def _combinations(keys: tuple[str, ...]) -> Array:
     """Every set of keys, by the number whose bits are its members."""
-    return _words(
+    return _objects(
         tuple(tuple(key for bit, key in enumerate(keys) if code >> bit & 1) for code in range(1 << len(keys)))
     )
 
