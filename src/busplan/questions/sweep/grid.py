@@ -24,6 +24,11 @@ from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 Array = NDArray[Any]
 """Numbers, truth values, or objects if there are words among them."""
+Columns = dict[str, Array]
+"""Columns by name, a row for each point and timing model, each of shape (rows,).
+
+Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
+"""
 
 _CHECKED_EACH: Final = 100
 """Up to this many values of a key are all checked; of more, the extremes: every valid range is an interval."""

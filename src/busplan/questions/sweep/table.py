@@ -1,22 +1,26 @@
-"""Capacity over a grid: the figures of `capacity` for many profiles at once, by the same functions.
+"""A sweep as asked for, checked; and its table: the figures of `capacity` for many profiles at once.
 
-Those functions accept arrays, so a profile whose keys hold arrays gives arrays. The values of each key lie along an
-axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are added here.
+The functions of `capacity` accept arrays, so a profile whose keys hold arrays gives arrays. The values of each key lie
+along an axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are
+added here.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, reduce
 from math import inf, prod
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from busplan.buses.cycle import BusCycle
-from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, Sort
+from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, Figure, Sort, by_key
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
 from busplan.elementwise import Number
+from busplan.errors import BusplanError
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.progress import Progress, ignored
+from busplan.questions.circle import CIRCLE_FIGURES
 from busplan.questions.fit.certainty import (
     TIME,
     VERDICTS,
@@ -29,8 +33,16 @@ from busplan.questions.fit.certainty import (
     verdict_code,
 )
 from busplan.questions.fit.figures import COUNTS, certainty_numbers, most_nodes, numeric_figures
-from busplan.questions.fit.network import network_of
-from busplan.questions.sweep.grid import Array, Grid
+from busplan.questions.fit.network import network_of, varied_nodes
+from busplan.questions.sweep.circles import (
+    CIRCLE_COLUMNS,
+    SEED,
+    SUMMARY_COLUMNS,
+    SUMMARY_FIGURES,
+    require_few,
+    without_seed,
+)
+from busplan.questions.sweep.grid import Array, Columns, Grid, axis_values, checked_grid, grid_models
 from busplan.sections.base import with_all_unchecked
 from busplan.sections.profile import Profile
 
@@ -39,11 +51,117 @@ CHUNK_POINTS: Final = 1 << 14
 
 _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
 
-Columns: TypeAlias = dict[str, Array]
-"""Columns by name, a row for each point and timing model, each of shape (rows,).
 
-Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
-"""
+class Sweep(NamedTuple):
+    """A table with a row for each point of a grid and each timing model, as it is asked for."""
+
+    network: Network
+    """The network, with its changes."""
+    grid: Grid
+    """Points of the rows."""
+    timing_models: tuple[str, ...]
+    group: str
+    """Group whose nodes vary for the most nodes and axes of the whole; empty where all nodes are alike."""
+    circle: bool = False
+    """If True, the circle test of each point is run."""
+    seeds: Array | None = None
+    """Seeds that each row is over; None without a summary."""
+    changes: KeyChanges = NO_CHANGES
+
+    @property
+    def profile(self) -> Profile:
+        """The profile of the network."""
+        profile: Profile = self.network.profile
+        return profile
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests."""
+        of_circle = CIRCLE_COLUMNS if self.seeds is None else SUMMARY_COLUMNS
+        return (*self.grid.axes, *figure_names(self.network), *(of_circle if self.circle else ()))
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Columns in numbers."""
+        figures, axes = column_figures(self.network), self.grid.axes
+        is_word = {
+            name: axes[name].dtype == object if name in axes else "word" in figures[name].sort for name in self.columns
+        }
+        return tuple(name for name in self.columns if not is_word[name])
+
+    def require_columns(self, columns: Iterable[str], *, name: str) -> None:
+        """Refuse columns that do not exist.
+
+        Parameters
+        ----------
+        columns
+            Their names.
+        name
+            Name of the argument in messages.
+        """
+        for column in columns:
+            if column not in self.columns:
+                raise BusplanError(f"{name} {column}: no such column; there are {', '.join(self.columns)}")
+
+    def require_number(self, column: str | None, *, name: str) -> None:
+        """Refuse a column that does not exist or is not numeric; None is none."""
+        if column is not None and column not in self.numbers:
+            raise BusplanError(f"{name} {column}: expected a column in numbers: {', '.join(self.numbers)}")
+
+    @property
+    def tests(self) -> Grid:
+        """Points of the circle tests, where there are any; seeds change fastest."""
+        return self.grid if self.seeds is None else Grid({**self.grid.axes, SEED: self.seeds})
+
+
+def checked_sweep(
+    network: Network,
+    vary: Mapping[str, str | Iterable[object]],
+    *,
+    timing_models: Sequence[str] | None,
+    group: str | None,
+    circle: bool,
+    summary: bool,
+    force: bool,
+    changes: KeyChanges = NO_CHANGES,
+) -> Sweep:
+    """Check what is asked of a sweep.
+
+    Parameters
+    ----------
+    network
+        The network, with its changes.
+    vary
+        Values by dotted key, as `sweep` takes them.
+    timing_models
+        Names of timing models; by default all that can express every value.
+    group
+        Name of the group whose nodes vary for the most nodes and axes; by default that with the most axes.
+    circle, summary, force
+        Run circle tests, summarise them over seeds, and run any number of them.
+    changes
+        The changes of the profile, for the answer to name them.
+
+    Raises
+    ------
+    BusplanError
+        No such group; as `axis_values`, `checked_grid`, `without_seed`, `grid_models` and `require_few`.
+    """
+    if summary and not circle:
+        raise BusplanError("summary: goes with circle")
+    profile = network.profile
+    names = [nodes.name for nodes in profile.group]
+    if group is not None and group not in names:
+        known = f"the groups {', '.join(names)}" if names else "no groups"
+        raise BusplanError(f"group {group}: {profile.name} has {known}")
+    axes = {key: axis_values(profile, key, given, name="vary") for key, given in vary.items()}
+    grid = checked_grid(profile, axes, with_circle=circle)
+    grid, seeds = without_seed(grid) if summary else (grid, None)
+    models = grid_models(network, grid, timing_models)
+    varied = group or (varied_nodes(profile).name if names else "")
+    if circle and not force:
+        require_few(grid, seeds=1 if seeds is None else seeds.size)
+    return Sweep(network, grid, models, varied, circle, seeds, changes)
 
 
 def figure_names(network: Network) -> tuple[str, ...]:
@@ -52,27 +170,24 @@ def figure_names(network: Network) -> tuple[str, ...]:
     return (*(figure.key for figure in network.bus.figures.capacity), *groups)
 
 
-def figure_table(
-    network: Network,
-    grid: Grid,
-    *,
-    timing_models: Sequence[str],
-    group: str = "",
-    progress: Progress = ignored,
-) -> Columns:
-    """Compute all figures of `capacity` over a grid.
+def column_figures(network: Network) -> dict[str, Figure]:
+    """The registered figures of a sweep's columns, those of groups with the name of the group."""
+    figures = by_key((*CIRCLE_FIGURES, *SUMMARY_FIGURES, *network.bus.figures.capacity))
+    groups = {
+        f"group.{group.name}.{key}": figures[key]._replace(label=f"{figures[key].label} of {group.name}")
+        for group in network.profile.group
+        for key in COUNTS
+    }
+    return {**figures, **groups}
+
+
+def figure_table(sweep: Sweep, *, progress: Progress = ignored) -> Columns:
+    """Compute all figures of `capacity` over the grid of a sweep.
 
     Parameters
     ----------
-    network
-        The network.
-    grid
-        Values of its keys, from `checked_grid`.
-    timing_models
-        Timing models, in this order.
-    group
-        Group of the profile whose nodes vary for the most nodes and axes of the whole, the others as they are; empty
-        where all nodes are alike.
+    sweep
+        The sweep.
     progress
         Called with the points that are done, and all of them.
 
@@ -80,17 +195,20 @@ def figure_table(
     ----------
     Paper, equations (1)-(11).
     """
-    profile = network.profile
+    grid, profile = sweep.grid, sweep.profile
+    names = (*grid.axes, *figure_names(sweep.network))
     parts: list[Columns] = []
     done = 0
     for chunk in grid.chunks(CHUNK_POINTS):
-        by_model = [{**chunk.values, **_figures(profile, chunk.values, model, group=group)} for model in timing_models]
-        names = (*grid.axes, *figure_names(network))
+        by_model = [
+            {**chunk.values, **_figures(profile, chunk.values, model, group=sweep.group)}
+            for model in sweep.timing_models
+        ]
         parts.append({name: _interleaved([columns[name] for columns in by_model], chunk.shape) for name in names})
         done += prod(chunk.shape)
         progress(done, grid.points)
     # A part lets go of a column when it is in the table.
-    return {name: np.concatenate([part.pop(name) for part in parts]) for name in [*parts[0]]}
+    return {name: np.concatenate([part.pop(name) for part in parts]) for name in names}
 
 
 def _interleaved(by_model: Sequence[Array], shape: tuple[int, ...]) -> Array:
