@@ -319,7 +319,7 @@ def summaries(results: Array) -> Columns:
     columns = (
         np.full(points, seeds),
         *_shares(failed, seeds),
-        *(part for key in _SPREAD for part in _spread(key, by_key[key])),
+        *(part for key in _SPREAD for part in _spread(by_key[key])),
     )
     return dict(zip(SUMMARY_COLUMNS, columns, strict=True))
 
@@ -340,13 +340,13 @@ def _shares(failed: Array, tests: int) -> tuple[Array, ...]:
     return failed / tests, low, high
 
 
-def _spread(key: str, values: Array) -> tuple[Array, ...]:
-    """Mean, standard deviation, 95 % quantile and worst, in the order of `_PARTS`."""
+def _spread(values: Array) -> tuple[Array, ...]:
+    """Mean, standard deviation, 95 % quantile and worst, in the order of `_PARTS`.
+
+    Errors are worse the larger they are; margins are of the loop, the same with every seed.
+    """
     # From the first on, so that equal values have exactly their mean, and no deviation.
     first = values[:, :1]
     off = values - first
     std = np.std(off, axis=1, ddof=1) if values.shape[1] > 1 else np.full(len(values), np.nan)
-    is_more_better = CIRCLE_BY_KEY[key].better == "more"
-    quantile = np.quantile(values, 1 - _SHARE if is_more_better else _SHARE, axis=1)
-    worst = values.min(axis=1) if is_more_better else values.max(axis=1)
-    return first[:, 0] + off.mean(axis=1), std, quantile, worst
+    return first[:, 0] + off.mean(axis=1), std, np.quantile(values, _SHARE, axis=1), values.max(axis=1)
