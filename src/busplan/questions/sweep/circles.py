@@ -16,8 +16,9 @@ from busplan.errors import BusplanError
 from busplan.profile.document import override
 from busplan.progress import Progress
 from busplan.questions.circle import CIRCLE_BY_KEY
-from busplan.questions.circle.roundness import NOTHING, Estimate, announce, bus, circle_test, estimate, setup
+from busplan.questions.circle.roundness import Estimate, announce, estimate, run_circles, setup
 from busplan.questions.fit.circle_refusal import refusals
+from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Array, Columns, Grid
 from busplan.sections.profile import Profile
@@ -126,7 +127,7 @@ def _run_chunk(chunk: tuple[Profile, Sequence[Point]]) -> list[CircleOutcome]:
     profile, points = chunk
     outcomes = []
     for point in points:
-        (result,) = circle_test(network_of(override(profile, point)), explain=False).results
+        (result,) = run_circles(network_of(override(profile, point)), explain=False).results
         figures = tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
         outcomes.append(CircleOutcome(figures, tuple(failure.name for failure in result.failures)))
     return outcomes
@@ -135,10 +136,9 @@ def _run_chunk(chunk: tuple[Profile, Sequence[Point]]) -> list[CircleOutcome]:
 def cost_of(profile: Profile, points: Sequence[Point]) -> Estimate:
     """Estimate what the circle tests of some points cost; of many, from some of them."""
     some = np.random.default_rng(0).permutation(len(points))[:_ESTIMATED]
-    cost = NOTHING
-    for variant in (network_of(override(profile, points[number])) for number in some):
-        if bus(variant).fits:
-            cost = cost.then(estimate((), [setup(variant)]))
+    variants = (network_of(override(profile, points[number])) for number in some)
+    fitting = (network for network in variants if figures(network, model=network.bus.deciding_model).fits)
+    cost = estimate((), map(setup, fitting))
     times = len(points) / len(some)
     return cost._replace(steps=round(times * cost.steps), time_s=times * cost.time_s)
 
