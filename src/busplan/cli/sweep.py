@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from busplan.questions.sweep import SweepAnswer
-    from busplan.questions.sweep.asked import Sweep
+    from busplan.questions.sweep.table import Sweep
 
 SweepForm = Literal[Form, RowsForm]
 _TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in get_args(RowsForm))
