@@ -122,41 +122,21 @@ _MODULES: Final = {
 COMMANDS: Final = tuple(name for names in GROUPS.values() for name in names)
 
 
-class LazyCommands(Mapping[str, Any]):
-    """Commands by name, each created at first use."""
-
-    def __init__(self) -> None:
-        self._made: dict[str, Any] = {}
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in COMMANDS:
-            raise KeyError(name)
-        if name not in self._made:
-            stem = name.replace("-", "_")
-            module = import_module(f"busplan.cli.{_MODULES[name]}")
-            single = typer.Typer(
-                add_completion=False,
-                rich_markup_mode=None,
-                pretty_exceptions_enable=False,
-                context_settings=SETTINGS,
-            )
-            single.command(name, cls=PlainCommand, epilog=FAILURES)(getattr(module, f"{stem}_command"))
-            self._made[name] = get_command(single)
-        return self._made[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(COMMANDS)
-
-    def __len__(self) -> int:
-        return len(COMMANDS)
-
-
 class LazyGroup(TyperGroup):
-    """The program's group of commands; its help lists them first."""
+    """The program's group of commands, each loaded at its first use; its help lists them first."""
 
-    def __init__(self, **settings: Any) -> None:
-        super().__init__(**settings)
-        self.commands: Any = LazyCommands()
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002 - typer's signature
+        """Load a command; None if there is no such command."""
+        if cmd_name in COMMANDS and cmd_name not in self.commands:
+            command = getattr(
+                import_module(f"busplan.cli.{_MODULES[cmd_name]}"), f"{cmd_name.replace('-', '_')}_command"
+            )
+            single = typer.Typer(
+                add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False, context_settings=SETTINGS
+            )
+            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(command)
+            self.commands[cmd_name] = get_command(single)
+        return self.commands.get(cmd_name)
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - typer's signature
         """Names of all commands, without loading them."""
@@ -166,7 +146,6 @@ class LazyGroup(TyperGroup):
         """Find the command of a command line."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
             from busplan.english import did_you_mean
-            from busplan.errors import BusplanError
 
             near = did_you_mean(args[0], list(COMMANDS)) or "`busplan --help` lists them"
             raise BusplanError(f"{args[0]}: no such command; {near}")
