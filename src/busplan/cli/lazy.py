@@ -21,10 +21,6 @@ FAILURES: Final = (
 """End of the help of every command."""
 _OFFER: Final = 60
 """Most characters of help for a completion in the shell."""
-_COMPLETION: Final = {
-    "install_completion": "Add completion by the Tab key to the start-up file of your shell, and exit.",
-    "show_completion": "Print the script that does it, to look at or to place by hand, and exit.",
-}
 
 
 @contextmanager
@@ -160,13 +156,6 @@ class LazyGroup(TyperGroup):
         """Parse the command line of a command and run it."""
         with _usage_in_our_form("busplan"):
             return super().invoke(ctx)
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        """Options, with our own help for the completion options that typer adds."""
-        params: list[Any] = super().get_params(ctx)
-        for param in params:
-            param.help = _COMPLETION.get(param.name, param.help)
-        return params
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
         """Complete commands and options."""
