@@ -6,7 +6,6 @@ from typing import Final, NamedTuple, cast
 
 from busplan.english import printable
 from busplan.forms.blocks import (
-    ALL_SHOWS,
     Block,
     Calculation,
     CalculationStep,
@@ -358,9 +357,7 @@ class _Placed(NamedTuple):
     width: int
 
 
-def table_lines(
-    table: Table, *, width: int | None = None, is_whole: bool = False, whole_by: str = ALL_SHOWS
-) -> list[Line]:
+def table_lines(table: Table, *, width: int | None = None, is_whole: bool = False, whole_by: str = "") -> list[Line]:
     """Lay out a table: words left, figures right, a rule below the headings, and below it what is left out.
 
     Parameters
@@ -514,7 +511,7 @@ def text(report: Report, *, width: int | None = None, height: int | None = None,
 
 
 def block_lines(
-    blocks: Iterable[Block], *, width: int | None = None, is_whole: bool = False, whole_by: str = ALL_SHOWS
+    blocks: Iterable[Block], *, width: int | None = None, is_whole: bool = False, whole_by: str = ""
 ) -> Iterator[Line]:
     """Write blocks as lines, with blank lines around everything but sentences.
 
