@@ -8,7 +8,7 @@ import pytest
 import busplan
 from busplan.forms import terminal
 from busplan.forms.charts import ChartCell, ChartGrid, legend
-from busplan.forms.svg import INKS
+from busplan.forms.inks import INKS
 from busplan.questions.map import MapAnswer, NotDrawn
 from busplan.questions.map.report import LOOKS
 
