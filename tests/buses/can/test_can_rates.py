@@ -122,8 +122,15 @@ def test_no_cycle_lasts_longer_than_the_fullest() -> None:
     # By its deadline alone it could block twice, and the two missing PDOs of one byte are shorter.
     assert figures(alone).required_us == fullest_us - 2 * 65 + 135
     assert figures(own).required_us == fullest_us
-    shown = busplan.timeline(own)
-    assert shown.used_us == pytest.approx(figures(own).required_us)
+    assert busplan.timeline(own).used_us == pytest.approx(fullest_us)
+    assert busplan.timeline(own, cycle=2).used_us == pytest.approx(fullest_us - 4 * 65 + 2 * 65)
+
+
+def test_a_cycle_of_sync_alone_waits_for_a_single_frame() -> None:
+    low = tuple(message(f"low{number}", 0x7F0 + number) for number in range(3))
+    own = machine(group("io", 2, size=8, every=2), messages=low)
+    assert busplan.timeline(own, cycle=1).used_us == 55 + 2 * 48 + 4 * 135 + 3 * 135
+    assert busplan.timeline(own, cycle=2).used_us == 55 + 135
 
 
 def test_a_loop_waits_for_the_cycle_in_which_its_commands_are_due() -> None:
