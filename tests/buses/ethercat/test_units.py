@@ -246,7 +246,7 @@ def test_the_timeline_lists_the_cycles_of_the_common_multiple() -> None:
     plan = profile([(1, 1, 100, 0), (2, 1, 400, 0), (2, 1, 200, 0)])
     us = [20 + 3 * E_BUS_US + BYTE_US * (52 + size) for size in (500, 300)]
     words = "The groups meet every 2 cycles; this is the fullest. "
-    assert f"{said}Cycles 1: g0, g1 ({us[0]:.3f} us); 2: g0, g2 ({us[1]:.3f} us).\n" in str(busplan.timeline(plan))
+    assert f"{words}Cycles 1: g0, g1 ({us[0]:.3f} us); 2: g0, g2 ({us[1]:.3f} us).\n" in str(busplan.timeline(plan))
     many = str(busplan.timeline(busplan.load_profile(plan, changes={"group.g1.every": 65})))
     assert "every 130 cycles; this is the fullest. More than 64 cycles are not listed.\n" in many
     assert "cycles" not in str(busplan.timeline(profile([(1, 1, 100, 0)])))
