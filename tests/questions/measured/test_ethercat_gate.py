@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.questions.measured import MeasuredAnswer
 from tests.oracles.ethercat_recording import (
     FRMW,
     LRW,
@@ -80,7 +79,7 @@ SHORT_LINE = replace(MACHINE, devices=4)
 
 def asked(
     packets: Packets, folder: Path, *, plan: str = FOUR, more: bytes = b"", **options: Any
-) -> tuple[MeasuredAnswer, dict[str, str]]:
+) -> tuple[busplan.MeasuredAnswer, dict[str, str]]:
     """The answer, and the code of each BP40x of `check --recording` by its first words."""
     profile, capture = folder / "plan.toml", folder / "capture.pcapng"
     profile.write_text(plan)
@@ -92,7 +91,7 @@ def asked(
     return busplan.measured(profile, capture), {text.partition(": ")[0]: code for text, code in words.items()}
 
 
-def recorded(answer: MeasuredAnswer, quantity: str) -> float | None:
+def recorded(answer: busplan.MeasuredAnswer, quantity: str) -> float | None:
     return next(figure.recorded for figure in answer.figures if figure.quantity == quantity)
 
 
@@ -186,6 +185,22 @@ def test_a_master_that_goes_on_with_its_own_count_misses_a_cycle_and_no_more(tmp
     assert recorded(answer, "cycles without a frame") == 1
 
 
+def test_a_new_count_begins_with_the_first_cycle_behind_a_gap(tmp_path: Path) -> None:
+    # The fullest cycles are the last before the gap and the first behind it.
+    before, behind = (
+        replace(SHORT_LINE, schedule=tuple(cycle(136 if place == fullest else 16) for place in range(4)))
+        for fullest in (3, 1)
+    )
+    packets = [packet for packet in simulated(before, 600) if packet[0] < 299_900]
+    packets += [packet for packet in simulated(behind, 600) if packet[0] > 300_900]
+    answer, found = asked(packets, tmp_path, plan=QUARTERS)
+    assert found == {"cycles without a frame": "BP401"}
+    assert recorded(answer, "cycles without a frame") == 1
+    events = {figure.quantity: figure.events for figure in answer.figures}
+    assert events["datagrams of a cycle with g0 and g1"] == 150
+    assert events["datagrams of a cycle with g0"] == 599 - 150
+
+
 def test_a_machine_of_another_plan_is_outside_it(tmp_path: Path) -> None:
     machine = replace(MACHINE, schedule=(cycle(124),))
     assert asked(simulated(machine, 600), tmp_path)[1]["datagrams of a cycle with g0 and g1"] == "BP401"
@@ -205,6 +220,17 @@ def test_the_start_of_a_master_is_no_missing_cycle(tmp_path: Path) -> None:
     answer, found = asked(started, tmp_path)
     assert found == {}
     assert any("4 frames of process data at its ends are left out" in remark for remark in answer.remarks)
+
+
+def test_the_end_of_a_master_is_no_missing_cycle(tmp_path: Path) -> None:
+    packets = simulated(MACHINE, 1200)
+    ended = [
+        packet for packet in packets if packet[0] < 399_500 or 449_900 < packet[0] < 450_900 or packet[0] > 1.1985e6
+    ]
+    answer, found = asked(ended, tmp_path)
+    assert found == {}
+    assert any("2 frames of process data at its ends are left out" in remark for remark in answer.remarks)
+    assert next(figure.events for figure in answer.figures if figure.quantity == "period") == 400
 
 
 @settings(max_examples=40)
