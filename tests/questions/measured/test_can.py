@@ -13,10 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.rule import RecordedFigure
 from busplan.errors import BusplanError
-from busplan.questions.measured import MeasuredAnswer
-from busplan.recordings.can import read_can, written_bits
+from busplan.recordings.can import written_bits
 from tests.oracles.can_recording import Logged, Queued, arbitrated, bits_of, candump, servo_8
 
 if TYPE_CHECKING:
@@ -27,13 +25,13 @@ PLAN = "can-servo-8"
 LOGGED = arbitrated(servo_8(300))
 
 
-def of_log(text: str, tmp_path: Path, *, plan: Any = PLAN, **options: Any) -> MeasuredAnswer:
+def of_log(text: str, tmp_path: Path, *, plan: Any = PLAN, **options: Any) -> busplan.MeasuredAnswer:
     path = tmp_path / "bus.log"
     path.write_text(text)
     return busplan.measured(plan, path, **options)
 
 
-def figure(answer: MeasuredAnswer, start: str) -> RecordedFigure:
+def figure(answer: busplan.MeasuredAnswer, start: str) -> Any:
     (found,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
     return found
 
@@ -82,6 +80,7 @@ def test_a_machine_within_its_plan_is_found_to_be(tmp_path: Path, seed: int) -> 
 
 def test_every_format_has_the_same_frames(tmp_path: Path) -> None:
     logged = [*LOGGED[:400], Logged(LOGGED[400].us, 0x18FF0102, b"\1\2\3", True, 0)]
+    exact: busplan.MeasuredAnswer | None = None
     for ending in ("log", "asc", "blf", "trc"):
         path = tmp_path / f"bus.{ending}"
         with can.Logger(str(path)) as writer:
@@ -95,13 +94,15 @@ def test_every_format_has_the_same_frames(tmp_path: Path) -> None:
                         channel=0,
                     )
                 )
-        found = read_can(path, progress=lambda _done, _total: None)
-        assert found.identifiers.tolist() == [frame.identifier for frame in logged], ending
-        assert found.extended.tolist() == [frame.extended for frame in logged]
-        assert found.bits.tolist() == [bits_of(frame) for frame in logged]
-        step_us = 100 if ending == "trc" else 2
-        assert found.times_us == pytest.approx([frame.us - logged[0].us for frame in logged], abs=step_us)
-        assert found.broken == ""
+        answer = busplan.measured(PLAN, path)
+        exact = exact or answer
+        step_us = 200 if ending == "trc" else 4
+        assert [found.quantity for found in answer.figures] == [found.quantity for found in exact.figures]
+        for found, of_log in zip(answer.figures, exact.figures, strict=True):
+            allowed = {"us": step_us, "share": 0.001, "kbit/s": 1000}.get(found.unit, 0)
+            assert found.recorded == pytest.approx(of_log.recorded, abs=allowed), (ending, found.quantity)
+        assert figure(answer, "frames of no message").note == "0x18ff0102"
+        assert not any("damaged" in remark for remark in answer.remarks)
 
 
 def test_what_is_planned_and_not_seen_and_seen_and_not_planned_is_said(tmp_path: Path) -> None:
@@ -198,14 +199,19 @@ def test_stuffing_is_that_of_classical_frames(tmp_path: Path) -> None:
 
 def test_a_long_length_code_of_a_classical_frame_is_one_of_8_bytes(tmp_path: Path) -> None:
     head = "date Sam Sep 30 15:06:13.191 2017\nbase hex  timestamps absolute\ninternal events logged\n"
-    each = [f"{number}.000000 1  7F0  Tx   d {code} 00 11 22 33 44 55 66 77\n" for number, code in enumerate("8AF")]
-    (tmp_path / "bus.asc").write_text(head + "".join(each))
-    log = read_can(tmp_path / "bus.asc", progress=lambda _done, _total: None)
-    assert log.sizes.tolist() == [8, 8, 8]
-    assert not log.is_fd.any()
+    frames = [f"{k / 100:.6f} 1  181  Tx   d {'8AF'[k % 3]} 00 11 22 33 44 55 66 77\n" for k in range(60)]
+    (tmp_path / "bus.asc").write_text(head + "".join(frames))
+    answer = busplan.measured(PLAN, tmp_path / "bus.asc")
+    assert figure(answer, "feedback: data").recorded == 8
+    assert not any("CAN FD" in remark for remark in answer.remarks)
+    codes = np.array([8, 10, 15])
+    data = np.full(3, 0x0011223344556677, dtype=np.uint64)
+    written = written_bits(np.full(3, 0x181), np.zeros(3, bool), np.zeros(3, bool), codes, data)
+    load = sum(written[k % 3] for k in range(1, 60)) / 590_000
+    assert figure(answer, "load ").recorded == pytest.approx(load, rel=1e-6)
     # Counted one by one, each with the other code in its length field and CRC.
-    words = [f"{0x7F0:012b}000{code:04b}{0x0011223344556677:064b}" for code in (8, 10, 15)]
-    for word, bits in zip(words, log.bits, strict=True):
+    words = [f"{0x181:012b}000{code:04b}{0x0011223344556677:064b}" for code in codes]
+    for word, bits in zip(words, written, strict=True):
         crc = 0
         for bit in word:
             crc = (crc << 1 & 0x7FFF) ^ (0x4599 if (crc >> 14) != int(bit) else 0)
@@ -247,7 +253,7 @@ def test_a_damaged_log_says_where(tmp_path: Path) -> None:
             end = random.randrange(200 if ending == "blf" else 4, len(content))
             path.write_bytes(content[:end] + random.choice((b"", b"\xff\0\n", b"nonsense\n")))
             try:
-                read_can(path, progress=lambda _done, _total: None)
+                busplan.measured(PLAN, path)
             except BusplanError:
                 continue
 

@@ -1,16 +1,15 @@
 """What a machine on CAN does wrong is an error of `check --recording`, and what a log cannot show is said."""
 
 from collections.abc import Callable
+from itertools import accumulate
 from pathlib import Path
 from random import Random
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.can.recorded import due_pdos
 from tests.oracles.can_recording import Queued, arbitrated, candump
 
 CYCLE = """schema_version = 1
@@ -133,23 +132,24 @@ def test_a_log_that_shows_nothing_fails_the_gate(tmp_path: Path) -> None:
     assert "its stamps have steps of 1,000,000 us, and a cycle lasts 4,000" in codes["BP403"]
 
 
-@given(
-    st.integers(1, 4),
-    st.lists(st.floats(0, 3.4), min_size=3, max_size=40),
-    st.sets(st.integers(5, 36), max_size=1),
-)
-def test_pdos_that_come_in_their_order_are_those_of_their_syncs(every: int, late: list[float], lost: set[int]) -> None:
-    """Each PDO is late by so many due periods, never before the one before it, the first and the last in time."""
-    late = [0.1, 0.1, *late, 0.1, 0.1, 0.1, 0.1]
-    sync_us = np.arange(0.0, len(late) * every + 1) * 1000.0
-    due_us = np.arange(0.0, len(late)) * every * 1000.0
-    times_us = np.maximum.accumulate(due_us + np.array(late) * every * 1000.0) + np.arange(len(late)) * 1e-3
-    found = due_pdos(sync_us, times_us, every=every)
-    if every == 1:
-        assert (found.missing, found.twice) == (0, 0)
-        assert found.late_us == pytest.approx(times_us - due_us)
-    kept = [number for number in range(len(late)) if number not in lost]
-    in_time = due_us + 100.0
-    found = due_pdos(sync_us, in_time[kept], every=every)
-    assert (found.missing, found.twice) == (len(late) - len(kept), 0)
-    assert found.late_us == pytest.approx(np.full(len(kept), 100.0))
+@given(st.lists(st.floats(0, 3.4), min_size=3, max_size=40), st.sets(st.integers(5, 9), max_size=1))
+def test_pdos_that_come_in_their_order_are_those_of_their_syncs(
+    tmp_path_factory: pytest.TempPathFactory, late: list[float], lost: set[int]
+) -> None:
+    """Each PDO of a node is late by so many periods, and never before the PDO before it."""
+    periods = [0.1, 0.1, *late, *(0.1 for _ in range(10))]
+    queued_us = list(accumulate(((cycle + after) * 4000.0 for cycle, after in enumerate(periods)), max))
+    late_us = [us - cycle * 4000.0 for cycle, us in enumerate(queued_us)]
+
+    def recorded(queued: list[Queued]) -> dict[str, float | None]:
+        folder = tmp_path_factory.mktemp("late")
+        (folder / "plan.toml").write_text(CYCLE)
+        (folder / "bus.log").write_text(candump(arbitrated(queued)))
+        answer = busplan.measured(folder / "plan.toml", folder / "bus.log")
+        return {figure.quantity: figure.recorded for figure in answer.figures}
+
+    of_late = recorded(machine(len(late_us), late_us=lambda cycle, frame: late_us[cycle] * (frame == 0x201)))
+    assert (of_late["PDOs missing"], of_late["PDOs twice"]) == (0, 0)
+    assert of_late["last PDO after SYNC"] == pytest.approx(max(1300, 700 + max(late_us)), abs=700)
+    sent = recorded(machine(sends=lambda cycle, frame: frame != 0x203 or cycle // 4 not in lost))
+    assert (sent["PDOs missing"], sent["PDOs twice"]) == (len(lost), 0)

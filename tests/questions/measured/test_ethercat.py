@@ -13,9 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.rule import RecordedFigure
 from busplan.errors import BusplanError
-from busplan.questions.measured import MeasuredAnswer
 from tests.oracles.ethercat_recording import (
     APRD,
     FPRD,
@@ -45,7 +43,7 @@ PLAN = busplan.load_profile(
 
 def of_packets(
     packets: list[tuple[float, bytes]], tmp_path: Path, *, plan: Any = PLAN, **options: Any
-) -> MeasuredAnswer:
+) -> busplan.MeasuredAnswer:
     path = tmp_path / "capture.pcapng"
     path.write_bytes(pcapng(packets))
     return busplan.measured(plan, path, **options)
@@ -53,11 +51,11 @@ def of_packets(
 
 def of_machine(
     machine: Machine, tmp_path: Path, *, cycles: int = 1200, seed: int = 1, **options: Any
-) -> MeasuredAnswer:
+) -> busplan.MeasuredAnswer:
     return of_packets(simulated(machine, cycles, seed=seed), tmp_path, **options)
 
 
-def figure(answer: MeasuredAnswer, start: str) -> RecordedFigure:
+def figure(answer: busplan.MeasuredAnswer, start: str) -> Any:
     (found,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
     return found
 
