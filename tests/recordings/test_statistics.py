@@ -10,20 +10,20 @@ from busplan.recordings.statistics import grid, lateness, quantile
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=200), st.floats(0.5, 1))
 def test_a_quantile_is_not_exceeded_by_its_share(values: list[float], share: float) -> None:
-    found = quantile(np.array(values), share)
-    assert found.value in values
-    assert sum(value <= found.value for value in values) >= share * len(values) - 1e-6
-    assert sum(value < found.value for value in values) < share * len(values) + 1e-6
+    result = quantile(np.array(values), share)
+    assert result.value in values
+    assert sum(value <= result.value for value in values) >= share * len(values) - 1e-6
+    assert sum(value < result.value for value in values) < share * len(values) + 1e-6
 
 
 def test_the_uncertainty_of_a_quantile_is_what_repetitions_scatter() -> None:
     random = np.random.default_rng(2)
-    found = [quantile(random.exponential(10, 2000), 0.95) for _ in range(300)]
-    scatter = float(np.std([each.value for each in found]))
-    assert np.mean([each.uncertainty for each in found]) == pytest.approx(scatter, rel=0.15)
+    quantiles = [quantile(random.exponential(10, 2000), 0.95) for _ in range(300)]
+    scatter = float(np.std([sample.value for sample in quantiles]))
+    assert np.mean([sample.uncertainty for sample in quantiles]) == pytest.approx(scatter, rel=0.15)
     medians = [quantile(random.normal(0, 3, 400), 0.5) for _ in range(300)]
-    assert np.mean([each.uncertainty for each in medians]) == pytest.approx(
-        np.std([each.value for each in medians]), rel=0.15
+    assert np.mean([sample.uncertainty for sample in medians]) == pytest.approx(
+        np.std([sample.value for sample in medians]), rel=0.15
     )
 
 
@@ -34,10 +34,10 @@ def test_a_period_is_found_whatever_is_missing(seed: int, scatter: float, count:
     kept = np.sort(random.choice(places[1:-1], count - 2, replace=False))
     kept = np.concatenate(([0], kept, [count + missing - 1]))
     times = kept * 100.0 + random.uniform(0, 100 * scatter, count)
-    found = grid(times - times[0])
-    assert found is not None
-    assert found.missing == missing
-    assert found.period_us == pytest.approx(100, abs=8 * found.uncertainty_us + 1e-9)
+    periodic = grid(times - times[0])
+    assert periodic is not None
+    assert periodic.missing == missing
+    assert periodic.period_us == pytest.approx(100, abs=8 * periodic.uncertainty_us + 1e-9)
 
 
 @pytest.mark.parametrize("shape", ["uniform", "normal", "exponential"])
@@ -46,9 +46,9 @@ def test_the_latest_event_is_found_within_its_u(shape: str, count: int) -> None:
     random, within, ever_more = np.random.default_rng(3), 0, 0.0
     for _ in range(100):
         late = getattr(random, shape)(size=count)
-        found = grid(np.arange(count) * 1000.04 + late - late[0])
-        assert found is not None
-        latest, spread = lateness(found, 1), float(late.max() - late.min())
+        periodic = grid(np.arange(count) * 1000.04 + late - late[0])
+        assert periodic is not None
+        latest, spread = lateness(periodic, 1), float(late.max() - late.min())
         assert latest.uncertainty is not None
         within += abs(latest.value - spread) <= 2 * latest.uncertainty
         ever_more = max(ever_more, latest.value / spread)
@@ -62,9 +62,9 @@ def test_clocks_that_drift_are_in_the_u_of_the_latest_event() -> None:
     for _ in range(30):
         late, count = random.uniform(0, 10, 20_000), 20_000
         times = np.arange(count) * 1000.0 + late
-        found = grid(times + 20e-6 * times**2 / (2 * times[-1]) - times[0])
-        assert found is not None
-        latest = lateness(found, 1)
+        periodic = grid(times + 20e-6 * times**2 / (2 * times[-1]) - times[0])
+        assert periodic is not None
+        latest = lateness(periodic, 1)
         assert latest.uncertainty is not None
         within += abs(latest.value - float(late.max() - late.min())) <= 2 * latest.uncertainty
     assert within >= 27

@@ -32,8 +32,8 @@ def of_log(text: str, tmp_path: Path, *, plan: Any = PLAN, **options: Any) -> bu
 
 
 def figure(answer: busplan.MeasuredAnswer, start: str) -> Any:
-    (found,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
-    return found
+    (recorded,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
+    return recorded
 
 
 frames = st.builds(
@@ -47,23 +47,25 @@ frames = st.builds(
 
 
 @given(st.lists(frames, min_size=1, max_size=50), st.integers(0, 0x3FFFF))
-def test_the_bits_of_a_frame_are_those_written_one_by_one(each: list[Queued], lower: int) -> None:
-    each = [frame._replace(identifier=frame.identifier << 18 | lower) if frame.extended else frame for frame in each]
-    found = written_bits(
-        np.array([frame.identifier for frame in each]),
-        np.array([frame.extended for frame in each]),
-        np.zeros(len(each), dtype=np.bool_),
-        np.array([len(frame.data) for frame in each]),
-        np.array([int.from_bytes(frame.data.ljust(8, b"\0"), "big") for frame in each], dtype=np.uint64),
+def test_the_bits_of_a_frame_are_those_written_one_by_one(frames: list[Queued], lower: int) -> None:
+    frames = [
+        frame._replace(identifier=frame.identifier << 18 | lower) if frame.extended else frame for frame in frames
+    ]
+    bits = written_bits(
+        np.array([frame.identifier for frame in frames]),
+        np.array([frame.extended for frame in frames]),
+        np.zeros(len(frames), dtype=np.bool_),
+        np.array([len(frame.data) for frame in frames]),
+        np.array([int.from_bytes(frame.data.ljust(8, b"\0"), "big") for frame in frames], dtype=np.uint64),
     )
-    assert found.tolist() == [bits_of(frame) for frame in each]
+    assert bits.tolist() == [bits_of(frame) for frame in frames]
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_machine_within_its_plan_is_found_to_be(tmp_path: Path, seed: int) -> None:
     logged = arbitrated(servo_8(300, seed=seed))
     answer = of_log(candump(logged), tmp_path)
-    assert [found.quantity for found in answer.outside] == []
+    assert [figure.quantity for figure in answer.outside] == []
     assert answer.edits == {}
     assert answer.day == "2023-11-14"
     # Every bit is counted: the load is that of the simulation.
@@ -97,10 +99,10 @@ def test_every_format_has_the_same_frames(tmp_path: Path) -> None:
         answer = busplan.measured(PLAN, path)
         exact = exact or answer
         step_us = 200 if ending == "trc" else 4
-        assert [found.quantity for found in answer.figures] == [found.quantity for found in exact.figures]
-        for found, of_log in zip(answer.figures, exact.figures, strict=True):
-            allowed = {"us": step_us, "share": 0.001, "kbit/s": 1000}.get(found.unit, 0)
-            assert found.recorded == pytest.approx(of_log.recorded, abs=allowed), (ending, found.quantity)
+        assert [figure.quantity for figure in answer.figures] == [figure.quantity for figure in exact.figures]
+        for row, of_log in zip(answer.figures, exact.figures, strict=True):
+            allowed = {"us": step_us, "share": 0.001, "kbit/s": 1000}.get(row.unit, 0)
+            assert row.recorded == pytest.approx(of_log.recorded, abs=allowed), (ending, row.quantity)
         assert figure(answer, "frames of no message").note == "0x18ff0102"
         assert not any("damaged" in remark for remark in answer.remarks)
 
@@ -123,7 +125,7 @@ def test_a_message_that_comes_more_often_or_longer_is_outside_and_measured(tmp_p
     plan = busplan.load_profile(PLAN, changes={"message.heartbeats.period_us": 70_000})
     logged = [frame._replace(data=b"\5\6") if frame.identifier == 0x708 else frame for frame in LOGGED]
     answer = of_log(candump(logged), tmp_path, plan=plan)
-    assert [found.quantity for found in answer.outside] == ["heartbeats: period", "heartbeats: data"]
+    assert [figure.quantity for figure in answer.outside] == ["heartbeats: period", "heartbeats: data"]
     assert answer.edits["message.heartbeats.payload_bytes"] == 2
     assert answer.edits["message.heartbeats.period_us"] == pytest.approx(50_000, rel=2e-3)
 
@@ -134,7 +136,7 @@ def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").recorded == pytest.approx(900, abs=150)
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").verdict == "outside"
     answer = of_log(candump(arbitrated(late)), tmp_path)
-    assert [found.quantity for found in answer.outside] == ["last PDO after SYNC"]
+    assert [figure.quantity for figure in answer.outside] == ["last PDO after SYNC"]
 
 
 def test_every_frame_of_a_pdo_has_a_name_of_its_own(tmp_path: Path) -> None:
@@ -170,8 +172,8 @@ def test_errors_remote_frames_and_can_fd_are_said(tmp_path: Path) -> None:
     more = "(1700000000.000001) can0 123#R\n(1700000000.000002) can0 20000080#0000000000000000\n"
     fd = "(1700000000.000003) can0 124##1" + "AA" * 16 + "\n"
     answer = of_log(more + fd + candump(LOGGED), tmp_path)
-    said = "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 in no load, for the plan has no "
-    assert f"{said}data bit rate." in answer.remarks
+    words = "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 in no load, for the plan has no "
+    assert f"{words}data bit rate." in answer.remarks
     assert "1 remote frame: the length code is shown as data." in answer.remarks
     assert figure(answer, "error frames").recorded == 1
 
@@ -226,7 +228,7 @@ def test_a_long_length_code_of_a_classical_frame_is_one_of_8_bytes(tmp_path: Pat
 def test_a_load_without_its_can_fd_frames_is_not_judged(tmp_path: Path) -> None:
     fd = "".join(f"(17000000{second}.000000) can0 080##1{'5A' * 64}\n" for second in range(10, 20))
     answer = of_log(fd, tmp_path)
-    assert not [found for found in answer.figures if found.quantity.startswith("load")]
+    assert not [figure for figure in answer.figures if figure.quantity.startswith("load")]
     mixed = of_log(candump(LOGGED) + fd, tmp_path)
     assert figure(mixed, "load ").verdict is None
     assert figure(mixed, "load ").note.endswith("without frames of CAN FD that switch")

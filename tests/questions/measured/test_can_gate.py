@@ -66,9 +66,9 @@ def errors(queued: list[Queued], folder: Path, *, more: str = "", plan: str = CY
     (folder / "plan.toml").write_text(plan)
     (folder / "bus.log").write_text(candump(arbitrated(queued)) + more)
     answer = busplan.check(folder / "plan.toml", recording=folder / "bus.log")
-    found = [finding for finding in answer.files[0].findings if finding.code.startswith("BP40")]
-    assert answer.passed == (not any(finding.severity == "error" for finding in found))
-    return {finding.problem.partition(": ")[2]: finding.code for finding in found}
+    findings = [finding for finding in answer.files[0].findings if finding.code.startswith("BP40")]
+    assert answer.passed == (not any(finding.severity == "error" for finding in findings))
+    return {finding.problem.partition(": ")[2]: finding.code for finding in findings}
 
 
 def test_a_machine_within_its_plan_has_no_finding(tmp_path: Path) -> None:
@@ -98,17 +98,17 @@ def test_commands_late_in_one_of_ten_due_cycles_are_told(tmp_path: Path) -> None
         (machine(sends=lambda cycle, frame: frame < 0x200 or cycle % 20 != 8), {"PDOs missing"}),
         (machine(sends=lambda _cycle, frame: frame != 0x202), {"PDOs missing", "not shown"}),
         (
-            [*machine(), *(each._replace(us=each.us + 50) for each in machine(3) if each.identifier == 0x201)],
+            [*machine(), *(frame._replace(us=frame.us + 50) for frame in machine(3) if frame.identifier == 0x201)],
             {"PDOs twice: 2 recorded"},
         ),
     ],
     ids=["half the rate", "no cycle", "no SYNC", "no commands", "a command never", "twice"],
 )
 def test_what_should_be_there_and_is_not_is_an_error(queued: list[Queued], figures: set[str], tmp_path: Path) -> None:
-    found = errors(queued, tmp_path)
-    assert len(found) == len(figures), found
+    words = errors(queued, tmp_path)
+    assert len(words) == len(figures), words
     for figure in figures:
-        assert any(words.startswith(figure) for words in found), found
+        assert any(text.startswith(figure) for text in words), words
 
 
 def test_error_frames_and_a_limit_of_what_may_be_missed(tmp_path: Path) -> None:
@@ -123,9 +123,9 @@ def test_error_frames_and_a_limit_of_what_may_be_missed(tmp_path: Path) -> None:
 
 
 def test_a_log_that_shows_nothing_fails_the_gate(tmp_path: Path) -> None:
-    found = errors(machine(3), tmp_path)
-    assert set(found.values()) == {"BP403"}
-    seconds = [each._replace(us=each.us // 1e6 * 1e6) for each in arbitrated(machine(2000))]
+    codes = errors(machine(3), tmp_path)
+    assert set(codes.values()) == {"BP403"}
+    seconds = [frame._replace(us=frame.us // 1e6 * 1e6) for frame in arbitrated(machine(2000))]
     (tmp_path / "bus.log").write_text(candump(seconds))
     answer = busplan.check(tmp_path / "plan.toml", recording=tmp_path / "bus.log")
     codes = {finding.code: finding.message for finding in answer.files[0].findings}
