@@ -11,9 +11,10 @@ from pydantic_core import ErrorDetails
 from busplan.buses import kind_names
 from busplan.english import printable
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
-from busplan.profile.document import Document, KeyPath
+from busplan.profile.document import Document
 from busplan.profile.edit import value_text
 from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, named_path, path_of, profile_model
+from busplan.profile.places import KeyPath
 from busplan.sections.base import MISSING, Problem
 
 _TAG: Final = "kind"

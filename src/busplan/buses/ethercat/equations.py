@@ -6,7 +6,7 @@ from typing import Final, Literal
 
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
 from busplan.buses.published import Spread, published, rows_of
-from busplan.elementwise import Number, alike, choose, larger, plain
+from busplan.elementwise import Number, choose, larger, plain, traced_with
 from busplan.sourced import Grade, Sourced, constants
 
 Port = Literal["100BASE-TX", "E-bus"]
@@ -177,7 +177,7 @@ def overhead_bytes(like: Number) -> Number:
     >>> overhead_bytes(1)
     40.0
     """
-    return alike(PREAMBLE_BYTES, like) + ETHERNET_BYTES + HEADER_BYTES + CHECK_BYTES + GAP_BYTES
+    return traced_with(PREAMBLE_BYTES, like) + ETHERNET_BYTES + HEADER_BYTES + CHECK_BYTES + GAP_BYTES
 
 
 def padding_bytes(datagrams_bytes: Number) -> Number:

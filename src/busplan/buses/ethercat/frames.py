@@ -32,7 +32,6 @@ from busplan.buses.ethercat.equations import (
 from busplan.buses.network import Group, Network, Rate, numbers_by_due
 from busplan.elementwise import (
     Number,
-    alike,
     choose,
     is_everywhere,
     is_off,
@@ -45,6 +44,7 @@ from busplan.elementwise import (
     smaller,
     square_root,
     total,
+    traced_with,
 )
 from busplan.errors import BusplanError
 
@@ -102,7 +102,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     """
     devices = [_with_data(group) for group in devices if not is_everywhere(group.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
-    headers = total([alike(DATAGRAM_BYTES, devices[0].number)] * datagrams)
+    headers = total([traced_with(DATAGRAM_BYTES, devices[0].number)] * datagrams)
     free: Number = 0.0
     frames: Number = 0
     present: Number = 0.0
@@ -396,9 +396,11 @@ def housekeeping_bytes(network: Network) -> Number:
     """The datagrams that the master adds to the first frame, those of distributed clocks among them [bytes]."""
     bus = network.profile.bus
     if bus.housekeeping_bytes is not None:
-        return total(datagram_bytes(alike(size, network.nodes)) for size in bus.housekeeping_bytes)
+        return total(datagram_bytes(traced_with(size, network.nodes)) for size in bus.housekeeping_bytes)
     tables = (HOUSEKEEPING_BYTES, CLOCK_BYTES) if bus.distributed_clocks else (HOUSEKEEPING_BYTES,)
-    added = [alike(table[bus.master or UNNAMED], network.nodes) for table in tables if table[bus.master or UNNAMED]]
+    added = [
+        traced_with(table[bus.master or UNNAMED], network.nodes) for table in tables if table[bus.master or UNNAMED]
+    ]
     if bus.master in STATE_CHECK_BYTES:
         checks_bytes = network.nodes * STATE_CHECK_BYTES[bus.master]
         # Those of many devices fill frames of their own, whose headers count here.
@@ -435,7 +437,7 @@ def mailbox_frame_us(network: Network) -> Number:
 def delay_us(group: Group) -> Number:
     """Delay of a device of a group, there and back [us]."""
     node = group.node
-    return device_us(alike(DELAY_US[node.port], group.nodes) if node.delay_us is None else node.delay_us)
+    return device_us(traced_with(DELAY_US[node.port], group.nodes) if node.delay_us is None else node.delay_us)
 
 
 def devices_us(network: Network) -> Number:

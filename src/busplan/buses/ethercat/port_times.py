@@ -11,7 +11,7 @@ from busplan.elementwise import plain
 from busplan.english import plural
 from busplan.recordings.ethercat import Latch
 from busplan.recordings.statistics import expanded
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.machine import ProfileGroup
 
 _WRAP_NS: Final = 1 << 32
 _PORTS_OF_LINE: Final = 2
@@ -61,25 +61,25 @@ class LineDelays(NamedTuple):
         edits = self.edits(network)
         return sum(
             2 * plain(nodes.nodes) * (edits[key] - _planned_us(nodes))
-            for nodes in network.alike
+            for nodes in network.profile.node_groups
             if (key := nodes.node_key("delay_us")) in edits
         )
 
-    def _groups(self, network: Network) -> list[tuple[AlikeNodes, range]]:
+    def _groups(self, network: Network) -> list[tuple[ProfileGroup, range]]:
         """Each group of the plan, and its devices by number, from 1; the first of all has no delay by port times.
 
         None where the plan has another number of devices.
         """
-        ends = list(accumulate(int(plain(nodes.nodes)) for nodes in network.alike))
+        ends = list(accumulate(int(plain(nodes.nodes)) for nodes in network.profile.node_groups))
         if ends[-1] != len(self.hops_us) + 1:
             return []
         numbers = (range(max(end, 1) + 1, next_end + 1) for end, next_end in pairwise((0, *ends)))
-        return list(zip(network.alike, numbers, strict=True))
+        return list(zip(network.profile.node_groups, numbers, strict=True))
 
     def _mean_us(self, numbers: range) -> float:
         return sum(self.hops_us[number - 2] for number in numbers) / len(numbers)
 
-    def _figure(self, numbers: range, nodes: AlikeNodes | None = None) -> RecordedFigure:
+    def _figure(self, numbers: range, nodes: ProfileGroup | None = None) -> RecordedFigure:
         """Mean delay of some devices, beside that of the group that the plan has them in."""
         name = f"delay of device {numbers[0]}"
         if len(numbers) > 1:
@@ -181,12 +181,12 @@ def _span_ns(times_ns: Mapping[int, int]) -> int:
     return span
 
 
-def _planned_us(nodes: AlikeNodes) -> float:
+def _planned_us(nodes: ProfileGroup) -> float:
     """Delay of a device one way as planned [us]."""
     delay_us = nodes.node.delay_us
     return float(DELAY_US[nodes.node.port]) if delay_us is None else plain(delay_us)
 
 
-def _cable_us(nodes: AlikeNodes) -> float:
+def _cable_us(nodes: ProfileGroup) -> float:
     """Cable to a device one way [us]."""
     return plain(cable_us(nodes.node.cable_m)) / 2
