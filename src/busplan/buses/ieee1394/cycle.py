@@ -23,6 +23,7 @@ from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delay
 from busplan.buses.ieee1394.transactions import (
     Exchange,
     GroupHops,
+    answers_split,
     charges_own_hops,
     events,
     exchange,
@@ -313,7 +314,9 @@ class Ieee1394Cycle(CycleWithStarts):
         yield BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")
         for kind in TRANSACTION_KINDS:
             for place, transaction in enumerate(sent for sent in self.exchanges if sent.kind == kind):
-                yield Run(transaction.parts, transaction.nodes, place, partial(self._laid_out, transaction, place))
+                yield Run(
+                    transaction.parts, transaction.group.nodes, place, partial(self._laid_out, transaction, place)
+                )
 
     def _laid_out(self, transaction: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
         """The transaction with a node of a group, by the node's number in it from 0."""
@@ -342,9 +345,10 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def published_nodes(self) -> Number | None:
         """Number of nodes by equation (11), where all nodes are alike [1]."""
-        network, read, write = self.network, self.longest("read"), self.longest("write")
+        network = self.network
         if not network.is_uniform:
             return None
+        read, write = self.longest("read"), self.longest("write")
         given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
         return equations.published_nodes(
             named(given_us, AVAILABLE.key, AVAILABLE.symbol),
@@ -365,12 +369,9 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """Parts of the cycle that the profile does not give."""
-        split = {id(transaction.group) for transaction in self.exchanges if transaction.responder.answer == "split"}
-        return (
-            *super().left_out(),
-            *(
-                LeftOut("the slowest execution", group.key("execution.worst_extra_us"))
-                for group in self.network.groups
-                if id(group) in split and not group.worst_extra_us
-            ),
+        slowest = (
+            LeftOut("the slowest execution", group.key("execution.worst_extra_us"))
+            for group in self.network.groups
+            if answers_split(group) and not group.worst_extra_us
         )
+        return (*super().left_out(), *slowest)
