@@ -579,9 +579,7 @@ def test_changes_that_are_refused_are_called_by_their_keys() -> None:
 
 def test_a_change_that_breaks_a_rule_of_another_key_names_that_key() -> None:
     optimal = read(edited(("gap_count = 63", 'gap_count = "optimal"')))
-    with pytest.raises(
-        BusplanError, match=r"\Awith bus\.cable_length_m 9\.0, bus\.gap_count: the table behind"
-    ):
+    with pytest.raises(BusplanError, match=r"\Awith bus\.cable_length_m 9\.0, bus\.gap_count: the table behind"):
         changed(optimal, bus__cable_length_m=9.0)
 
 
