@@ -3,9 +3,7 @@
 import pytest
 
 import busplan
-from busplan.buses import kind_named
-from busplan.profile.sources import load
-from busplan.questions.evidence import Comparison, sections_of
+from busplan.questions.evidence import Comparison, KindEvidence
 
 # As printed in Table I: payload, T_lant, T1+T2, T1+T2 theory.
 TABLE_1 = [
@@ -30,17 +28,22 @@ TABLE_2 = [
 
 
 @pytest.fixture(scope="module")
-def comparisons() -> list[Comparison]:
-    (kind,) = busplan.evidence(paper=True).kinds
-    return [one for section in kind.sections for one in section.comparisons]
+def ieee1394() -> KindEvidence:
+    (kind,) = busplan.evidence("ieee1394").kinds
+    assert {section.data for section in kind.sections} == {"paper", "dvrk", "ieee1394"}
+    return kind
 
 
 @pytest.fixture(scope="module")
-def others() -> list[Comparison]:
+def comparisons(ieee1394: KindEvidence) -> list[Comparison]:
+    """What the paper publishes."""
+    return [row for section in ieee1394.sections if section.data == "paper" for row in section.comparisons]
+
+
+@pytest.fixture(scope="module")
+def others(ieee1394: KindEvidence) -> list[Comparison]:
     """What is known beside the paper."""
-    bus = kind_named("ieee1394")
-    assert bus.evidence_data == ("paper", "dvrk", "ieee1394")
-    return [one for data in bus.evidence_data[1:] for table in sections_of(bus, data) for one in table.comparisons]
+    return [row for section in ieee1394.sections if section.data != "paper" for row in section.comparisons]
 
 
 def chosen(comparisons: list[Comparison], section: str, method: str) -> dict[str, Comparison]:
@@ -82,7 +85,7 @@ def test_latency_of_the_paper_model_leaves_what_both_its_halves_leave(comparison
     # T_exec is derived from the same table, so this is arithmetic and no validation: the report says so.
     whole = chosen(comparisons, "Table I: T_lant, measured", "paper model")
     half = chosen(comparisons, "Table I: T1+T2, measured", "paper model")
-    execution = load("paper-two-node").profile.alike_nodes[0].node.execution
+    execution = busplan.load_profile("paper-two-node").alike_nodes[0].node.execution
     for size, latency_us, first_us, _ in TABLE_1:
         # The response to a write carries no payload: at 4 bytes both halves are 6.0 us, of which 32 bits are payload.
         second_us = latency_us - first_us - execution.execution_us(size)

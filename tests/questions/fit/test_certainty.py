@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import busplan
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS
+from busplan.questions.fit.certainty import VERDICTS
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import network_of
 
@@ -196,7 +196,7 @@ def test_more_bias_or_reserve_never_improves_and_more_uncertainty_never_shows(
     assert _rank(with_reserve) >= _rank(before)
     assert (with_reserve.safe_nodes or 0) <= (before.safe_nodes or 0)
     doubtful = of(changed(profile, {"node.execution.uncertainty_us": 1e3}))
-    assert doubtful.verdict != FITS or before.verdict == FITS
+    assert doubtful.verdict != "fits" or before.verdict == "fits"
     fitted = changed(profile, {"node.execution.residual": "standard", "node.execution.measured_gap_count": 63})
     biased = changed(profile, {"node.execution.residual": "none"})
     assert _rank(of(biased)) >= _rank(of(fitted))
@@ -236,18 +236,18 @@ def test_the_three_verdicts_lie_where_the_margin_crosses_the_uncertainty(make: M
             needed_us - doubt_us - 1e-6,
         )
     }
-    assert list(verdicts.values()) == [FITS, NOT_SHOWN, NOT_SHOWN, DOES_NOT_FIT]
+    assert list(verdicts.values()) == ["fits", "not shown to fit", "not shown to fit", "does not fit"]
 
 
 def test_a_reserve_is_a_share_of_the_slice(make: Maker) -> None:
     one = of(make())
     assert one.safe_required_us is not None
     period_us = one.safe_required_us / 0.85
-    for step_us, verdict in ((1e-6, FITS), (-1e-6, NOT_SHOWN)):
+    for step_us, verdict in ((1e-6, "fits"), (-1e-6, "not shown to fit")):
         reserved = make(cycle__period_us=period_us + step_us, cycle__slice_ratio=1.0, limits={"reserve": 0.15})
         assert of(reserved).verdict == verdict
 
 
 def test_a_broken_limit_does_not_fit_whatever_the_time(make: Maker) -> None:
     one = of(make(bus__nodes=17, cycle__period_us=1e6))
-    assert (one.verdict, one.exceeded) == (DOES_NOT_FIT, ("hops",))
+    assert (one.verdict, one.exceeded) == ("does not fit", ("hops",))
