@@ -166,7 +166,7 @@ def sweep_command(
     for change, key in product(changes.each, varied):
         require_separate(change, key, typed=f"--vary {key}")
     model = chosen_model(timing_model)
-    asked = checked_sweep(
+    checked = checked_sweep(
         load_network(loaded),
         varied,
         timing_models=None if model is None else [model],
@@ -176,19 +176,19 @@ def sweep_command(
         force=force,
         changes=changes,
     )
-    asked.require_number(sort_by or None, name="--sort")
-    asked.require_number(figure, name="--figure")
+    checked.require_number(sort_by or None, name="--sort")
+    checked.require_number(figure, name="--figure")
     chosen = [name.strip() for name in columns.split(",")] if columns is not None else []
-    asked.require_columns(chosen, name="--columns")
+    checked.require_columns(chosen, name="--columns")
     if plot is not None:
-        require_drawable(asked.grid, option="--plot")
+        require_drawable(checked.grid, option="--plot")
     rows = _Rows(chosen, top or _DEFAULT_TOP, sort_by or None, ascending=bool(order), is_whole=all_)
     with ExitStack() as run:
         # Opened before the work, so that a path that cannot be written fails at once.
         picture_file = run.enter_context(new_file(plot, overwrite=True)) if plot else None
         file = run.enter_context(new_file(output, overwrite=True)) if output else None
-        with progress_bar("sweep") as progress, _crew(asked, jobs=jobs, cluster=cluster) as crew:
-            answer = computed(asked, executor=crew, progress=progress)
+        with progress_bar("sweep") as progress, _crew(checked, jobs=jobs, cluster=cluster) as crew:
+            answer = computed(checked, executor=crew, progress=progress)
         _write(answer, form, rows, file)
         if picture_file is not None and picture_form is not None:
             from busplan.forms.svg import content
@@ -232,17 +232,17 @@ def _write(answer: "SweepAnswer", form: SweepForm, rows: _Rows, file: BinaryIO |
 
 
 @contextmanager
-def _crew(asked: "Sweep", *, jobs: int | None, cluster: str | None) -> Iterator["Executor | None"]:
+def _crew(sweep: "Sweep", *, jobs: int | None, cluster: str | None) -> Iterator["Executor | None"]:
     """Where circle tests run: in worker processes or on a cluster; None for this thread."""
     if cluster is not None:
         from busplan.cli.workers import dask_executor
 
         with dask_executor(cluster) as there:
             yield there
-    elif asked.circle:
+    elif sweep.circle:
         from busplan.cli.workers import available_processors, executor
 
-        with executor(min(jobs or available_processors(), asked.tests.points)) as here:
+        with executor(min(jobs or available_processors(), sweep.tests.points)) as here:
             yield here
     else:
         yield None

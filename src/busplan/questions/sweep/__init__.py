@@ -48,7 +48,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
     Parameters
     ----------
     sweep
-        The sweep as asked for.
+        Its grid, timing models and options.
     table
         Its columns.
     """
