@@ -157,7 +157,7 @@ def test_stamps_that_are_late_are_said_and_doubted(tmp_path: Path) -> None:
     frame = Queued(0.0, 0x300, b"\xaa" * 8, False, False)
     bits = bits_of(frame)  # at 1000 kbit/s a microsecond each
 
-    def answer(late_us: float) -> MeasuredAnswer:
+    def answer(late_us: float) -> busplan.MeasuredAnswer:
         """Frames directly after each other, of which each fourth is stamped late."""
         stamps_us = (bits * place + (late_us if place % 4 == 1 else 0.0) for place in range(400))
         return of_log(candump([Logged(us, 0x300, frame.data, False, bits) for us in stamps_us]), tmp_path)
