@@ -104,7 +104,7 @@ def latency_command(
         str | None,
         option(
             "--payload BYTES[,BYTES...]",
-            "Payload of read and write alike in bytes, or several with commas, as 4,16,32.  [default: the profile's "
+            "Payload of both read and write in bytes, or several with commas, as 4,16,32.  [default: the profile's "
             "payload.read_bytes and payload.write_bytes]",
         ),
     ] = None,
@@ -365,7 +365,7 @@ _REFUSED: Final[dict[DrawnForm, str]] = {
 }
 
 
-@takes_changes("Of all profiles, as --period.", period=True)
+@takes_changes("It holds for all profiles, as --period does.", period=True)
 def report_command(
     profiles: Annotated[
         list[str],

@@ -215,7 +215,7 @@ def _say_report(changes: KeyChanges, result: "PlanAnswer") -> None:
     say(*(line.text for line in block_lines(blocks, width=message_width())))
 
 
-@takes_changes("Of the bench, where it was not as the profile: --apply does not write it.")
+@takes_changes("For a bench that differed from the profile: --apply does not write it.")
 def calibrate_command(
     profile: ProfileArgument,
     measurements: Annotated[
@@ -254,9 +254,10 @@ def calibrate_command(
     acknowledge, in us) and a line for each measurement; payloads may repeat, and lines that begin with # are comments.
     A column transaction says read or write (write without it).
 
-    T_exec is the latency less the time of its packets by the timing model, equation (3); of each payload the median. If
-    the bench differs from the profile, say so: --set bus.nodes=2 --set bus.gap_count=63. Of three or more measurements
-    of a payload, those far from their median are named by their line and left out; slow ones are in worst_extra_us.
+    T_exec is the latency less the time of its packets by the timing model, equation (3); each payload has the median.
+    Where the bench differs from the profile, give its values: --set bus.nodes=2 --set bus.gap_count=63. Of three or
+    more measurements of a payload, those far from their median are named by their line and left out; slow ones are in
+    worst_extra_us.
     Times are in us. Exits 0 with any figures.
 
     Example: busplan calibrate paper-two-node table-1.csv
@@ -301,7 +302,7 @@ def _measurements_file(argument: str) -> Iterator[Path]:
         yield locate_measurements(argument).path
 
 
-@takes_changes("Of the machine as it was recorded: --apply does not write it.")
+@takes_changes("For a machine that was recorded with another value: --apply does not write it.")
 def measured_command(
     profile: ProfileArgument,
     recording: Annotated[
@@ -335,9 +336,9 @@ def measured_command(
     """Show what the machine does by a recording of its bus, beside what was planned.
 
     Each figure has the planned and the recorded value, the residual, its expanded uncertainty U, and whether it is
-    within the plan: jitter, times, load and bytes at most as planned, or no further beside than U. What the recording
-    does not show is said. Of EtherCAT record all packets of the master's port, both ways. Times are in us. `busplan
-    manual measured` says how each figure is found. Exits 0 with any figures.
+    within the plan: jitter, times, load and bytes at most as planned, or beyond it by no more than U. A figure that the
+    recording does not show has a reason. Of EtherCAT record all packets of the master's port, both ways. Times are in
+    us. `busplan manual measured` says how each figure is measured. Exits 0 with any figures.
 
     Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
     """
@@ -419,7 +420,7 @@ def _complete_kinds(incomplete: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in kind_names() if name.startswith(last)]
 
 
-@takes_changes("Of the profile, before it is put on other kinds.", period=True)
+@takes_changes("It changes the profile before that is put on other kinds.", period=True)
 def compare_command(
     profile: ProfileArgument,
     buses: Annotated[

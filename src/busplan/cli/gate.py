@@ -50,8 +50,8 @@ _BUILD_FORMATS: Final = [name for name, report_format in FORMATS.items() if repo
 
 
 @takes_changes(
-    words="Of all files, each of which must be valid without it; a finding is at the key's place in the file, or at "
-    "its section."
+    "It holds for all files, each of which must be valid without it; a finding is at the key in the file, or at its "
+    "section."
 )
 def check_command(
     paths: Annotated[
@@ -256,7 +256,7 @@ def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -
         say(*FORMATS["concise"].write(report).splitlines())
 
 
-@takes_changes(words="Of both profiles.")
+@takes_changes("It holds for both profiles.")
 def diff_command(
     a: Annotated[
         str,

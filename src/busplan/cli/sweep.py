@@ -48,7 +48,7 @@ _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_E
 _DEFAULT_TOP: Final = 20
 
 
-@takes_changes(words="Not of a key that varies.")
+@takes_changes("A key that varies takes none.")
 def sweep_command(
     profile: ProfileArgument,
     vary: Annotated[
@@ -108,7 +108,7 @@ def sweep_command(
         str | None,
         option(
             "--group NAME",
-            "Of a profile with groups: the one whose nodes vary for max_axes, safe_axes and so on; the others are as "
+            "In a profile with groups: the one whose nodes vary for max_axes, safe_axes and so on; the others stay as "
             "they are.  [default: the one with the most axes]",
         ),
     ] = None,

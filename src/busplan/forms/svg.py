@@ -373,8 +373,8 @@ class _Sheet:
             if curve.has_line:
                 SubElement(paths, "path", {"class": f"line {curve.entry.ink}", "d": _path(area, curve)})
         for curve in curves.curves:
-            known = [(number, x, y) for number, (x, y) in enumerate(curve.points) if y is not None]
-            for number, x, y in (known if curve.has_dots else known[-1:]) if curve.entry.mark else ():
+            points = [(number, x, y) for number, (x, y) in enumerate(curve.points) if y is not None]
+            for number, x, y in (points if curve.has_dots else points[-1:]) if curve.entry.mark else ():
                 title = curve.words[number] if curve.words else ""
                 _dot(area.area, curve.entry, x=area.x(x), y=area.y(y), title=title)
 

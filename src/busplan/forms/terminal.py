@@ -160,13 +160,15 @@ def _lanes(title: str, lanes: Lanes, width: int) -> Iterator[Line]:
 
 def _cells(lane: Lane, ruler: Ruler, columns: int) -> str:
     """Fill each column with the mark that takes most of it, or a space."""
+    size = (ruler.high - ruler.low) / columns
     parts: list[dict[str, float]] = [{} for _ in range(columns)]
     for span in lane.spans:
-        start, end = columns * ruler.share(span.start), columns * ruler.share(span.end)
+        first, last = (min(columns - 1, max(0, int((end - ruler.low) / size))) for end in (span.start, span.end))
         # An overlap that is only float rounding is none.
-        least = min(1.0, end - start) * 1e-6
-        for number in range(max(0, int(start)), min(columns - 1, int(end)) + 1):
-            inside = min(end, number + 1) - max(start, number)
+        least = min(size, span.end - span.start) * 1e-6
+        for number in range(first, last + 1):
+            start = ruler.low + number * size
+            inside = min(span.end, start + size) - max(span.start, start)
             if inside > least:
                 parts[number][span.entry.mark] = parts[number].get(span.entry.mark, 0.0) + inside
     return "".join(max(part, key=lambda mark: part[mark]) if part else " " for part in parts)
