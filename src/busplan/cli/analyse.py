@@ -52,9 +52,9 @@ def capacity_command(
     timing_model: TimingModelOption = "both",
     sensitivity: Annotated[
         bool,
-        typer.Option(
+        option(
             "--sensitivity",
-            help="Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or "
+            "Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or "
             "one retry more, 10 us more host time, or a bus reset, one at a time; and what binds next. CSV has these "
             "rows instead.",
         ),
@@ -141,7 +141,7 @@ def circle_test_command(
     period: PeriodsOption = None,
     changes: KeyChanges = NO_CHANGES,
     contributions: Annotated[
-        bool, typer.Option("--contributions", help="Rank the error sources: run the test again without each of them.")
+        bool, option("--contributions", "Rank the error sources: run the test again without each of them.")
     ] = False,
     trace: Annotated[
         Path | None,

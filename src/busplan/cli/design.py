@@ -77,25 +77,19 @@ def plan_command(
     ] = None,
     apply: Annotated[
         bool,
-        typer.Option(
-            "--apply", help="Write the recommended values into PROFILE, a file; comments and layout stay as they are."
-        ),
+        option("--apply", "Write the recommended values into PROFILE, a file; comments and layout stay as they are."),
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help=f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
+        option(
+            "--output,-o FILE",
+            f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
             "name, as NEW.toml: write a copy of PROFILE with the recommended values, whose name is that of the file; - "
             "is standard output, and the report goes to standard error.  [default: no file, and the report to standard "
             "output]",
         ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Let -o NEW.toml overwrite a file that is already there.")
-    ] = False,
+    force: Annotated[bool, option("--force", "Let -o NEW.toml overwrite a file that is already there.")] = False,
     all_: AllOption = False,
     format_: FormatOption = None,
 ) -> None:
@@ -238,9 +232,9 @@ def calibrate_command(
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
-        typer.Option(
+        option(
             "--apply",
-            help="Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; "
+            "Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; "
             "your own comments stay.",
         ),
     ] = False,
@@ -323,9 +317,9 @@ def measured_command(
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
-        typer.Option(
+        option(
             "--apply",
-            help="Write the values that were measured into the file PROFILE, with a comment on their origin; your own "
+            "Write the values that were measured into the file PROFILE, with a comment on their origin; your own "
             "comments stay.",
         ),
     ] = False,
@@ -379,7 +373,7 @@ def map_command(
     y: Annotated[str | None, _direction("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
     changes: KeyChanges = NO_CHANGES,
     circle: Annotated[
-        bool, typer.Option("--circle", help="Also run the circle test of every cell that fits, up to 1,000.")
+        bool, option("--circle", "Also run the circle test of every cell that fits, up to 1,000.")
     ] = False,
     jobs: JobsOption = None,
     all_: AllOption = False,
@@ -464,15 +458,9 @@ def import_command(
     ],
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="NEW.toml",
-            help="Write the profile to a new file.  [default: standard output]",
-            show_default=False,
-        ),
+        option("--output,-o NEW.toml", "Write the profile to a new file.  [default: standard output]"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
+    force: Annotated[bool, option("--force", "Let -o overwrite a file that is already there.")] = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
 
