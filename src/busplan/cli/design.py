@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from functools import partial
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -37,6 +37,8 @@ from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges, require_s
 
 if TYPE_CHECKING:
     from busplan.profile.document import LoadedProfile
+    from busplan.questions.calibrate import CalibrateAnswer
+    from busplan.questions.measured import MeasuredAnswer
     from busplan.questions.plan import PlanAnswer
 
 
@@ -279,13 +281,18 @@ def calibrate_command(
             source=name,
         )
         if apply:
-            for change in changes.by_set:
-                for key in calibration.edits:
-                    require_separate(change, key, typed="--apply")
-            apply_changes(loaded.document, calibration.edits, notes=calibration.notes)
-            kept = "your comments are kept: see whether they hold of the new values"
-            say(f"wrote [{' '.join(calibration.notes)}] of {profile}; {kept}")
+            _write_edits(loaded, changes, calibration, words=f"[{' '.join(calibration.notes)}]")
         give(calibration.report(applied_to=profile if apply else None))
+
+
+def _write_edits(
+    loaded: "LoadedProfile", changes: KeyChanges, answer: "CalibrateAnswer | MeasuredAnswer", *, words: str
+) -> None:
+    """Write what was measured into the profile's file, but for keys that --set gives for the measurement."""
+    for change, key in product(changes.by_set, answer.edits):
+        require_separate(change, key, typed="--apply")
+    apply_changes(loaded.document, answer.edits, notes=answer.notes)
+    say(f"wrote {words} of {loaded.document.name}; your comments are kept: see whether they hold of the new values")
 
 
 def _measurements_file(argument: str) -> Iterator[Path]:
@@ -349,11 +356,7 @@ def measured_command(
         if apply and not seen.edits:
             raise BusplanError(f"--apply: {recording} shows no value of a key")
         if apply:
-            for change in changes.by_set:
-                for key in seen.edits:
-                    require_separate(change, key, typed="--apply")
-            apply_changes(loaded.document, seen.edits, notes=seen.notes)
-            say(f"wrote {', '.join(seen.edits)} of {profile}; your comments are kept: see whether they hold")
+            _write_edits(loaded, changes, seen, words=", ".join(seen.edits))
         give(seen.report(applied_to=profile if apply else None))
 
 
