@@ -80,7 +80,7 @@ _Operator: TypeAlias = "Callable[[Traced, Any], Traced]"
 
 def _operators(name: str) -> tuple[_Operator, _Operator]:
     """An operator of traced numbers, and its form for a number on the left."""
-    return lambda own, operand: _computed(name, own, operand), lambda own, operand: _computed(name, operand, own)
+    return lambda left, right: _computed(name, left, right), lambda right, left: _computed(name, left, right)
 
 
 class Traced:
@@ -503,7 +503,7 @@ def rows(numbers: Iterable[Number], shape: tuple[int, ...]) -> "memoryview[float
     return np.stack([np.broadcast_to(number, shape).ravel() for number in numbers], axis=1).astype(float)  # type: ignore[arg-type] # none is traced
 
 
-def from_rows(found: "memoryview[float] | NDArray[Any]", place: int, shape: tuple[int, ...]) -> Number:
+def from_rows(table: "memoryview[float] | NDArray[Any]", place: int, shape: tuple[int, ...]) -> Number:
     """The number at a place of the row of each point.
 
     Examples
@@ -511,10 +511,10 @@ def from_rows(found: "memoryview[float] | NDArray[Any]", place: int, shape: tupl
     >>> from_rows(rows([1, 2.5], ()), 1, ())
     2.5
     """
-    if isinstance(found, memoryview):
-        number: Number = found[0, place]
+    if isinstance(table, memoryview):
+        number: Number = table[0, place]
         return number
-    return found[:, place].reshape(shape)
+    return table[:, place].reshape(shape)
 
 
 def named(number: Number, key: str, symbol: str) -> Number:

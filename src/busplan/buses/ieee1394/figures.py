@@ -13,7 +13,6 @@ from busplan.buses.figure import (
     Ink,
     by,
     by_key,
-    capacity_figures,
 )
 from busplan.buses.ieee1394 import equations as eq
 
@@ -263,20 +262,17 @@ LATENCY_TABLE: Final = tuple(
 
 FIGURES: Final = BusFigures(
     TERMS,
-    capacity_figures(
-        _DOCUMENT_TERMS,
-        setup=SETUP,
-        own=(
-            *(READ_LATENCY, WRITE_LATENCY, READ_TRANSACTION, WRITE_TRANSACTION),
-            *(BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
-        ),
-        counted=(NODES_EQ11,),
-    ),
+    document_terms=_DOCUMENT_TERMS,
     setup=SETUP,
     headings=(HOPS.key, GAP_COUNT.key),
+    added=(
+        *(READ_LATENCY, WRITE_LATENCY, READ_TRANSACTION, WRITE_TRANSACTION),
+        *(BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
+    ),
+    counts=(NODES_EQ11,),
     table=TABLE,
     compared=COMPARED,
     planned=(GAP_COUNT.key, GAP_COUNT_SAFE.key),
-    phases=LATENCY_TABLE,
+    latency_rows=LATENCY_TABLE,
     latency_document=LATENCY,
 )
