@@ -28,7 +28,7 @@ def test_the_types_are_seen_through_the_lazy_names() -> None:
         assert_type(busplan.plan("paper-4ms").recommended, Option | None)
         assert_type(busplan.check("paper-4ms", circle=False).findings, tuple[Located, ...])
         assert_type(busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})["max_axes"], NDArray[Any])
-        assert_type(busplan.map_("paper-4ms").own, Cell | None)
+        assert_type(busplan.map_("paper-4ms").design, Cell | None)
         assert_type(busplan.compare("paper-4ms").kinds, tuple[MachineOnKind | NotOnKind, ...])
         assert_type(busplan.diff("paper-4ms", "paper-1ms").keys, tuple[KeyDifference, ...])
         assert_type(busplan.explain("paper-4ms", "margin_us").derivations[0].steps, tuple[Step, ...])

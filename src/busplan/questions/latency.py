@@ -139,7 +139,7 @@ def latency(
         given = one_or_several(payload_bytes, name="payload_bytes")
         sizes = [whole(size, name="payload_bytes") for size in given]
         _require_execution(network.profile, sizes)
-        networks = [with_payloads(network, [(size, size)] * len(network.alike)) for size in sizes]
+        networks = [with_payloads(network, [(size, size)] * len(network.profile.node_groups)) for size in sizes]
     tables = tuple(_transactions(variant, models) for variant in networks)
     return LatencyAnswer(network.profile, tuple(networks), tables)
 
@@ -149,7 +149,7 @@ def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
     unknown = dict.fromkeys(
         f"payload {size} bytes: outside the execution table of {alike.name or profile.name}, {execution.range_bytes}; "
         "nothing is extrapolated"
-        for alike in profile.alike_nodes
+        for alike in profile.node_groups
         if isinstance(execution := alike.node.execution, TableExecution)
         for size in payloads_bytes
         if not execution.covers(size)

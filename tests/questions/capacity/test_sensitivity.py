@@ -18,7 +18,7 @@ TABLE = {"kind": "table", "payload_bytes": [4, 12, 14], "time_us": [30.0, 34.0, 
 
 
 def with_longer_execution(profile: busplan.Profile) -> dict[str, Any]:
-    execution: Any = profile.alike_nodes[0].node.execution
+    execution: Any = profile.node_groups[0].node.execution
     if execution.kind == "table":
         return {"node.execution.time_us": [1.1 * us for us in execution.time_us]}
     return {
@@ -29,8 +29,8 @@ def with_longer_execution(profile: busplan.Profile) -> dict[str, Any]:
 
 WRITTEN: dict[str, Callable[[busplan.Profile], dict[str, Any]]] = {
     "execution time +10%": with_longer_execution,
-    "one node more": lambda profile: {"bus.nodes": profile.alike_nodes[0].nodes + 1},
-    "one axis more per node": lambda profile: {"node.axes": profile.alike_nodes[0].node.axes + 1},
+    "one node more": lambda profile: {"bus.nodes": profile.node_groups[0].nodes + 1},
+    "one axis more per node": lambda profile: {"node.axes": profile.node_groups[0].node.axes + 1},
     "payload +4 bytes": lambda profile: {
         f"payload.{kind}_bytes": 4 + (getattr(profile.payload, f"{kind}_bytes") or 0) for kind in ("read", "write")
     },
@@ -200,7 +200,7 @@ def test_without_execution_the_cycle_is_that_of_nodes_that_need_no_time(name: st
     profile = busplan.load_profile(name)
     bottleneck = next_bottleneck(profile)
     execution = {"kind": "linear", "base_us": 0, "per_byte_us": 0, "grade": "derived"}
-    idle = {nodes.node_key("execution"): execution for nodes in profile.alike_nodes}
+    idle = {nodes.node_key("execution"): execution for nodes in profile.node_groups}
     without = figures(changed(profile, idle))
     if bottleneck.binding_term.name == "execution":
         assert bottleneck.next_binding_term.name == without.binding_term

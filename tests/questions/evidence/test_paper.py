@@ -3,7 +3,7 @@
 import pytest
 
 import busplan
-from busplan.questions.evidence import Comparison, KindEvidence
+from busplan.questions.evidence import Comparison
 
 # As printed in Table I: payload, T_lant, T1+T2, T1+T2 theory.
 TABLE_1 = [
@@ -28,22 +28,29 @@ TABLE_2 = [
 
 
 @pytest.fixture(scope="module")
-def ieee1394() -> KindEvidence:
+def everything() -> list[Comparison]:
     (kind,) = busplan.evidence("ieee1394").kinds
-    assert {section.data for section in kind.sections} == {"paper", "dvrk", "ieee1394"}
-    return kind
+    return [row for section in kind.sections for row in section.comparisons]
 
 
 @pytest.fixture(scope="module")
-def comparisons(ieee1394: KindEvidence) -> list[Comparison]:
-    """What the paper publishes."""
-    return [row for section in ieee1394.sections if section.data == "paper" for row in section.comparisons]
+def comparisons() -> list[Comparison]:
+    """The paper's own."""
+    (kind,) = busplan.evidence(paper=True).kinds
+    return [row for section in kind.sections for row in section.comparisons]
 
 
 @pytest.fixture(scope="module")
-def others(ieee1394: KindEvidence) -> list[Comparison]:
+def beside(everything: list[Comparison]) -> list[Comparison]:
     """What is known beside the paper."""
-    return [row for section in ieee1394.sections if section.data != "paper" for row in section.comparisons]
+    return [row for row in everything if row.section.startswith(("dVRK", "IEEE 1394"))]
+
+
+def test_evidence_of_the_bus_is_that_of_the_paper_and_what_is_known_beside_it(
+    everything: list[Comparison], comparisons: list[Comparison], beside: list[Comparison]
+) -> None:
+    assert everything == [*comparisons, *beside]
+    assert beside
 
 
 def chosen(comparisons: list[Comparison], section: str, method: str) -> dict[str, Comparison]:
@@ -85,10 +92,11 @@ def test_latency_of_the_paper_model_leaves_what_both_its_halves_leave(comparison
     # T_exec is derived from the same table, so this is arithmetic and no validation: the report says so.
     whole = chosen(comparisons, "Table I: T_lant, measured", "paper model")
     half = chosen(comparisons, "Table I: T1+T2, measured", "paper model")
-    execution = busplan.load_profile("paper-two-node").alike_nodes[0].node.execution
+    latencies = busplan.latency("paper-two-node", payload_bytes=[size for size, *_ in TABLE_1], timing_model="paper")
+    execution_us = {row.payload_bytes: row.phases["execution_us"] or 0.0 for row in latencies.transactions}
     for size, latency_us, first_us, _ in TABLE_1:
         # The response to a write carries no payload: at 4 bytes both halves are 6.0 us, of which 32 bits are payload.
-        second_us = latency_us - first_us - execution.execution_us(size)
+        second_us = latency_us - first_us - execution_us[size]
         assert second_us == pytest.approx(6.0 - 32 / 393.216, abs=0.05)
         quantity = f"{size} bytes"
         second = half[quantity].computed - second_us
@@ -117,17 +125,17 @@ def test_the_can_row_is_135_us_of_wire_and_10_ms_of_host(comparisons: list[Compa
     assert wire.residual == -10365
 
 
-def test_every_figure_has_the_grade_of_its_source(comparisons: list[Comparison], others: list[Comparison]) -> None:
-    measured = {row.section for row in (*comparisons, *others) if row.grade == "measured"}
-    assert {row.partition(":")[0] for row in measured} == {
+def test_every_figure_has_the_grade_of_its_source(comparisons: list[Comparison], beside: list[Comparison]) -> None:
+    sections = {row.section for row in (*comparisons, *beside) if row.grade == "measured"}
+    assert {section.partition(":")[0] for section in sections} == {
         *("Table I", "Section IV-A", "Figs. 9 and 10", "dVRK", "IEEE 1394"),
     }
-    assert {row.grade for row in (*comparisons, *others)} == {"published", "measured", "derived", None}
-    assert all((row.grade is None) == (row.published is None) for row in (*comparisons, *others))
+    assert {row.grade for row in (*comparisons, *beside)} == {"published", "measured", "derived", None}
+    assert all((row.grade is None) == (row.published is None) for row in (*comparisons, *beside))
 
 
-def test_the_kit_gains_less_on_the_bus_alone_than_was_measured_with_its_host(others: list[Comparison]) -> None:
-    rows = chosen(others, "dVRK: I/O time, individual schedule divided by broadcast schedule", "standard model")
+def test_the_kit_gains_less_on_the_bus_alone_than_was_measured_with_its_host(beside: list[Comparison]) -> None:
+    rows = chosen(beside, "dVRK: I/O time, individual schedule divided by broadcast schedule", "standard model")
     assert rows["gain, of the bus alone"].published == 4
     # By hand, 8 hops and gap count 21: 309.555 us one by one, 135.053 us by broadcasts with isochronous requests.
     assert rows["gain, of the bus alone"].computed == pytest.approx(309.555 / 135.053, rel=1e-5)
@@ -137,37 +145,37 @@ def test_the_kit_gains_less_on_the_bus_alone_than_was_measured_with_its_host(oth
     assert rows["host time that makes it 4"].computed == pytest.approx(host_us, abs=0.01)
 
 
-def test_the_kit_runs_at_periods_that_its_cycles_fit(others: list[Comparison]) -> None:
-    rows = chosen(others, "dVRK: the periods that it runs at", "standard model")
+def test_the_kit_runs_at_periods_that_its_cycles_fit(beside: list[Comparison]) -> None:
+    rows = chosen(beside, "dVRK: the periods that it runs at", "standard model")
     assert [row.published for row in rows.values()] == pytest.approx([1e6 / 1500, 1e6 / 6000])
     assert all((row.residual or 0.0) < 0 for row in rows.values())
 
 
-def test_the_hub_and_a_board_of_the_kit(others: list[Comparison]) -> None:
-    (block,) = chosen(others, "dVRK: the block of the hub", "standard model").values()
+def test_the_hub_and_a_board_of_the_kit(beside: list[Comparison]) -> None:
+    (block,) = chosen(beside, "dVRK: the block of the hub", "standard model").values()
     assert block.computed == block.published == 4 * (8 * 33 + 1)
-    boards = chosen(others, "dVRK: the broadcast of one board", "standard model")
+    boards = chosen(beside, "dVRK: the broadcast of one board", "standard model")
     hop_us = 0.023 + 14 / 98.304
     by_hand = {f"{hops} hop{'s' * (hops > 1)}": 2 * hops * hop_us + 1.63 + 8 * 92 / 393.216 for hops in (1, 8)}
     assert {name: row.computed for name, row in boards.items()} == pytest.approx(by_hand)
 
 
-def test_the_times_of_the_boards_are_the_firmwares(others: list[Comparison]) -> None:
-    times = chosen(others, "dVRK: when a board broadcasts, firmware up to Rev 7", "standard model").values()
+def test_the_times_of_the_boards_are_the_firmwares(beside: list[Comparison]) -> None:
+    times = chosen(beside, "dVRK: when a board broadcasts, firmware up to Rev 7", "standard model").values()
     assert [round(row.computed, 2) for row in times] == [row.published for row in times] == [3.05, 5.21]
 
 
-def test_what_is_known_of_the_standard_beside_the_paper(others: list[Comparison]) -> None:
-    delays = [row for row in others if row.section.startswith("IEEE 1394: delays")]
+def test_what_is_known_of_the_standard_beside_the_paper(beside: list[Comparison]) -> None:
+    delays = [row for row in beside if row.section.startswith("IEEE 1394: delays")]
     assert [(row.quantity, row.published) for row in delays] == [
         ("PHY", 0.144),
         ("PHY", 0.144),
         ("cable of 4.5 m", pytest.approx(4.5 * 5.05e-3)),
     ]
     assert [abs(row.relative_residual or 0.0) < 0.02 for row in delays] == [False, True, True]
-    met = [row for row in others if row.section.startswith("IEEE 1394: smallest")]
+    met = [row for row in beside if row.section.startswith("IEEE 1394: smallest")]
     assert [(row.published, row.computed) for row in met] == [(23, 23), (23, 23)]
-    trips = [row for row in others if row.section.startswith("IEEE 1394: a round trip")]
+    trips = [row for row in beside if row.section.startswith("IEEE 1394: a round trip")]
     assert [row.published for row in trips] == [100, 140]
     assert all(row.computed < 0.25 * (row.published or 0.0) for row in trips)
 

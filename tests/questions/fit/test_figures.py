@@ -35,7 +35,7 @@ def test_max_nodes_is_the_largest_that_fits_in_exact_arithmetic(
     limit = {"S100": 512, "S200": 1024, "S400": 2048}[profile.bus.speed]
     available = Fraction(profile.cycle.slice_ratio) * Fraction(profile.cycle.period_us)
 
-    largest_bytes = max(profile.alike_nodes[0].bytes_of(kind) for kind in ("read", "write"))
+    largest_bytes = max(profile.node_groups[0].bytes_of(kind) for kind in ("read", "write"))
 
     def good(nodes: int, model: str) -> bool:
         hops = nodes if profile.bus.max_hops is None else profile.bus.max_hops
@@ -76,7 +76,7 @@ def test_required_time_equals_the_exact_one(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile], exact: Exact
 ) -> None:
     profile = data.draw(any_profile)
-    nodes = profile.alike_nodes[0].nodes
+    nodes = profile.node_groups[0].nodes
     for figures in busplan.capacity(profile).results:
         expected_us = float(exact(profile, figures.timing_model, nodes))
         assert figures.required_us == pytest.approx(expected_us, rel=1e-13)
@@ -99,8 +99,8 @@ def test_the_figures_of_a_profile_agree_with_each_other(
         figures.available_us - figures.required_us, abs=1e-9 * figures.required_us
     )
     assert figures.utilisation == pytest.approx(figures.required_us / figures.available_us)
-    assert figures.max_axes == profile.alike_nodes[0].node.axes * figures.max_nodes
-    assert figures.axes == profile.alike_nodes[0].node.axes * figures.nodes
+    assert figures.max_axes == profile.node_groups[0].node.axes * figures.max_nodes
+    assert figures.axes == profile.node_groups[0].node.axes * figures.nodes
     assert figures.time_slice_us * figures.nodes == pytest.approx(figures.available_us)
     assert values["gaps_us"] == pytest.approx(values["subaction_gap_us"] + values["arbitration_reset_gap_us"])
     assert figures.min_period_us is not None
@@ -120,7 +120,7 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     shown_us = figures.required_us + figures.bias_us + (figures.uncertainty_us or 0)
     assert figures.safe_required_us == pytest.approx(shown_us)
     assert figures.safe_min_period_us == pytest.approx(figures.safe_required_us / profile.cycle.slice_ratio)
-    assert figures.safe_axes == profile.alike_nodes[0].node.axes * figures.safe_nodes
+    assert figures.safe_axes == profile.node_groups[0].node.axes * figures.safe_nodes
     assert (figures.verdict == "fits" and figures.safe) == (figures.nodes <= figures.safe_nodes)
 
 

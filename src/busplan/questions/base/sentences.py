@@ -85,7 +85,7 @@ def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterato
         Whether the figures are latencies, and not those of the cycle.
     """
     names: dict[str, list[str]] = {}
-    for group in network.profile.alike_nodes:
+    for group in network.profile.node_groups:
         names.setdefault(group.node.execution.grade or "", []).append(group.name)
     grades = ", ".join(
         f"{grade or 'without a grade'} of {' and '.join(groups)}" if len(names) > 1 else grade

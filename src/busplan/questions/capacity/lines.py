@@ -207,7 +207,7 @@ def _gauge(verdict: Verdict) -> Gauge | None:
     limit = network.bus.limit("load")
     if limit is None:
         return None
-    load, most = plain(limit.bound.value(network)), plain(limit.bound.most(network))
+    load, most = plain(limit.value(network)), plain(limit.most(network))
     whole = max(1.0, load)
     return Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
 

@@ -13,7 +13,7 @@ from busplan.questions.fit.certainty import certainty
 from busplan.questions.fit.figures import FitFigures, figures, safe_nodes
 from busplan.questions.fit.network import at_once, changed, trial, with_payloads
 from busplan.sections.base import TRANSACTION_KINDS, value_at
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.machine import ProfileGroup
 
 
 class NextLimit(NamedTuple):
@@ -111,8 +111,8 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     """
     bus = network.bus
     yield _slower(network)
-    yield from (_one_node_more(network, group) for group in network.alike)
-    yield from (_one_axis_more(network, group) for group in network.alike)
+    yield from (_one_node_more(network, group) for group in network.profile.node_groups)
+    yield from (_one_axis_more(network, group) for group in network.profile.node_groups)
     yield _more_bytes(network)
     yield from (_with_keys(network, change) for change in bus.perturbations(network))
     if bus.safety.after_reset:
@@ -137,13 +137,13 @@ def _slower(network: Network) -> Perturbed:
     return Perturbed(f"execution time +{_EXECUTION_SHARE:.0%}", "execution_us", before, after, then, note)
 
 
-def _one_node_more(network: Network, group: AlikeNodes) -> Perturbed:
+def _one_node_more(network: Network, group: ProfileGroup) -> Perturbed:
     more = group.nodes + 1
-    then = network.asking(group.name).with_nodes(more)
+    then = network.varying(group.name).with_nodes(more)
     return Perturbed(f"one node more{_in(group)}", group.nodes_key, group.nodes, more, then, "")
 
 
-def _one_axis_more(network: Network, group: AlikeNodes) -> Perturbed:
+def _one_axis_more(network: Network, group: ProfileGroup) -> Perturbed:
     key, axes = group.node_key("axes"), group.node.axes + 1
     then, unknown = _if_known(lambda: trial(network, {key: axes}))
     note = unknown or ("" if group.payload.follows_axes else "no payload follows the axes")
@@ -151,7 +151,7 @@ def _one_axis_more(network: Network, group: AlikeNodes) -> Perturbed:
 
 
 def _more_bytes(network: Network) -> Perturbed:
-    sizes = [tuple(group.bytes_of(kind) for kind in TRANSACTION_KINDS) for group in network.alike]
+    sizes = [tuple(group.bytes_of(kind) for kind in TRANSACTION_KINDS) for group in network.profile.node_groups]
     longer = [
         (read_bytes + _PAYLOAD_STEP_BYTES, write_bytes + _PAYLOAD_STEP_BYTES) for read_bytes, write_bytes in sizes
     ]
@@ -182,7 +182,7 @@ def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:
         return None, f"not known: {error}"
 
 
-def _in(group: AlikeNodes) -> str:
+def _in(group: ProfileGroup) -> str:
     return f" in {group.name}" if group.name else ""
 
 
@@ -250,10 +250,9 @@ def _effect(cause: Perturbed, now: FitFigures, network: Network) -> Effect:
 def _nearer(network: Network, changed: Network) -> Iterator[str]:
     """Say how much nearer a change comes to limits that are times, each with its doubt as a shown verdict has it."""
     for limit in network.bus.limits:
-        if limit.bound.doubt is None:
+        if limit.doubt is None:
             continue
-        bound = limit.bound
-        left_us, then_us = (plain(bound.most(of)) - plain(bound.shown.value(of)) for of in (network, changed))
+        left_us, then_us = (plain(limit.most(of)) - plain(limit.shown.value(of)) for of in (network, changed))
         if then_us < left_us and left_us > 0:
             yield f"it takes {left_us - then_us:.1f} us of the {left_us:.1f} us before the limit of {limit.key}"
         elif then_us < left_us:

@@ -23,7 +23,7 @@ from busplan.profile.sources import load
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.circle import CircleFigures
-from busplan.questions.circle.roundness import circle_test
+from busplan.questions.circle.roundness import run_circles
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.sections.base import Section
@@ -205,7 +205,7 @@ class _Case:
 
     @cached_property
     def _circle(self) -> CircleFigures:
-        return circle_test(self.network, progress=self._progress).results[0]
+        return run_circles(self.network, progress=self._progress).results[0]
 
     def sum_of(self, row: Row) -> float:
         """The figures of a row with this profile and this model, added up."""

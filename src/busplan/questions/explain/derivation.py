@@ -338,11 +338,11 @@ def assumptions(network: Network) -> tuple[Input, ...]:
         numbers += [traced[key] for key in ("required_us", "available_us", "safe_required_us") if key in traced]
     for limit in bus.limits:
         if limit.role != "safety":
-            numbers += (limit.bound.value(limited), limit.bound.most(limited), limit.bound.uncertainty(limited))
+            numbers += (limit.value(limited), limit.most(limited), limit.uncertainty(limited))
     by_name: dict[str, Input] = {}
     for given in inputs(Traced(None, parts=tuple(numbers))):
         by_name.setdefault(given.name, given)
-    executions = tuple(group.node_key("execution.") for group in profile.alike_nodes)
+    executions = tuple(group.node_key("execution.") for group in profile.node_groups)
 
     def rank(given: Input) -> int:
         """Place of the grade of an input; a choice comes after all of them."""

@@ -6,7 +6,7 @@ from typing import Final, Literal, NamedTuple
 
 from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
-from busplan.buses.limits import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Bound, Limit
+from busplan.buses.limits import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total, within
@@ -86,7 +86,7 @@ def certainty(cycle: BusCycle) -> Certainty:
 
 def limit_codes(network: Network) -> dict[str, Number]:
     """The place among `VERDICTS` of each limit of the bus by key, those of safety left out."""
-    return {limit.key: limit.bound.verdict_code(network) for limit in network.bus.limits if limit.role != "safety"}
+    return {limit.key: limit.verdict_code(network) for limit in network.bus.limits if limit.role != "safety"}
 
 
 def time_code(weighed: Certainty, network: Network) -> Number:
@@ -119,4 +119,4 @@ def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
 
 def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
     """The limit of time: what a network needs [us] against its share of the period."""
-    return Limit(TIME, "{value:.3f} us needed of {most:.3f} us", Bound(needed_us, available_us))
+    return Limit(TIME, "{value:.3f} us needed of {most:.3f} us", needed_us, available_us)

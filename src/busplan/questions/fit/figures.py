@@ -59,7 +59,7 @@ def safe_nodes(network: Network, *, group: str = "", without: str | None = None)
         Number of nodes [1], and the key of the limit.
     """
     limits = [limit for limit in limits_to_be_safe(network) if limit.key != without]
-    return _nodes_within(network.asking(group), limits)
+    return _nodes_within(network.varying(group), limits)
 
 
 def _nodes_within(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:
@@ -112,7 +112,7 @@ def _most_within(limit: Limit, network: Network, cached_network: Callable[[int],
     if not (over.any() if hasattr(over, "any") else over):
         return ceiling
     if elements > 1:
-        varying = _size(limit.bound.least_value(network.with_nodes(1)))
+        varying = _size(limit.least_value(network.with_nodes(1)))
         counted = ceiling * (varying * _VALUE_COST + elements)
         if counted <= ceiling.bit_length() * elements * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))
@@ -247,8 +247,8 @@ def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
     """How many nodes of each group fit a network's period, and are shown to fit; of all where they are alike."""
     decides = model == network.bus.deciding_model
     counts = []
-    for group in network.profile.alike_nodes:
-        most, limit = _nodes_within(network.asking(group.name), limits_with_time(network, model=model))
+    for group in network.profile.node_groups:
+        most, limit = _nodes_within(network.varying(group.name), limits_with_time(network, model=model))
         safe, safe_limit = safe_nodes(network, group=group.name) if decides else (None, None)
         nodes, axes = int(group.nodes), group.node.axes
         safe_axes = None if safe is None else axes * safe
@@ -391,8 +391,8 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     period_us = bus.periods.from_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
         if limit.period is not None and not limit.is_slow:
-            bound = limit.bound.shown if is_shown else limit.bound.nominal
-            period_us = larger(period_us, bus.periods.from_us(limit.period(bound, network)))
+            kept = limit.shown if is_shown else limit.nominal
+            period_us = larger(period_us, bus.periods.from_us(kept.shortest_period_us(network)))
     return period_us
 
 

@@ -94,7 +94,7 @@ def traced_network(network: Network) -> Network:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if is_number or (isinstance(value, str) and _chooses(profile, key)):
             values[key] = Traced(value, given=given(profile, key))
-    for group in profile.alike_nodes:
+    for group in profile.node_groups:
         execution, key = group.node.execution, group.node_key(_TABLE)
         if isinstance(execution, TableExecution):
             table = GivenTable(execution.time_us)
@@ -107,7 +107,7 @@ def traced_network(network: Network) -> Network:
 def _chooses(profile: Profile, key: str) -> bool:
     """Whether a key is text-valued and selects a formula."""
     names = choosing_keys(bus_of(profile))
-    return any(key == group.node_key(name) for group in profile.alike_nodes for name in names)
+    return any(key == group.node_key(name) for group in profile.node_groups for name in names)
 
 
 def choosing_keys(bus: Bus) -> tuple[str, ...]:
@@ -230,7 +230,7 @@ def _of_rates(figures: RuleFigures, network: Network) -> Iterator[_Share]:
             cycle = bus.cycle(endless._replace(period_us=figures.period_us), model=figures.timing_model)
             yield (key,), 1 - plain(cycle.required_us) / figures.required_us, "the required time"
         elif (load := bus.limit("load")) is not None:
-            yield (key,), 1 - plain(load.bound.value(endless)) / plain(load.bound.value(network)), "the load"
+            yield (key,), 1 - plain(load.value(endless)) / plain(load.value(network)), "the load"
 
 
 def _doubt_us(doubts: Sequence[Any]) -> float:

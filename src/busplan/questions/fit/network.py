@@ -9,7 +9,7 @@ from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, is_everywhere, total
 from busplan.profile.document import override
 from busplan.sections.base import TRANSACTION_KINDS, Section, with_all_unchecked, with_unchecked
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import Profile
 
 PERIOD: Final = "cycle.period_us"
@@ -20,9 +20,9 @@ def bus_of(profile: Profile) -> Bus:
     return kind_named(profile.bus.kind)
 
 
-def varied_nodes(profile: Profile) -> AlikeNodes:
+def varied_nodes(profile: Profile) -> ProfileGroup:
     """The nodes whose number varies when axes are counted: all that are alike, or the group of the most axes."""
-    return max(profile.alike_nodes, key=lambda group: int(group.nodes * group.node.axes))
+    return max(profile.node_groups, key=lambda group: int(group.nodes * group.node.axes))
 
 
 def network_of(profile: Profile) -> Network:
@@ -34,18 +34,18 @@ def network_of(profile: Profile) -> Network:
         The profile. Its values may be numbers, arrays or traced numbers.
     """
     cycle = profile.cycle
-    groups = tuple(_group(members) for members in _side_by_side(profile.alike_nodes))
+    groups = tuple(_group(members) for members in _side_by_side(profile.node_groups))
     varied = None if profile.group else ""
     return Network(profile, bus_of(profile), groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us, varied)
 
 
-def _group(members: Sequence[AlikeNodes]) -> Group:
+def _group(members: Sequence[ProfileGroup]) -> Group:
     first = members[0]
     execution = first.node.execution
     read_bytes, write_bytes = (first.bytes_of(kind) for kind in TRANSACTION_KINDS)
     read_us, write_us = execution.execution_us(read_bytes), execution.execution_us(write_bytes)
     return Group(
-        said=first,
+        members=tuple(members),
         nodes=first.nodes if len(members) == 1 else total(member.nodes for member in members),
         axes=first.node.axes,
         read_bytes=read_bytes,
@@ -55,13 +55,12 @@ def _group(members: Sequence[AlikeNodes]) -> Group:
         worst_extra_us=execution.worst_extra_us,
         read_uncertainty_us=execution.standard_uncertainty_us(read_us),
         write_uncertainty_us=execution.standard_uncertainty_us(write_us),
-        members=tuple(members),
     )
 
 
-def _side_by_side(groups: Sequence[AlikeNodes]) -> list[list[AlikeNodes]]:
+def _side_by_side(groups: Sequence[ProfileGroup]) -> list[list[ProfileGroup]]:
     """Join neighbours that differ only in name and number, so that their cycle is that of a uniform bus."""
-    runs: list[list[AlikeNodes]] = []
+    runs: list[list[ProfileGroup]] = []
     for group in groups:
         # Groups at slower rates go in cycles of their own.
         is_in_every = is_everywhere(getattr(group.payload, "every", 1) <= 1)
@@ -111,7 +110,7 @@ def with_payloads(network: Network, sizes_bytes: Iterable[tuple[Number, Number]]
         The execution time of a payload is not known.
     """
     values: dict[str, object] = {}
-    for group, sizes in zip(network.alike, sizes_bytes, strict=True):
+    for group, sizes in zip(network.profile.node_groups, sizes_bytes, strict=True):
         section = f"group.{group.name}" if group.name else "payload"
         for kind, size_bytes in zip(TRANSACTION_KINDS, sizes, strict=True):
             values |= {f"{section}.{kind}_bytes": size_bytes, f"{section}.{kind}_bytes_per_axis": None}

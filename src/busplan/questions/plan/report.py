@@ -164,7 +164,7 @@ def _record(plan: PlanAnswer, option: Option) -> Record:
 
 def _payload_bytes(profile: Profile, kind: TransactionKind) -> int | None:
     """Payload of the first nodes in one direction [bytes]; None without nodes."""
-    return next((int(alike.bytes_of(kind)) for alike in profile.alike_nodes), None)
+    return next((int(alike.bytes_of(kind)) for alike in profile.node_groups), None)
 
 
 def plan_records(plan: PlanAnswer) -> list[Record]:
