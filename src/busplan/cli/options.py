@@ -200,21 +200,21 @@ def plot_form(path: Path) -> Picture:
 
 
 def require_company(company: str, options: Mapping[str, object], *, is_given: object) -> None:
-    """Refuse options that go with another, which is not given.
+    """Refuse options that go with another option.
 
     Parameters
     ----------
     company
         The other option, as in its help.
     options
-        Value by option; one that is empty is not given.
+        Value by option; an empty value is an option that is not given.
     is_given
         Whether the other option is given.
 
     Raises
     ------
     BusplanError
-        The first option without the other.
+        An option without its company.
     """
     for name, value in options.items():
         if value and not is_given:
