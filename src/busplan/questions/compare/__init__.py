@@ -243,7 +243,7 @@ def _safe_axes(network: Network) -> SafeAxes:
     varied = varied_nodes(profile)
     nodes, limit = safe_nodes(network, group=varied.name)
     node_axes = int(varied.node.axes)
-    beside = sum(int(group.nodes) * int(group.node.axes) for group in profile.alike_nodes if group.name != varied.name)
+    beside = sum(int(group.nodes) * int(group.node.axes) for group in profile.node_groups if group.name != varied.name)
     axes = None if not node_axes else beside + nodes * node_axes if nodes else 0
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
 

@@ -41,7 +41,8 @@ from busplan.questions.base.sentences import (
     with_profile,
 )
 from busplan.questions.compare import CompareAnswer, MachineOnKind, NotOnKind, SafeAxes
-from busplan.questions.fit.certainty import DOES_NOT_FIT, limits_behind
+from busplan.questions.fit.certainty import DOES_NOT_FIT
+from busplan.questions.fit.figures import limits_behind
 
 _INKS: Final[tuple[Ink, ...]] = ("request", "contention", "work", "sync", "acknowledge", "response", "reserve")
 """Colours of the curves; each has a letter, too."""
@@ -194,7 +195,7 @@ def _note(machine: MachineOnKind | NotOnKind, network: Network) -> Sentence:
         return Sentence((f"{machine.bus.title} cannot have this machine: {'; '.join(machine.why)}.",), "warns")
     figures, bus = machine.figures, machine.bus
     sentences = []
-    broken = [limit.words(machine.network) for limit in map(bus.limit, limits_behind(figures)) if limit]
+    broken = [limit.words(machine.network) for limit in limits_behind(figures, machine.network)]
     if broken:
         sentences.append(Sentence((f"At {period(figures.period_us)} {'; '.join(broken)}.",)))
     if machine.smallest.us is None:

@@ -14,9 +14,9 @@ from busplan.progress import Progress
 from busplan.questions.import_.can import BIT_RATE, LEAST, SHOWN
 from busplan.questions.import_.can_database import EXTENDED
 from busplan.questions.import_.reading import Fact, Reading, assumed
-from busplan.recordings.can import (
+from busplan.recordings.can import CanFrames, read_can
+from busplan.recordings.can_timing import (
     LISTED,
-    CanFrames,
     ClockStretch,
     EventModel,
     SentFrames,
@@ -24,7 +24,6 @@ from busplan.recordings.can import (
     faults,
     least_bit_rate,
     longest_stretch,
-    read_can,
     sent_messages,
     stamps_of_no_bus,
     step_us,

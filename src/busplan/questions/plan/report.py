@@ -33,15 +33,14 @@ from busplan.questions.base.sentences import (
     change_meanings,
     document,
     fields,
-    key_value,
     margin_parts,
     reset_sentence,
     settings_sentence,
     warning_sentences,
     with_profile,
 )
-from busplan.questions.fit.certainty import FITS, limits_behind
-from busplan.questions.fit.figures import COUNTS, CapacityFigures
+from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.figures import COUNTS, limits_behind
 from busplan.questions.fit.network import PERIOD
 from busplan.questions.plan import Option, PlanAnswer, Relaxation
 from busplan.questions.plan.search import freedoms
@@ -163,7 +162,7 @@ def _record(plan: PlanAnswer, option: Option) -> Record:
         **{key: values[key] for key in option.network.bus.figures.planned},
         # Of the first nodes; a bus of messages alone has none.
         **{
-            f"{kind}_bytes": next((int(alike.bytes_of(kind)) for alike in profile.alike_nodes), None)
+            f"{kind}_bytes": next((int(alike.bytes_of(kind)) for alike in profile.node_groups), None)
             for kind in TRANSACTION_KINDS
         },
     }
@@ -190,18 +189,19 @@ def _row(option: Option) -> TableRow:
         _short(option.network, option.changes),
         option.network.bus.figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
         ShownValue(option.held_by, "held_by"),
-        *_margin(option.deciding),
+        *_margin(option),
         *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES)),
     )
     return TableRow(cells, highlighted=option.recommended)
 
 
-def _margin(figures: CapacityFigures) -> tuple[ShownValue, ShownValue]:
+def _margin(option: Option) -> tuple[ShownValue, ShownValue]:
     """Margin less the bias, and its uncertainty."""
+    figures = option.deciding
     margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     # A margin beyond its uncertainty is none of the causes where limits of the bus are.
     beyond_us = (figures.margin_corrected_us or 0.0) - (figures.uncertainty_us or 0.0)
-    is_enough = figures.verdict == FITS or (beyond_us > 0 and limits_behind(figures))
+    is_enough = figures.verdict == FITS or (beyond_us > 0 and limits_behind(figures, option.network))
     return margin._replace(state="neutral" if is_enough else "fails"), doubt
 
 
@@ -245,5 +245,5 @@ def _counted(words: str, value: BusValue) -> str:
 
 
 def _short_value(key: str, value: BusValue) -> ShownValue:
-    shown = key_value(key, value)
+    shown = ShownValue(value, key)
     return shown._replace(unit=period_value(float(value)).unit) if key.endswith("_us") else shown

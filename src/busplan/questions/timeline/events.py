@@ -155,7 +155,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
     nodes = int(plain(network.nodes))
     if nodes > MOST_NODES:
         limit = network.bus.limit("nodes")
-        carries = "" if limit is None else f"; one bus carries {limit.bound.most(network):g}"
+        carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
         where = "bus.nodes" if network.is_uniform else "nodes of all groups"
         raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
     model = leading_model(network) if model is None else model
@@ -302,4 +302,4 @@ def due_groups(laid_out: Schedule, number: int) -> list[Group]:
 
 def group_names(groups: Sequence[Group]) -> tuple[str, ...]:
     """Names of groups of the profile."""
-    return tuple(alike.name for group in groups for alike in group.members or (group.said,) if alike.name)
+    return tuple(member.name for group in groups for member in group.members if member.name)

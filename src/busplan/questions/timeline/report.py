@@ -182,9 +182,9 @@ def _charged(window: Schedule) -> Sentence:
     network, nodes, cycle = window.network, window.figures.nodes, "the cycle"
     if window.number is not None and window.cycles > 1:
         cycle = f"cycle {drawn_number(window)} of {window.cycles}"
-    setup = ", ".join((nouns(nodes, "node"), *network.bus.setup_words(network)))
+    setup, path = ", ".join((nouns(nodes, "node"), *network.bus.setup_words(network))), network.bus.path_words(network)
     return sentence(
-        f"{{}} {setup}; {{}} to {{}} of {cycle}, {network.bus.way_charged(network)}",
+        f"{{}} {setup}; {{}} to {{}} of {cycle}{path and f', {path}'}",
         count_value(nodes, "nodes"),
         ShownValue(window.from_us, "from_us", "", TOTAL.decimals),
         ShownValue(window.to_us, "to_us", "us", TOTAL.decimals),
