@@ -475,8 +475,8 @@ def worded(number: Number, words: str) -> Number:
     return Traced(number.value, formula=words, numbers=short(number.value), parts=(number,))
 
 
-def alike(constant: Number, number: Number) -> Number:
-    """A constant that is computed with other constants before it meets a number: of that number's sort."""
+def traced_with(constant: Number, number: Number) -> Number:
+    """A constant, traced where a number is: so that it is an input, though it meets other constants first."""
     if isinstance(number, Traced) and isinstance(constant, Sourced):
         return Traced(float(constant), given=input_of(constant))
     return constant

@@ -4,17 +4,19 @@ import shlex
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from functools import partial
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from busplan.cli.answering import answer, profile_files, report_with, require_apart
+from busplan.cli.answering import answer, profile_files, require_apart
 from busplan.cli.options import (
     STANDARD_OUTPUT,
     VALUES_HELP,
     AllOption,
+    DrawnFormatOption,
+    DrawnOutputOption,
     FormatOption,
     JobsOption,
     OutputOption,
@@ -22,11 +24,10 @@ from busplan.cli.options import (
     load_changed,
     option,
     parse_axis,
+    require_company,
     takes_changes,
 )
-from busplan.cli.output import PlanFailsError, emit_document, message_width, say
-from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, show_drawn
-from busplan.cli.progress import progress_bar
+from busplan.cli.output import PlanFailsError, message_width, progress_bar, say, write_document
 from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.english import printable
 from busplan.errors import BusplanError
@@ -35,10 +36,9 @@ from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges, require_separate
 
 if TYPE_CHECKING:
-    from busplan.forms.blocks import Report
     from busplan.profile.document import LoadedProfile
-    from busplan.questions.compare import CompareAnswer
-    from busplan.questions.map import MapAnswer
+    from busplan.questions.calibrate import CalibrateAnswer
+    from busplan.questions.measured import MeasuredAnswer
     from busplan.questions.plan import PlanAnswer
 
 
@@ -48,11 +48,7 @@ _LONGEST_NAME = 100
 _LONGEST_DESCRIPTION = 2000
 
 
-@takes_changes(
-    "Part of the goal: it is kept, and --apply and -o write it.",
-    period=" with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
-    "[default: the profile's cycle.period_us, which may be changed]",
-)
+@takes_changes("Part of the goal, as --period: it is kept, and --apply and -o write it.", period=True)
 def plan_command(
     profile: ProfileArgument,
     nodes: Annotated[
@@ -83,25 +79,19 @@ def plan_command(
     ] = None,
     apply: Annotated[
         bool,
-        typer.Option(
-            "--apply", help="Write the recommended values into PROFILE, a file; comments and layout stay as they are."
-        ),
+        option("--apply", "Write the recommended values into PROFILE, a file; comments and layout stay as they are."),
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help=f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
+        option(
+            "--output,-o FILE",
+            f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
             "name, as NEW.toml: write a copy of PROFILE with the recommended values, whose name is that of the file; - "
             "is standard output, and the report goes to standard error.  [default: no file, and the report to standard "
             "output]",
         ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Let -o NEW.toml overwrite a file that is already there.")
-    ] = False,
+    force: Annotated[bool, option("--force", "Let -o NEW.toml overwrite a file that is already there.")] = False,
     all_: AllOption = False,
     format_: FormatOption = None,
 ) -> None:
@@ -118,7 +108,7 @@ def plan_command(
     Example: busplan plan paper-1ms --axes 16
     """
     if nodes is not None:
-        changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.each))
+        changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.entries))
     report_file = output if output is not None and output.suffix.lower() in ENDINGS else None
     if report_file is None and output is not None and output.suffix.lower() not in _PROFILE_ENDINGS:
         raise BusplanError(
@@ -154,7 +144,7 @@ def plan_command(
             _apply(loaded, result)
         elif file is not None:
             say(f"wrote {new}")
-        (partial(_say_report, changes) if piped else give)(result.report())
+        (partial(_say_report, changes) if piped else give)(result)
     if result.recommended is None:
         raise PlanFailsError
 
@@ -164,7 +154,7 @@ def _check_options(
 ) -> None:
     problems = []
     if axes is not None:
-        nodes = [change.typed for change in changes.each if change.key == "bus.nodes"]
+        nodes = [change.typed for change in changes.entries if change.key == "bus.nodes"]
         problems += [f"{typed} and --axes {axes}: give one of them" for typed in nodes]
     if apply and new is not None:
         problems.append(f"--apply and -o {new}: give one of them; -o leaves PROFILE as it is")
@@ -188,8 +178,8 @@ def _apply(loaded: "LoadedProfile", result: "PlanAnswer") -> None:
 def _write_profile(loaded: "LoadedProfile", result: "PlanAnswer", file: NewFile | None, *, name: str | None) -> None:
     """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged.
 
-    A file is another plan than that of the profile: it has a name of its own, and what its description says is said
-    of the profile that it comes from.
+    A file is another plan than the profile: it has another name, and its description names the profile that it comes
+    from.
     """
     if result.recommended is not None:
         from busplan.profile.edit import edited_copy
@@ -197,10 +187,10 @@ def _write_profile(loaded: "LoadedProfile", result: "PlanAnswer", file: NewFile 
         profile, choices = loaded.profile, _choices(result)
         if name is not None:
             choices["name"] = printable(name).strip()[:_LONGEST_NAME] or profile.name
-            said = f"A plan of {profile.name}, which is: {profile.description.strip()}"[:_LONGEST_DESCRIPTION]
-            choices |= {"description": said} if profile.description.strip() else {}
-        write = emit_document if file is None else file.write
-        write(edited_copy(loaded, choices))
+            if profile.description.strip():
+                words = f"A plan of {profile.name}, which is: {profile.description.strip()}"
+                choices["description"] = words[:_LONGEST_DESCRIPTION]
+        write_document(edited_copy(loaded, choices), file)
     elif file is not None:
         file.abandon()
 
@@ -212,14 +202,16 @@ def _choices(result: "PlanAnswer") -> dict[str, object]:
     return {key: whole(value) for key, value in (result.recommended_changes or {}).items()}
 
 
-def _say_report(changes: KeyChanges, report: "Report") -> None:
+def _say_report(changes: KeyChanges, result: "PlanAnswer") -> None:
     """Write the report to standard error: standard output has the profile."""
     from busplan.forms.terminal import block_lines
+    from busplan.questions.base.sentences import changed_report
 
-    say(*(line.text for line in block_lines(report_with(changes, report).blocks, width=message_width())))
+    blocks = changed_report(result.report(), changes).blocks
+    say(*(line.text for line in block_lines(blocks, width=message_width())))
 
 
-@takes_changes("Of the bench, where it was not as the profile: --apply does not write it.")
+@takes_changes("For a bench that differed from the profile: --apply does not write it.")
 def calibrate_command(
     profile: ProfileArgument,
     measurements: Annotated[
@@ -242,9 +234,9 @@ def calibrate_command(
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
-        typer.Option(
+        option(
             "--apply",
-            help="Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; "
+            "Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; "
             "your own comments stay.",
         ),
     ] = False,
@@ -258,9 +250,10 @@ def calibrate_command(
     acknowledge, in us) and a line for each measurement; payloads may repeat, and lines that begin with # are comments.
     A column transaction says read or write (write without it).
 
-    T_exec is the latency less the time of its packets by the timing model, equation (3); of each payload the median. If
-    the bench differs from the profile, say so: --set bus.nodes=2 --set bus.gap_count=63. Of three or more measurements
-    of a payload, those far from their median are named by their line and left out; slow ones are in worst_extra_us.
+    T_exec is the latency less the time of its packets by the timing model, equation (3); each payload has the median.
+    Where the bench differs from the profile, give its values: --set bus.nodes=2 --set bus.gap_count=63. Of three or
+    more measurements of a payload, those far from their median are named by their line and left out; slow ones are in
+    worst_extra_us.
     Times are in us. Exits 0 with any figures.
 
     Example: busplan calibrate paper-two-node table-1.csv
@@ -288,13 +281,18 @@ def calibrate_command(
             source=name,
         )
         if apply:
-            for change in changes.by_set:
-                for key in calibration.edits:
-                    require_separate(change, key, typed="--apply")
-            apply_changes(loaded.document, calibration.edits, notes=calibration.notes)
-            kept = "your comments are kept: see whether they hold of the new values"
-            say(f"wrote [{' '.join(calibration.notes)}] of {profile}; {kept}")
+            _write_edits(loaded, changes, calibration, words=f"[{' '.join(calibration.notes)}]")
         give(calibration.report(applied_to=profile if apply else None))
+
+
+def _write_edits(
+    loaded: "LoadedProfile", changes: KeyChanges, answer: "CalibrateAnswer | MeasuredAnswer", *, words: str
+) -> None:
+    """Write what was measured into the profile's file, but for keys that --set gives for the measurement."""
+    for change, key in product(changes.by_set, answer.edits):
+        require_separate(change, key, typed="--apply")
+    apply_changes(loaded.document, answer.edits, notes=answer.notes)
+    say(f"wrote {words} of {loaded.document.name}; your comments are kept: see whether they hold of the new values")
 
 
 def _measurements_file(argument: str) -> Iterator[Path]:
@@ -305,7 +303,7 @@ def _measurements_file(argument: str) -> Iterator[Path]:
         yield locate_measurements(argument).path
 
 
-@takes_changes("Of the machine as it was recorded: --apply does not write it.")
+@takes_changes("For a machine that was recorded with another value: --apply does not write it.")
 def measured_command(
     profile: ProfileArgument,
     recording: Annotated[
@@ -326,9 +324,9 @@ def measured_command(
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
-        typer.Option(
+        option(
             "--apply",
-            help="Write the values that were measured into the file PROFILE, with a comment on their origin; your own "
+            "Write the values that were measured into the file PROFILE, with a comment on their origin; your own "
             "comments stay.",
         ),
     ] = False,
@@ -339,9 +337,9 @@ def measured_command(
     """Show what the machine does by a recording of its bus, beside what was planned.
 
     Each figure has the planned and the recorded value, the residual, its expanded uncertainty U, and whether it is
-    within the plan: jitter, times, load and bytes at most as planned, or no further beside than U. What the recording
-    does not show is said. Of EtherCAT record all packets of the master's port, both ways. Times are in us. `busplan
-    manual measured` says how each figure is found. Exits 0 with any figures.
+    within the plan: jitter, times, load and bytes at most as planned, or beyond it by no more than U. A figure that the
+    recording does not show has a reason. Of EtherCAT record all packets of the master's port, both ways. Times are in
+    us. `busplan manual measured` says how each figure is measured. Exits 0 with any figures.
 
     Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
     """
@@ -358,35 +356,27 @@ def measured_command(
         if apply and not seen.edits:
             raise BusplanError(f"--apply: {recording} shows no value of a key")
         if apply:
-            for change in changes.by_set:
-                for key in seen.edits:
-                    require_separate(change, key, typed="--apply")
-            apply_changes(loaded.document, seen.edits, notes=seen.notes)
-            say(f"wrote {', '.join(seen.edits)} of {profile}; your comments are kept: see whether they hold")
+            _write_edits(loaded, changes, seen, words=", ".join(seen.edits))
         give(seen.report(applied_to=profile if apply else None))
 
 
-def _direction(option: str, *, default: str) -> typer.models.OptionInfo:
-    help_ = (
-        f"Quantity on the {option[-1]} axis: a key of the profile, or axes for the axes of all nodes (varies the "
-        "number of nodes; with groups, of the group with the most axes), and up to 64 values in its unit: "
-        f"{VALUES_HELP}  [default: {default}]"
+def _direction(name: str, *, default: str) -> Any:
+    return option(
+        f"{name} KEY=VALUES",
+        f"Quantity on the {name[-1]} axis: a key of the profile, or axes for the axes of all nodes (varies the number "
+        "of nodes; with groups, of the group with the most axes), and up to 64 values in its unit: "
+        f"{VALUES_HELP}  [default: {default}]",
     )
-    direction: typer.models.OptionInfo = typer.Option(option, metavar="KEY=VALUES", help=help_, show_default=False)
-    return direction
 
 
-@takes_changes(
-    period=" of this design with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
-    words="For a key on an axis of the map, it moves the mark.",
-)
+@takes_changes("For a key on an axis of the map, it moves the mark.", period=True)
 def map_command(
     profile: ProfileArgument,
     x: Annotated[str | None, _direction("--x", default="axes about the most that fit")] = None,
     y: Annotated[str | None, _direction("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
     changes: KeyChanges = NO_CHANGES,
     circle: Annotated[
-        bool, typer.Option("--circle", help="Also run the circle test of every cell that fits, up to 1,000.")
+        bool, option("--circle", "Also run the circle test of every cell that fits, up to 1,000.")
     ] = False,
     jobs: JobsOption = None,
     all_: AllOption = False,
@@ -402,32 +392,21 @@ def map_command(
 
     Example: busplan map paper-4ms --y cycle.period_us=500:4000:500
     """
-    chosen = drawn_form(format_, output)
-    if jobs is not None and not circle:
-        raise BusplanError("--jobs: goes with --circle")
-    if jobs is not None and jobs < 1:
-        raise BusplanError(f"--jobs {jobs}: must be 1 or more")
-
-    def find() -> "MapAnswer":
+    require_company("--circle", {"--jobs": jobs}, is_given=circle)
+    files = profile_files(profile)
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True) as give:
         from busplan.cli.workers import available_processors, executor
         from busplan.questions.map import map_
 
-        loaded = load_changed(profile, changes)
-        with ExitStack() as run:
-            return map_(
-                loaded,
-                x=_along(x, option="--x"),
-                y=_along(y, option="--y"),
-                circle=circle,
-                progress=run.enter_context(progress_bar("map")),
-                executor=run.enter_context(executor(jobs or available_processors())) if circle else None,
+        along_x, along_y = (
+            None if text is None else dict([parse_axis(text, option=name)]) for name, text in (("--x", x), ("--y", y))
+        )
+        processes = (jobs or available_processors()) if circle else 1
+        with progress_bar("map") as progress, executor(processes) as crew:
+            trade_off = map_(
+                load_changed(profile, changes), x=along_x, y=along_y, circle=circle, progress=progress, executor=crew
             )
-
-    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
-
-
-def _along(text: str | None, *, option: str) -> dict[str, str] | None:
-    return None if text is None else dict([parse_axis(text, option=option)])
+        give(trade_off)
 
 
 def _complete_kinds(incomplete: str) -> list[str]:
@@ -438,10 +417,7 @@ def _complete_kinds(incomplete: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in kind_names() if name.startswith(last)]
 
 
-@takes_changes(
-    period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
-    words="Of the profile, before it is put on other kinds.",
-)
+@takes_changes("It changes the profile before that is put on other kinds.", period=True)
 def compare_command(
     profile: ProfileArgument,
     buses: Annotated[
@@ -466,15 +442,12 @@ def compare_command(
 
     Example: busplan compare gantry-24
     """
-    chosen = drawn_form(format_, output)
-
-    def find() -> "CompareAnswer":
+    files = profile_files(profile)
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True) as give:
         from busplan.questions.compare import compare
 
         kinds = None if buses is None else [kind.strip() for kind in buses.split(",")]
-        return compare(load_changed(profile, changes), buses=kinds)
-
-    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
+        give(compare(load_changed(profile, changes), buses=kinds))
 
 
 def import_command(
@@ -488,15 +461,9 @@ def import_command(
     ],
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="NEW.toml",
-            help="Write the profile to a new file.  [default: standard output]",
-            show_default=False,
-        ),
+        option("--output,-o NEW.toml", "Write the profile to a new file.  [default: standard output]"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
+    force: Annotated[bool, option("--force", "Let -o overwrite a file that is already there.")] = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
 
@@ -522,15 +489,10 @@ def import_command(
         file = None if new is None else files.enter_context(new_file(new, overwrite=force))
         from busplan.questions.import_ import import_profile
 
-        name = None if new is None else new.stem
         with progress_bar("recording") as progress:
-            answer = import_profile(paths, name=name, progress=progress)
-        sentences = answer.sentences()
-        if file is None:
-            emit_document(answer.text)
-        else:
-            file.write(answer.text.encode())
+            imported = import_profile(paths, name=None if new is None else new.stem, progress=progress)
+        sentences = imported.sentences()
+        write_document(imported.text, file)
     say(*([f"wrote {new}"] if new else []), *sentences)
     if new:
-        shown = shlex.quote(f"./{new}" if str(new).startswith("-") else str(new))
-        say(f"next: busplan capacity {shown}")
+        say(f"next: busplan capacity {shlex.quote(f'./{new}' if str(new).startswith('-') else str(new))}")

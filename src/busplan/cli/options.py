@@ -1,23 +1,24 @@
 """Arguments and options of several commands, and parsers of their values."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from functools import wraps
 from inspect import Parameter, signature
+from itertools import product
 from math import isinf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 import typer
 
 from busplan.errors import BusplanError
-from busplan.forms import ENDINGS, Form, ending_expected
+from busplan.extras import require_resvg
+from busplan.forms import ENDINGS, PICTURES, Form, Picture, ending_expected
 from busplan.profile.changes import SET, KeyChange, KeyChanges, parse_set, require_separate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from busplan.sections.profile import Profile
 
 
@@ -101,19 +102,19 @@ def chosen_model(timing_model: str | None) -> str | None:
 
 
 def option(usage: str, words: str, **settings: Any) -> Any:
-    """Make an option whose help states the default: in the code it is None.
+    """Make an option whose help states the default: in the code it is None, or False.
 
     Parameters
     ----------
     usage
-        Name and value as in the help: "--jobs N".
+        Names and value as in the help: "--output,-o FILE".
     words
         Text of its help, with the default in brackets at the end.
     settings
         Further settings of typer's option.
     """
-    name, _, value = usage.partition(" ")
-    return typer.Option(name, metavar=value, help=words, show_default=False, **settings)
+    names, _, value = usage.partition(" ")
+    return typer.Option(*names.split(","), metavar=value or None, help=words, **{"show_default": False, **settings})
 
 
 STANDARD_OUTPUT: Final = Path("-")
@@ -128,37 +129,45 @@ def output_option(words: str) -> Any:
         Beginning of its help: what is written where.
     """
     help_ = f"{words}; an old file is replaced; - is standard output.  [default: standard output]"
-    return typer.Option("--output", "-o", metavar="FILE", parser=_file_unless_dash, help=help_, show_default=False)
+    return option("--output,-o FILE", help_, parser=_file_unless_dash)
 
 
 def _file_unless_dash(text: str) -> Path | None:
     return None if text == "-" else Path(text)
 
 
-def format_option(default: str) -> Any:
+def format_option(default: str, *, more: str = "") -> Any:
     """Make the option --format.
 
     Parameters
     ----------
     default
         The form without --format and --output.
+    more
+        What its help says of further forms.
     """
-    help_ = f"Form of the answer; a table is plain text.  [default: by the ending of --output, else {default}]"
-    return typer.Option("--format", help=help_, show_default=False)
+    help_ = f"Form of the answer; a table is plain text.{more}  [default: by the ending of --output, else {default}]"
+    return option("--format", help_)
 
 
-AllOption = Annotated[
-    bool, typer.Option("--all", help="Show everything: every row, and every column on a narrow terminal, too.")
-]
+AllOption = Annotated[bool, option("--all", "Show everything: every row, and every column on a narrow terminal, too.")]
 FormatOption = Annotated[Form | None, format_option("table")]
 JobsOption = Annotated[
-    int | None, option("--jobs N", "Number of processes for --circle.  [default: one for each processor]")
+    int | None, option("--jobs N", "Number of processes for --circle.  [default: one for each processor]", min=1)
 ]
 OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(ENDINGS)}")]
+DrawnForm = Literal[Form, Picture]
+"""Form of an answer that may also be a picture."""
+DRAWN_ENDINGS: Final[Mapping[str, DrawnForm]] = MappingProxyType({**ENDINGS, **PICTURES})
+DrawnFormatOption = Annotated[
+    DrawnForm | None,
+    format_option("table", more=" png goes to a file or a pipe, and needs the extra plot (resvg-py)."),
+]
+DrawnOutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(DRAWN_ENDINGS)}")]
 
 
 def form_of_file(
-    given: AnyForm | None, output: Path | None, *, forms: "Mapping[str, AnyForm]", default: AnyForm
+    given: AnyForm | None, output: Path | None, *, forms: Mapping[str, AnyForm], default: AnyForm
 ) -> AnyForm:
     """Choose the form of a document: by --format, else by the ending of --output, else the default.
 
@@ -172,6 +181,44 @@ def form_of_file(
     if chosen is None:
         raise BusplanError(f"--output {output}: {ending_expected(ending, forms, otherwise=', or --format')}")
     return chosen
+
+
+def plot_form(path: Path) -> Picture:
+    """Form of the picture of --plot, by the ending of its name.
+
+    Raises
+    ------
+    BusplanError
+        The ending is not known, or the form is png and resvg-py is missing.
+    """
+    ending = path.suffix.lower()
+    if ending not in PICTURES:
+        raise BusplanError(f"--plot {path}: {ending_expected(ending, PICTURES)}")
+    if ending == ".png":
+        require_resvg("--plot")
+    return PICTURES[ending]
+
+
+def require_company(company: str, options: Mapping[str, object], *, is_given: object) -> None:
+    """Refuse options that go with another option.
+
+    Parameters
+    ----------
+    company
+        The other option, as in its help.
+    options
+        Value by option; an empty value is an option that is not given.
+    is_given
+        Whether the other option is given.
+
+    Raises
+    ------
+    BusplanError
+        An option without its company.
+    """
+    for name, value in options.items():
+        if value and not is_given:
+            raise BusplanError(f"{name}: goes with {company}")
 
 
 VALUES_HELP: Final = (
@@ -223,19 +270,19 @@ def parse_axis(text: str, *, option: str) -> tuple[str, str]:
 _PERIOD: Final = "cycle.period_us"
 PeriodsOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--period",
-        metavar="TIME[,TIME...]",
-        help="Communication period with its unit, as 4ms, 250us or 0.001s, or several with commas.  [default: the "
+    option(
+        "--period TIME[,TIME...]",
+        "Communication period with its unit, as 4ms, 250us or 0.001s, or several with commas.  [default: the "
         "profile's cycle.period_us]",
-        show_default=False,
     ),
 ]
-
-
-def _period_option(words: str) -> Any:
-    option = typer.Option("--period", metavar="TIME", help=f"Communication period{words}", show_default=False)
-    return Annotated[str | None, option]
+_TakenPeriod = Annotated[
+    str | None,
+    option(
+        "--period TIME",
+        "Communication period with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
+    ),
+]
 
 
 def _period_change(text: str) -> KeyChange:
@@ -244,17 +291,16 @@ def _period_change(text: str) -> KeyChange:
 
 
 def _set_option(words: str) -> Any:
-    help_ = (
+    usage = (
         "Compute with another value of a key of the profile, as cycle.nonperiodic_us=50, bus.speed=S200 or "
         "node.execution.time_us=[30,40]. VALUE is TOML, a number without its unit, and is checked like the file; a "
         f"table replaces the whole section. May be given several times.{words and ' '}{words}  [default: the profile "
         "as it is]"
     )
-    option = typer.Option(SET, metavar="KEY=VALUE", help=help_, show_default=False)
-    return Annotated[list[str] | None, option]
+    return Annotated[list[str] | None, option(f"{SET} KEY=VALUE", usage)]
 
 
-def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
+def takes_changes(words: str = "", *, period: bool = False) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Replace the parameter `changes` of a command by --set, and by --period where that sets the profile's period.
 
     Parameters
@@ -262,45 +308,38 @@ def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..
     words
         End of the help of --set: what is special here.
     period
-        End of the help of --period, with the default; empty where the command has none, or its own.
+        Whether --period sets the profile's period; a command may have its own, for several.
     """
-    options = {**({"period": _period_option(period)} if period else {}), "set_": _set_option(words)}
+    options = {**({"period": _TakenPeriod} if period else {}), "set_": _set_option(words)}
 
     def replaced(command: Callable[..., None]) -> Callable[..., None]:
-        own = signature(command)
+        written = signature(command)
         parameters: list[Parameter] = []
-        for parameter in own.parameters.values():
+        for parameter in written.parameters.values():
             if parameter.name == "changes":
-                kinds = options.items()
-                parameters += [
-                    Parameter(name, parameter.kind, default=None, annotation=option) for name, option in kinds
-                ]
+                for name, annotation in options.items():
+                    parameters.append(Parameter(name, parameter.kind, default=None, annotation=annotation))
             else:
                 parameters.append(parameter)
 
         @wraps(command)
-        def with_changes(*arguments: Any, set_: list[str] | None, **others: Any) -> None:
-            text = others.pop("period") if period else None
+        def with_changes(*arguments: Any, set_: list[str] | None, **given: Any) -> None:
+            text = given.pop("period") if period else None
             made = () if text is None else (_period_change(text),)
             changes = KeyChanges((*made, *parse_set(set_ or ())))
-            for computed in others.get("period") or ():
-                _require_no_period(changes, computed)
-            command(*arguments, changes=changes, **others)
+            # Periods to compute, such as 4ms, beside a change of the period.
+            for computed, change in product(given.get("period") or (), changes.entries):
+                if change.key == _PERIOD:
+                    require_separate(change, _PERIOD, typed=f"--period {computed}")
+            command(*arguments, changes=changes, **given)
 
         # Typer reads the options of a command from its signature; without it every command would list these two.
-        with_changes.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+        with_changes.__signature__ = written.replace(parameters=parameters)  # type: ignore[attr-defined]
         kept = {name: annotation for name, annotation in command.__annotations__.items() if name != "changes"}
         with_changes.__annotations__ = {**kept, **options}
         return with_changes
 
     return replaced
-
-
-def _require_no_period(changes: KeyChanges, text: str) -> None:
-    """Refuse periods to compute, such as 4ms, beside a change of the period."""
-    for change in changes.each:
-        if change.key == _PERIOD:
-            require_separate(change, _PERIOD, typed=f"--period {text}")
 
 
 def load_changed(argument: str, changes: KeyChanges) -> "Profile":
@@ -343,7 +382,7 @@ def _period_changes(text: str) -> list[KeyChange]:
         raise BusplanError(f"--period {text}: expected times with their unit between commas, as 500us,1ms") from None
 
 
-def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "list[Profile]":
+def load_each(arguments: Sequence[str], load: "Callable[[str], Profile]") -> "list[Profile]":
     """Read every profile.
 
     Parameters
@@ -360,10 +399,9 @@ def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "li
     """
     profiles: list[Profile] = []
     problems: list[str] = []
-    asked = list(arguments)
-    if asked.count("-") > 1:
+    if arguments.count("-") > 1:
         raise BusplanError("-: standard input can be read once; give files for the others")
-    for argument in asked:
+    for argument in arguments:
         try:
             profiles.append(load(argument))
         except BusplanError as error:

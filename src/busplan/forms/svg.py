@@ -1,12 +1,11 @@
 """Drawings as SVG: widths are in percent, so that a drawing fills its container and text keeps its size."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from importlib.resources import as_file, files
 from itertools import groupby
-from math import ceil, cos, log, radians, sin
-from types import MappingProxyType
+from math import ceil, cos, radians, sin
 from typing import TYPE_CHECKING, Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -24,6 +23,7 @@ from busplan.forms.charts import (
     Span,
     legend,
 )
+from busplan.forms.inks import styled
 from busplan.forms.lines import Line, wrapped
 from busplan.forms.scale import placed
 
@@ -62,106 +62,6 @@ def png(svg: str) -> bytes:
             font_files=[str(fonts / "regular.ttf"), str(fonts / "bold.ttf")],
             style_sheet=_FONT,
         )
-
-
-DARK: Final = "@media screen and (prefers-color-scheme:dark)"
-"""Media query for the colours on a dark background; printed pages are light."""
-
-
-class InkColours(NamedTuple):
-    """Colours of one ink."""
-
-    light: str
-    """On a light background."""
-    dark: str
-    """On a dark background."""
-
-
-def _shades(name: str, pale: tuple[int, int, int], deep: tuple[int, int, int]) -> dict[str, InkColours]:
-    """Colours from pale to deep, evenly; black letters are read on all of them."""
-    shades = {}
-    for level in range(LEVELS):
-        share = level / (LEVELS - 1)
-        parts = (round(start + share * (end - start)) for start, end in zip(pale, deep, strict=True))
-        shades[f"{name}-{level}"] = InkColours(*[f"#{''.join(f'{part:02x}' for part in parts)}"] * 2)
-    return shades
-
-
-LEVELS: Final = 10
-"""Colours of numbers above zero, and of those below."""
-INKS: Final[Mapping[str, InkColours]] = MappingProxyType(
-    {
-        "first": InkColours("#1d4f91", "#8cb8f5"),
-        "second": InkColours("#a34a00", "#f5b041"),
-        "sync": InkColours("#7c3aed", "#a78bfa"),
-        "contention": InkColours("#e08a00", "#f5b041"),
-        "request": InkColours("#1d6fd8", "#5aa9ff"),
-        "acknowledge": InkColours("#c8327c", "#ff7fb5"),
-        "work": InkColours("#5aa845", "#6fbf5a"),
-        "response": InkColours("#0a8f94", "#38c6c4"),
-        "gap": InkColours("#b4bcc6", "#778292"),
-        "long-gap": InkColours("#8792a0", "#4d5765"),
-        "reserve": InkColours("#9a5b2e", "#d39a6a"),
-        "idle": InkColours("#e6eaef", "#252d38"),
-        # Data from nodes are teal as responses are, data to nodes blue as requests are.
-        "in": InkColours("#2a9d8f", "#5cc9bb"),
-        "out": InkColours("#4668a8", "#7c9fe0"),
-        "fits": InkColours("#6cc07a", "#5cab67"),
-        "unsure": InkColours("#f2c14e", "#dba82f"),
-        "short": InkColours("#d5dae0", "#8792a0"),
-        "barred": InkColours("#aab4c0", "#667282"),
-        "unsafe": InkColours("#ec7fb4", "#e377ad"),
-        "uneven": InkColours("#74aef7", "#6ea8f5"),
-        "unjudged": InkColours("#bfe3c4", "#a5d0ab"),
-        "refused": InkColours("#b59ae0", "#a78fd4"),
-        **_shades("above", (233, 241, 252), (52, 128, 216)),
-        **_shades("below", (251, 228, 224), (214, 84, 72)),
-    }
-)
-"""Colours by ink; the name of an ink is its CSS class."""
-
-
-def fills(scope: str) -> tuple[str, str]:
-    """CSS rules that colour each ink inside a selector: for a light background and for a dark one."""
-    light, dark = (
-        "".join(f"{scope} .{ink}{{color:{colours[side]};fill:{colours[side]}}}\n" for ink, colours in INKS.items())
-        for side in (0, 1)
-    )
-    return light, dark
-
-
-_PAPER: Final = ".chart{background:var(--paper)}\n.chart .paper{fill:var(--paper)}\n"
-_SHEET_OF_PAPER: Final = '<rect class="paper" width="100%" height="100%"/>'
-"""For viewers that have no background of an SVG."""
-_ROOT: Final = re.compile(r":root\s*\{([^}]*)\}")
-_DARK_ROOT: Final = re.compile(r"\A.*?\}\s*\}\n", re.DOTALL)
-"""The variables at the top of the style sheet: for light backgrounds, and for dark ones."""
-_VARIABLE: Final = re.compile(r"(--[\w-]+):\s*([^;]+);")
-_THEMED: Final = re.compile(r"[^{}]*\{[^{}]*var\([^{}]*\}")
-"""A rule with a variable."""
-
-
-def styled(svg: str) -> str:
-    """Add the style sheet of the page's charts to a drawing.
-
-    Each colour stands in it twice, for light and for dark backgrounds: not every viewer of SVG knows variables.
-
-    Parameters
-    ----------
-    svg
-        The drawing.
-    """
-    chart = (files("busplan.forms") / "templates" / "chart.css").read_text(encoding="utf-8")
-    light, dark = (dict(_VARIABLE.findall(block)) for block in _ROOT.findall(chart))
-    rules = f"{_DARK_ROOT.sub('', chart)}{_PAPER}"
-    on_light, on_dark = fills(".chart")
-    sheet = f"{_filled(rules, light)}{on_light}{DARK}{{{_filled(''.join(_THEMED.findall(rules)), dark)}{on_dark}}}"
-    head, body = svg.split(">", 1)
-    return f"{head}>\n<style>{sheet}</style>{_SHEET_OF_PAPER}{body}"
-
-
-def _filled(rules: str, colours: Mapping[str, str]) -> str:
-    return re.sub(r"var\((--[\w-]+)\)", lambda match: colours[match[1]], rules)
 
 
 _PHONE: Final = 335
@@ -270,13 +170,6 @@ def _percent(share: float) -> str:
     return f"{100 * share:.5g}%"
 
 
-def _share(ruler: Ruler, value: float) -> float:
-    """Place of a value on a scale, from 0 to 1."""
-    if ruler.is_log:
-        return log(value / ruler.low) / log(ruler.high / ruler.low)
-    return (value - ruler.low) / (ruler.high - ruler.low)
-
-
 class _Area(NamedTuple):
     """A plot between two scales."""
 
@@ -289,11 +182,11 @@ class _Area(NamedTuple):
 
     def x(self, value: float) -> str:
         """The x of a value, in percent."""
-        return _percent(_share(self.plot.across, value))
+        return _percent(self.plot.across.share(value))
 
     def y(self, value: float) -> float:
         """The y of a value, in px."""
-        return self.top + self.height * (1 - _share(self.plot.up, value))
+        return self.top + self.height * (1 - self.plot.up.share(value))
 
     def paths(self) -> Element:
         """A place for paths in the coordinates of `point`, clipped to the plot; stretched with it but in a PNG."""
@@ -391,12 +284,12 @@ class _Sheet:
         gutter = min(_GUTTER, 100 * (_SMALL_LETTER * longest + 12) / self._room)
         area = _inside(self._body, left=gutter, width=99 - gutter)
         width = WIDTH * (1 - 2 * _MARGIN / 100) * (99 - gutter) / 100
-        places = [(height * (1 - _share(up, tick.at)), _ROW) for tick in up.ticks]
-        for number in placed(places, room=height + _ROW, own=_own(up)):
+        places = [(height * (1 - up.share(tick.at)), _ROW) for tick in up.ticks]
+        for number in placed(places, room=height + _ROW, own=up.own_tick):
             y = top + places[number][0]
             if isinstance(plot, Curves):
                 _line(area, ("0", "100%"), (y, y), css="rule")
-            css = "small here" if number == _own(up) else "small"
+            css = "small here" if number == up.own_tick else "small"
             _text(self._body, up.ticks[number].label, x=f"{gutter - 2:.5g}%", y=round(y) + 4, css=css, anchor="end")
         self.y = top + height
         self._across(area, across, room=self._room * (99 - gutter) / 100)
@@ -406,13 +299,13 @@ class _Sheet:
 
     def _across(self, area: Element, ruler: Ruler, *, room: float) -> None:
         """Draw the ticks of a scale below a plot that is `room` px wide or more."""
-        labels = [(room * _share(ruler, tick.at), _SMALL_LETTER * len(tick.label)) for tick in ruler.ticks]
-        for number, start in placed(labels, room=room, gap=_SMALL_LETTER, own=_own(ruler)).items():
+        labels = [(room * ruler.share(tick.at), _SMALL_LETTER * len(tick.label)) for tick in ruler.ticks]
+        for number, start in placed(labels, room=room, gap=_SMALL_LETTER, own=ruler.own_tick).items():
             (at, size), tick = labels[number], ruler.ticks[number]
-            x, middle = _percent(_share(ruler, tick.at)), at - size / 2
+            x, middle = _percent(ruler.share(tick.at)), at - size / 2
             _line(area, (x, x), (self.y, self.y + 5), css="rule")
             anchor = "middle" if abs(start - middle) < 1 else "start" if start > middle else "end"
-            css = "small here" if number == _own(ruler) else "small"
+            css = "small here" if number == ruler.own_tick else "small"
             _text(area, tick.label, x=x, y=self.y + 19, css=css, anchor=anchor)
         self.y += _LINE + 2
 
@@ -445,7 +338,7 @@ class _Sheet:
             if is_fine:
                 _frame(place, x="-6", y=-6, width="12", height=12)
             else:
-                left = _percent(_share(grid.across, x) - wide / 2)
+                left = _percent(grid.across.share(x) - wide / 2)
                 _frame(area.area, x=left, y=area.y(y) - tall / 2, width=_percent(wide), height=tall)
 
     @staticmethod
@@ -466,7 +359,7 @@ class _Sheet:
     def _curves(self, curves: Curves) -> None:
         area = self._area(curves, height=_CURVES)
         for shade in curves.shades:
-            low, high = (_share(curves.across, end) for end in (shade.low, shade.high))
+            low, high = (curves.across.share(end) for end in (shade.low, shade.high))
             box = {"x": _percent(low), "width": _percent(high - low)}
             _rect(area.area, **box, y=area.top, height=_CURVES, css=f"shade {shade.entry.ink}")
             middle, foot = _percent((low + high) / 2), area.top + _CURVES - 6
@@ -480,8 +373,8 @@ class _Sheet:
             if curve.has_line:
                 SubElement(paths, "path", {"class": f"line {curve.entry.ink}", "d": _path(area, curve)})
         for curve in curves.curves:
-            known = [(number, x, y) for number, (x, y) in enumerate(curve.points) if y is not None]
-            for number, x, y in (known if curve.has_dots else known[-1:]) if curve.entry.mark else ():
+            points = [(number, x, y) for number, (x, y) in enumerate(curve.points) if y is not None]
+            for number, x, y in (points if curve.has_dots else points[-1:]) if curve.entry.mark else ():
                 title = curve.words[number] if curve.words else ""
                 _dot(area.area, curve.entry, x=area.x(x), y=area.y(y), title=title)
 
@@ -506,7 +399,7 @@ class _Sheet:
             for span in lane.spans:
                 _span(area, span, lanes.across, y=self.y, height=tall)
             for guide in lanes.guides:
-                x = _percent(_share(lanes.across, guide.x or 0.0))
+                x = _percent(lanes.across.share(guide.x or 0.0))
                 _line(area, (x, x), (self.y - 2, self.y + tall + 2), css=f"line {guide.entry.ink}")
             self.y += tall + 3
         self._across(area, lanes.across, room=self._room * (100 - gutter) / 100)
@@ -531,11 +424,6 @@ class _Sheet:
         self.y += tall
 
 
-def _own(ruler: Ruler) -> int | None:
-    """Number of the tick of this design."""
-    return next((number for number, tick in enumerate(ruler.ticks) if tick.at == ruler.own), None)
-
-
 def _borders(grid: ChartGrid) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
     """Edges between cells inside and outside, as shares of the plot."""
     wide, tall = 1 / len(grid.rows[0]), 1 / len(grid.rows)
@@ -554,7 +442,7 @@ def _path(area: _Area, curve: Curve) -> str:
     pieces, is_joined = [], False
     for x, y in curve.points:
         if y is not None:
-            point = area.point(_share(area.plot.across, x), _share(area.plot.up, y))
+            point = area.point(area.plot.across.share(x), area.plot.up.share(y))
             pieces.append(f"{'L' if is_joined else 'M'}{point}")
         is_joined = y is not None
     return "".join(pieces)
@@ -562,7 +450,7 @@ def _path(area: _Area, curve: Curve) -> str:
 
 def _span(area: Element, span: Span, ruler: Ruler, *, y: float, height: float) -> None:
     """Draw a bar, and its letter if there is room."""
-    start, end = (100 * min(1.0, max(0.0, _share(ruler, at))) for at in (span.start, span.end))
+    start, end = (100 * min(1.0, max(0.0, ruler.share(at))) for at in (span.start, span.end))
     width, ink = f"{end - start:.5g}%", span.entry.ink
     _rect(area, x=f"{start:.5g}%", y=y, width=width, height=height, css=ink, title=span.words)
     if end - start >= _LETTER_PERCENT and height >= _ROW - 3:

@@ -11,9 +11,10 @@ from pydantic_core import ErrorDetails
 from busplan.buses import kind_names
 from busplan.english import printable
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
-from busplan.profile.document import Document, KeyPath
+from busplan.profile.document import Document
 from busplan.profile.edit import value_text
 from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, named_path, path_of, profile_model
+from busplan.profile.places import KeyPath
 from busplan.sections.base import MISSING, Problem
 
 _TAG: Final = "kind"
@@ -208,9 +209,6 @@ def _example(model: type[BaseModel]) -> str:
 
 
 def _unknown(path: KeyPath, section: type[BaseModel]) -> str:
-    instead = getattr(section, "removed", {}).get(path[-1])
-    if instead is not None:
-        return f"removed key: {instead}"
     names = list(section.model_fields)
     close = get_close_matches(str(path[-1]), names, n=1)
     if close:
@@ -274,16 +272,12 @@ def refused_changes(
     sources: dict[KeyPath, str] = {
         path_of(data, key): origin.get(key, f"{key} {value}") for key, value in changes.items()
     }
-    return BusplanError(*(_of_changes(finding, sources, kind=kind_of(data)) for finding in findings(error, data)))
+    return BusplanError(*(_of_changes(finding, sources) for finding in findings(error, data)))
 
 
-def _of_changes(finding: KeyFinding, sources: dict[KeyPath, str], *, kind: str | None) -> str:
+def _of_changes(finding: KeyFinding, sources: dict[KeyPath, str]) -> str:
     """Message for a problem after changes: of a changed key, of a key around or inside it, or of any other key."""
     if finding.path in sources:
-        if finding.kind == "unknown-key" and finding.key not in sources[finding.path]:
-            # The option stands for a key that its user did not write.
-            what = str(finding.path[-1]).replace("_", " ")
-            return f"{sources[finding.path]}: a bus of kind {kind} has no {what}"
         return f"{sources[finding.path]}: {finding.message}"
     near = [source for path, source in sources.items() if all(map(eq, path, finding.path))]
     if near:

@@ -21,10 +21,10 @@ from busplan.sections.cycle import (
     TableExecution,
 )
 from busplan.sections.machine import (
-    AlikeNodes,
     CircleSection,
     DeliverySection,
     MechanicsSection,
+    ProfileGroup,
     ServoSection,
     ToleranceSection,
 )
@@ -86,15 +86,15 @@ class Profile(Section):
 
     @property
     def asks_for_circle(self) -> bool:
-        """Whether the profile says anything that a circle test is for."""
+        """Whether the profile has a section of the circle test."""
         return not self.model_fields_set.isdisjoint(CIRCLE_SECTIONS)
 
     @property
-    def alike_nodes(self) -> tuple[AlikeNodes, ...]:
-        """The nodes, as groups of which each is alike, in the order of the chain; none of a network without a cycle."""
+    def node_groups(self) -> tuple[ProfileGroup, ...]:
+        """The groups of nodes, in the order of the chain: one where all are alike, none where there is no cycle."""
         if self.group:
-            return tuple(AlikeNodes(group.name, group.nodes, group, group) for group in self.group)
-        return (AlikeNodes("", self.bus.nodes, self.node, self.payload),) if self.has_cycle else ()
+            return tuple(ProfileGroup(group.name, group.nodes, group, group) for group in self.group)
+        return (ProfileGroup("", self.bus.nodes, self.node, self.payload),) if self.has_cycle else ()
 
     @property
     def has_cycle(self) -> bool:
@@ -102,23 +102,23 @@ class Profile(Section):
         return True
 
     @classmethod
-    def nodes_problems(cls, said: Collection[str]) -> Iterator[Problem]:
-        """Tell what is wrong with the way a profile says its nodes: all alike, or in groups.
+    def nodes_problems(cls, given: Collection[str]) -> Iterator[Problem]:
+        """Tell what is wrong with the way a profile gives its nodes: all alike, or in groups.
 
         Parameters
         ----------
-        said
-            Which sections, and which of the key bus.nodes, it has.
+        given
+            The sections that it has, and "bus.nodes" if it has that key.
         """
         for key in OF_ALIKE_NODES:
-            if "group" in said and key in said:
+            if "group" in given and key in given:
                 where = ", as group.NAME.nodes" if key == "bus.nodes" else ""
                 yield Problem(f"each [[group]] has its own{where}; remove one of the two", key=key, kind="inconsistent")
-            elif "group" not in said and key not in said:
+            elif "group" not in given and key not in given:
                 yield Problem(MISSING, key=key, kind="missing-key")
 
     @model_validator(mode="after")
-    def _nodes_are_said_once(self) -> Self:
+    def _nodes_are_given_once(self) -> Self:
         present = {name for name in self.model_fields_set if getattr(self, name) not in (None, ())}
         problems = list(self.nodes_problems(present | ({"bus.nodes"} if self.bus.nodes is not None else set())))
         names = [group.name for group in self.group]
@@ -140,7 +140,7 @@ class Profile(Section):
                 key=key,
                 kind="execution-unknown",
             )
-            for place, nodes in enumerate(self.alike_nodes)
+            for place, nodes in enumerate(self.node_groups)
             if isinstance(execution := nodes.node.execution, TableExecution)
             for key, size, sum_ in _payloads(nodes, place)
             if not execution.covers(size)
@@ -150,7 +150,7 @@ class Profile(Section):
         return self
 
 
-def _payloads(nodes: AlikeNodes, place: int) -> Iterator[tuple[str, int, str]]:
+def _payloads(nodes: ProfileGroup, place: int) -> Iterator[tuple[str, int, str]]:
     """Key of each payload, its bytes, and a word on how they add up where the key does not hold all of them."""
     section = f"group.{place}" if nodes.name else "payload"
     for kind in TRANSACTION_KINDS:

@@ -229,7 +229,7 @@ def _traffic(network: Network) -> Traffic:
 
 
 def _pdos(group: Group, bus: Any, kind: TransactionKind, *, is_first: bool) -> Pdos:
-    payload = group.said.payload
+    payload = group.payload
     identifier = getattr(payload, f"{NAMES[kind]}_identifier")
     if identifier is None:
         identifier = int(_FIRST[kind]) if is_first else FOLLOWS

@@ -30,9 +30,14 @@ if TYPE_CHECKING:
 
 def _pdo_per(network: Network) -> Setting:
     """PDOs of each axis, where a node has several: its parameters map them."""
-    keys = {nodes.name: f"group.{nodes.name}.pdo_per" if nodes.name else "payload.pdo_per" for nodes in network.alike}
+    keys = {
+        nodes.name: f"group.{nodes.name}.pdo_per" if nodes.name else "payload.pdo_per"
+        for nodes in network.profile.node_groups
+    }
     several = {
-        keys[nodes.name]: "axis" for nodes in network.alike if nodes.payload.pdo_per == "node" and nodes.node.axes > 1
+        keys[nodes.name]: "axis"
+        for nodes in network.profile.node_groups
+        if nodes.payload.pdo_per == "node" and nodes.node.axes > 1
     }
     reason = "" if several else "each axis has one already"
     values = (several,) if several else ()
@@ -158,7 +163,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         rate, data_rate = network.profile.bus.bit_rate_kbit_s, network.profile.bus.data_bit_rate_kbit_s
         most = BIT_RATES[-1] if data_rate is None else data_rate
         return (
-            *((_pdo_per(network),) if any(nodes.node.axes > 1 for nodes in network.alike) else ()),
+            *((_pdo_per(network),) if any(nodes.node.axes > 1 for nodes in network.profile.node_groups) else ()),
             _higher("bit_rate", rate, [higher for higher in BIT_RATES if higher <= most]),
             *(() if data_rate is None else (_higher("data_bit_rate", data_rate, DATA_BIT_RATES),)),
             _identifier_bits(network),
@@ -180,22 +185,18 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     def payloads(self, network: Network) -> PayloadRange:
         """Whole bytes up to four frames of each PDO."""
         most_bytes = min(pdos.most_bytes for pdos in traffic_of(network).pdos)
-        axes = (int(plain(group.axes)) for group in network.groups if group.said.payload.pdo_per == "axis")
+        axes = (int(plain(group.axes)) for group in network.groups if group.payload.pdo_per == "axis")
         return PayloadRange(1, most_bytes * max(min(axes, default=1), 1), carrier="four frames")
 
     def setpoints_every(self, network: Network) -> tuple[str, int]:
         """Cycles between set-points of the fastest group."""
         groups = [group for group in network.groups if plain(group.axes)] or network.groups
-        fastest = min(groups, key=lambda group: plain(group.every))
-        return f"group.{fastest.said.name}.every" if fastest.said.name else "payload.every", int(plain(fastest.every))
+        fastest = min(groups, key=lambda group: plain(group.every)).members[0]
+        return f"group.{fastest.name}.every" if fastest.name else "payload.every", int(plain(fastest.payload.every))
 
     def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
         """Nodes and axes; of a network without them its messages."""
         return super().counted(network) if network.groups else ((len(network.profile.message), "message"),)
-
-    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
-        """Say what each frame is charged."""
-        return "every frame with the stuff bits of its length"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The bit rate, or both of CAN FD, and PDOs that are not in every cycle."""
@@ -203,7 +204,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         data = "" if bus.data_bit_rate_kbit_s is None else f", {bus.data_bit_rate_kbit_s:g} kbit/s of data"
         seldom = (
             f"PDOs {nodes.name and f'of {nodes.name} '}every {int(plain(nodes.payload.every))} cycles"
-            for nodes in network.alike
+            for nodes in network.profile.node_groups
             if nodes.payload.every > 1
         )
         return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}", *seldom)

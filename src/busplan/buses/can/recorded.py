@@ -18,16 +18,15 @@ from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, 
 from busplan.elementwise import plain
 from busplan.english import first_of, plural
 from busplan.progress import Progress
-from busplan.recordings.can import (
+from busplan.recordings.can import CanFrames, read_can
+from busplan.recordings.can_timing import (
     LISTED,
-    CanFrames,
     SentFrames,
     event_model,
     faults,
     least_bit_rate,
     longest_stretch,
     mean_period,
-    read_can,
     sent_messages,
     stamps_of_no_bus,
     step_us,

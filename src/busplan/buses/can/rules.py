@@ -11,7 +11,7 @@ from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.equations import MAX_IDENTIFIER, MOST_NODES, MOST_STEPS, SATURATED
 from busplan.buses.can.frames import Points, Stream, Traffic, last_identifier, streams, traffic_of
 from busplan.buses.can.waiting import message_responses
-from busplan.buses.limits import NODE_LIMIT, Bound, Limit
+from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, larger, plain, pointwise, smaller, total, within
@@ -182,26 +182,30 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",
-        Bound(_pdos, lambda _network: MOST_NODES),
+        _pdos,
+        lambda _network: MOST_NODES,
         way_out=f"a second bus has {MOST_NODES:g} more",
     ),
     Limit(
         "payload",
         _payload_words,
-        Bound(_largest_pdo, _least_room),
+        _largest_pdo,
+        _least_room,
         way_out="a smaller payload would do",
     ),
     Limit(
         "range",
         "identifier {value:.0f} is over {most:.0f}, the largest of {bus.identifier_bits} bits",
-        Bound(_largest_identifier, _most_identifier),
+        _largest_identifier,
+        _most_identifier,
         way_out="smaller identifiers, or those of 29 bits, have room",
         is_slow=True,
     ),
     Limit(
         "identifiers",
         lambda network: first_of([words for _, words in _collision_words(network)], 1),
-        Bound(_identifiers_twice, lambda _network: 0),
+        _identifiers_twice,
+        lambda _network: 0,
         way_out="identifiers further apart have room",
         has_rule=True,
         is_slow=True,
@@ -209,17 +213,19 @@ LIMITS: Final = (
     Limit(
         "load",
         _load_words,
-        Bound(_load, lambda network: network.profile.limits.max_load),
+        _load,
+        lambda network: network.profile.limits.max_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
-        period=lambda _bound, network: CanCycle(network, WORST).load_period_us,
+        period=lambda _limit, network: CanCycle(network, WORST).load_period_us,
         has_rule=True,
     ),
     Limit(
         "deadline",
         _deadline_words,
-        Bound(_deadline, lambda _network: 1),
+        _deadline,
+        lambda _network: 1,
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
-        period=lambda _bound, network: _kept_from_us(network),
+        period=lambda _limit, network: _kept_from_us(network),
         has_rule=True,
         is_slow=True,
     ),
@@ -239,7 +245,7 @@ def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:
     """Two senders use one identifier: a problem for each key that sets those of the second."""
     # Groups that the network joins have keys of their own.
     groups = [
-        group._replace(said=nodes, nodes=nodes.nodes, members=())
+        group._replace(nodes=nodes.nodes, members=(nodes,))
         for group in subject.network.groups
         for nodes in group.members
     ]

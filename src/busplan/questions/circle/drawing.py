@@ -25,11 +25,10 @@ from busplan.forms.charts import (
 from busplan.forms.lines import Tone
 from busplan.forms.numbers import ROUNDING_UM, decimals_of, period
 from busplan.forms.scale import ring_step
-from busplan.questions.circle import CircleFigures, CircleTest
-from busplan.questions.circle.failures import ContourProfile, contour_profile
+from busplan.questions.circle import CircleFigures, CircleTestAnswer
 from busplan.sections.machine import ToleranceSection
 from busplan.servo.circle import CircleRun
-from busplan.servo.contour import contour_error
+from busplan.servo.contour import blocks, contour_error
 from busplan.servo.path import Direction
 
 _ERROR_SHARE: Final = 0.25
@@ -40,6 +39,51 @@ _FLAT: Final = 0.1
 """Errors whose spread is a smaller share of the largest would look like one line above zero."""
 _NANOMETRES_BELOW_UM: Final = 0.1
 TOLERANCE: Final = Entry("tolerance", "tolerance of the largest error", shape="line")
+
+
+CONTOUR_SECTORS: Final = 720
+"""Sectors of the drawn circle: half a degree each, narrower than a printed line."""
+
+
+class ContourProfile(NamedTuple):
+    """Smallest and largest contour error in equal sectors from the x axis on [mm]; None in a sector without points."""
+
+    low_mm: tuple[float | None, ...]
+    high_mm: tuple[float | None, ...]
+
+    @property
+    def largest_mm(self) -> float:
+        """Largest contour error, without its sign [mm]."""
+        return max((abs(error) for error in (*self.low_mm, *self.high_mm) if error is not None), default=0.0)
+
+
+def contour_profile(run: CircleRun) -> ContourProfile:
+    """Condense the measured part of a circle test.
+
+    Parameters
+    ----------
+    run
+        The simulation.
+
+    Returns
+    -------
+    ContourProfile
+        Sector 0 begins on the positive x axis; sectors follow counter-clockwise.
+    """
+    low, high = np.full(CONTOUR_SECTORS, np.inf), np.full(CONTOUR_SECTORS, -np.inf)
+    for block in blocks(run.measured):
+        x_mm, y_mm = run.x_mm[block], run.y_mm[block]
+        error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
+        turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
+        sector = np.minimum((turn * CONTOUR_SECTORS).astype(np.int64), CONTOUR_SECTORS - 1)
+        # Neighbouring points are mostly in the same sector: only the extremes of each stay are looked at one by one.
+        entered = np.flatnonzero(np.diff(sector, prepend=-1))
+        np.minimum.at(low, sector[entered], np.minimum.reduceat(error_mm, entered))
+        np.maximum.at(high, sector[entered], np.maximum.reduceat(error_mm, entered))
+    return ContourProfile(
+        tuple(float(value) if np.isfinite(value) else None for value in low),
+        tuple(float(value) if np.isfinite(value) else None for value in high),
+    )
 
 
 class LengthUnit(NamedTuple):
@@ -122,11 +166,6 @@ def magnified(largest_mm: float, *, tolerance_mm: float | None) -> Magnified | N
     return Magnified(edge_mm, ring_step(edge_mm * 1e3), drawn)
 
 
-def largest_mm(contour: ContourProfile) -> float:
-    """Largest contour error around the circle, without its sign [mm]."""
-    return max((abs(error) for error in (*contour.low_mm, *contour.high_mm) if error is not None), default=0.0)
-
-
 class ErrorRange(NamedTuple):
     """Range of a scale of errors."""
 
@@ -161,9 +200,9 @@ def error_range(low_um: float, high_um: float) -> ErrorRange:
     >>> error_range(502.456, 502.458)
     ErrorRange(bottom_um=502.456, top_um=502.458)
     """
-    spread_um, largest_um = high_um - low_um, max(abs(low_um), abs(high_um))
-    if low_um * high_um > 0 and ROUNDING_UM <= spread_um < _FLAT * largest_um:
-        return ErrorRange(low_um, high_um)
+    errors = ErrorRange(low_um, high_um)
+    if errors.zero_outside and ROUNDING_UM <= high_um - low_um < _FLAT * errors.largest_um:
+        return errors
     return ErrorRange(min(0.0, low_um), max(0.0, high_um))
 
 
@@ -190,18 +229,12 @@ def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> Dia
     return Dial(Entry("first"), low, high, tuple(rings), (scale.ring_text, "a ring"), direction == "cw")
 
 
-def circle_drawing(contour: ContourProfile, scale: Magnified, direction: Direction) -> Drawing:
-    """Draw the circle alone; parameters as `dial` has them."""
-    return Drawing("Circle with its contour error magnified", (Panel(dial(contour, scale, direction)),))
-
-
 Floats = NDArray[np.float64]
-
 _MAX_POINTS: Final = 2000
 """Most points of one curve: more would not be visible."""
 
 
-class Stretch(NamedTuple):
+class _Stretch(NamedTuple):
     """A part of the move. Of many points, the smallest and the largest error of each stretch are kept."""
 
     time_s: Floats
@@ -209,21 +242,16 @@ class Stretch(NamedTuple):
     measured: bool
 
 
-class CircleRow(NamedTuple):
+class _Row(NamedTuple):
     """One simulated period."""
 
     result: CircleFigures
     run: CircleRun
-    curves: tuple[Stretch, ...]
-
-    @property
-    def judged(self) -> tuple[Stretch, ...]:
-        """Curves that mean and largest error are taken from: the whole move on a trapezoid."""
-        return tuple(curve for curve in self.curves if curve.measured or self.result.path == "trapezoid")
+    curves: tuple[_Stretch, ...]
 
 
-class Scales(NamedTuple):
-    """Scales and limits that all rows share, so that they compare."""
+class _Scales(NamedTuple):
+    """_Scales and limits that all rows share, so that they compare."""
 
     circle: Magnified | None
     """None if there is no error to show."""
@@ -232,31 +260,14 @@ class Scales(NamedTuple):
     tolerance: ToleranceSection
 
 
-def circle_rows(test: CircleTest) -> list[CircleRow]:
-    """Rows of the periods that were simulated.
-
-    Parameters
-    ----------
-    test
-        The circle test.
-    """
-    pairs = zip(test.results, test.runs, strict=True)
-    return [CircleRow(result, run, _curves(run)) for result, run in pairs if run is not None]
-
-
-def common_scales(rows: Sequence[CircleRow], tolerance: ToleranceSection) -> Scales:
-    """Scales of all rows. A row whose table left the circle counts only if there is no other.
-
-    Parameters
-    ----------
-    rows
-        The rows, one or more.
-    tolerance
-        Limits of the circle.
-    """
+def _common_scales(rows: Sequence[_Row], tolerance: ToleranceSection) -> _Scales:
+    """_Scales of all rows. A row whose table left the circle counts only if there is no other."""
     shown = [row for row in rows if not row.run.diverged] or rows
     measured = [curve.error_um for row in shown for curve in row.curves if curve.measured]
-    judged = [curve.error_um for row in shown for curve in row.judged]
+    # Mean and largest error of a trapezoid are those of the whole move.
+    judged = measured
+    if rows[0].result.path == "trapezoid":
+        judged = [curve.error_um for row in shown for curve in row.curves]
     radius_um = rows[0].result.radius_mm * 1e3
     low_um, high_um = (float(np.clip(end, -radius_um, radius_um)) for end in _ends(judged))
     largest_mm = min(max(map(abs, _ends(measured))), radius_um) / 1e3
@@ -265,14 +276,14 @@ def common_scales(rows: Sequence[CircleRow], tolerance: ToleranceSection) -> Sca
     if circle is not None and circle.tolerance_mm is not None and not errors.zero_outside:
         limit_um = circle.tolerance_mm * 1e3
         errors = ErrorRange(min(errors.bottom_um, -limit_um), max(errors.top_um, limit_um))
-    return Scales(circle, errors, length_unit(errors.largest_um), tolerance)
+    return _Scales(circle, errors, length_unit(errors.largest_um), tolerance)
 
 
 def _ends(errors: Sequence[Floats]) -> tuple[float, float]:
     return min(float(error_um.min()) for error_um in errors), max(float(error_um.max()) for error_um in errors)
 
 
-def _curves(run: CircleRun) -> tuple[Stretch, ...]:
+def _curves(run: CircleRun) -> tuple[_Stretch, ...]:
     """The measured part, and what lies before and after it; neighbours share a point."""
     error_um = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm) * 1e3
     start, stop = run.measured.start, min(run.measured.stop, run.steps)
@@ -281,7 +292,7 @@ def _curves(run: CircleRun) -> tuple[Stretch, ...]:
     for first, end, measured in parts:
         kept = first + extremes(error_um[first:end], most=_MAX_POINTS)
         time_s = (kept + 1).astype(np.float64) * (run.timing.step_us / 1e6)
-        curves.append(Stretch(time_s, error_um[kept], measured))
+        curves.append(_Stretch(time_s, error_um[kept], measured))
     return tuple(curves)
 
 
@@ -322,7 +333,7 @@ _TONES: Final[dict[bool | None, Tone]] = {True: "passes", False: "fails", None: 
 _DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
 
 
-def test_drawing(test: CircleTest) -> Drawing:
+def circle_drawing(test: CircleTestAnswer) -> Drawing:
     """Draw each simulated period on the same scales, one below the other.
 
     Parameters
@@ -330,8 +341,9 @@ def test_drawing(test: CircleTest) -> Drawing:
     test
         The circle test, with at least one simulated period.
     """
-    rows = circle_rows(test)
-    scales = common_scales(rows, test.profile.tolerance)
+    pairs = zip(test.results, test.runs, strict=True)
+    rows = [_Row(result, run, _curves(run)) for result, run in pairs if run is not None]
+    scales = _common_scales(rows, test.profile.tolerance)
     servo = "ideal drive" if test.results[0].ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(result.period_us) for result, run in zip(test.results, test.runs, strict=True) if run is None]
     words = [f"circle test, {servo}"]
@@ -344,11 +356,11 @@ def test_drawing(test: CircleTest) -> Drawing:
     return Drawing(test.profile.name, tuple(panel for panel in panels if panel), tuple(words), description)
 
 
-def _circle(row: CircleRow, scales: Scales) -> Panel:
+def _circle(row: _Row, scales: _Scales) -> Panel:
     """The setup, the verdict, and the circle on the scale of all periods."""
     result, scale = row.result, scales.circle
     setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
-    deviation = measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
+    deviation = _measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
     whole = "no G on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}"
     words = f"{_shown(row, scales)}; {whole}; {_DIRECTIONS[row.run.path.direction]}"
     plot = None
@@ -357,7 +369,7 @@ def _circle(row: CircleRow, scales: Scales) -> Panel:
     return Panel(plot, f"{result.verdict_word}: {setup}", words, _TONES[result.passed])
 
 
-def _shown(row: CircleRow, scales: Scales) -> str:
+def _shown(row: _Row, scales: _Scales) -> str:
     """What the circle shows, or why it is not drawn."""
     if row.run.diverged:
         return f"circle not drawn: the {'table left the circle' if row.result.stable else 'loop is unstable'}"
@@ -367,19 +379,19 @@ def _shown(row: CircleRow, scales: Scales) -> str:
     return f"{scales.circle.ring_text} a ring, {times} times magnified"
 
 
-def measure_text(value_mm: float | None, limit_mm: float | None, scales: Scales) -> str:
-    """Write a measure with its unit, and its tolerance where there is one."""
+def _measure_text(value_mm: float | None, limit_mm: float | None, scales: _Scales) -> str:
+    """A measure with its unit, and its tolerance where there is one."""
     unit = scales.unit
     value = "-" if value_mm is None else f"{decimals_of(value_mm * 1e3 * unit.per_um, 3)} {unit.name}"
     return value if limit_mm is None else f"{value} (limit {unit.text(limit_mm * 1e3)})"
 
 
-def _errors(row: CircleRow, scales: Scales) -> Panel:
+def _errors(row: _Row, scales: _Scales) -> Panel:
     """The contour error over time, with its mean and maximum above: the measured part strong and shaded."""
     errors, per_um, tolerance = scales.errors, scales.unit.per_um, scales.tolerance
     result, limit_mm = row.result, tolerance.max_contour_error_mm
-    mean = measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
-    largest = measure_text(result.max_contour_error_mm, limit_mm, scales)
+    mean = _measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
+    largest = _measure_text(result.max_contour_error_mm, limit_mm, scales)
     label = ", ".join(filter(None, (f"contour error [{scales.unit.name}]", errors.zero_outside)))
     up = numbers(label, errors.bottom_um * per_um, errors.top_um * per_um, room=_ROOM)
     guides = [] if errors.zero_outside else [Guide(Entry("zero"), y=0.0)]
@@ -391,7 +403,7 @@ def _errors(row: CircleRow, scales: Scales) -> Panel:
     return Panel(Curves(across, up, curves, tuple(guides), tuple(during)), f"mean {mean}, max {largest}")
 
 
-def _curve(curve: Stretch, up: Ruler, row: CircleRow, *, per_um: float) -> Curve:
+def _curve(curve: _Stretch, up: Ruler, row: _Row, *, per_um: float) -> Curve:
     """A part of the move; far outside, where no huge coordinate can be drawn, the place does not matter."""
     spread, is_turn = up.high - up.low, row.result.path != "trapezoid"
     errors = np.clip(curve.error_um * per_um, up.low - spread, up.high + spread)
@@ -405,7 +417,7 @@ def _curve(curve: Stretch, up: Ruler, row: CircleRow, *, per_um: float) -> Curve
     return Curve(entry, tuple(zip(curve.time_s.tolist(), errors.tolist(), strict=True)))
 
 
-def _ranking(row: CircleRow, rows: Sequence[CircleRow], scales: Scales) -> Panel | None:
+def _ranking(row: _Row, rows: Sequence[_Row], scales: _Scales) -> Panel | None:
     """Part of the largest error that each source takes, the largest part first.
 
     Periods whose table followed the circle share a scale; the others share a second.
