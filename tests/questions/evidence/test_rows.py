@@ -72,7 +72,7 @@ def test_a_function_refuses_arguments_that_it_does_not_take(monkeypatch: pytest.
     data = deepcopy(published("can"))
     data["evidence"][0]["rows"][0]["given"]["bits"] = 1
     monkeypatch.setattr(rows, "published", lambda _: data)
-    with pytest.raises(BusplanError, match=r"can\.toml: .*row '0 bytes.*given: frame_bits: got an unexpected keyword"):
+    with pytest.raises(BusplanError, match=r"can\.toml: .*row '0 bytes.*frame_bits\(\) got an unexpected keyword"):
         busplan.evidence("can")
 
 

@@ -27,7 +27,7 @@ from busplan.buses.ieee1394.timing import (
 from busplan.buses.ieee1394.transactions import ARBITRATION, PACKET_PARTS, Exchange
 from busplan.buses.network import Network
 from busplan.buses.published import Spread, rows_of
-from busplan.elementwise import Number, alike, choose, is_off, larger, named, total
+from busplan.elementwise import Number, choose, is_off, larger, named, total, traced_with
 from busplan.sourced import Sourced
 
 _BENCH: Final = Link(float(DATA_RATE_MBIT_S["S400"]), MAX_GAP_COUNT, 1, float(REFERENCE_CABLE_M))
@@ -93,7 +93,7 @@ def gap_term_us(gap_count: Number, *, measured: Number = MAX_GAP_COUNT, symbol: 
     symbol
         Symbol in a derivation.
     """
-    ticks = alike(ARBITRATION_GAP_TICKS, gap_count) / 2
+    ticks = traced_with(ARBITRATION_GAP_TICKS, gap_count) / 2
     return named(ticks * (measured - gap_count) / BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)
 
 
@@ -207,7 +207,7 @@ def of_inputs(
     execution
         Doubt of the execution times, where the cycle has any.
     """
-    half_width_us = alike(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
+    half_width_us = traced_with(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
     return (
         Doubt("residual", "residual of Table I", residual_us),
         Doubt("gap_term", "gap term of eq (4)", larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),

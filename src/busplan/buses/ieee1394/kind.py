@@ -57,7 +57,7 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
             'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
             'calibrate with cycle.schedule = "individual"'
         )
-    nodes = next(nodes for nodes in network.alike if nodes.name == group)
+    nodes = next(nodes for nodes in network.profile.node_groups if nodes.name == group)
     answer, key = getattr(nodes.node, f"{kind}_response"), nodes.node_key(f"{kind}_response")
     if answer != "split":
         raise BusplanError(
@@ -179,7 +179,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             "cycle.retries": profile.cycle.retries,
             "host.transaction_us": profile.host.transaction_us,
         }
-        for nodes in network.alike:
+        for nodes in network.profile.node_groups:
             paper_has_not[nodes.node_key("read_response")] = nodes.node.read_response != "split"
             paper_has_not[nodes.node_key("write_response")] = nodes.node.write_response != "split"
             paper_has_not[nodes.node_key("execution.worst_extra_us")] = nodes.node.execution.worst_extra_us
@@ -226,7 +226,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         speed = network.profile.bus.speed
         return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), carrier=speed)
 
-    def way_charged(self, network: Network) -> str:
+    def path_words(self, network: Network) -> str:
         """Say whose hops each node is charged."""
         if is_broadcast(network):
             return "every packet at the hops of the farthest"

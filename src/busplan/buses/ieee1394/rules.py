@@ -24,7 +24,7 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
-from busplan.buses.limits import Bound, Limit
+from busplan.buses.limits import Limit
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, margin, told_apart
 from busplan.elementwise import Number, plain
@@ -65,52 +65,60 @@ LIMITS: Final = (
     Limit(
         "payload",
         "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        Bound(lambda network: network.largest_payload_bytes, _most_payload),
+        lambda network: network.largest_payload_bytes,
+        _most_payload,
         way_out="a faster bus or a smaller payload would do",
         has_rule=True,
     ),
     Limit(
         "nodes",
         "{value:.0f} nodes are over the {most:.0f} of one bus",
-        Bound(lambda network: network.nodes, lambda _network: MAX_NODES),
+        lambda network: network.nodes,
+        lambda _network: MAX_NODES,
         way_out=f"a second bus has {MAX_NODES:g} more",
         has_rule=True,
     ),
     Limit(
         "hops",
         "{value:.0f} hops are over the {most:.0f} of one bus",
-        Bound(hops_of, lambda _network: MAX_HOPS),
+        hops_of,
+        lambda _network: MAX_HOPS,
         way_out=f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes",
         has_rule=True,
     ),
     Limit(
         "broadcasting nodes",
         "{value:.0f} nodes are over the {most:.0f} that a hub collects data of",
-        Bound(_of_broadcast(lambda network: network.nodes), lambda _network: MAX_BROADCAST_NODES),
+        _of_broadcast(lambda network: network.nodes),
+        lambda _network: MAX_BROADCAST_NODES,
         way_out=_ONE_BY_ONE,
     ),
     Limit(
         "hub block",
         "the hub's block of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        Bound(_of_broadcast(hub_block_bytes), _most_payload),
+        _of_broadcast(hub_block_bytes),
+        _most_payload,
         way_out=f"less read from each node, or {_ONE_BY_ONE}",
     ),
     Limit(
         "write block",
         "the write of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        Bound(_of_broadcast(write_block_bytes), _most_payload),
+        _of_broadcast(write_block_bytes),
+        _most_payload,
         way_out=f"less written to each node, or {_ONE_BY_ONE}",
     ),
     Limit(
         "cycle starts",
         "a cycle start takes {value:.3f} us, over {most:.3f} us: no time is left for the nodes until the next one",
-        Bound(_cycle_start_us, lambda _network: CYCLE_US - LEAST_ASYNCHRONOUS_US),
+        _cycle_start_us,
+        lambda _network: CYCLE_US - LEAST_ASYNCHRONOUS_US,
         way_out="less bus.isochronous_us, or no cycle master, leaves time",
     ),
     Limit(
         "gap table",
         unsafe_words,
-        Bound(lambda network: safe_gap_count(hops_of(network)), gap_count_of),
+        lambda network: safe_gap_count(hops_of(network)),
+        gap_count_of,
         way_out=f"for cables of more than {REFERENCE_CABLE_M:g} m none is known to be safe",
         role="safety",
     ),
@@ -148,7 +156,7 @@ def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
 def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More nodes than one bus has addresses for."""
     if "nodes" in subject.deciding.exceeded:
-        key = subject.profile.alike_nodes[-1].nodes_key
+        key = subject.profile.node_groups[-1].nodes_key
         yield RuleProblem(key, subject.limit_words("nodes"), "put the others on a second bus")
 
 
@@ -156,7 +164,7 @@ def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More cable hops than the standard allows."""
     if "hops" in subject.deciding.exceeded:
         is_chain = _bus(subject).max_hops is None
-        key = subject.profile.alike_nodes[-1].nodes_key if is_chain else "bus.max_hops"
+        key = subject.profile.node_groups[-1].nodes_key if is_chain else "bus.max_hops"
         way_out = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if is_chain else "rewire the tree"
         yield RuleProblem(key, subject.limit_words("hops"), way_out)
 
@@ -185,7 +193,7 @@ def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
-    for nodes, kind in product(subject.profile.alike_nodes, TRANSACTION_KINDS):
+    for nodes, kind in product(subject.profile.node_groups, TRANSACTION_KINDS):
         yield nodes.payload_key(kind), int(nodes.bytes_of(kind))
 
 

@@ -22,7 +22,7 @@ from busplan.buses.ieee1394.constants import (
     WRITE_RESPONSE_BYTES,
     padded_bytes,
 )
-from busplan.elementwise import Number, alike, choose, is_off, larger, named, smaller, worded
+from busplan.elementwise import Number, choose, is_off, larger, named, smaller, traced_with, worded
 from busplan.sections.base import TransactionKind
 
 TimingModelName = Literal["paper", "standard"]
@@ -118,7 +118,7 @@ def delays(link: Link, *, model: TimingModelName, alone: Number = False) -> Dela
         Whether a single node answers on the bus.
     """
     rate_mbit_s, gap_count = link.data_rate_mbit_s, link.gap_count
-    clock_mbit_s = rate_mbit_s if model == "paper" else alike(BASE_RATE_MBIT_S, rate_mbit_s)
+    clock_mbit_s = rate_mbit_s if model == "paper" else traced_with(BASE_RATE_MBIT_S, rate_mbit_s)
     phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
     subaction_us = equations.subaction_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
     reset_us = equations.arbitration_reset_gap_us(gap_count, gap_clock_mbit_s=clock_mbit_s)
@@ -235,7 +235,7 @@ def _packet_bytes(kind: TransactionKind, payload_bytes: Number) -> tuple[Number,
         )
     return (
         choose(is_quadlet, QUADLET_WRITE_REQUEST_BYTES, BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + data_bytes),
-        worded(alike(WRITE_RESPONSE_BYTES, payload_bytes), WRITE_RESPONSE_BYTES.meaning),
+        worded(traced_with(WRITE_RESPONSE_BYTES, payload_bytes), WRITE_RESPONSE_BYTES.meaning),
     )
 
 

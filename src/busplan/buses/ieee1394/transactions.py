@@ -7,7 +7,7 @@ from busplan.buses.cycle import BusEvent
 from busplan.buses.ieee1394.constants import DATA_RATE_MBIT_S, safe_gap_count
 from busplan.buses.ieee1394.timing import Answer, Delays, Link, Phases, Responder, TimingModelName, transaction
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, alike, named, plain, worded
+from busplan.elementwise import Number, named, plain, traced_with, worded
 from busplan.sections.base import TransactionKind
 
 
@@ -39,7 +39,7 @@ def link_of(network: Network) -> Link:
     """Rate, gap count and distance of the farthest node."""
     bus = network.profile.bus
     return Link(
-        data_rate_mbit_s=alike(DATA_RATE_MBIT_S[bus.speed], network.nodes),
+        data_rate_mbit_s=traced_with(DATA_RATE_MBIT_S[bus.speed], network.nodes),
         gap_count=named(gap_count_of(network), "gap_count", "g"),
         hops=named(hops_of(network), "hops", "H"),
         cable_length_m=bus.cable_length_m,
@@ -138,7 +138,7 @@ def exchange(
         delays=delays,
         payload_bytes=payload_bytes,
         responder=responder,
-        overhead_bytes=group.said.payload.overhead_bytes,
+        overhead_bytes=group.payload.overhead_bytes,
     )
     uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
     parts = tuple(_parts(kind, phases, answer))
