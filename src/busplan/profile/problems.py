@@ -209,9 +209,6 @@ def _example(model: type[BaseModel]) -> str:
 
 
 def _unknown(path: KeyPath, section: type[BaseModel]) -> str:
-    instead = getattr(section, "removed", {}).get(path[-1])
-    if instead is not None:
-        return f"removed key: {instead}"
     names = list(section.model_fields)
     close = get_close_matches(str(path[-1]), names, n=1)
     if close:

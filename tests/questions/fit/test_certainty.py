@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import busplan
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS
-from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import network_of
 
 Maker = Callable[..., busplan.Profile]
@@ -28,7 +28,8 @@ def changed(profile: busplan.Profile, changes: dict[str, object]) -> busplan.Pro
 
 
 def of(profile: busplan.Profile, model: str = "standard") -> CapacityFigures:
-    return capacity_figures(network_of(profile), model=model)
+    (figures,) = busplan.capacity(profile, timing_model=model).results
+    return figures
 
 
 def with_fixed_execution(profile: busplan.Profile, execution_us: float, **changes: Any) -> busplan.Profile:

@@ -8,7 +8,7 @@ import pytest
 
 import busplan
 from busplan.forms.charts import ChartGrid, Curves, Drawing, legend
-from busplan.forms.svg import INKS
+from busplan.forms.inks import INKS
 
 MODELS = ("paper", "standard")
 TOO_FAST_AND_NOT = {"cycle.period_us": [100.0, 2000.0, 4000.0], "circle.radius_mm": [10.0]}

@@ -12,12 +12,9 @@ from busplan.buses.ethercat.cycle import (
     STRETCHES,
     VENDORS,
     EthercatCycle,
-    command_doubt_us,
-    last_command_us,
     sync0_share,
 )
 from busplan.buses.ethercat.equations import (
-    BYTE_BIAS_US,
     CONSTANTS,
     FIGURES,
     MAILBOX_BYTES,
@@ -29,7 +26,7 @@ from busplan.buses.ethercat.equations import (
     SYNC_SHIFT,
     room_bytes,
 )
-from busplan.buses.ethercat.frames import data_bytes, datagrams, devices, layout
+from busplan.buses.ethercat.frames import data_bytes, datagrams, layout
 from busplan.buses.limits import (
     NODE_LIMIT,
     NOT_SHOWN_KEPT,
@@ -45,7 +42,7 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded, Rule, RuleProblem, RuleSubject
-from busplan.elementwise import Number, larger, plain, total
+from busplan.elementwise import Number, larger, plain
 from busplan.english import plural
 from busplan.progress import Progress
 
@@ -53,21 +50,17 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def _largest_device(network: Network) -> Number:
-    return reduce(larger, (data_bytes(group, network) for group in network.groups))
-
-
-def _longest_cable(network: Network) -> Number:
-    lengths_m: list[Number] = [group.node.cable_m for group in network.groups]
-    return reduce(larger, lengths_m)
-
-
 def _late_command_us(network: Network) -> Number:
     """When the last device has taken its command, with what bytes take beyond the wire; 0 without clocks [us]."""
     if not network.profile.bus.distributed_clocks:
         return 0.0
-    process_bytes = total(device.number * device.data_bytes for device in devices(network))
-    return last_command_us(network) + process_bytes * BYTE_BIAS_US
+    cycle = EthercatCycle(network, LAST_BYTE)
+    return cycle.last_command_us + cycle.bias_us()
+
+
+def _late_command_doubt_us(network: Network) -> Number:
+    """Standard uncertainty of that [us]."""
+    return EthercatCycle(network, LAST_BYTE).command_doubt_us if network.profile.bus.distributed_clocks else 0.0
 
 
 def _words(network: Network) -> str:
@@ -85,7 +78,7 @@ SYNC0: Final = share_of_period(
     _words,
     us=_late_command_us,
     share=sync0_share,
-    doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,
+    doubt=_late_command_doubt_us,
     perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
     way_out="a larger bus.sync_shift moves SYNC0 back",
 )
@@ -102,14 +95,14 @@ LIMITS: Final = (
     Limit(
         "payload",
         "a device of {value:.0f} bytes is over the {most:.0f} bytes of a frame, and no device is split",
-        _largest_device,
+        lambda network: reduce(larger, (data_bytes(group, network) for group in network.groups)),
         lambda network: room_bytes(datagrams(network)),
         way_out="a smaller payload would do",
     ),
     Limit(
         "cable",
         "a cable of {value:g} m is over the {most:g} m of 100BASE-TX",
-        _longest_cable,
+        lambda network: reduce(larger, (group.node.cable_m for group in network.groups)),
         lambda _network: MOST_CABLE_M,
         way_out="a device between would do",
     ),
