@@ -30,11 +30,12 @@ from typing import Any, Final, NamedTuple, get_args
 from unittest import mock
 
 import tomli_w
+from typer.main import get_command
 
 import busplan
 from busplan.buses import kind_names
-from busplan.cli import run
-from busplan.cli.lazy import LazyCommands
+from busplan.cli import app, run
+from busplan.cli.lazy import COMMANDS
 from busplan.errors import BusplanError
 from busplan.profile.document import decode, validate
 from busplan.profile.kinds import profile_schema
@@ -343,7 +344,9 @@ class Command(NamedTuple):
 def commands() -> list[Command]:
     """Every command that takes a profile, with its forms."""
     found = []
-    for name, command in LazyCommands().items():
+    command_line: Any = get_command(app)
+    for name in COMMANDS:
+        command = command_line.get_command(None, name)
         options = {option: one for one in command.params for option in (*one.opts, *one.secondary_opts)}
         arguments = {one.metavar for one in command.params if one.param_type_name == "argument"}
         if not arguments & {"PROFILE", "PATH", "A"} or "MEASUREMENTS" in arguments:

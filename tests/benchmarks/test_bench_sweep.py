@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import busplan
+from busplan.buses.ieee1394.doubts import residual
 from busplan.buses.ieee1394.section import Ieee1394Profile
-from busplan.buses.ieee1394.transactions import residual
 from busplan.profile.document import override
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of

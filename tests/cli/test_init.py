@@ -136,8 +136,11 @@ def state_of(pid: int) -> str:
 def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> tuple[int, str]:
     """Exit code and words of `init` in a terminal, with an answer to each of its questions."""
     leader, follower = pty.openpty()
-    # The terminal of a session of its own, so that Ctrl-C reaches the program.
-    program = "import os; os.login_tty(0); from busplan.__main__ import main; main()"
+    # The terminal of a session of its own, so that Ctrl-C reaches the program, also where the tests ignore it.
+    program = (
+        "import os, signal; signal.signal(2, signal.default_int_handler); os.login_tty(0)\n"
+        "from busplan.__main__ import main; main()"
+    )
     command = [sys.executable, "-c", program, "init", "asked", *arguments]
     process = subprocess.Popen(command, cwd=folder, stdin=follower, stdout=follower, stderr=follower)
     os.close(follower)

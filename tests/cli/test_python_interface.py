@@ -5,10 +5,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
+from typer.main import get_command
 
 import busplan
-from busplan.cli.lazy import COMMANDS, LazyCommands
+from busplan.cli import app
+from busplan.cli.lazy import COMMANDS
 
+COMMAND_LINE: Any = get_command(app)
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "import": busplan.import_profile,
     "plan": busplan.plan,
@@ -87,7 +90,7 @@ PARAMETERS_ALONE: Mapping[str | tuple[str, str], str] = {
 def options(command: str) -> dict[str, Any]:
     """Arguments and options of a command, by the name of the parameter that takes the same."""
     own = inspect.signature(FUNCTIONS[command]).parameters
-    names = {one.name.rstrip("_"): one for one in LazyCommands()[command].params}
+    names = {one.name.rstrip("_"): one for one in COMMAND_LINE.get_command(None, command).params}
     spelled = {name: WITH_THEIR_UNIT.get(name, name) for name in names}
     return {spelled[name] if spelled[name] in own else name: one for name, one in names.items()}
 

@@ -109,7 +109,7 @@ REFUSALS = {
     "--vary bus.nodes=1:9 --format csv --top 3": "--top: goes with --format table, markdown or html; csv has every row",
     "--vary bus.nodes=1:9 --figure fits": "--figure: goes with --plot FILE",
     "--vary bus.nodes=1:9 --jobs 2": "--jobs: goes with --circle",
-    "--vary bus.nodes=1:9 --top 0": "--top 0: must be 1 or more",
+    "--vary bus.nodes=1:9 --top 0": "'--top': must be greater than or equal to 1",
     "--vary bus.nodes=1:9 --sort limited_by": "--sort limited_by: expected a column in numbers: bus.nodes, period_us",
     "--vary bus.gap_count=1,optimal --sort bus.gap_count": "--sort bus.gap_count: expected a column in numbers",
     "--vary bus.nodes=1:9 --sort nodes:up": "--sort nodes:up: expected a column, or a column and :asc",
@@ -119,7 +119,7 @@ REFUSALS = {
     "--vary bus.nodes=1:9 --vary node.axes=1:3 --vary cycle.period_us=1:9 --plot x.svg": "draws one or two keys",
     "--vary cycle.period_us=1:900000 --plot x.svg": "--plot: 900,000 points",
     "--vary cycle.period_us=1:9000 --circle": "more circle tests than the 1,000",
-    "--vary bus.nodes=1:9 -o rows.npz": "gives arrays, and FILE.csv, FILE.json or FILE.parquet holds",
+    "--vary bus.nodes=1:9 -o rows.npz": "expected a name ending in .txt, .md, .html, .csv, .json, .parquet",
 }
 
 

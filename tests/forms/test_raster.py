@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import busplan
-from busplan.forms.svg import INKS, png
+from busplan.forms.inks import INKS
+from busplan.forms.svg import png
 
 SVG = "{http://www.w3.org/2000/svg}"
 Pixels = NDArray[np.uint8]

@@ -1,17 +1,20 @@
-"""A profile that has no findings, and ways to make one that has."""
+"""A profile that has no findings, ways to make one that has, and the check of a text."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from busplan.gate.gate import FileResult, check_document
-from busplan.profile.document import Document
+import busplan
 
-CLEAN = (Path(__file__).parent / "examples" / "BP001" / "valid.toml").read_text(encoding="utf-8")
+EXAMPLES = Path(__file__).parent / "examples"
+CLEAN = (EXAMPLES / "BP001" / "valid.toml").read_text(encoding="utf-8")
+MODELS = json.loads((EXAMPLES / "BP301" / "baseline.json").read_text(encoding="utf-8"))["models"]
 
 Changed = Callable[..., str]
-Check = Callable[..., FileResult]
+Check = Callable[..., Any]
 
 
 @pytest.fixture
@@ -34,8 +37,29 @@ def changed() -> Changed:
 
 
 @pytest.fixture
-def check() -> Check:
-    def check(text: str, **options: object) -> FileResult:
-        return check_document(Document("a.toml", text), **options)  # type: ignore[arg-type]
+def gate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Check:
+    """Check a text, or bytes, as a file: the whole answer.
+
+    `baseline` has `figures` and `keys` as a file of the answer has them; without keys, it is an older one.
+    """
+    monkeypatch.chdir(tmp_path)
+
+    def check(
+        text: str | bytes, *, name: str = "a.toml", baseline: Mapping[str, Any] | None = None, **options: Any
+    ) -> Any:
+        Path(name).write_bytes(text.encode() if isinstance(text, str) else text)
+        if baseline is not None:
+            keys = {name: baseline["keys"]} if baseline.get("keys") is not None else {}
+            content = {"schema": 1, "command": "baseline", "models": MODELS, "keys": keys}
+            recorded = json.dumps({**content, "profiles": {name: baseline["figures"]}})
+            Path("baseline.json").write_text(recorded, encoding="utf-8")
+            options["baseline"] = "baseline.json"
+        return busplan.check(name, record=True, **options)
 
     return check
+
+
+@pytest.fixture
+def check(gate: Check) -> Check:
+    """Check a text: the result of its file."""
+    return lambda text, **options: gate(text, **options).files[0]

@@ -1,28 +1,36 @@
 """Every limit of a rule at its edge: what just holds has no finding, what just does not has one."""
 
 import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from busplan.buses.ieee1394.constants import safe_gap_count
-from busplan.gate.gate import check_document
-from busplan.profile.document import decode
-from busplan.profile.sources import locate
 
-PLAIN = re.sub(r" *#.*", "", locate("paper-4ms")[0].read_text(encoding="utf-8")).split("[servo]")[0]
+SHIPPED = Path(__file__).resolve().parents[2] / "profiles" / "paper-4ms.toml"
+PLAIN = re.sub(r" *#.*", "", SHIPPED.read_text(encoding="utf-8")).split("[servo]")[0]
+
+Codes = Callable[..., set[str]]
 
 
-def codes(*replacements: tuple[str, str], more: str = "") -> set[str]:
+@pytest.fixture
+def codes(check: Callable[..., Any]) -> Codes:
     """Codes found in the plain profile with lines replaced."""
-    text = PLAIN
-    for old, new in replacements:
-        assert old in text
-        text = text.replace(old, new)
-    return {one.code for one in check_document(decode((text + more).encode(), name="edge.toml")).findings}
+
+    def found(*replacements: tuple[str, str], more: str = "") -> set[str]:
+        text = PLAIN
+        for old, new in replacements:
+            assert old in text
+            text = text.replace(old, new)
+        return {finding.code for finding in check(text + more).findings}
+
+    return found
 
 
 @pytest.mark.parametrize("nodes", [1, 2, 16])
-def test_gap_count_is_wasteful_above_the_table_unsafe_below_and_right_at_it(nodes: int) -> None:
+def test_gap_count_is_wasteful_above_the_table_unsafe_below_and_right_at_it(nodes: int, codes: Codes) -> None:
     safe = safe_gap_count(nodes)
     gaps = sorted({0, safe - 1, safe, safe + 1, 63})
     found = {
@@ -33,22 +41,22 @@ def test_gap_count_is_wasteful_above_the_table_unsafe_below_and_right_at_it(node
 
 
 @pytest.mark.parametrize(("nodes", "expected"), [(62, set()), (63, {"BP106"})])
-def test_nodes_of_one_bus(nodes: int, expected: set[str]) -> None:
+def test_nodes_of_one_bus(nodes: int, expected: set[str], codes: Codes) -> None:
     assert codes(("nodes = 2", f"nodes = {nodes}\nmax_hops = 4")) & {"BP106"} == expected
 
 
 @pytest.mark.parametrize(("hops", "expected"), [(16, set()), (17, {"BP107"})])
-def test_hops_of_one_bus(hops: int, expected: set[str]) -> None:
+def test_hops_of_one_bus(hops: int, expected: set[str], codes: Codes) -> None:
     assert codes(("nodes = 2", f"nodes = 2\nmax_hops = {hops}")) & {"BP107"} == expected
 
 
 @pytest.mark.parametrize(("size", "expected"), [(512, set()), (513, {"BP108", "BP111"}), (516, {"BP108"})])
-def test_payload_of_a_speed_and_of_quadlets(size: int, expected: set[str]) -> None:
+def test_payload_of_a_speed_and_of_quadlets(size: int, expected: set[str], codes: Codes) -> None:
     changes = (("S400", "S100"), ("write_bytes = 12", f"write_bytes = {size}"))
     assert codes(*changes) & {"BP108", "BP111"} == expected
 
 
-def test_limits_are_broken_beyond_them_and_not_at_them() -> None:
+def test_limits_are_broken_beyond_them_and_not_at_them(codes: Codes) -> None:
     # 13 nodes are shown to fit (1959.603 us), 14 are not (2139.161 us), for two there are: 11 nodes, 44 axes to spare.
     assert codes(more="[limits]\nmin_spare_nodes = 11\nmin_spare_axes = 44\n") & {"BP104", "BP105"} == set()
     assert codes(more="[limits]\nmin_spare_nodes = 12\nmin_spare_axes = 45\n") & {"BP104", "BP105"} == {
@@ -60,7 +68,7 @@ def test_limits_are_broken_beyond_them_and_not_at_them() -> None:
     assert "BP103" in codes(more="[limits]\nmax_utilisation = 0.131660\n")
 
 
-def test_the_slice_is_overrun_below_the_smallest_period() -> None:
+def test_the_slice_is_overrun_below_the_smallest_period(codes: Codes) -> None:
     # 263.320 us and a bias of 8 * 0.827 us, less an uncertainty of 6.311 us: nothing lower can be right.
     own = {"BP101", "BP102", "BP114"}
     assert codes(("period_us = 4000", "period_us = 527.25")) & own == {"BP101", "BP102"}
@@ -73,14 +81,14 @@ def test_the_slice_is_overrun_below_the_smallest_period() -> None:
     assert codes(("period_us = 4000", "period_us = 414.23")) & own == {"BP101"}
 
 
-def test_a_reserve_is_a_share_of_the_slice_that_must_be_free() -> None:
+def test_a_reserve_is_a_share_of_the_slice_that_must_be_free(codes: Codes) -> None:
     # 276.247 us of 1000 us are the rest of a reserve of 72.3753 %.
     period = ("period_us = 4000", "period_us = 2000")
     assert codes(period, more="[limits]\nreserve = 0.72375\n") & {"BP101", "BP114"} == set()
     assert codes(period, more="[limits]\nreserve = 0.72376\n") & {"BP101", "BP114"} == {"BP114"}
 
 
-def test_cycle_starts_that_leave_no_time_are_an_error_however_long_the_period_is() -> None:
+def test_cycle_starts_that_leave_no_time_are_an_error_however_long_the_period_is(codes: Codes) -> None:
     # T_reset 21.047, arbitration 4.524, 2 hops 0.331 and 160 bits at 98.304 Mbit/s: 27.530 us, of 124 us at most.
     def found(isochronous_us: float) -> set[str]:
         bus = ("nodes = 2", f"nodes = 2\ncycle_master = true\nisochronous_us = {isochronous_us}")

@@ -1,5 +1,6 @@
 """`check --recording`: a machine outside its plan is an error, at the key that plans it."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,7 +8,6 @@ from typing import TYPE_CHECKING
 import pytest
 
 import busplan
-from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from subprocess import CompletedProcess
@@ -50,10 +50,16 @@ def test_a_share_and_its_uncertainty_are_in_one_unit(tmp_path: Path) -> None:
     profile = tmp_path / "slow.toml"
     profile.write_text((LOG.parent / "valid.toml").read_text().replace("period_us = 4000", "period_us = 8000"))
     (seen,) = [one for one in busplan.measured(profile, LOG).figures if one.quantity == "load"]
-    assert seen.uncertainty is not None
+    assert None not in (seen.uncertainty, seen.recorded, seen.planned)
     messages = [one.finding.message for one in busplan.check(profile, recording=LOG).findings]
     (said,) = [message for message in messages if message.startswith("name: load: ")]
-    assert f" +/- {100 * seen.uncertainty:.2g} % recorded, " in said
+    assert f" +/- {100 * (seen.uncertainty or 0.0):.2g} % recorded, " in said
+    recorded, planned = (
+        float(number) for number in re.findall(r"load: ([\d.]+) .* at most ([\d.]+) % planned", said)[0]
+    )
+    assert (recorded, planned) == pytest.approx(
+        tuple(100 * (share or 0.0) for share in (seen.recorded, seen.planned)), rel=0.01
+    )
 
 
 def test_what_no_key_plans_is_at_the_name(tmp_path: Path) -> None:
@@ -84,5 +90,5 @@ def test_what_cannot_be_compared_is_no_finding(run: Run, tmp_path: Path) -> None
     done = run("check", "press.toml", "--recording", "own.pcapng", "-o", "own.pcapng", cwd=tmp_path)
     assert done.returncode == 2
     assert (tmp_path / "own.pcapng").read_bytes() == CAPTURE.read_bytes()
-    with pytest.raises(BusplanError, match="goes with one profile"):
+    with pytest.raises(busplan.BusplanError, match="goes with one profile"):
         busplan.check(["paper-4ms", "paper-dma"], recording=CAPTURE)

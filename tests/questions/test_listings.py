@@ -2,14 +2,14 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from subprocess import CompletedProcess
 
 import busplan
-from busplan.cli.profiles_report import profiles_report
 from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, ShownValue, Snippet, Table
 from busplan.gate.rules import NEVER_SUPPRESSED, all_rules, rule_report, rules_report
-from busplan.profile.sources import load, shipped_names
 
+Run = Callable[..., CompletedProcess[str]]
 ValuesIn = Callable[[object], Iterator[ShownValue]]
 
 
@@ -45,12 +45,11 @@ def test_evidence_has_every_comparison_once(
     assert {one["data"] for one in figures} == {"paper", "dvrk", "ieee1394"}
 
 
-def test_each_profile_is_a_section() -> None:
-    report = profiles_report([load(name).profile for name in shipped_names()])
-    text = render(report, "table")
+def test_each_profile_is_a_section(run: Run) -> None:
+    text = run("profiles").stdout
     assert "paper-two-node: 1 node at 4 ms, paper model leads\n" in text
     assert "\n\n\n" not in text
-    assert "### Shipped profiles\n\n#### `can-fd-arm-7`" in render(report, "markdown")
+    assert "### Shipped profiles\n\n#### `can-fd-arm-7`" in run("profiles", "--format", "markdown").stdout
 
 
 def test_the_rules_are_one_table() -> None:

@@ -54,12 +54,8 @@ class RuleSubject(Protocol):
         """Capacity under the timing model that decides."""
 
     @property
-    def others(self) -> Sequence[RuleFigures]:
-        """Capacity under the other timing models."""
-
-    @property
     def others_fit(self) -> Sequence[tuple[str, bool]]:
-        """The other timing models, each with whether the cycle fits; cheaper than their figures."""
+        """The other timing models, each with whether the cycle fits."""
 
     def after(self, changes: Mapping[str, "Value"]) -> RuleFigures:
         """Capacity under the timing model that decides, with other values by dotted key."""

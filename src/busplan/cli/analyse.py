@@ -12,6 +12,9 @@ from busplan.cli.answering import answer, profile_files, require_apart
 from busplan.cli.options import (
     ALL_MODELS,
     AllOption,
+    DrawnForm,
+    DrawnFormatOption,
+    DrawnOutputOption,
     FormatOption,
     OutputOption,
     PeriodsOption,
@@ -25,22 +28,20 @@ from busplan.cli.options import (
     option,
     parse_sizes,
     periods_us,
+    plot_form,
+    require_company,
     takes_changes,
     time_us,
 )
-from busplan.cli.output import PlanFailsError, say
-from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, plot_form, show_drawn
-from busplan.cli.progress import progress_bar
+from busplan.cli.output import PlanFailsError, progress_bar, say
 from busplan.errors import BusplanError
-from busplan.files import NewFile, document_bytes, new_file
-from busplan.forms import Form, Picture
+from busplan.files import document_bytes, new_file
+from busplan.forms import Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Command
     from busplan.questions.capacity import CapacityAnswer
-    from busplan.questions.circle import CircleTestAnswer
-    from busplan.questions.timeline import TimelineAnswer
 
 
 @takes_changes()
@@ -88,13 +89,12 @@ def _next_commands(argument: str, result: "CapacityAnswer", changes: KeyChanges)
     from busplan.forms.blocks import Command
     from busplan.questions.base.answer import change_options, period_option, shell_word
 
-    own_us, asked_us = result.profile.cycle.period_us, [verdict.period_us for verdict in result.verdicts]
-    tried = period_option(asked_us[0]) if len(asked_us) == 1 and asked_us[0] != own_us else ()
-    changed = " ".join((shell_word(argument), *change_options(changes, period_us=own_us), *tried))
-    all_well = all(verdict.all_well for verdict in result.verdicts)
-    second = "circle-test" if all_well else "plan"
-    asked = (f"capacity {changed} --sensitivity", f"{second} {changed}", f"report {changed}")
-    return tuple(Command(f"busplan {words}") for words in asked)
+    profile_us, periods = result.profile.cycle.period_us, [verdict.period_us for verdict in result.verdicts]
+    tried = period_option(periods[0]) if len(periods) == 1 and periods[0] != profile_us else ()
+    changed = " ".join((shell_word(argument), *change_options(changes, period_us=profile_us), *tried))
+    second = "circle-test" if all(verdict.all_well for verdict in result.verdicts) else "plan"
+    commands = (f"capacity {changed} --sensitivity", f"{second} {changed}", f"report {changed}")
+    return tuple(Command(f"busplan {command}") for command in commands)
 
 
 @takes_changes()
@@ -132,7 +132,7 @@ def latency_command(
             payload_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
             timing_model=chosen_model(timing_model),
         )
-        give(latencies.report())
+        give(latencies)
 
 
 @takes_changes()
@@ -152,7 +152,7 @@ def circle_test_command(
         ),
     ] = None,
     every: Annotated[
-        int | None, option("--every N", "Write one of N steps of the simulation to --trace.  [default: 10]")
+        int | None, option("--every N", "Write one of N steps of the simulation to --trace.  [default: 10]", min=1)
     ] = None,
     plot: Annotated[
         Path | None,
@@ -177,10 +177,7 @@ def circle_test_command(
 
     Example: busplan circle-test paper-4ms --contributions
     """
-    if every is not None and trace is None:
-        raise BusplanError("--every: goes with --trace FILE.csv")
-    if every is not None and every < 1:
-        raise BusplanError(f"--every {every}: must be 1 or more")
+    require_company("--trace FILE.csv", {"--every": every}, is_given=trace)
     require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
     form = None if plot is None else plot_form(plot)
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
@@ -196,10 +193,19 @@ def circle_test_command(
                 test = circle_test(loaded, period_us=periods, contributions=contributions, progress=progress)
             if trace_file is not None:
                 trace_file.writelines(block.encode() for block in test.trace_csv(every=every or 10))
-            if plot_file is not None and form is not None:
-                _draw(test, plot_file, changes, form)
-        _say_written(trace, plot, drawn=any(test.runs))
-        give(test.report())
+            if plot_file is not None and form is not None and any(test.runs):
+                from busplan.forms.svg import content
+
+                plot_file.write(document_bytes(content(test.drawing(), form, note=changes.words)))
+            elif plot_file is not None:
+                plot_file.abandon()
+        if trace is not None:
+            say(f"wrote {trace}")
+        if plot is not None and any(test.runs):
+            say(f"wrote {plot}")
+        elif plot is not None:
+            say(f"{plot}: not written, for no period fits the bus: nothing to draw")
+        give(test)
     if test.passed is False:
         raise PlanFailsError
 
@@ -217,24 +223,7 @@ def _naming(profile: str, period: list[str] | None) -> Iterator[None]:
         raise BusplanError(*(f"{name}: {problem}{typed}" for problem in error.problems)) from None
 
 
-def _draw(test: "CircleTestAnswer", file: NewFile, changes: KeyChanges, form: Picture) -> None:
-    """Draw the simulated periods; without any, an old file stays unchanged."""
-    if not any(test.runs):
-        file.abandon()
-        return
-    from busplan.forms.svg import content
-
-    file.write(document_bytes(content(test.drawing(), form, note=changes.words)))
-
-
-def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
-    if trace is not None:
-        say(f"wrote {trace}")
-    if plot is not None:
-        say(f"wrote {plot}" if drawn else f"{plot}: not written, for no period fits the bus: nothing to draw")
-
-
-@takes_changes(period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]")
+@takes_changes(period=True)
 def timeline_command(
     profile: ProfileArgument,
     from_: Annotated[
@@ -291,21 +280,19 @@ def timeline_command(
 
     Example: busplan timeline paper-4ms --transaction read:1
     """
-    chosen = drawn_form(format_, output)
     from_us = None if from_ is None else time_us(from_, option="--from")
     to_us = None if to is None else time_us(to, option="--to")
     if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
-
-    def find() -> "TimelineAnswer":
+    files = profile_files(profile)
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True) as give:
         from busplan.questions.timeline import timeline
 
         loaded = load_changed(profile, changes)
-        return timeline(
+        schedule = timeline(
             loaded, timing_model=timing_model, from_us=from_us, to_us=to_us, transaction=transaction, cycle=cycle
         )
-
-    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
+        give(schedule)
 
 
 def complete_figure(incomplete: str) -> list[str]:
@@ -370,18 +357,15 @@ def explain_command(
             timing_model=checked_models(None, load_network(loaded)) if timing_model == ALL_MODELS else timing_model,
             transaction=transaction,
         )
-        give(explanation.report())
+        give(explanation)
 
 
-_REFUSED: Final[dict[Form, str]] = {
+_REFUSED: Final[dict[DrawnForm, str]] = {
     "csv": "a page holds many tables; each names its command, and that command's --format csv has its rows"
 }
 
 
-@takes_changes(
-    period=" of all profiles with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
-    words="Of all profiles.",
-)
+@takes_changes("Of all profiles, as --period.", period=True)
 def report_command(
     profiles: Annotated[
         list[str],
@@ -434,4 +418,4 @@ def report_command(
                 progress=progress,
                 origins=[(argument, changes) for argument in profiles],
             )
-        give(page.report())
+        give(page)

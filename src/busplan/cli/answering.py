@@ -3,23 +3,121 @@
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from busplan.cli.options import form_of_file
-from busplan.cli.output import emit_document, emit_pages, is_styled, refuse_terminal, say
+from busplan.cli.options import DRAWN_ENDINGS, DrawnForm, form_of_file
+from busplan.cli.output import emit_pages, is_styled, refuse_terminal, say, terminal_size, write_document
 from busplan.errors import BusplanError
-from busplan.files import document_bytes, new_file
-from busplan.forms import ENDINGS, Form, render
+from busplan.extras import require_resvg
+from busplan.files import NewFile, new_file
+from busplan.forms import PICTURES, Form, render
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Report
+    from busplan.questions.base.answer import Answer
 
-
+_ALL_SHOWS: Final = "--all shows all."
 _PROFILE: Final = ".toml"
+NOTHING_REFUSED: Final[Mapping[DrawnForm, str]] = MappingProxyType({})
+
+
+@contextmanager
+def answer(
+    form: DrawnForm | None,
+    output: Path | None,
+    *,
+    inputs: Iterable[Path] = (),
+    changes: KeyChanges = NO_CHANGES,
+    is_whole: bool = False,
+    default: Form = "table",
+    refused: Mapping[DrawnForm, str] = NOTHING_REFUSED,
+    is_drawn: bool = False,
+) -> "Iterator[Callable[[Answer | Report], None]]":
+    """Open the destination of an answer before the work, so that a path that cannot be written fails at once.
+
+    Parameters
+    ----------
+    form
+        Value of --format.
+    output
+        Value of --output.
+    inputs
+        Files that the command reads.
+    changes
+        Changes of the profile; the answer names those made by --set.
+    is_whole
+        Value of --all.
+    default
+        Form on standard output without --format.
+    refused
+        Forms that this command does not have, with the reason.
+    is_drawn
+        Whether the answer may also be a picture.
+
+    Yields
+    ------
+    Callable
+        Writes an answer, or its report, to the destination in the chosen form.
+
+    Raises
+    ------
+    BusplanError
+        The file cannot be written or is an input, the form is refused, or the file name has no known ending; a page of
+        HTML or a PNG would go to a terminal, or resvg-py is missing.
+    """
+    forms = {ending: name for ending, name in DRAWN_ENDINGS.items() if is_drawn or ending not in PICTURES}
+    chosen = form_of_file(form, output, forms=forms, default=default)
+    if chosen in refused:
+        raise BusplanError(f"--format {chosen}: {refused[chosen]}")
+    if output is None and chosen in ("html", "png"):
+        refuse_terminal(chosen)
+    if chosen == "png":
+        require_resvg(f"--format {chosen}")
+    if output is not None:
+        require_apart({"--output": output}, inputs=inputs)
+    with ExitStack() as files:
+        file = None if output is None else files.enter_context(new_file(output, overwrite=True))
+        yield partial(_give, form=chosen, file=file, changes=changes, is_whole=is_whole)
+    if output is not None:
+        say(f"wrote {output}")
+
+
+def _give(
+    shown: "Answer | Report", form: DrawnForm, file: NewFile | None, changes: KeyChanges, *, is_whole: bool
+) -> None:
+    """Write an answer as a picture or as a report, with the --set options named."""
+    from busplan.forms.blocks import Report
+    from busplan.questions.base.sentences import changed_report, changes_sentences
+
+    match form:
+        case "svg" | "png":
+            from busplan.forms.numbers import sentence_text
+            from busplan.forms.svg import content
+
+            if isinstance(shown, Report):
+                raise TypeError("a report has no picture")
+            note = " ".join(map(sentence_text, changes_sentences(changes)))
+            write_document(content(shown.drawing(), form, note=note), file)
+        case _:
+            report = changed_report(shown if isinstance(shown, Report) else shown.report(), changes)
+            write_report(report._replace(is_whole=is_whole or report.is_whole), form, file)
+
+
+def write_report(report: "Report", form: Form, file: NewFile | None) -> None:
+    """Write a report to a file or standard output, on a terminal in its width and colours."""
+    report = report._replace(whole_by=_ALL_SHOWS)
+    if form == "table" and file is None:
+        from busplan.forms import terminal
+
+        width, height = terminal_size() or (None, None)
+        emit_pages(terminal.text(report, width=width, height=height, styled=is_styled()))
+    else:
+        write_document(render(report, form), file)
 
 
 def require_apart(
@@ -41,12 +139,12 @@ def require_apart(
     BusplanError
         An output is an input or another output, also through a link, or has the name of a profile without being one.
     """
-    asked = {option: path for option, path in outputs.items() if path is not None}
-    if not asked:
+    given = {option: path for option, path in outputs.items() if path is not None}
+    if not given:
         return
     read = {_identity(path): "standard input" if str(path) == "-" else path for path in inputs}
     written: dict[object, str] = {}
-    for option, path in asked.items():
+    for option, path in given.items():
         if str(path) == "-":
             raise BusplanError(f"{option} -: standard output has the document; give the name of a file")
         place = _identity(path)
@@ -82,116 +180,3 @@ def _real(path: Path) -> Path:
     with suppress(ValueError):
         return Path(os.path.realpath(path))
     return path
-
-
-_NARROWEST: Final = 40
-"""Least width to lay out for; a narrower terminal breaks the lines itself."""
-NOTHING_REFUSED: Final[Mapping[Form, str]] = MappingProxyType({})
-
-
-@contextmanager
-def answer(
-    form: Form | None,
-    output: Path | None,
-    *,
-    inputs: Iterable[Path] = (),
-    changes: KeyChanges = NO_CHANGES,
-    is_whole: bool = False,
-    default: Form = "table",
-    refused: Mapping[Form, str] = NOTHING_REFUSED,
-) -> "Iterator[Callable[[Report], None]]":
-    """Open the destination of an answer before the work, so that a path that cannot be written fails at once.
-
-    Parameters
-    ----------
-    form
-        Value of --format.
-    output
-        Value of --output.
-    inputs
-        Files that the command reads.
-    changes
-        Changes of the profile; the answer names those made by --set.
-    is_whole
-        Value of --all.
-    default
-        Form on standard output without --format.
-    refused
-        Forms that this command does not have, with the reason.
-
-    Yields
-    ------
-    Callable
-        Writes a report to the destination, in the chosen form.
-
-    Raises
-    ------
-    BusplanError
-        The file cannot be written or is an input, the form is refused, or the file name has no known ending; a page of
-        HTML would go to a terminal.
-    """
-    chosen = form_of_file(form, output, forms=ENDINGS, default=default)
-    if chosen in refused:
-        raise BusplanError(f"--format {chosen}: {refused[chosen]}")
-    if output is None:
-        if chosen == "html":
-            refuse_terminal(chosen)
-        yield lambda report: give(_completed(report, changes, is_whole=is_whole), chosen)
-        return
-    require_apart({"--output": output}, inputs=inputs)
-    with new_file(output, overwrite=True) as file:
-        yield lambda report: _write(file.write, _completed(report, changes, is_whole=is_whole), chosen)
-    say(f"wrote {output}")
-
-
-def _completed(report: "Report", changes: KeyChanges, *, is_whole: bool) -> "Report":
-    """The report with the --set options named, whole where --all asks for it."""
-    return report_with(changes, report)._replace(is_whole=is_whole or report.is_whole)
-
-
-def report_with(changes: KeyChanges, report: "Report") -> "Report":
-    """Name the --set options in an answer: in a sentence at its top, and in its JSON document."""
-    if not changes.by_set:
-        return report
-    from busplan.questions.base.sentences import changed_report
-
-    return changed_report(report, changes)
-
-
-def _write(write: Callable[[bytes], object], report: "Report", form: Form) -> None:
-    write(document_bytes(render(report, form)))
-
-
-def give(report: "Report", form: Form) -> None:
-    """Write an answer to standard output, on a terminal in its width and colours."""
-    if form == "table":
-        from busplan.forms import terminal
-
-        emit_pages(terminal.text(report, width=terminal_width(), height=terminal_height(), styled=is_styled()))
-    else:
-        emit_document(render(report, form))
-
-
-def terminal_width() -> int | None:
-    """Width of the terminal, by COLUMNS if set; None if standard output is no terminal."""
-    if not sys.stdout.isatty():
-        return None
-    from shutil import get_terminal_size
-
-    return max(get_terminal_size().columns, _NARROWEST)
-
-
-def terminal_height() -> int | None:
-    """Lines of the terminal, by LINES if set; None if standard output is no terminal."""
-    if not sys.stdout.isatty():
-        return None
-    from shutil import get_terminal_size
-
-    return get_terminal_size().lines
-
-
-def columns() -> int:
-    """Width of documents that always have one: the terminal's, or the default."""
-    from busplan.forms.terminal import WIDTH
-
-    return terminal_width() or WIDTH

@@ -6,15 +6,17 @@ from contextlib import ExitStack, suppress
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from busplan.cli.answering import answer, profile_files, report_with, require_apart
+from busplan.cli.answering import answer, profile_files, require_apart
 from busplan.cli.options import (
     STANDARD_OUTPUT,
     VALUES_HELP,
     AllOption,
+    DrawnFormatOption,
+    DrawnOutputOption,
     FormatOption,
     JobsOption,
     OutputOption,
@@ -22,11 +24,10 @@ from busplan.cli.options import (
     load_changed,
     option,
     parse_axis,
+    require_company,
     takes_changes,
 )
-from busplan.cli.output import PlanFailsError, emit_document, message_width, say
-from busplan.cli.pictures import DrawnFormatOption, DrawnOutputOption, drawn_form, show_drawn
-from busplan.cli.progress import progress_bar
+from busplan.cli.output import PlanFailsError, message_width, progress_bar, say, write_document
 from busplan.cli.rewrite import apply_changes, require_own_file
 from busplan.english import printable
 from busplan.errors import BusplanError
@@ -35,10 +36,7 @@ from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges, require_separate
 
 if TYPE_CHECKING:
-    from busplan.forms.blocks import Report
     from busplan.profile.document import LoadedProfile
-    from busplan.questions.compare import CompareAnswer
-    from busplan.questions.map import MapAnswer
     from busplan.questions.plan import PlanAnswer
 
 
@@ -48,11 +46,7 @@ _LONGEST_NAME = 100
 _LONGEST_DESCRIPTION = 2000
 
 
-@takes_changes(
-    "Part of the goal: it is kept, and --apply and -o write it.",
-    period=" with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
-    "[default: the profile's cycle.period_us, which may be changed]",
-)
+@takes_changes("Part of the goal, as --period: it is kept, and --apply and -o write it.", period=True)
 def plan_command(
     profile: ProfileArgument,
     nodes: Annotated[
@@ -118,7 +112,7 @@ def plan_command(
     Example: busplan plan paper-1ms --axes 16
     """
     if nodes is not None:
-        changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.each))
+        changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.entries))
     report_file = output if output is not None and output.suffix.lower() in ENDINGS else None
     if report_file is None and output is not None and output.suffix.lower() not in _PROFILE_ENDINGS:
         raise BusplanError(
@@ -154,7 +148,7 @@ def plan_command(
             _apply(loaded, result)
         elif file is not None:
             say(f"wrote {new}")
-        (partial(_say_report, changes) if piped else give)(result.report())
+        (partial(_say_report, changes) if piped else give)(result)
     if result.recommended is None:
         raise PlanFailsError
 
@@ -164,7 +158,7 @@ def _check_options(
 ) -> None:
     problems = []
     if axes is not None:
-        nodes = [change.typed for change in changes.each if change.key == "bus.nodes"]
+        nodes = [change.typed for change in changes.entries if change.key == "bus.nodes"]
         problems += [f"{typed} and --axes {axes}: give one of them" for typed in nodes]
     if apply and new is not None:
         problems.append(f"--apply and -o {new}: give one of them; -o leaves PROFILE as it is")
@@ -188,8 +182,8 @@ def _apply(loaded: "LoadedProfile", result: "PlanAnswer") -> None:
 def _write_profile(loaded: "LoadedProfile", result: "PlanAnswer", file: NewFile | None, *, name: str | None) -> None:
     """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged.
 
-    A file is another plan than that of the profile: it has a name of its own, and what its description says is said
-    of the profile that it comes from.
+    A file is another plan than the profile: it has another name, and its description names the profile that it comes
+    from.
     """
     if result.recommended is not None:
         from busplan.profile.edit import edited_copy
@@ -197,10 +191,10 @@ def _write_profile(loaded: "LoadedProfile", result: "PlanAnswer", file: NewFile 
         profile, choices = loaded.profile, _choices(result)
         if name is not None:
             choices["name"] = printable(name).strip()[:_LONGEST_NAME] or profile.name
-            said = f"A plan of {profile.name}, which is: {profile.description.strip()}"[:_LONGEST_DESCRIPTION]
-            choices |= {"description": said} if profile.description.strip() else {}
-        write = emit_document if file is None else file.write
-        write(edited_copy(loaded, choices))
+            if profile.description.strip():
+                words = f"A plan of {profile.name}, which is: {profile.description.strip()}"
+                choices["description"] = words[:_LONGEST_DESCRIPTION]
+        write_document(edited_copy(loaded, choices), file)
     elif file is not None:
         file.abandon()
 
@@ -212,11 +206,13 @@ def _choices(result: "PlanAnswer") -> dict[str, object]:
     return {key: whole(value) for key, value in (result.recommended_changes or {}).items()}
 
 
-def _say_report(changes: KeyChanges, report: "Report") -> None:
+def _say_report(changes: KeyChanges, result: "PlanAnswer") -> None:
     """Write the report to standard error: standard output has the profile."""
     from busplan.forms.terminal import block_lines
+    from busplan.questions.base.sentences import changed_report
 
-    say(*(line.text for line in block_lines(report_with(changes, report).blocks, width=message_width())))
+    blocks = changed_report(result.report(), changes).blocks
+    say(*(line.text for line in block_lines(blocks, width=message_width())))
 
 
 @takes_changes("Of the bench, where it was not as the profile: --apply does not write it.")
@@ -366,20 +362,16 @@ def measured_command(
         give(seen.report(applied_to=profile if apply else None))
 
 
-def _direction(option: str, *, default: str) -> typer.models.OptionInfo:
-    help_ = (
-        f"Quantity on the {option[-1]} axis: a key of the profile, or axes for the axes of all nodes (varies the "
-        "number of nodes; with groups, of the group with the most axes), and up to 64 values in its unit: "
-        f"{VALUES_HELP}  [default: {default}]"
+def _direction(name: str, *, default: str) -> Any:
+    return option(
+        f"{name} KEY=VALUES",
+        f"Quantity on the {name[-1]} axis: a key of the profile, or axes for the axes of all nodes (varies the number "
+        "of nodes; with groups, of the group with the most axes), and up to 64 values in its unit: "
+        f"{VALUES_HELP}  [default: {default}]",
     )
-    direction: typer.models.OptionInfo = typer.Option(option, metavar="KEY=VALUES", help=help_, show_default=False)
-    return direction
 
 
-@takes_changes(
-    period=" of this design with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
-    words="For a key on an axis of the map, it moves the mark.",
-)
+@takes_changes("For a key on an axis of the map, it moves the mark.", period=True)
 def map_command(
     profile: ProfileArgument,
     x: Annotated[str | None, _direction("--x", default="axes about the most that fit")] = None,
@@ -402,32 +394,21 @@ def map_command(
 
     Example: busplan map paper-4ms --y cycle.period_us=500:4000:500
     """
-    chosen = drawn_form(format_, output)
-    if jobs is not None and not circle:
-        raise BusplanError("--jobs: goes with --circle")
-    if jobs is not None and jobs < 1:
-        raise BusplanError(f"--jobs {jobs}: must be 1 or more")
-
-    def find() -> "MapAnswer":
+    require_company("--circle", {"--jobs": jobs}, is_given=circle)
+    files = profile_files(profile)
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True) as give:
         from busplan.cli.workers import available_processors, executor
         from busplan.questions.map import map_
 
-        loaded = load_changed(profile, changes)
-        with ExitStack() as run:
-            return map_(
-                loaded,
-                x=_along(x, option="--x"),
-                y=_along(y, option="--y"),
-                circle=circle,
-                progress=run.enter_context(progress_bar("map")),
-                executor=run.enter_context(executor(jobs or available_processors())) if circle else None,
+        along_x, along_y = (
+            None if text is None else dict([parse_axis(text, option=name)]) for name, text in (("--x", x), ("--y", y))
+        )
+        processes = (jobs or available_processors()) if circle else 1
+        with progress_bar("map") as progress, executor(processes) as crew:
+            trade_off = map_(
+                load_changed(profile, changes), x=along_x, y=along_y, circle=circle, progress=progress, executor=crew
             )
-
-    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
-
-
-def _along(text: str | None, *, option: str) -> dict[str, str] | None:
-    return None if text is None else dict([parse_axis(text, option=option)])
+        give(trade_off)
 
 
 def _complete_kinds(incomplete: str) -> list[str]:
@@ -438,10 +419,7 @@ def _complete_kinds(incomplete: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in kind_names() if name.startswith(last)]
 
 
-@takes_changes(
-    period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
-    words="Of the profile, before it is put on other kinds.",
-)
+@takes_changes("Of the profile, before it is put on other kinds.", period=True)
 def compare_command(
     profile: ProfileArgument,
     buses: Annotated[
@@ -466,15 +444,12 @@ def compare_command(
 
     Example: busplan compare gantry-24
     """
-    chosen = drawn_form(format_, output)
-
-    def find() -> "CompareAnswer":
+    files = profile_files(profile)
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_, is_drawn=True) as give:
         from busplan.questions.compare import compare
 
         kinds = None if buses is None else [kind.strip() for kind in buses.split(",")]
-        return compare(load_changed(profile, changes), buses=kinds)
-
-    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
+        give(compare(load_changed(profile, changes), buses=kinds))
 
 
 def import_command(
@@ -522,15 +497,10 @@ def import_command(
         file = None if new is None else files.enter_context(new_file(new, overwrite=force))
         from busplan.questions.import_ import import_profile
 
-        name = None if new is None else new.stem
         with progress_bar("recording") as progress:
-            answer = import_profile(paths, name=name, progress=progress)
-        sentences = answer.sentences()
-        if file is None:
-            emit_document(answer.text)
-        else:
-            file.write(answer.text.encode())
+            imported = import_profile(paths, name=None if new is None else new.stem, progress=progress)
+        sentences = imported.sentences()
+        write_document(imported.text, file)
     say(*([f"wrote {new}"] if new else []), *sentences)
     if new:
-        shown = shlex.quote(f"./{new}" if str(new).startswith("-") else str(new))
-        say(f"next: busplan capacity {shown}")
+        say(f"next: busplan capacity {shlex.quote(f'./{new}' if str(new).startswith('-') else str(new))}")

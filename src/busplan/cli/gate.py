@@ -1,13 +1,14 @@
 """Commands of the gate: check, diff, rule and schema."""
 
-from contextlib import contextmanager
+import sys
+from contextlib import nullcontext
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from busplan.cli.answering import answer, columns, profile_files, require_apart
+from busplan.cli.answering import answer, profile_files, require_apart
 from busplan.cli.options import (
     AllOption,
     FormatOption,
@@ -18,18 +19,21 @@ from busplan.cli.options import (
     load_each,
     option,
     output_option,
+    require_company,
     takes_changes,
 )
-from busplan.cli.output import PlanFailsError, emit_document, emit_text, is_styled, is_terminal, say, write_document
+from busplan.cli.output import PlanFailsError, emit_document, emit_text, is_styled, say, terminal_size
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.english import plural
 from busplan.errors import BusplanError
+from busplan.files import document_bytes, write_file
 from busplan.gate.formats import FORMATS
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
     from concurrent.futures import Executor
+    from contextlib import AbstractContextManager
 
     from busplan.gate.baseline import Baseline
     from busplan.gate.report import CheckReport
@@ -40,6 +44,8 @@ else:
     # The choices for typer.
     FormatName = Literal[tuple(FORMATS)]
 
+_WIDTH: Final = 80
+"""Columns of a coloured report without a terminal."""
 _BUILD_FORMATS: Final = [name for name, report_format in FORMATS.items() if report_format.reader == "builds"]
 
 
@@ -144,20 +150,26 @@ def check_command(
 
     Example: busplan check paper-1ms paper-4ms --format github
     """
-    if circle_steps is not None and not circle:
-        raise BusplanError("--circle-steps: goes without --no-circle")
-    if quantile != 1 and recording is None:
-        raise BusplanError("--quantile: goes with --recording FILE")
-    _require_baseline(baseline, update=update_baseline, passes=pass_on_unmatched)
-    if update_baseline and changes.each:
+    require_company("--circle", {"--circle-steps": circle_steps}, is_given=circle)
+    require_company("--recording FILE", {"--quantile": quantile != 1}, is_given=recording)
+    of_baseline = {"--update-baseline": update_baseline, "--pass-on-unmatched": pass_on_unmatched}
+    require_company("--baseline FILE", of_baseline, is_given=baseline)
+    if update_baseline and pass_on_unmatched:
+        raise BusplanError("--pass-on-unmatched: goes without --update-baseline")
+    if update_baseline and changes.entries:
         raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
+    updated = baseline if update_baseline else None
+    if updated is not None:
+        require_changeable(updated)
     from busplan.gate.check import check
     from busplan.profile.sources import collect
 
     collection = collect(paths, stdin_name=stdin_filename, skip_others=skip_others)
-    _require_apart(collection.sources, recording, output=output, baseline=baseline, updated=update_baseline)
+    read = [source.path for source in collection.sources if source.failure is None]
+    read += [path for path in (recording, baseline) if path is not None and path != updated]
+    require_apart({"--output": output, "--baseline": updated}, inputs=read)
     recorded = None if baseline is None else _read_baseline(baseline, needed=not update_baseline)
-    with _executor(min(jobs, len(collection.sources))) as where:
+    with _crew(min(jobs, len(collection.sources))) as crew:
         report = check(
             collection,
             circle=circle,
@@ -168,7 +180,7 @@ def check_command(
             recording=recording,
             quantile=quantile,
             skip_others=skip_others,
-            executor=where,
+            executor=crew,
             **({} if circle_steps is None else {"circle_steps": circle_steps}),
         )
     _write(report, format_=format_, output=output)
@@ -178,8 +190,8 @@ def check_command(
     if verbose:
         say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
         say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
-    if update_baseline and baseline is not None:
-        _update_baseline(baseline, collection.sources, report, quiet=quiet)
+    if updated is not None:
+        _update_baseline(updated, collection.sources, report, quiet=quiet)
     if not quiet:
         from busplan.forms.numbers import sentence_text
         from busplan.questions.base.sentences import changes_sentences
@@ -191,41 +203,13 @@ def check_command(
         raise PlanFailsError
 
 
-def _require_baseline(baseline: Path | None, *, update: bool, passes: bool) -> None:
-    """Refuse options of a baseline that is not named, and to update one that cannot be written."""
-    if baseline is None and (update or passes):
-        raise BusplanError(f"{'--update-baseline' if update else '--pass-on-unmatched'}: needs --baseline FILE")
-    if update and passes:
-        raise BusplanError("--pass-on-unmatched: goes without --update-baseline")
-    if update and baseline is not None:
-        require_changeable(baseline)
-
-
-def _require_apart(
-    sources: "Sequence[ProfileSource]",
-    recording: Path | None,
-    *,
-    output: Path | None,
-    baseline: Path | None,
-    updated: bool,
-) -> None:
-    read = [source.path for source in sources if source.failure is None]
-    read += [] if recording is None else [recording]
-    if baseline is not None and not updated:
-        read.append(baseline)
-    require_apart({"--output": output, "--baseline": baseline if updated else None}, inputs=read)
-
-
-@contextmanager
-def _executor(number: int) -> "Iterator[Executor | None]":
-    """Worker processes; None for this one."""
-    if number <= 1:
-        yield None
-        return
+def _crew(jobs: int) -> "AbstractContextManager[Executor | None]":
+    """Worker processes; None for this process alone, which does not load what starts them."""
+    if jobs <= 1:
+        return nullcontext()
     from busplan.cli.workers import workers
 
-    with workers(number) as crew:
-        yield crew
+    return workers(jobs)
 
 
 def _read_baseline(path: Path, *, needed: bool) -> "Baseline | None":
@@ -260,12 +244,14 @@ def _update_baseline(path: Path, sources: "Sequence[ProfileSource]", report: "Ch
 
 def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -> None:
     """Write the report; without a format, as a person at a terminal or a program behind a pipe reads it best."""
-    name = format_ or ("full" if output is None and is_terminal() else "concise")
-    chosen = FORMATS[name]
-    if output is not None or chosen.reader != "people":
-        write_document(chosen.write(report), output, quiet=True)
+    chosen = FORMATS[format_ or ("full" if output is None and sys.stdout.isatty() else "concise")]
+    if output is not None:
+        write_file(output, document_bytes(chosen.write(report)), overwrite=True)
+    elif chosen.reader != "people":
+        emit_document(chosen.write(report))
     else:
-        emit_text(chosen.write(report, width=columns() if is_styled() else None))
+        width, _ = terminal_size() or (_WIDTH, 0)
+        emit_text(chosen.write(report, width=width if is_styled() else None))
     if chosen.repeats:
         say(*FORMATS["concise"].write(report).splitlines())
 
@@ -315,28 +301,20 @@ def diff_command(
 
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """
-    allowed = _tolerance(tolerance, wanted=fail_on_regression)
+    require_company("--fail-on-regression", {"--tolerance": tolerance is not None}, is_given=fail_on_regression)
+    if tolerance is not None and not (isfinite(tolerance) and tolerance >= 0):
+        raise BusplanError(f"--tolerance {tolerance:g}: must be 0 or more, in percent")
     with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
-        from busplan.profile.edit import load_revision
+        from busplan.profile.sources import load_revision
         from busplan.questions.diff import diff
 
         first, second = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
         difference = diff(first, second, timing_model=chosen_model(timing_model), arguments=(a, b))
-        give(difference.report())
-        regressions = difference.regression_words(tolerance_percent=allowed)
+        give(difference)
+        regressions = difference.regression_words(tolerance_percent=tolerance or 0.0)
     if fail_on_regression and regressions:
         say(regressions)
         raise PlanFailsError
-
-
-def _tolerance(percent: float | None, *, wanted: bool) -> float:
-    if percent is None:
-        return 0.0
-    if not wanted:
-        raise BusplanError("--tolerance: goes with --fail-on-regression")
-    if not (isfinite(percent) and percent >= 0):
-        raise BusplanError(f"--tolerance {percent:g}: must be 0 or more, in percent")
-    return percent
 
 
 def complete_code(incomplete: str) -> list[str]:

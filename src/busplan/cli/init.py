@@ -4,7 +4,7 @@ import re
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
@@ -50,8 +50,8 @@ def init_command(
         list[str] | None,
         option(
             "--group NAME:NODESxAXES[:READ/WRITE]",
-            "Nodes alike, with the axes of one node and, if not by --bytes-per-axis, the bytes that a node sends and"
-            " receives; repeated, instead of --nodes and --axes.  [default: all nodes alike]",
+            "Nodes of the same kind: the axes of one node and, if not by --bytes-per-axis, the bytes that it sends and "
+            "receives; repeated, instead of --nodes and --axes.  [default: one group]",
         ),
     ] = None,
     period: Annotated[
@@ -99,7 +99,7 @@ def init_command(
         raise BusplanError(f"{name!r}: no name for a profile; expected a name or a path, as press-line")
     # A name that begins with a dash would be an option.
     shown = shlex.quote(f"./{path}" if str(path).startswith("-") else str(path))
-    asked = {
+    given = {
         "--bus": bus,
         "--nodes": nodes,
         "--axes": axes,
@@ -108,25 +108,19 @@ def init_command(
         "--bytes-per-axis": bytes_per_axis,
         "--host": host,
     }
+    values = _Values({name: value for name, value in given.items() if value})
     from busplan.profile.starter import machine_text, starter_text
 
     if source is None:
-        groups = _groups(group or [])
-        if groups and (nodes or axes):
-            raise BusplanError("--group: goes without --nodes and --axes: each group says its own")
-        values = _Values()
-        kind, taken = values.kind(bus), values.taken
-        machine = _machine(
-            kind, values, groups=groups, nodes=nodes, axes=axes, period=period, bytes_per_axis=bytes_per_axis, host=host
-        )
-        text = _with_settings(machine_text(machine, kind=kind, name=path.stem, file=shown), name=shown)
+        kind = values.kind()
+        text = _with_settings(machine_text(_machine(kind, values), kind=kind, name=path.stem, file=shown), name=shown)
     else:
-        given = [option for option, value in asked.items() if value]
-        if given:
-            raise BusplanError(f"--from: goes without {' and '.join(given)}: a copy has the values of its profile")
-        text, taken = starter_text(source, name=path.stem), []
+        if values.given:
+            options = " and ".join(values.given)
+            raise BusplanError(f"--from: goes without {options}: a copy has the values of its profile")
+        text = starter_text(source, name=path.stem)
     write_file(path, text.encode(), overwrite=force)
-    defaults = [f"not given, so taken: {' '.join(taken)}"] if taken else []
+    defaults = [f"not given, so taken: {' '.join(values.taken)}"] if values.taken else []
     say(*defaults, f"wrote {path}", *_card(text), f"next: busplan capacity {shown}")
 
 
@@ -146,120 +140,109 @@ def _with_settings(text: str, *, name: str) -> str:
     return text
 
 
-def _groups(written: list[str]) -> "tuple[NodeGroup, ...]":
+def _groups(texts: list[str]) -> "tuple[NodeGroup, ...]":
     """Groups of nodes, as `--group` has them."""
     from busplan.profile.starter import NodeGroup
 
     groups = {}
-    for text in written:
-        matched = _GROUP.fullmatch(text)
-        if matched is None:
+    for text in texts:
+        match = _GROUP.fullmatch(text)
+        if match is None:
             raise BusplanError(
                 f"--group {text}: expected NAME:NODESxAXES or NAME:NODESxAXES:READ/WRITE, as dual:4x2 or io:3x0:32/8"
             )
-        name, nodes, axes, read, write = matched.group("name", "nodes", "axes", "read", "write")
+        name, nodes, axes, read, write = match.group("name", "nodes", "axes", "read", "write")
         if name in groups:
             raise BusplanError(f"--group {text}: there is a group {name} already; give it another name")
         if not int(nodes):
             raise BusplanError(f"--group {text}: must have 1 node or more")
-        own_bytes = (int(read), int(write)) if read else (None, None)
-        groups[name] = NodeGroup(name, int(nodes), int(axes), *own_bytes)
+        sizes = (int(read), int(write)) if read else (None, None)
+        groups[name] = NodeGroup(name, int(nodes), int(axes), *sizes)
     return tuple(groups.values())
 
 
 class _Values:
-    """Values of options: given, asked for in a terminal, or defaults that are taken and said."""
+    """Values of options: given, asked for in a terminal, or defaults that are taken and named."""
 
-    def __init__(self) -> None:
+    def __init__(self, given: dict[str, Any]) -> None:
+        self.given = given
+        """Value of each option that is given."""
         self.asks = all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
         self.taken: list[str] = []
-        """The defaults that nobody was asked about, as options."""
+        """Defaults that nobody was asked about, as options."""
 
-    def value(self, given: _Answer | None, option: str, question: str, default: _Answer) -> _Answer:
-        if given is not None:
-            return given
-        if self.asks:
-            return _asked(question, default)
-        self.taken.append(f"{option} {default}")
-        return default
+    def value(self, option: str, question: str, default: _Answer) -> _Answer:
+        """The given value, or the answer in the terminal; Ctrl-C interrupts, and an input that ends is no answer."""
+        if option in self.given:
+            value: _Answer = self.given[option]
+        elif self.asks:
+            try:
+                value = typer.prompt(question, default=default, type=type(default), err=True)
+            except typer.Abort as stopped:
+                if isinstance(stopped.__context__, KeyboardInterrupt):
+                    raise KeyboardInterrupt from None
+                options = "--bus, --nodes, --axes, --period, --bytes-per-axis and --host"
+                raise BusplanError(f"no answer: give {options}") from None
+        else:
+            value = default
+            self.taken.append(f"{option} {default}")
+        return value
 
-    def number(self, given: int | None, option: str, question: str, default: int) -> int:
-        while (number := self.value(given, option, question, default)) < 1:
+    def number(self, option: str, question: str, default: int) -> int:
+        """A number, which the option itself checks."""
+        while (number := self.value(option, question, default)) < 1:
             say("must be 1 or more")
         return number
 
-    def kind(self, given: str | None) -> str:
+    def kind(self) -> str:
         """Kind of bus; a word that is no kind is asked for again."""
         while True:
-            word = self.value(given, "--bus", f"Kind of bus: {', '.join(kind_names())}", _KIND)
+            word = self.value("--bus", f"Kind of bus: {', '.join(kind_names())}", _KIND)
             try:
-                return kind_called(word, option="--bus" if given else "")
+                return kind_called(word, option="--bus" if "--bus" in self.given else "")
             except BusplanError as refused:
-                if given:
+                if "--bus" in self.given:
                     raise
                 say(str(refused))
 
-    def period_us(self, given: str | None, default: str) -> float:
+    def period_us(self, default: str) -> float:
+        """The communication period [us]."""
         from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 
-        text = self.value(given, "--period", "Communication period, with its unit", default)
+        text = self.value("--period", "Communication period, with its unit", default)
         period_us = time_us(text, option="--period")
         if not MIN_STEP_US <= period_us <= MAX_TIME_US:
             raise BusplanError(f"--period {text}: must be between {MIN_STEP_US:g} and {MAX_TIME_US:g} us")
         return period_us
 
 
-def _machine(
-    kind: str,
-    values: _Values,
-    *,
-    groups: "tuple[NodeGroup, ...]",
-    nodes: int | None,
-    axes: int | None,
-    period: str | None,
-    bytes_per_axis: int | None,
-    host: str | None,
-) -> "Machine":
+def _machine(kind: str, values: _Values) -> "Machine":
     """The machine of the options; values that they leave open are asked for, or defaults."""
     from busplan.profile.starter import Machine, shared_out
 
-    starter = kind_named(kind).starter
+    starter, groups = kind_named(kind).starter, _groups(values.given.get("--group", []))
+    if groups and values.given.keys() & {"--nodes", "--axes"}:
+        raise BusplanError("--group: goes without --nodes and --axes: each group says its own")
     if not groups:
-        count = values.number(nodes, "--nodes", "Nodes, the host not counted", _NODES)
-        total = values.number(axes, "--axes", "Axes of all nodes", _AXES_PER_NODE * count)
-        groups = shared_out(total, nodes=count)
-    period_us = values.period_us(period, starter.period)
-    size = bytes_per_axis or _BYTES_PER_AXIS
+        nodes = values.number("--nodes", "Nodes, the host not counted", _NODES)
+        axes = values.number("--axes", "Axes of all nodes", _AXES_PER_NODE * nodes)
+        groups = shared_out(axes, nodes=nodes)
+    period_us = values.period_us(starter.period)
+    size = _BYTES_PER_AXIS
     if any(group.read_bytes is None for group in groups):
-        words = "Bytes for each axis, in either direction"
-        size = values.number(bytes_per_axis, "--bytes-per-axis", words, _BYTES_PER_AXIS)
-    elif bytes_per_axis is not None:
+        size = values.number("--bytes-per-axis", "Bytes for each axis, in either direction", size)
+    elif "--bytes-per-axis" in values.given:
         raise BusplanError("--bytes-per-axis: nothing takes it: each --group says the bytes of its nodes")
+    host = values.given.get("--host")
     if starter.hosts:
         if host is None and values.asks:
             # The first line that the profile would have from each.
             say(*(f"{name}: {' '.join(lines.partition(chr(10))[0].split())}" for name, lines in starter.hosts.items()))
-        host = values.value(host, "--host", f"Host of the master: {', '.join(starter.hosts)}", starter.host)
-    _require_host(kind, host)
+        host = values.value("--host", f"Host of the master: {', '.join(starter.hosts)}", starter.host)
+    if host is not None and host not in starter.hosts:
+        hosts = f"there are {', '.join(starter.hosts)}" if starter.hosts else f"a profile of kind {kind} has no host"
+        raise BusplanError(f"--host {host}: {hosts}")
     return Machine(groups, period_us, size, host)
-
-
-def _require_host(kind: str, host: str | None) -> None:
-    known = kind_named(kind).starter.hosts
-    if host is not None and host not in known:
-        there = f"there are {', '.join(known)}" if known else f"a new profile of kind {kind} has no host"
-        raise BusplanError(f"--host {host}: {there}")
-
-
-def _asked(words: str, default: _Answer) -> _Answer:
-    """Ask in the terminal; Ctrl-C interrupts as everywhere, and an input that ends is no answer."""
-    try:
-        answer: _Answer = typer.prompt(words, default=default, type=type(default), err=True)
-    except typer.Abort as stopped:
-        if isinstance(stopped.__context__, KeyboardInterrupt):
-            raise KeyboardInterrupt from None
-        raise BusplanError("no answer: give --bus, --nodes, --axes, --period, --bytes-per-axis and --host") from None
-    return answer
 
 
 def _card(text: str) -> list[str]:

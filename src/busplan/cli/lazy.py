@@ -21,10 +21,6 @@ FAILURES: Final = (
 """End of the help of every command."""
 _OFFER: Final = 60
 """Most characters of help for a completion in the shell."""
-_COMPLETION: Final = {
-    "install_completion": "Add completion by the Tab key to the start-up file of your shell, and exit.",
-    "show_completion": "Print the script that does it, to look at or to place by hand, and exit.",
-}
 
 
 @contextmanager
@@ -122,41 +118,21 @@ _MODULES: Final = {
 COMMANDS: Final = tuple(name for names in GROUPS.values() for name in names)
 
 
-class LazyCommands(Mapping[str, Any]):
-    """Commands by name, each created at first use."""
-
-    def __init__(self) -> None:
-        self._made: dict[str, Any] = {}
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in COMMANDS:
-            raise KeyError(name)
-        if name not in self._made:
-            stem = name.replace("-", "_")
-            module = import_module(f"busplan.cli.{_MODULES[name]}")
-            single = typer.Typer(
-                add_completion=False,
-                rich_markup_mode=None,
-                pretty_exceptions_enable=False,
-                context_settings=SETTINGS,
-            )
-            single.command(name, cls=PlainCommand, epilog=FAILURES)(getattr(module, f"{stem}_command"))
-            self._made[name] = get_command(single)
-        return self._made[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(COMMANDS)
-
-    def __len__(self) -> int:
-        return len(COMMANDS)
-
-
 class LazyGroup(TyperGroup):
-    """The program's group of commands; its help lists them first."""
+    """The program's group of commands, each loaded at its first use; its help lists them first."""
 
-    def __init__(self, **settings: Any) -> None:
-        super().__init__(**settings)
-        self.commands: Any = LazyCommands()
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002 - typer's signature
+        """Load a command; None if there is no such command."""
+        if cmd_name in COMMANDS and cmd_name not in self.commands:
+            command = getattr(
+                import_module(f"busplan.cli.{_MODULES[cmd_name]}"), f"{cmd_name.replace('-', '_')}_command"
+            )
+            single = typer.Typer(
+                add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False, context_settings=SETTINGS
+            )
+            single.command(cmd_name, cls=PlainCommand, epilog=FAILURES)(command)
+            self.commands[cmd_name] = get_command(single)
+        return self.commands.get(cmd_name)
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - typer's signature
         """Names of all commands, without loading them."""
@@ -166,7 +142,6 @@ class LazyGroup(TyperGroup):
         """Find the command of a command line."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
             from busplan.english import did_you_mean
-            from busplan.errors import BusplanError
 
             near = did_you_mean(args[0], list(COMMANDS)) or "`busplan --help` lists them"
             raise BusplanError(f"{args[0]}: no such command; {near}")
@@ -181,13 +156,6 @@ class LazyGroup(TyperGroup):
         """Parse the command line of a command and run it."""
         with _usage_in_our_form("busplan"):
             return super().invoke(ctx)
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        """Options, with our own help for the completion options that typer adds."""
-        params: list[Any] = super().get_params(ctx)
-        for param in params:
-            param.help = _COMPLETION.get(param.name, param.help)
-        return params
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
         """Complete commands and options."""

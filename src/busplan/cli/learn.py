@@ -1,15 +1,20 @@
 """Commands that teach: manual, profiles, evidence and paper."""
 
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from busplan.cli.answering import answer, require_apart
 from busplan.cli.options import AllOption, FormatOption, OutputOption, output_option
-from busplan.cli.output import emit_pages, is_terminal, write_document
-from busplan.cli.progress import progress_bar
+from busplan.cli.output import emit_document, emit_pages, progress_bar, say
 from busplan.errors import BusplanError
+from busplan.files import write_file
+
+if TYPE_CHECKING:
+    from busplan.forms.blocks import Report
+    from busplan.sections.profile import Profile
 
 
 def complete_topic(incomplete: str) -> list[str]:
@@ -37,28 +42,28 @@ def manual_command(
     """
     from busplan.manual import page, topics
 
-    known = topics()
-    if topic is not None and topic not in known:
+    headings = topics()
+    if topic is not None and topic not in headings:
         from busplan.english import did_you_mean
 
-        hints = "; ".join(filter(None, (f"there are {', '.join(known)}", did_you_mean(topic, known))))
+        hints = "; ".join(filter(None, (f"there are {', '.join(headings)}", did_you_mean(topic, headings))))
         raise BusplanError(f"{topic or repr(topic)}: no such topic; {hints}")
     require_apart({"--output": output})
     if topic is None:
-        write_document(_contents(known), output)
-    elif output is None and is_terminal():
+        width = max(map(len, headings))
+        lines = (f"{name:{width}}  {heading}\n" for name, heading in headings.items())
+        text = f"Topics of the manual; `busplan manual TOPIC` shows one:\n\n{''.join(lines)}"
+    else:
+        text = page(topic)
+    if output is not None:
+        write_file(output, text.encode(), overwrite=True)
+        say(f"wrote {output}")
+    elif topic is not None and sys.stdout.isatty():
         from busplan.forms.pages import rendered
 
-        emit_pages(rendered(page(topic)))
+        emit_pages(rendered(text))
     else:
-        write_document(page(topic), output)
-
-
-def _contents(headings: dict[str, str]) -> str:
-    """List of topics, one on each line."""
-    width = max(map(len, headings))
-    lines = (f"{topic:{width}}  {heading}\n" for topic, heading in headings.items())
-    return f"Topics of the manual; `busplan manual TOPIC` shows one:\n\n{''.join(lines)}"
+        emit_document(text)
 
 
 def profiles_command(format_: FormatOption = None, output: OutputOption = None) -> None:
@@ -69,10 +74,29 @@ def profiles_command(format_: FormatOption = None, output: OutputOption = None) 
     Example: busplan profiles
     """
     with answer(format_, output) as give:
-        from busplan.cli.profiles_report import profiles_report
         from busplan.profile.sources import load, shipped_names
 
-        give(profiles_report([load(name).profile for name in shipped_names()]))
+        give(_profiles_report([load(name).profile for name in shipped_names()]))
+
+
+def _profiles_report(profiles: "list[Profile]") -> "Report":
+    """Name, main figures and description of each profile."""
+    from busplan.english import nouns
+    from busplan.forms.blocks import Chapter, Code, Report, Sentence, count_value, sentence
+    from busplan.forms.numbers import period_value
+    from busplan.questions.base.sentences import document
+
+    records, chapters = [], []
+    for profile in profiles:
+        nodes, model = sum(group.nodes for group in profile.node_groups), profile.bus.timing_model
+        description = " ".join(profile.description.split())
+        period_us: Any = profile.cycle.period_us if profile.has_cycle else None
+        figures = {"name": profile.name, "nodes": nodes, "period_us": period_us, "timing_model": model}
+        records.append({**figures, "description": description})
+        words = f"{{}}: {{}} {nouns(nodes, 'node')} at {{}}, {model} model leads"
+        title = sentence(words, Code(profile.name), count_value(nodes, "nodes"), period_value(period_us))
+        chapters.append(Chapter(title, (Sentence((description,)),)))
+    return Report(Sentence(("Shipped profiles",)), chapters, document("profiles", profiles=records), records)
 
 
 def complete_kind(incomplete: str) -> list[str]:
@@ -103,8 +127,8 @@ def evidence_command(
         from busplan.questions.evidence import evidence
 
         with progress_bar("circle tests") as progress:
-            known = evidence(kind, progress=progress)
-        give(known.report())
+            compared = evidence(kind, progress=progress)
+        give(compared)
 
 
 def paper_command(all_: AllOption = False, format_: FormatOption = None, output: OutputOption = None) -> None:
@@ -121,5 +145,5 @@ def paper_command(all_: AllOption = False, format_: FormatOption = None, output:
         from busplan.questions.evidence import evidence
 
         with progress_bar("circle tests") as progress:
-            known = evidence(paper=True, progress=progress)
-        give(known.report())
+            compared = evidence(paper=True, progress=progress)
+        give(compared)

@@ -1,23 +1,24 @@
 """Arguments and options of several commands, and parsers of their values."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from functools import wraps
 from inspect import Parameter, signature
+from itertools import product
 from math import isinf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 import typer
 
 from busplan.errors import BusplanError
-from busplan.forms import ENDINGS, Form, ending_expected
+from busplan.extras import require_resvg
+from busplan.forms import ENDINGS, PICTURES, Form, Picture, ending_expected
 from busplan.profile.changes import SET, KeyChange, KeyChanges, parse_set, require_separate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from busplan.sections.profile import Profile
 
 
@@ -135,15 +136,17 @@ def _file_unless_dash(text: str) -> Path | None:
     return None if text == "-" else Path(text)
 
 
-def format_option(default: str) -> Any:
+def format_option(default: str, *, more: str = "") -> Any:
     """Make the option --format.
 
     Parameters
     ----------
     default
         The form without --format and --output.
+    more
+        What its help says of further forms.
     """
-    help_ = f"Form of the answer; a table is plain text.  [default: by the ending of --output, else {default}]"
+    help_ = f"Form of the answer; a table is plain text.{more}  [default: by the ending of --output, else {default}]"
     return typer.Option("--format", help=help_, show_default=False)
 
 
@@ -152,13 +155,21 @@ AllOption = Annotated[
 ]
 FormatOption = Annotated[Form | None, format_option("table")]
 JobsOption = Annotated[
-    int | None, option("--jobs N", "Number of processes for --circle.  [default: one for each processor]")
+    int | None, option("--jobs N", "Number of processes for --circle.  [default: one for each processor]", min=1)
 ]
 OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(ENDINGS)}")]
+DrawnForm = Literal[Form, Picture]
+"""Form of an answer that may also be a picture."""
+DRAWN_ENDINGS: Final[Mapping[str, DrawnForm]] = MappingProxyType({**ENDINGS, **PICTURES})
+DrawnFormatOption = Annotated[
+    DrawnForm | None,
+    format_option("table", more=" png goes to a file or a pipe, and needs the extra plot (resvg-py)."),
+]
+DrawnOutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(DRAWN_ENDINGS)}")]
 
 
 def form_of_file(
-    given: AnyForm | None, output: Path | None, *, forms: "Mapping[str, AnyForm]", default: AnyForm
+    given: AnyForm | None, output: Path | None, *, forms: Mapping[str, AnyForm], default: AnyForm
 ) -> AnyForm:
     """Choose the form of a document: by --format, else by the ending of --output, else the default.
 
@@ -172,6 +183,44 @@ def form_of_file(
     if chosen is None:
         raise BusplanError(f"--output {output}: {ending_expected(ending, forms, otherwise=', or --format')}")
     return chosen
+
+
+def plot_form(path: Path) -> Picture:
+    """Form of the picture of --plot, by the ending of its name.
+
+    Raises
+    ------
+    BusplanError
+        The ending is not known, or the form is png and resvg-py is missing.
+    """
+    ending = path.suffix.lower()
+    if ending not in PICTURES:
+        raise BusplanError(f"--plot {path}: {ending_expected(ending, PICTURES)}")
+    if ending == ".png":
+        require_resvg("--plot")
+    return PICTURES[ending]
+
+
+def require_company(company: str, options: Mapping[str, object], *, is_given: object) -> None:
+    """Refuse options that go with another, which is not given.
+
+    Parameters
+    ----------
+    company
+        The other option, as in its help.
+    options
+        Value by option; one that is empty is not given.
+    is_given
+        Whether the other option is given.
+
+    Raises
+    ------
+    BusplanError
+        The first option without the other.
+    """
+    for name, value in options.items():
+        if value and not is_given:
+            raise BusplanError(f"{name}: goes with {company}")
 
 
 VALUES_HELP: Final = (
@@ -233,9 +282,15 @@ PeriodsOption = Annotated[
 ]
 
 
-def _period_option(words: str) -> Any:
-    option = typer.Option("--period", metavar="TIME", help=f"Communication period{words}", show_default=False)
-    return Annotated[str | None, option]
+_TakenPeriod = Annotated[
+    str | None,
+    typer.Option(
+        "--period",
+        metavar="TIME",
+        help="Communication period with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
+        show_default=False,
+    ),
+]
 
 
 def _period_change(text: str) -> KeyChange:
@@ -254,7 +309,7 @@ def _set_option(words: str) -> Any:
     return Annotated[list[str] | None, option]
 
 
-def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
+def takes_changes(words: str = "", *, period: bool = False) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Replace the parameter `changes` of a command by --set, and by --period where that sets the profile's period.
 
     Parameters
@@ -262,45 +317,38 @@ def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..
     words
         End of the help of --set: what is special here.
     period
-        End of the help of --period, with the default; empty where the command has none, or its own.
+        Whether --period sets the profile's period; a command may have its own, for several.
     """
-    options = {**({"period": _period_option(period)} if period else {}), "set_": _set_option(words)}
+    options = {**({"period": _TakenPeriod} if period else {}), "set_": _set_option(words)}
 
     def replaced(command: Callable[..., None]) -> Callable[..., None]:
-        own = signature(command)
+        written = signature(command)
         parameters: list[Parameter] = []
-        for parameter in own.parameters.values():
+        for parameter in written.parameters.values():
             if parameter.name == "changes":
-                kinds = options.items()
-                parameters += [
-                    Parameter(name, parameter.kind, default=None, annotation=option) for name, option in kinds
-                ]
+                for name, annotation in options.items():
+                    parameters.append(Parameter(name, parameter.kind, default=None, annotation=annotation))
             else:
                 parameters.append(parameter)
 
         @wraps(command)
-        def with_changes(*arguments: Any, set_: list[str] | None, **others: Any) -> None:
-            text = others.pop("period") if period else None
+        def with_changes(*arguments: Any, set_: list[str] | None, **given: Any) -> None:
+            text = given.pop("period") if period else None
             made = () if text is None else (_period_change(text),)
             changes = KeyChanges((*made, *parse_set(set_ or ())))
-            for computed in others.get("period") or ():
-                _require_no_period(changes, computed)
-            command(*arguments, changes=changes, **others)
+            # Periods to compute, such as 4ms, beside a change of the period.
+            for computed, change in product(given.get("period") or (), changes.entries):
+                if change.key == _PERIOD:
+                    require_separate(change, _PERIOD, typed=f"--period {computed}")
+            command(*arguments, changes=changes, **given)
 
         # Typer reads the options of a command from its signature; without it every command would list these two.
-        with_changes.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+        with_changes.__signature__ = written.replace(parameters=parameters)  # type: ignore[attr-defined]
         kept = {name: annotation for name, annotation in command.__annotations__.items() if name != "changes"}
         with_changes.__annotations__ = {**kept, **options}
         return with_changes
 
     return replaced
-
-
-def _require_no_period(changes: KeyChanges, text: str) -> None:
-    """Refuse periods to compute, such as 4ms, beside a change of the period."""
-    for change in changes.each:
-        if change.key == _PERIOD:
-            require_separate(change, _PERIOD, typed=f"--period {text}")
 
 
 def load_changed(argument: str, changes: KeyChanges) -> "Profile":
@@ -343,7 +391,7 @@ def _period_changes(text: str) -> list[KeyChange]:
         raise BusplanError(f"--period {text}: expected times with their unit between commas, as 500us,1ms") from None
 
 
-def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "list[Profile]":
+def load_each(arguments: Sequence[str], load: "Callable[[str], Profile]") -> "list[Profile]":
     """Read every profile.
 
     Parameters
@@ -360,10 +408,9 @@ def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "li
     """
     profiles: list[Profile] = []
     problems: list[str] = []
-    asked = list(arguments)
-    if asked.count("-") > 1:
+    if arguments.count("-") > 1:
         raise BusplanError("-: standard input can be read once; give files for the others")
-    for argument in asked:
+    for argument in arguments:
         try:
             profiles.append(load(argument))
         except BusplanError as error:

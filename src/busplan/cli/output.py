@@ -1,4 +1,4 @@
-"""All output: documents to stdout, messages to stderr, streams that write everything, and signals."""
+"""All output: documents to stdout, messages and progress to stderr, streams that write everything, and signals."""
 
 import codecs
 import io
@@ -8,11 +8,17 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from time import monotonic
 from types import FrameType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from busplan.errors import BusplanError
-from busplan.files import document_bytes, write_file
+from busplan.files import NewFile, document_bytes
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
+
+    from busplan.progress import Progress
 
 _BY_OTHERS: Final = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals of a service manager or a closing terminal; for Ctrl-C, Python raises KeyboardInterrupt."""
@@ -164,6 +170,50 @@ def message_width() -> int | None:
     return get_terminal_size().columns
 
 
+_PATIENCE_S: Final = 1.0
+"""Work that takes no longer shows no progress."""
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator["Progress"]:
+    """Give a function that takes the work done and the total work, and shows both if stderr is a terminal."""
+    started = monotonic()
+    bar: Bar | None = None
+
+    def report(done: int, total: int) -> None:
+        nonlocal bar
+        if bar is None:
+            if not sys.stderr.isatty() or monotonic() - started < _PATIENCE_S:
+                return
+            from rich.console import Console
+            from rich.progress import Progress
+
+            bar = Progress(console=Console(stderr=True), transient=True)
+            bar.start()
+            bar.add_task(title)
+        bar.update(bar.task_ids[0], completed=done, total=total)
+
+    try:
+        yield report
+    finally:
+        if bar is not None:
+            bar.stop()
+
+
+_NARROWEST: Final = 40
+"""Least width to lay out for; a narrower terminal breaks the lines itself."""
+
+
+def terminal_size() -> tuple[int, int] | None:
+    """Columns and lines of the terminal, by COLUMNS and LINES if set; None if standard output is no terminal."""
+    if not sys.stdout.isatty():
+        return None
+    from shutil import get_terminal_size
+
+    columns, lines = get_terminal_size()
+    return max(columns, _NARROWEST), lines
+
+
 def emit_text(text: str) -> None:
     """Write text for people to stdout, in the encoding of the terminal; characters that it lacks are escaped.
 
@@ -186,9 +236,8 @@ def emit_pages(text: str) -> None:
     """
     is_read = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
     if is_read and os.environ.get(PAGER, "less") not in ("", "cat"):
-        from shutil import get_terminal_size
-
-        if text.count("\n") >= get_terminal_size().lines:
+        size = terminal_size()
+        if size and text.count("\n") >= size[1]:
             from pydoc import pager
 
             os.environ.setdefault("LESS", "-FRX")
@@ -222,27 +271,14 @@ def refuse_terminal(form: str) -> None:
         raise BusplanError(f"--format {form}: is not for a terminal; give -o FILE.{form}, or use a pipe")
 
 
-def write_document(document: str | bytes, output: Path | None, *, quiet: bool = False) -> None:
-    """Write a document to a file, with a message, or to stdout if `output` is None.
-
-    Raises
-    ------
-    BusplanError
-        It cannot be written.
-    """
-    if output is None:
+def write_document(document: str | bytes, file: NewFile | None) -> None:
+    """Write a document to an open file, or to stdout without one."""
+    if file is None:
         emit_document(document)
-        return
-    write_file(output, document_bytes(document), overwrite=True)
-    if not quiet:
-        say(f"wrote {output}")
-
-
-def is_terminal() -> bool:
-    """Whether a person at a terminal reads standard output."""
-    return sys.stdout.isatty()
+    else:
+        file.write(document_bytes(document))
 
 
 def is_styled() -> bool:
     """Whether to write colours: on a terminal, or with FORCE_COLOR."""
-    return os.environ.get("FORCE_COLOR", "0") not in ("", "0") or is_terminal()
+    return os.environ.get("FORCE_COLOR", "0") not in ("", "0") or sys.stdout.isatty()

@@ -1,15 +1,16 @@
-"""`busplan sweep`: its options and their checks."""
+"""`busplan sweep`."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
+from contextlib import ExitStack, nullcontext
+from functools import partial
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, BinaryIO, Final, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from busplan.cli.answering import give, profile_files, require_apart
+from busplan.cli.answering import profile_files, require_apart, write_report
 from busplan.cli.options import (
     VALUES_HELP,
     AllOption,
@@ -22,26 +23,27 @@ from busplan.cli.options import (
     option,
     output_option,
     parse_axes,
+    plot_form,
+    require_company,
     takes_changes,
 )
-from busplan.cli.output import emit_document, refuse_terminal, say
-from busplan.cli.pictures import plot_form
-from busplan.cli.progress import progress_bar
+from busplan.cli.output import progress_bar, refuse_terminal, say, write_document
 from busplan.errors import BusplanError
-from busplan.extras import require_extra, require_pyarrow
-from busplan.files import document_bytes, new_file
-from busplan.forms import ENDINGS, ROWS_ENDINGS, Form, RowsForm, render
+from busplan.extras import require_pyarrow
+from busplan.files import NewFile, document_bytes, new_file
+from busplan.forms import ENDINGS, ROWS_ENDINGS, Form, RowsForm
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from concurrent.futures import Executor
+    from contextlib import AbstractContextManager
 
+    from busplan.forms.blocks import Report
     from busplan.questions.sweep import SweepAnswer
     from busplan.questions.sweep.table import Sweep
 
 SweepForm = Literal[Form, RowsForm]
-_TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in get_args(RowsForm))
-"""Forms with the top rows, for people."""
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
 _DEFAULT_TOP: Final = 20
 
@@ -85,7 +87,7 @@ def sweep_command(
             "Top rows: largest first by this column, or smallest first with :asc.  [default: order of the grid]",
         ),
     ] = None,
-    top: Annotated[int | None, option("--top N", "Number of top rows.  [default: 20]")] = None,
+    top: Annotated[int | None, option("--top N", "Number of top rows.  [default: 20]", min=1)] = None,
     plot: Annotated[
         Path | None,
         option(
@@ -145,15 +147,21 @@ def sweep_command(
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
-    form = format_ or _form_of(output)
+    form = form_of_file(format_, output, forms=_ENDINGS, default="table")
+    has_top = form not in ROWS_ENDINGS.values()
+    of_top = {"--sort": sort, "--top": top}
+    require_company(f"--format table, markdown or html; {form} has every row", of_top, is_given=has_top)
+    require_company("--plot FILE", {"--figure": figure}, is_given=plot)
+    of_circle = {"--jobs": jobs, "--cluster": cluster, "--force": force, "--summary": summary}
+    require_company("--circle", of_circle, is_given=circle)
+    if cluster is not None and jobs is not None:
+        raise BusplanError(
+            "--jobs: is the number of processes here, and --cluster runs the tests elsewhere; leave one out"
+        )
     if form == "parquet":
-        _require_parquet(output, typed=format_)
-    _require_sense(form, {"--sort": sort, "--top": top})
-    _require_needed("--plot FILE", {"--figure": figure} if plot is None else {})
-    of_circle = {"--jobs": jobs, "--cluster": cluster, "--force": force or None, "--summary": summary or None}
-    _require_needed("--circle", {} if circle else of_circle)
-    _require_numbers({"--top": top, "--jobs": jobs})
-    _require_cluster(cluster, jobs)
+        if output is None:
+            refuse_terminal("parquet")
+        require_pyarrow("--format parquet" if format_ else f"--output {output}")
     require_apart({"--output": output, "--plot": plot}, inputs=profile_files(profile))
     picture_form = None if plot is None else plot_form(plot)
     sort_by, _, order = (sort or "").partition(":")
@@ -163,10 +171,10 @@ def sweep_command(
     from busplan.questions.sweep import checked_sweep, computed, require_drawable
 
     loaded, varied = load_changed(profile, changes), parse_axes(vary or [])
-    for change, key in product(changes.each, varied):
+    for change, key in product(changes.entries, varied):
         require_separate(change, key, typed=f"--vary {key}")
     model = chosen_model(timing_model)
-    checked = checked_sweep(
+    sweep = checked_sweep(
         load_network(loaded),
         varied,
         timing_models=None if model is None else [model],
@@ -176,123 +184,61 @@ def sweep_command(
         force=force,
         changes=changes,
     )
-    checked.require_number(sort_by or None, name="--sort")
-    checked.require_number(figure, name="--figure")
-    chosen = [name.strip() for name in columns.split(",")] if columns is not None else []
-    checked.require_columns(chosen, name="--columns")
+    sweep.require_number(sort_by or None, name="--sort")
+    sweep.require_number(figure, name="--figure")
+    names = [name.strip() for name in columns.split(",")] if columns is not None else []
+    sweep.require_columns(names, name="--columns")
     if plot is not None:
-        require_drawable(checked.grid, option="--plot")
-    rows = _Rows(chosen, top or _DEFAULT_TOP, sort_by or None, ascending=bool(order), is_whole=all_)
+        require_drawable(sweep.grid, option="--plot")
     with ExitStack() as run:
         # Opened before the work, so that a path that cannot be written fails at once.
         picture_file = run.enter_context(new_file(plot, overwrite=True)) if plot else None
         file = run.enter_context(new_file(output, overwrite=True)) if output else None
-        with progress_bar("sweep") as progress, _crew(checked, jobs=jobs, cluster=cluster) as crew:
-            answer = computed(checked, executor=crew, progress=progress)
-        _write(answer, form, rows, file)
+        with progress_bar("sweep") as progress, _crew(sweep, jobs=jobs, cluster=cluster) as crew:
+            answer = computed(sweep, executor=crew, progress=progress)
+        top_rows = partial(
+            answer.report, columns=names, top=top or _DEFAULT_TOP, sort_by=sort_by or None, ascending=bool(order)
+        )
+        _write(answer, form, names, top_rows, file, is_whole=all_)
         if picture_file is not None and picture_form is not None:
             from busplan.forms.svg import content
 
             picture_file.write(document_bytes(content(answer.drawing(figure=figure), picture_form)))
-    for path in (output, plot):
-        if path is not None:
-            say(f"wrote {path}")
+    say(*(f"wrote {path}" for path in (output, plot) if path is not None))
 
 
-class _Rows(NamedTuple):
-    """Which rows and columns are written."""
+def _crew(sweep: "Sweep", *, jobs: int | None, cluster: str | None) -> "AbstractContextManager[Executor | None]":
+    """Where circle tests run: in worker processes or on a cluster; None for this process."""
+    if not sweep.circle:
+        return nullcontext()
+    from busplan.cli.workers import available_processors, dask_executor, executor
 
-    columns: list[str]
-    """Those asked for; none without --columns."""
-    top: int
-    sort_by: str | None
-    ascending: bool
-    is_whole: bool
-    """If True, a narrow terminal leaves out no column of the top rows."""
+    if cluster is not None:
+        return dask_executor(cluster)
+    return executor(min(jobs or available_processors(), sweep.tests.points))
 
 
-def _write(answer: "SweepAnswer", form: SweepForm, rows: _Rows, file: BinaryIO | None) -> None:
-    """Write a sweep to a file, and say how much fits; or to standard output."""
+def _write(
+    answer: "SweepAnswer",
+    form: SweepForm,
+    columns: list[str],
+    top_rows: "Callable[[], Report]",
+    file: NewFile | None,
+    *,
+    is_whole: bool,
+) -> None:
+    """Write all rows, or a report with the top rows; and say how much fits, unless the report has it."""
     from busplan.forms.numbers import sentence_text
     from busplan.questions.base.sentences import changes_sentences
 
-    changes = answer.sweep.changes
+    changes = changes_sentences(answer.sweep.changes)
     match form:
         case "csv" | "json" | "parquet":
-            for piece in answer.rows_in(form, rows.columns):
-                (emit_document if file is None else file.write)(piece)
+            for piece in answer.rows_in(form, columns):
+                write_document(piece, file)
         case _:
-            top = answer.report(columns=rows.columns, top=rows.top, sort_by=rows.sort_by, ascending=rows.ascending)
-            report = top._replace(blocks=(*changes_sentences(changes), *top.blocks), is_whole=rows.is_whole)
+            report = top_rows()
+            write_report(report._replace(blocks=(*changes, *report.blocks), is_whole=is_whole), form, file)
             if file is None:
-                give(report, form)
                 return
-            file.write(document_bytes(render(report, form)))
-    say(*map(sentence_text, (*changes_sentences(changes), *answer.sentences())))
-
-
-@contextmanager
-def _crew(sweep: "Sweep", *, jobs: int | None, cluster: str | None) -> Iterator["Executor | None"]:
-    """Where circle tests run: in worker processes or on a cluster; None for this thread."""
-    if cluster is not None:
-        from busplan.cli.workers import dask_executor
-
-        with dask_executor(cluster) as there:
-            yield there
-    elif sweep.circle:
-        from busplan.cli.workers import available_processors, executor
-
-        with executor(min(jobs or available_processors(), sweep.tests.points)) as here:
-            yield here
-    else:
-        yield None
-
-
-def _form_of(output: Path | None) -> SweepForm:
-    """Choose the form by the ending of the file."""
-    ending = "" if output is None else output.suffix.lower()
-    if ending == ".npz":
-        raise BusplanError(
-            f"--output {output}: a sweep writes no NumPy file; in Python, busplan.sweep(...) gives arrays, "
-            "and FILE.csv, FILE.json or FILE.parquet holds every row"
-        )
-    return form_of_file(None, output, forms=_ENDINGS, default="table")
-
-
-def _require_parquet(output: Path | None, *, typed: str | None) -> None:
-    """Refuse a table that cannot be written, or that nobody can read."""
-    if output is None:
-        refuse_terminal("parquet")
-    require_pyarrow("--format parquet" if typed else f"--output {output}")
-
-
-def _require_cluster(cluster: str | None, jobs: int | None) -> None:
-    """Refuse a cluster without its library, or beside processes of our own."""
-    if cluster is not None and jobs is not None:
-        raise BusplanError(
-            "--jobs: is the number of processes here, and --cluster runs the tests elsewhere; leave one out"
-        )
-    if cluster is not None:
-        require_extra("distributed", extra="cluster", option="--cluster", module="distributed")
-
-
-def _require_numbers(options: Mapping[str, int | None]) -> None:
-    """Refuse numbers below 1."""
-    for name, number in options.items():
-        if number is not None and number < 1:
-            raise BusplanError(f"{name} {number}: must be 1 or more")
-
-
-def _require_sense(form: SweepForm, options: Mapping[str, object]) -> None:
-    """Refuse options of the top rows where every row is written."""
-    for name, value in options.items():
-        if value is not None and form not in _TOP_FORMS:
-            forms = f"{', '.join(_TOP_FORMS[:-1])} or {_TOP_FORMS[-1]}"
-            raise BusplanError(f"{name}: goes with --format {forms}; {form} has every row in the order of the grid")
-
-
-def _require_needed(needed: str, options: Mapping[str, object]) -> None:
-    """Refuse options that need another, which is not there."""
-    for name, value in options.items():
-        if value is not None:
-            raise BusplanError(f"{name}: goes with {needed}")
+    say(*map(sentence_text, (*changes, *answer.sentences())))

@@ -20,6 +20,7 @@ import numpy as np
 from busplan import __version__
 from busplan.cli.output import ENDING, say
 from busplan.errors import BusplanError, WorkerLostError
+from busplan.extras import require_extra
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -57,7 +58,7 @@ def workers(number: int) -> Iterator[Executor]:
     WorkerLostError
         A worker was killed.
     """
-    others = active_children()
+    before = active_children()
     with _signals_blocked():  # also for Python's resource tracker, which starts here
         # Spawn: forking a process with threads is unsafe.
         crew = _Workers(number, mp_context=get_context("spawn"), initializer=_begin)
@@ -67,7 +68,7 @@ def workers(number: int) -> Iterator[Executor]:
         raise WorkerLostError("a worker was killed (out of memory?)") from None
     finally:
         for process in active_children():
-            if process not in others:
+            if process not in before:
                 process.kill()
         # The executor's own thread joins them: a second one that did would take their exit codes from it.
         crew.shutdown(cancel_futures=True)
@@ -79,12 +80,8 @@ class _Workers(ProcessPoolExecutor):
         with _signals_blocked():
             future = super().submit(fn, *args, **kwargs)
         # Calls end with their workers. The executor's thread stumbles over a cancelled one when it sees them killed.
-        future.cancel = _refuse  # type: ignore[method-assign]
+        future.cancel = lambda: False  # type: ignore[method-assign]
         return future
-
-
-def _refuse() -> bool:
-    return False
 
 
 @contextmanager
@@ -128,10 +125,11 @@ def dask_executor(address: str) -> Iterator[Executor]:
     Raises
     ------
     BusplanError
-        No scheduler answers, or a worker has other versions.
+        The extra is missing, no scheduler answers, or a worker has other versions.
     WorkerLostError
         The scheduler ended, or the same tests were on several workers that died.
     """
+    require_extra("distributed", extra="cluster", option="--cluster", module="distributed")
     from distributed import KilledWorker
 
     # Dask tells of lost workers and schedulers in its log.
@@ -178,7 +176,7 @@ def _require_versions(client: "Client", address: str) -> int:
     for worker, theirs in sorted(workers.items()):
         if isinstance(theirs, dict):
             wrong = ", ".join(
-                f"{name} {theirs[name]} where {own} is here" for name, own in ours.items() if theirs[name] != own
+                f"{name} {theirs[name]} where {here} is here" for name, here in ours.items() if theirs[name] != here
             )
         else:
             wrong = f"no busplan {__version__} that loads ({theirs})"

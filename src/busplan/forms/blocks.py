@@ -266,9 +266,6 @@ class Chapter(NamedTuple):
 Block = Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Card | Detail | Chapter
 
 
-ALL_SHOWS: Final = "--all shows all."
-
-
 class Report(NamedTuple):
     """An answer, ready for every form; plain values."""
 
@@ -286,8 +283,8 @@ class Report(NamedTuple):
     """If True, details are shown, and a narrow terminal leaves out no column."""
     next_commands: tuple[Command, ...] = ()
     """What to ask next."""
-    whole_by: str = ALL_SHOWS
-    """Says how the reader sees the details that tables leave out."""
+    whole_by: str = ""
+    """Says how the reader sees the details that tables leave out; empty in a file."""
     is_card_enough: bool = False
     """If True, a terminal too low for all of it shows no more than its cards."""
 

@@ -1,6 +1,6 @@
 """Charts as data: cells of a grid, curves, bars in lanes and a circle, with their scales and what their marks mean.
 
-A question gives these records; `forms.svg` draws them as SVG and PNG, `forms.characters` in characters.
+A question gives these records; `forms.svg` draws them as SVG and PNG, `forms.terminal` in characters.
 """
 
 from collections.abc import Callable, Iterable, Iterator

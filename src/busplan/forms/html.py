@@ -5,23 +5,19 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.resources import files
 from itertools import groupby
-from typing import Final
+from typing import Final, get_args
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from busplan import __version__
 from busplan.buses.figure import unit_of
 from busplan.english import json_text, printable_lines
-from busplan.forms import blocks as made_of
-from busplan.forms.blocks import Bar, Block, Chapter, Command, Report, Sentence, Table
+from busplan.forms.blocks import Bar, Block, Cell, Chapter, Command, Report, Sentence, Table
 from busplan.forms.charts import Drawing
+from busplan.forms.inks import DARK, fills
 from busplan.forms.numbers import cell_text, figure_text, sentence_text, shown_blocks, unit_text
-from busplan.forms.svg import DARK, fills, inline, signed_bar
-
-_TYPES: Final = ("ShownValue", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
-_BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Calculation", "Question", "Card", "Chapter")
-
+from busplan.forms.svg import inline, signed_bar
 
 _DARK_RULES: Final = re.compile(r"@media screen and \(prefers-color-scheme: ?dark\) ?\{([^{}]*\{[^{}]*\})*\s*\}")
 _NOT_ON_LIGHT: Final = '&:not([data-jp-theme-light="true"] *)'
@@ -42,11 +38,15 @@ def page(report: Report) -> str:
         The whole document. The same answer always gives the same document.
     """
     blocks = shown_blocks(report)
-    return _template("page.html.j2").render(
-        title=report.title,
-        blocks=blocks,
-        program=f"busplan {__version__}",
-        colours=Markup(_colours()),  # noqa: S704 - our own constants
+    return (
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            title=report.title,
+            blocks=blocks,
+            program=f"busplan {__version__}",
+            colours=Markup(_colours()),  # noqa: S704 - our own constants
+        )
     )
 
 
@@ -59,16 +59,13 @@ def fragment(report: Report) -> str:
         The answer.
     """
     blocks = shown_blocks(report)
-    page = files("busplan.forms") / "templates"
-    chart, style = ((page / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
+    folder = files("busplan.forms") / "templates"
+    chart, style = ((folder / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
     # The rules are nested in the fragment's own rule, where & stands for its outer element: that is its root.
-    own = f"{chart}{_colours()}{style}".replace(":root", "&")
-    own = _DARK_RULES.sub(lambda rules: f"{_NOT_ON_LIGHT} {{\n{rules[0]}\n}}\n", own)
-    return _template("fragment.html.j2").render(blocks=blocks, style=Markup(own))  # noqa: S704 - as above
-
-
-def _template(name: str) -> Template:
-    return _environment().get_template(name)
+    sheet = f"{chart}{_colours()}{style}".replace(":root", "&")
+    sheet = _DARK_RULES.sub(lambda rules: f"{_NOT_ON_LIGHT} {{\n{rules[0]}\n}}\n", sheet)
+    template = _environment().get_template("fragment.html.j2")
+    return template.render(blocks=blocks, style=Markup(sheet))  # noqa: S704 - as above
 
 
 @cache
@@ -83,9 +80,8 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    for name in (*_TYPES, *_BLOCKS):
-        kind = getattr(made_of, name)
-        environment.tests[name.lower()] = lambda block, kind=kind: isinstance(block, kind)
+    for kind in {*get_args(Cell), *get_args(Block)} - {str}:
+        environment.tests[kind.__name__.lower()] = lambda piece, kind=kind: isinstance(piece, kind)
     environment.filters |= {
         "exact": lambda value: json_text(value.value),
         "exact_unit": lambda value: unit_of(value.key),

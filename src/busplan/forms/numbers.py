@@ -237,4 +237,4 @@ def left_out_sentence(rows: int, columns: Sequence[str] = (), *, whole_by: str) 
     names = list(dict.fromkeys(columns))
     parts = [f"{rows} {nouns(rows, 'row')}"] if rows else []
     parts += [f"{nouns(len(names), 'column')} {', '.join(names)}"] if names else []
-    return f"Not shown: {'; '.join(parts)}. {whole_by}" if parts else ""
+    return f"Not shown: {'; '.join(parts)}. {whole_by}".rstrip() if parts else ""

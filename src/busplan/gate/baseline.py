@@ -72,8 +72,8 @@ def figures_of(subject: Subject) -> dict[str, float]:
 
 def keys_of(profile: Profile) -> dict[str, object]:
     """Values of a profile to record, by dotted key: those that its file sets."""
-    said = flat(profile.model_dump(mode="json", exclude_unset=True))
-    return {key: value for key, value in said if key not in _WORDS}
+    values = flat(profile.model_dump(mode="json", exclude_unset=True))
+    return {key: value for key, value in values if key not in _WORDS}
 
 
 def _of_all(kind: str) -> Iterable[Figure]:
@@ -128,9 +128,9 @@ class Baseline(NamedTuple):
         """
         records = self.without_profile(checked)
         counts = (
-            f"{plural(len(names), noun)} ha{'s' if len(names) == 1 else 've'} no {other} "
+            f"{plural(len(names), noun)} ha{'s' if len(names) == 1 else 've'} no {partner} "
             f"({first_of(names, _MOST_NAMED)})"
-            for names, noun, other in ((profiles, "profile", "record"), (records, "record", "profile"))
+            for names, noun, partner in ((profiles, "profile", "record"), (records, "record", "profile"))
             if names
         )
         words = ", ".join(counts)
@@ -292,9 +292,9 @@ def _causes(subject: Subject, before: Mapping[str, object], lost: Mapping[str, o
 def _changed(subject: Subject, before: Mapping[str, object]) -> dict[str, ChangedValue]:
     """Keys whose value differs from the recorded one; a key that a file leaves out has its default."""
     profile = subject.profile
-    values, said = dict(flat(profile.model_dump(mode="json"))), keys_of(profile)
+    values = dict(flat(profile.model_dump(mode="json")))
     changed: dict[str, ChangedValue] = {}
-    for key in dict.fromkeys((*said, *before)):
+    for key in dict.fromkeys((*keys_of(profile), *before)):
         change = ChangedValue(before[key] if key in before else default_of(profile, key), values.get(key))
         if change.before != change.now:
             changed[key] = change
@@ -313,8 +313,8 @@ def _wins_back(subject: Subject, key: str, value: object, lost: Mapping[str, obj
 
 def _keys(changes: Mapping[str, ChangedValue]) -> str:
     """Say how keys changed; the finding begins with the first of them."""
-    first, *others = (f"{_shown(value.now)}, was {_shown(value.before)}" for value in changes.values())
-    named = [f"{key} = {words}" for key, words in zip(list(changes)[1:], others, strict=True)][: _MOST_NAMED - 1]
+    first, *rest = (f"{_shown(value.now)}, was {_shown(value.before)}" for value in changes.values())
+    named = [f"{key} = {words}" for key, words in zip(list(changes)[1:], rest, strict=True)][: _MOST_NAMED - 1]
     more = len(changes) - 1 - len(named)
     return "; ".join((first, *named, *([f"and {more} more"] if more else ())))
 
@@ -334,16 +334,18 @@ def _words(lost: Mapping[str, tuple[float, float | None]], *, deciding: str) -> 
         key = _figure(name).key
         return not name.startswith(f"{deciding}."), order.index(key) if key in order else len(order)
 
-    said, verb = [], ""
+    phrases, verb = [], ""
     for name in sorted(lost, key=place)[:_MOST_FIGURES]:
         model, _, path = name.partition(".")
         figure, before = _figure(name), verb
         verb = " rose" if figure.better == "less" else " fell"
         by_model = "" if model == deciding else f" by the {model} timing"
         # A figure says the verb for those behind it.
-        said.append(f"{_label(path, figure)}{verb if verb != before else ''} {_change(figure, *lost[name])}{by_model}")
-    more = len(lost) - len(said)
-    words = ", ".join(said)
+        phrases.append(
+            f"{_label(path, figure)}{verb if verb != before else ''} {_change(figure, *lost[name])}{by_model}"
+        )
+    more = len(lost) - len(phrases)
+    words = ", ".join(phrases)
     return f"{words}, and {more} more" if more else words
 
 

@@ -12,7 +12,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.numbers import sentence_text
 from busplan.gate.baseline import Baseline, load_baseline
 from busplan.gate.finding import MOST_STEPS, Recording
-from busplan.gate.gate import FileResult, check_document, check_source
+from busplan.gate.gate import FileResult, check_source
 from busplan.gate.report import CheckReport, Located, check_report, summary_sentence
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import Document
@@ -131,27 +131,26 @@ def check(
     }
     check_file = partial(check_source, options=options)
     in_memory = [Document(f"{profile.name}.toml", profile_text(profile)) for profile in profiles]
-    sources = (*collection.sources, *(ProfileSource(FilePath(document.name), document.name) for document in in_memory))
-    names = [source.name if recorded is None else recorded.name_of(source) for source in sources]
+    files: tuple[ProfileSource | Document, ...] = (*collection.sources, *in_memory)
+    names = [_record_name(file, recorded) for file in files]
     records = [None if recorded is None else recorded.profiles.get(name) for name in names]
-    if executor is None:
-        results = list(map(check_file, collection.sources, records))
-    else:
-        # Only this process has standard input.
-        both = list(zip(collection.sources, records, strict=False))
-        own = {source: check_file(source, record) for source, record in both if str(source.path) == "-"}
-        others = [pair for pair in both if pair[0] not in own]
-        checked = executor.map(check_file, *zip(*others, strict=True)) if others else ()
-        by_source = own | dict(zip((source for source, _ in others), checked, strict=True))
-        results = [by_source[source] for source in collection.sources]
-    results += [
-        check_document(document, baseline=record, **options)
-        for document, record in zip(in_memory, records[len(results) :], strict=True)
+    # Only this process has standard input and what is in memory.
+    is_here = [executor is None or isinstance(file, Document) or str(file.path) == "-" for file in files]
+    there = [pair for pair, here in zip(zip(files, records, strict=True), is_here, strict=True) if not here]
+    checked = executor.map(check_file, *zip(*there, strict=True)) if executor is not None and there else iter(())
+    results = [
+        check_file(file, record) if here else next(checked)
+        for file, record, here in zip(files, records, is_here, strict=True)
     ]
     unmatched = "" if recorded is None else _unmatched(recorded, names, results)
     if unmatched and not pass_on_unmatched:
         results.append(FileResult(str(recorded), None, (), {}, failure=unmatched))
     return CheckAnswer(tuple(results), changed, len(collection.skipped) if skip_others else 0, unmatched)
+
+
+def _record_name(file: ProfileSource | Document, recorded: Baseline | None) -> str:
+    source = ProfileSource(FilePath(file.name), file.name) if isinstance(file, Document) else file
+    return source.name if recorded is None else recorded.name_of(source)
 
 
 def _unmatched(recorded: Baseline, names: Sequence[str], results: Sequence[FileResult]) -> str:
@@ -173,10 +172,10 @@ def _collected(paths: ProfileLike | Iterable[ProfileLike], *, skip_others: bool)
 
 
 def _recorded(baseline: str | os.PathLike[str] | Baseline) -> Baseline:
-    known = baseline if isinstance(baseline, Baseline) else load_baseline(FilePath(baseline))
-    if not known.is_current:
+    recorded = baseline if isinstance(baseline, Baseline) else load_baseline(FilePath(baseline))
+    if not recorded.is_current:
         raise BusplanError(
-            f"{known}: recorded by other timing models, so its figures cannot be compared; record it again with "
+            f"{recorded}: recorded by other timing models, so its figures cannot be compared; record it again with "
             "--update-baseline"
         )
-    return known
+    return recorded

@@ -1,13 +1,22 @@
 """Findings of the gate: of a profile's bus, its circle, and a recording of the machine."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Final, NamedTuple
 
 from busplan.buses.limits import Value
 from busplan.buses.rule import Mending, RecordedFigure, Rule, RuleProblem, Severity, told_apart
 from busplan.english import listed, printable
-from busplan.gate.rules import NOT_RECORDED, NOTHING_RECORDED, OUTSIDE_PLAN
+from busplan.gate.rules import (
+    CIRCLE,
+    IMPOSSIBLE_CIRCLE,
+    LONG_CIRCLE,
+    NOT_RECORDED,
+    NOTHING_RECORDED,
+    OF_CIRCLE,
+    OF_STABILITY,
+    OUTSIDE_PLAN,
+)
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import LoadedProfile, Spot
 from busplan.profile.edit import short_text
@@ -112,24 +121,15 @@ class Subject:
         """The verdict, by the timing model that decides."""
         return figures(self.network, model=self.network.bus.deciding_model)
 
-    @cached_property
-    def others(self) -> tuple[FitFigures, ...]:
-        """Figures under the other timing models."""
-        return tuple(figures(self.network, model=model) for model in self._other_models)
-
     @property
     def others_fit(self) -> tuple[tuple[str, bool], ...]:
         """The other timing models, each with whether the cycle fits; no figures are computed for that."""
-        given_us, cycle = available_us(self.network), self.network.bus.cycle
+        given_us, bus = available_us(self.network), self.network.bus
         return tuple(
-            (model, bool(fits_in(cycle(self.network, model=model).required_us, available_us=given_us)))
-            for model in self._other_models
+            (model, bool(fits_in(bus.cycle(self.network, model=model).required_us, available_us=given_us)))
+            for model in model_names(self.network)
+            if model != bus.deciding_model
         )
-
-    @property
-    def _other_models(self) -> tuple[str, ...]:
-        deciding = self.network.bus.deciding_model
-        return tuple(model for model in model_names(self.network) if model != deciding)
 
     def after(self, changes: Mapping[str, Value]) -> FitFigures:
         """The verdict with other values by dotted key."""
@@ -145,6 +145,10 @@ class Subject:
         limit = self.network.bus.limit(key)
         return "" if limit is None else limit.words(self.network)
 
+    def cure(self) -> Mending:
+        """The change after which the profile holds every constraint of a plan; one for all rules."""
+        return self._cure
+
     @cached_property
     def _cure(self) -> Mending:
         mending = cure(self.network)
@@ -153,21 +157,16 @@ class Subject:
         lines = tuple(f"{key} = {short_text(value)}" for key, value in mending.changes.items())
         return Mending("the period must change" if PERIOD in mending.changes else "", lines)
 
-    def cure(self) -> Mending:
-        """The change after which the profile holds every constraint of a plan; one for all rules."""
-        return self._cure
-
 
 MOST_STEPS: Final = 10_000_000
 """Most steps of a circle that the gate runs: seconds, and a few hundred megabytes."""
-_NOT_RUN: Final = ("BP203", "BP204")
 
 
-def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
-    """Run the circle test of a profile, and yield the code of each broken rule with its problem.
+def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
+    """Run the circle test of a profile, and yield each broken rule with its problem.
 
-    A circle that cannot be run is said whether or not it was to be run. A cycle that does not fit breaks another rule,
-    and has no circle.
+    A circle that cannot be run is a problem whether or not it was to be run. A cycle that does not fit breaks another
+    rule, and has no circle.
 
     Parameters
     ----------
@@ -176,7 +175,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     """
     profile, network, most_steps = subject.profile, subject.network, subject.circle_steps
     refused = refusals(network) if profile.asks_for_circle else ()
-    yield from (("BP203", _refused(cause, profile)) for cause in refused)
+    yield from ((IMPOSSIBLE_CIRCLE, _refused(cause, profile)) for cause in refused)
     if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
         return
     from busplan.questions.circle.failures import STABILITY
@@ -185,23 +184,24 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     steps = path_steps(network)
     if steps > most_steps:
         words = f"the circle takes {steps:,} steps, more than {most_steps:,}: not run"
-        yield "BP204", RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
+        yield LONG_CIRCLE, RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
         return
     result = run_circles(network).results[0]
-    # A cycle that is not shown to fit has a rule of its own: nothing of the circle mends it.
-    failures = [failure for failure in result.failures if not failure.is_of_bus]
     first = result.to_attack
     attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
-    for failure in failures:
-        stability = failure.name in STABILITY
+    for failure in result.failures:
+        if failure.is_of_bus:  # a cycle that is not shown to fit has a rule of its own
+            continue
+        is_stability = failure.name in STABILITY
         # A finding needs a key in the file: a default limit has none.
-        said = failure.name in profile.tolerance.model_fields_set
-        key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
-        gain = profile.servo.position_gain_per_s
-        way_out = "lower servo.position_gain_per_s or what delays the loop" if stability and gain else ""
+        is_set = failure.name in profile.tolerance.model_fields_set
+        key = f"tolerance.{failure.name}" if is_set else "servo.position_gain_per_s"
+        way_out = ""
         if failure.name in CONTOUR_MEASURES and failure.value is not None:
             way_out = attack
-        yield "BP202" if stability else "BP201", RuleProblem(key, failure.text, way_out)
+        elif is_stability and profile.servo.position_gain_per_s:
+            way_out = "lower servo.position_gain_per_s or what delays the loop"
+        yield OF_STABILITY if is_stability else OF_CIRCLE, RuleProblem(key, failure.text, way_out)
 
 
 def _refused(cause: Refused, profile: Profile) -> RuleProblem:
@@ -221,13 +221,13 @@ def _key_in_file(*keys: str, profile: Profile) -> str:
     return "servo" if "servo" in profile.model_fields_set else "circle"
 
 
-def answered(subject: Subject, problems: Sequence[tuple[str, RuleProblem]]) -> set[str]:
+def circle_rules_run(subject: Subject, problems: Iterable[tuple[Rule, RuleProblem]]) -> set[str]:
     """Codes of the rules that were checked; without a test, only that of the rule that says why there is none."""
-    not_run = {code for code, _ in problems if code in _NOT_RUN}
+    not_run = {rule.code for rule, _ in problems if rule in (IMPOSSIBLE_CIRCLE, LONG_CIRCLE)}
     if not_run:
         return not_run
     is_run = subject.circle_steps is not None and (subject.deciding.fits or not subject.profile.asks_for_circle)
-    return {"BP201", "BP202", *_NOT_RUN} if is_run else {"BP203"}
+    return {rule.code for rule in (CIRCLE if is_run else (IMPOSSIBLE_CIRCLE,))}
 
 
 _UNPLANNED: Final = "name"

@@ -6,9 +6,18 @@ from typing import Any, Final, Literal, NamedTuple
 
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
-from busplan.gate import finding as circle
 from busplan.gate.baseline import Record, figures_of, keys_of, regression
-from busplan.gate.finding import MOST_STEPS, Finding, Recording, Subject, Violation, beside_plan, finding_of
+from busplan.gate.finding import (
+    MOST_STEPS,
+    Finding,
+    Recording,
+    Subject,
+    Violation,
+    beside_plan,
+    circle_problems,
+    circle_rules_run,
+    finding_of,
+)
 from busplan.gate.rules import (
     BASELINE,
     BY_KIND,
@@ -77,13 +86,15 @@ def suppress(
     for comment in suppressions(document):
         if not comment.codes:
             way_out = "write # busplan: ignore[CODE] reason"
-            findings.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, "the comment suppresses nothing", way_out))
+            findings.append(_of_comment(SUPPRESSION_WITHOUT_EFFECT, comment, "the comment suppresses nothing", way_out))
         elif not comment.reason:
             way_out = "add the reason after the bracket"
-            findings.append(_finding(SUPPRESSION_WITHOUT_REASON, comment, "the suppression gives no reason", way_out))
+            findings.append(
+                _of_comment(SUPPRESSION_WITHOUT_REASON, comment, "the suppression gives no reason", way_out)
+            )
         for code in comment.codes:
-            hit = [placed for placed in left if placed.rule.code == code and placed.spot.line == comment.of_line]
-            left = [placed for placed in left if placed not in hit]
+            hit = [broken for broken in left if broken.rule.code == code and broken.spot.line == comment.of_line]
+            left = [broken for broken in left if broken not in hit]
             if code not in all_rules():
                 message = f"{code or 'nothing'} is not the code of a rule"
             elif code in NEVER_SUPPRESSED:
@@ -92,11 +103,11 @@ def suppress(
                 message = f"{code} has nothing to suppress on line {comment.of_line}"
             else:
                 continue
-            findings.append(_finding(SUPPRESSION_WITHOUT_EFFECT, comment, message))
+            findings.append(_of_comment(SUPPRESSION_WITHOUT_EFFECT, comment, message))
     return left, findings
 
 
-def _finding(rule: Rule, suppression: Suppression, words: str, way_out: str = "") -> Finding:
+def _of_comment(rule: Rule, suppression: Suppression, words: str, way_out: str = "") -> Finding:
     return finding_of(rule, RuleProblem("", words, way_out), suppression.spot, words=words)
 
 
@@ -106,11 +117,11 @@ Status = Literal["ok", "findings", "error"]
 class Fit(NamedTuple):
     """How the cycle of a profile fits its slice, by the timing model that decides."""
 
-    verdict: str | None
+    verdict: str | None = None
     """fits, not shown to fit, or does not fit."""
-    margin_corrected_us: float | None
+    margin_corrected_us: float | None = None
     """Time left in the slice, corrected for the bias [us]."""
-    uncertainty_us: float | None
+    uncertainty_us: float | None = None
     """Expanded uncertainty of the corrected margin [us]."""
 
 
@@ -143,8 +154,10 @@ class FileResult(NamedTuple):
         return "findings" if self.findings else "ok"
 
 
-def check_source(source: ProfileSource, recorded: Record | None = None, *, options: Mapping[str, Any]) -> FileResult:
-    """Read one file and check it against all rules.
+def check_source(
+    source: ProfileSource | Document, recorded: Record | None = None, *, options: Mapping[str, Any]
+) -> FileResult:
+    """Read one file, unless it is in memory, and check it against all rules.
 
     Parameters
     ----------
@@ -155,6 +168,8 @@ def check_source(source: ProfileSource, recorded: Record | None = None, *, optio
     options
         Named arguments of `check_document`.
     """
+    if isinstance(source, Document):
+        return check_document(source, baseline=recorded, **options)
     if source.failure is not None:
         return FileResult(source.name, None, (), {}, failure=source.failure)
     try:
@@ -214,30 +229,25 @@ def check_document(
         return FileResult(document.name, profile.name, (), {}, failure=failure)
     subject = Subject(LoadedProfile(profile, document), changes, circle_steps=circle_steps if with_circle else None)
     rules = cycle_rules(profile.bus.kind)
-    known: dict[int, Any] = {}
-    violations = [
-        _placed(document, rule, problem, known) for rule in rules if rule.check for problem in rule.check(subject)
-    ]
-    ran = {rule.code for rule in rules}
-    problems = list(circle.circle_problems(subject))
-    violations += [_placed(document, all_rules()[code], problem) for code, problem in problems]
-    ran |= circle.answered(subject, problems)
+    of_circle = list(circle_problems(subject))
+    problems = [(rule, problem) for rule in rules if rule.check for problem in rule.check(subject)] + of_circle
+    ran = {rule.code for rule in rules} | circle_rules_run(subject, of_circle)
     if baseline is not None:
-        lost = regression(subject, baseline)
-        violations += [_placed(document, BASELINE, problem) for problem in lost]
+        problems += ((BASELINE, problem) for problem in regression(subject, baseline))
         ran.add(BASELINE.code)
     if recording is not None:
         try:
-            beside = list(beside_plan(profile, recording))
+            problems += beside_plan(profile, recording)
         except BusplanError as error:
             return FileResult(document.name, profile.name, (), {}, failure="; ".join(error.problems))
-        violations += [_placed(document, rule, problem) for rule, problem in beside]
         ran.update(rule.code for rule in RECORDING)
-    if changes.each:
+    paths: dict[int, Any] = {}
+    violations = [_placed(document, rule, problem, paths) for rule, problem in problems]
+    if changes.entries:
         # Comments were written for the file as it is: with changes, none counts as without effect.
         ran = set()
     left, of_comments = suppress(violations, document, ran=ran)
-    findings = [*(_said(placed, subject) for placed in left), *of_comments]
+    findings = [*(_finding_of(violation, subject) for violation in left), *of_comments]
     deciding = subject.deciding
     fit = Fit(deciding.verdict, deciding.margin_corrected_us, deciding.uncertainty_us)
     not_run = profile.asks_for_circle and not with_circle
@@ -262,15 +272,14 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
         yield finding_of(rule, RuleProblem(problem.key, words), spot, words=words)
 
 
-def _placed(document: Document, rule: Rule, problem: RuleProblem, known: dict[int, Any] | None = None) -> Violation:
-    """Find the line of a problem's key, or of the table that should have it; `known` as `path_of` takes it."""
-    path = path_of(document.data(), problem.key, known) if problem.key.count(".") > 1 else (*problem.key.split("."),)
-    spot = document.spot(path)
-    return Violation(rule, problem, spot)
+def _placed(document: Document, rule: Rule, problem: RuleProblem, paths: dict[int, Any]) -> Violation:
+    """Find the line of a problem's key, or of the table that should have it; `paths` as `path_of` takes it."""
+    path = path_of(document.data(), problem.key, paths) if problem.key.count(".") > 1 else (*problem.key.split("."),)
+    return Violation(rule, problem, document.spot(path))
 
 
-def _said(placed: Violation, subject: Subject) -> Finding:
-    rule, problem, spot = placed
+def _finding_of(violation: Violation, subject: Subject) -> Finding:
+    rule, problem, spot = violation
     message = problem.message if isinstance(problem.message, str) else problem.message()
     return finding_of(rule, problem, spot, words=f"{problem.key}: {message}{subject.origin}")
 

@@ -120,15 +120,12 @@ def summary_sentence(report: CheckReport) -> Sentence:
         count_value(counts.warnings, "warnings"),
         state=_state(report),
     )
-    if failed:
-        summary = joined(summary, sentence("{} could not be checked", count_value(failed)), by="; ")
-    if counts.circles_not_run:
-        words = f"{{}} {nouns(counts.circles_not_run, 'circle test')} not run"
-        summary = joined(summary, sentence(words, count_value(counts.circles_not_run, "circles_not_run")), by="; ")
-    if report.others:
-        words = f"skipped {{}} {nouns(report.others, 'file')} without a schema_version"
-        summary = joined(summary, sentence(words, count_value(report.others)), by="; ")
-    return summary
+    parts = (
+        (failed, "{} could not be checked"),
+        (counts.circles_not_run, f"{{}} {nouns(counts.circles_not_run, 'circle test')} not run"),
+        (report.others, f"skipped {{}} {nouns(report.others, 'file')} without a schema_version"),
+    )
+    return joined(summary, *(sentence(words, count_value(number)) for number, words in parts if number), by="; ")
 
 
 def _state(report: CheckReport) -> State:
@@ -150,7 +147,7 @@ def check_document(report: CheckReport) -> JsonDocument:
             "path": file.path,
             "profile": file.profile,
             "status": file.status,
-            **(file.fit or Fit(None, None, None))._asdict(),
+            **(file.fit or Fit())._asdict(),
             "findings": [finding._asdict() for finding in file.findings],
         }
         files.append(content if file.failure is None else {**content, "failure": file.failure})
@@ -158,15 +155,15 @@ def check_document(report: CheckReport) -> JsonDocument:
 
 
 TONES: Final[dict[Severity, Tone]] = {"error": "fails", "warning": "warns"}
-"""Colour of each severity, which is always said in a word, too."""
+"""Colour of each severity; a word says it, too."""
 
 
 def marked_line(text: str, path: str, finding: Finding) -> Line:
     """Mark the place, the code and the severity of a line that begins with them."""
     place, words = finding_parts(path, finding)
     start = len(printable(place)) + 1
-    said = Mark(start, start + words.index(": "), TONES[finding.severity])
-    return Line(text, "drawn", (Mark(0, start, "title"), said))
+    severity = Mark(start, start + words.index(": "), TONES[finding.severity])
+    return Line(text, "drawn", (Mark(0, start, "title"), severity))
 
 
 def concise(report: CheckReport, *, width: int | None = None) -> str:
@@ -374,25 +371,19 @@ def _artifact(path: str) -> dict[str, str]:
 
 def github(report: CheckReport) -> str:
     """One workflow command for each finding, which GitHub shows next to the line of the file."""
-    return "".join(f"{_command(located)}\n" for located in report.located)
+    lines = []
+    for path, finding, _, _ in report.located:
+        place = {"file": path, "line": finding.line, "col": finding.column, "title": f"{finding.code} {finding.rule}"}
+        properties = ",".join(
+            f"{name}={_escaped(str(value)).replace(':', '%3A').replace(',', '%2C')}" for name, value in place.items()
+        )
+        lines.append(f"::{finding.severity} {properties}::{_escaped(finding.message)}\n")
+    return "".join(lines)
 
 
-def _command(located: Located) -> str:
-    finding = located.finding
-    properties = {
-        "file": located.path,
-        "line": str(finding.line),
-        "col": str(finding.column),
-        "title": f"{finding.code} {finding.rule}",
-    }
-    said = ",".join(f"{name}={_escaped(value, property_=True)}" for name, value in properties.items())
-    return f"::{finding.severity} {said}::{_escaped(finding.message, property_=False)}"
-
-
-def _escaped(text: str, *, property_: bool) -> str:
-    text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-    # GitHub has no escape for other control characters.
-    return printable(text.replace(":", "%3A").replace(",", "%2C") if property_ else text)
+def _escaped(text: str) -> str:
+    """Escape line ends as GitHub does; it has no escape for other control characters."""
+    return printable(text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A"))
 
 
 _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -406,21 +397,17 @@ def junit(report: CheckReport) -> str:
     root = Element("testsuites", {"name": "busplan check", **counts})
     suite = SubElement(root, "testsuite", {"name": "busplan check", **counts})
     for file in report.files:
-        _case(suite, file)
+        case = SubElement(suite, "testcase", classname="busplan.check", name=_clean(file.path), file=_clean(file.path))
+        if file.failure is not None:
+            SubElement(case, "error", message=_clean(file.failure))
+        for severity, tag in (("error", "failure"), ("warning", "system-out")):
+            findings = [finding for finding in file.findings if finding.severity == severity]
+            if findings:
+                first = {"message": _clean(findings[0].message), "type": findings[0].code} if tag == "failure" else {}
+                lines = "\n".join(finding_line(file.path, finding) for finding in findings)
+                SubElement(case, tag, first).text = _clean(lines)
     indent(root)
     return tostring(root, encoding="unicode", xml_declaration=True) + "\n"
-
-
-def _case(suite: Element, file: FileResult) -> None:
-    case = SubElement(suite, "testcase", classname="busplan.check", name=_clean(file.path), file=_clean(file.path))
-    if file.failure is not None:
-        SubElement(case, "error", message=_clean(file.failure))
-    for severity, tag in (("error", "failure"), ("warning", "system-out")):
-        findings = [finding for finding in file.findings if finding.severity == severity]
-        if not findings:
-            continue
-        said = {"message": _clean(findings[0].message), "type": findings[0].code} if tag == "failure" else {}
-        SubElement(case, tag, said).text = _clean("\n".join(finding_line(file.path, finding) for finding in findings))
 
 
 def _clean(text: str) -> str:
@@ -433,20 +420,17 @@ _FINDINGS: Final = ("place", "rule", "severity", "what is wrong", "how to mend i
 
 def markdown_report(report: CheckReport) -> str:
     """A table of the profiles with their verdicts, and one of the findings; an empty one is left out."""
-    return "".join(f"{line}\n" for line in _markdown_lines(report))
-
-
-def _markdown_lines(report: CheckReport) -> Iterator[str]:
-    said = (*changes_sentences(report.changes), summary_sentence(report))
-    yield from ("### Check of profiles", "", escaped(" ".join(map(sentence_text, said))))
+    sentences = (*changes_sentences(report.changes), summary_sentence(report))
+    lines = ["### Check of profiles", "", escaped(" ".join(map(sentence_text, sentences)))]
     if report.files:
-        yield from ("", *table(_PROFILES, map(_profile, report.files), left=3))
+        lines += ["", *table(_PROFILES, map(_profile, report.files), left=3)]
     if report.located:
-        yield from ("", *table(_FINDINGS, map(_finding_row, report.located), left=len(_FINDINGS)))
+        lines += ["", *table(_FINDINGS, map(_finding_row, report.located), left=len(_FINDINGS))]
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _profile(file: FileResult) -> list[str]:
-    fit = file.fit or Fit(None, None, None)
+    fit = file.fit or Fit()
     margin = MISSING
     if fit.margin_corrected_us is not None:
         doubt = "" if fit.uncertainty_us is None else f" +/- {fit.uncertainty_us:.1f}"
@@ -461,8 +445,8 @@ def _profile_result(file: FileResult) -> str:
     counts = [
         plural(severities.count(severity), severity) for severity in ("error", "warning") if severity in severities
     ]
-    said = ", ".join(counts) or "passes"
-    return f"**{said}**" if "error" in severities else said
+    words = ", ".join(counts) or "passes"
+    return f"**{words}**" if "error" in severities else words
 
 
 def _finding_row(located: Located) -> list[str]:

@@ -16,8 +16,6 @@ from busplan.errors import BusplanError, ProblemKind
 from busplan.forms.blocks import (
     Block,
     Code,
-    JsonDocument,
-    Record,
     Report,
     Sentence,
     Snippet,
@@ -26,17 +24,18 @@ from busplan.forms.blocks import (
     TableRow,
 )
 from busplan.questions.base.sentences import document, fields
-from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME, fits_in, limits_behind
+from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME, fits_in
+from busplan.questions.fit.figures import limits_behind
 from busplan.questions.fit.inputs import heavy_assumptions
 from busplan.sections.cycle import TableExecution
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle does not fit, whatever the uncertainty."""
-    deciding, bus = subject.deciding, subject.network.bus
+    deciding = subject.deciding
     if deciding.verdict != DOES_NOT_FIT:
         return
-    broken = [limit for limit in map(bus.limit, deciding.exceeded) if limit is not None]
+    broken = limits_behind(deciding, subject.network)
     alone = [limit for limit in broken if not limit.has_rule]
     for limit in alone:
         yield RuleProblem("cycle.period_us", limit.words(subject.network), limit.way_out)
@@ -46,16 +45,17 @@ def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle may fit, but the uncertainty leaves that open."""
-    deciding, reserve, bus = subject.deciding, subject.profile.limits.reserve, subject.network.bus
+    deciding, reserve = subject.deciding, subject.profile.limits.reserve
     if deciding.verdict != NOT_SHOWN:
         return
-    for limit in map(bus.limit, limits_behind(deciding)):
-        if limit is not None and not limit.has_rule:
+    for limit in limits_behind(deciding, subject.network):
+        if not limit.has_rule:
             words = limit.words(subject.network)
             yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", limit.way_out)
     if TIME in (deciding.not_shown or ()):
-        asked = f"{margin(deciding)}, limits.reserve asks for {reserve * deciding.available_us:.1f} us"
-        words = asked if reserve else overrun(deciding)
+        words = overrun(deciding)
+        if reserve:
+            words = f"{margin(deciding)}, limits.reserve asks for {reserve * deciding.available_us:.1f} us"
         yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", *subject.cure())
 
 
@@ -111,17 +111,17 @@ def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
         for group in slow_groups(network):
             words = busy_words(group, network)
             name = "time_us" if isinstance(group.node.execution, TableExecution) else "base_us"
-            said = words if is_broken else f"not shown: {words}"
-            yield RuleProblem(group.key(f"execution.{name}"), said, *subject.cure())
+            problem = words if is_broken else f"not shown: {words}"
+            yield RuleProblem(group.key(f"execution.{name}"), problem, *subject.cure())
 
 
 def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
     """Much of the required time, or of its uncertainty, is an assumption."""
     for assumption in heavy_assumptions(subject.deciding, subject.network):
-        what = "an assumption" if len(assumption.keys) == 1 else "an assumption of several"
+        noun = "an assumption" if len(assumption.keys) == 1 else "an assumption of several"
         for key in assumption.keys:
-            at = f"{key}.grade" if assumption.is_execution else key
-            yield RuleProblem(at, f"{what}, which {assumption.carries}", "measure it")
+            place = f"{key}.grade" if assumption.is_execution else key
+            yield RuleProblem(place, f"{noun}, which {assumption.carries}", "measure it")
 
 
 CHECKS: Final[Mapping[str, Callable[[RuleSubject], Iterator[RuleProblem]]]] = {
@@ -158,6 +158,10 @@ _FILE_CODES: Final[Mapping[ProblemKind, str]] = {
 BY_KIND: Final = {kind: OWN[code] for kind, code in _FILE_CODES.items()}
 """Rules of the file format, by what reading a profile finds."""
 BASELINE, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT = (OWN[code] for code in ("BP301", "BP901", "BP902"))
+CIRCLE = OF_CIRCLE, OF_STABILITY, IMPOSSIBLE_CIRCLE, LONG_CIRCLE = tuple(
+    OWN[code] for code in ("BP201", "BP202", "BP203", "BP204")
+)
+"""Rules of a circle."""
 RECORDING = OUTSIDE_PLAN, NOT_RECORDED, NOTHING_RECORDED = tuple(OWN[code] for code in ("BP401", "BP402", "BP403"))
 """Rules of a recording of the machine."""
 NEVER_SUPPRESSED: Final = frozenset((*_FILE_CODES.values(), "BP901", "BP902"))
@@ -204,64 +208,34 @@ def rule_answer(code: str | None = None) -> Report:
         return rules_report(list(rules.values()))
     named = {**rules, **{rule.name.upper(): rule for rule in rules.values()}}
     if code.upper() not in named:
-        known = (*rules, *(rule.name for rule in rules.values()))
-        hint = " ".join(filter(None, (did_you_mean(code, known), "`busplan rule` lists them")))
+        names = (*rules, *(rule.name for rule in rules.values()))
+        hint = " ".join(filter(None, (did_you_mean(code, names), "`busplan rule` lists them")))
         raise BusplanError(f"{code}: no such rule; {hint}")
     return rule_report(named[code.upper()])
 
 
 def rules_report(rules: Sequence[Rule]) -> Report:
-    """Report of `rule` with one line for each rule.
-
-    Parameters
-    ----------
-    rules
-        The rules.
-    """
-    return Report(
-        Sentence(("Rules of the gate",)),
-        (_table(rules),),
-        _rules_document(rules),
-        _rules_records(rules),
-    )
+    """Report of `rule` with one line for each rule."""
+    rows = (TableRow((Code(rule.code), rule.name, rule.severity, rule.summary)) for rule in rules)
+    return _report(Sentence(("Rules of the gate",)), [Table(_COLUMNS, tuple(rows))], rules)
 
 
 def rule_report(rule: Rule) -> Report:
-    """Report of `rule CODE` with the explanation of one rule.
-
-    Parameters
-    ----------
-    rule
-        The rule.
-    """
-    return Report(
-        Sentence((Code(rule.code), f" {rule.name}")),
-        tuple(_rule_blocks(rule)),
-        _rules_document([rule]),
-        _rules_records([rule]),
-    )
-
-
-def _table(rules: Sequence[Rule]) -> Table:
-    rows = (TableRow((Code(rule.code), rule.name, rule.severity, rule.summary)) for rule in rules)
-    return Table(_COLUMNS, tuple(rows))
-
-
-def _rule_blocks(rule: Rule) -> Iterator[Block]:
-    yield Sentence((Code(rule.code), f" {rule.name} ({rule.severity}): {rule.summary}"))
-    yield Sentence((rule.explanation,))
+    """Report of `rule CODE` with the explanation of one rule."""
+    blocks: list[Block] = [
+        Sentence((Code(rule.code), f" {rule.name} ({rule.severity}): {rule.summary}")),
+        Sentence((rule.explanation,)),
+    ]
     if rule.code in NEVER_SUPPRESSED:
-        yield Sentence(("It cannot be suppressed.",))
+        blocks.append(Sentence(("It cannot be suppressed.",)))
     else:
-        yield Sentence(("Suppress it with a reason, on its line or alone on the line above:",))
-        yield Snippet((f"# busplan: ignore[{rule.code}] reason",))
+        blocks.append(Sentence(("Suppress it with a reason, on its line or alone on the line above:",)))
+        blocks.append(Snippet((f"# busplan: ignore[{rule.code}] reason",)))
+    return _report(Sentence((Code(rule.code), f" {rule.name}")), blocks, [rule])
 
 
-def _rules_document(rules: Sequence[Rule]) -> JsonDocument:
-    return document("rule", rules=_rules_records(rules))
-
-
-def _rules_records(rules: Sequence[Rule]) -> list[Record]:
-    return [
+def _report(title: Sentence, blocks: Sequence[Block], rules: Sequence[Rule]) -> Report:
+    records = [
         {"code": rule.code, "rule": rule.name, **fields(rule, "severity", "summary", "explanation")} for rule in rules
     ]
+    return Report(title, tuple(blocks), document("rule", rules=records), records)

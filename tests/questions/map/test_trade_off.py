@@ -35,7 +35,7 @@ def at(profile: busplan.Profile, changes: dict[str, Any]) -> busplan.Profile | N
         changed = busplan.load_profile(profile, changes=changes)
         if axes is None:
             return changed
-        (group,) = changed.alike_nodes
+        (group,) = changed.node_groups
         nodes, rest = divmod(axes, group.node.axes)
         return None if rest else busplan.load_profile(changed, changes={"bus.nodes": nodes})
     except busplan.BusplanError:
@@ -102,7 +102,7 @@ def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
     answer = busplan.map_(profile)
     assert (answer.x.key, answer.y.key) == (AXES, PERIOD)
     assert answer.design is not None
-    (nodes,) = profile.alike_nodes
+    (nodes,) = profile.node_groups
     assert (answer.design.x, answer.design.y) == (nodes.nodes * nodes.node.axes, profile.cycle.period_us)
     assert max(len(answer.x.values), len(answer.y.values)) <= 24
     assert list(answer.y.values) == sorted(set(answer.y.values))

@@ -18,8 +18,8 @@ import busplan
 from busplan.buses import kind_named, kind_names
 from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, ShownValue, Table
+from busplan.forms.inks import INKS
 from busplan.forms.numbers import cell_text, sentence_text
-from busplan.forms.svg import INKS
 from busplan.profile.changes import NO_CHANGES
 from busplan.questions.base.answer import shell_word
 

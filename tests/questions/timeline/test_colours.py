@@ -7,7 +7,7 @@ import pytest
 
 import busplan
 from busplan.buses import kind_named, kind_names
-from busplan.forms.svg import INKS
+from busplan.forms.inks import INKS
 from busplan.profile.sources import shipped_names
 
 TO_NODES, FROM_NODES = {"request", "out"}, {"response", "in"}

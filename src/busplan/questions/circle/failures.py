@@ -7,8 +7,8 @@ from typing import Any, Final, NamedTuple
 
 from busplan.buses.network import Network
 from busplan.elementwise import existing
-from busplan.questions.fit.certainty import FITS, TIME, limits_behind
-from busplan.questions.fit.figures import FitFigures
+from busplan.questions.fit.certainty import FITS, TIME
+from busplan.questions.fit.figures import FitFigures, limits_behind
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
@@ -160,8 +160,7 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
 
 def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
     """Limits of the bus that a cycle breaks, or that it is not shown to fit."""
-    behind = limits_behind(capacity)
-    broken = [limit for limit in network.bus.limits if limit.key in behind]
+    broken = limits_behind(capacity, network)
     late: tuple[Failure, ...] = ()
     if TIME in capacity.exceeded:
         late = (Failure("required_us", capacity.required_us, capacity.available_us),)
@@ -171,8 +170,8 @@ def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
         *(
             Failure(
                 limit.key,
-                existing(limit.bound.value(network)),
-                existing(limit.bound.most(network)),
+                existing(limit.value(network)),
+                existing(limit.most(network)),
                 limit.words(network),
             )
             for limit in broken

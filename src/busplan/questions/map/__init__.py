@@ -21,9 +21,9 @@ from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_network, with_cycle
 from busplan.questions.circle import CircleFigures
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty, limits_behind
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_refusal import refusals
-from busplan.questions.fit.figures import figures, safe_nodes, shortest_period_us
+from busplan.questions.fit.figures import figures, limits_behind, safe_nodes, shortest_period_us
 from busplan.questions.fit.network import PERIOD, at_period, changed, varied_nodes
 from busplan.questions.sweep import axis_values
 from busplan.questions.sweep.circles import (
@@ -78,7 +78,7 @@ class Cell(NamedTuple):
     limited_by: tuple[str, ...]
     """Limits that are broken; for a circle that fails, its failures; for a circle that cannot be run, the keys that
     prevent it; empty where the cell fits."""
-    binding_term: str
+    binding_term: str | None
     """The largest term of the cycle."""
     verdict: VerdictWord
     margin_corrected_us: float | None
@@ -336,7 +336,7 @@ def _periods_of_nodes(network: Network, group: str) -> list[float]:
     bus = network.bus
     most, _ = safe_nodes(at_period(network, min(MAX_TIME_US, bus.periods.longest_us)), group=group)
     counts = np.arange(1, most + 1)
-    cycle = bus.cycle(network.asking(group).with_nodes(counts), model=bus.deciding_model)
+    cycle = bus.cycle(network.varying(group).with_nodes(counts), model=bus.deciding_model)
     needed_us = np.asarray(certainty(cycle).safe_required_us)
     periods_us = shortest_period_us(cycle.network, needed_us, is_shown=True)
     return [float(us) for us in np.broadcast_to(np.asarray(periods_us), counts.shape)]
@@ -391,7 +391,7 @@ def _nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
     BusplanError
         No whole number of nodes has so many axes.
     """
-    varied = next(nodes for nodes in network.profile.alike_nodes if nodes.nodes_key == nodes_key)
+    varied = next(nodes for nodes in network.profile.node_groups if nodes.nodes_key == nodes_key)
     node_axes = int(varied.node.axes)
     axes_beside = int(plain(network.axes)) - int(varied.nodes) * node_axes
     varied_axes = axes - axes_beside if isinstance(axes, int) else 0
@@ -407,7 +407,8 @@ def _cell(network: Network, *, x: Value, y: Value) -> Cell:
     unsafe = tuple(limit.key for limit in network.bus.limits if limit.role == "safety" and limit.is_broken(network))
     verdict: Any = fit.verdict  # there is one under the timing model that decides
     state: State = verdict
-    limits: tuple[str, ...] = () if verdict == FITS else limits_behind(fit) or (TIME,)
+    behind = tuple(limit.key for limit in limits_behind(fit, network))
+    limits: tuple[str, ...] = () if verdict == FITS else behind or (TIME,)
     # "Does not fit" goes before "unsafe", and both before "not shown".
     if unsafe and verdict != DOES_NOT_FIT:
         state, limits = "unsafe", unsafe

@@ -198,7 +198,7 @@ def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[Sen
     varied
         Keys that vary.
     """
-    for nodes in profile.alike_nodes:
+    for nodes in profile.node_groups:
         if nodes.node_key("axes") not in varied or nodes.payload.follows_axes:
             continue
         section = f"group.{nodes.name}" if nodes.name else "payload"

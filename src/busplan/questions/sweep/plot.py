@@ -24,9 +24,9 @@ from busplan.forms.charts import (
     letters,
     numbers,
 )
+from busplan.forms.inks import LEVELS
 from busplan.forms.numbers import SILENT_UNITS, factor_of, figure_text, with_unit
 from busplan.forms.scale import ticks
-from busplan.forms.svg import LEVELS
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.network import bus_of
 from busplan.questions.sweep.grid import Array, Columns, Grid

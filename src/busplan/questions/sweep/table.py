@@ -296,11 +296,11 @@ def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str
             "limited_by": _objects([None]),
             "safe_limited_by": _objects([None]),
         }
-    counts = {name: _counts_of(network.asking(name), limits, model=model) for name in network.names}
+    counts = {name: _counts_of(network.varying(name), limits, model=model) for name in network.names}
     whole = counts[group]
     if network.is_uniform:
         return whole
-    varied = network.asking(group).asked_nodes
+    varied = network.varying(group).varied_group
     beside = {"nodes": network.nodes - varied.nodes, "axes": network.axes - varied.nodes * varied.node.axes}
     # Where not even one of its nodes fits, there is no number of the whole.
     more = {
@@ -315,7 +315,7 @@ def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str
 
 
 def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict[str, Array]:
-    most, axes = most_nodes(network, limits), network.asked_nodes.node.axes
+    most, axes = most_nodes(network, limits), network.varied_group.node.axes
     counted = {
         "max_nodes": _number(most.nodes, "count"),
         "max_axes": _number(axes * most.nodes, "count"),
