@@ -2,15 +2,24 @@
 
 import csv
 import json
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from busplan.profile.sources import load, locate
+from busplan import load_profile
 
 Run = Callable[..., Any]
+
+SHIPPED = Path(__file__).parents[2] / "profiles"
+
+
+def execution_in(path: Path) -> Any:
+    """The execution time that a file has."""
+    return tomllib.loads(path.read_text(encoding="utf-8-sig"))["node"]["execution"]
+
 
 MEASURED = "payload_bytes,latency_us\n4,48\n4,49\n64,80\n64,81\n256,160\n256,400\n256,161\n"
 
@@ -18,7 +27,7 @@ MEASURED = "payload_bytes,latency_us\n4,48\n4,49\n64,80\n64,81\n256,160\n256,400
 @pytest.fixture
 def bench(tmp_path: Path) -> Path:
     path = tmp_path / "bench.toml"
-    path.write_bytes(locate("paper-two-node")[0].read_bytes())
+    path.write_bytes((SHIPPED / "paper-two-node.toml").read_bytes())
     (tmp_path / "m.csv").write_text(MEASURED, encoding="utf-8")
     return path
 
@@ -28,7 +37,7 @@ def test_the_shipped_example_is_near_the_shipped_table(busplan: Run, tmp_path: P
     assert (run.returncode, run.stderr) == (0, "")
     document = json.loads(run.stdout)
     assert (document["schema"], document["command"], document["profile"]) == (1, "calibrate", "paper-two-node")
-    shipped = load("paper-two-node").document.data()["node"]["execution"]
+    shipped = execution_in(SHIPPED / "paper-two-node.toml")
     found = document["execution"]
     assert (found["payload_bytes"], found["grade"]) == (shipped["payload_bytes"], shipped["grade"])
     # The shipped one has the halves of Table I as measured; these have the residual of the model, and say so.
@@ -59,7 +68,7 @@ def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(bu
         "payload_bytes = [4, 64, 256]",
         *("uncertainty_us = 0.707", 'residual = "standard"', "measured_gap_count = 63", "worst_extra_us = 239.501"),
     ]
-    execution = load(str(bench)).profile.node_groups[0].node.execution
+    execution = load_profile(bench).node_groups[0].node.execution
     assert (execution.grade, execution.uncertainty_us) == ("measured", 0.707)
     busplan("calibrate", "bench.toml", "m.csv", "--timing-model", "standard", "--apply", cwd=bench.parent)
     assert bench.read_text() == after
@@ -76,7 +85,7 @@ def test_apply_from_a_line_to_a_table(busplan: Run, bench: Path) -> None:
     bench.write_bytes(b"\xef\xbb\xbf" + with_a_line(bench).encode().replace(b"\n", b"\r\n"))
     run = busplan("calibrate", "bench.toml", "-", "--apply", cwd=bench.parent, stdin=MEASURED)
     assert run.returncode == 0
-    execution = load(str(bench)).document.data()["node"]["execution"]
+    execution = execution_in(bench)
     fitted = {"residual", "measured_gap_count", "uncertainty_us", "worst_extra_us"}
     assert set(execution) == {"grade", "kind", "payload_bytes", "time_us", *fitted}
     # The timing model that decides, whatever leads the tables of the profile.
@@ -99,7 +108,7 @@ def test_what_a_time_was_fitted_against_is_written_and_weighed(
 ) -> None:
     run = busplan("calibrate", "bench.toml", "m.csv", "--timing-model", timing, *options, "--apply", cwd=bench.parent)
     assert run.returncode == 0, run.stderr
-    execution = load(str(bench)).document.data()["node"]["execution"]
+    execution = execution_in(bench)
     assert (execution["residual"], execution["measured_gap_count"]) == (residual, gap_count)
     document = json.loads(busplan("capacity", "bench.toml", "--format", "json", cwd=bench.parent).stdout)
     (deciding,) = [one for one in document["results"] if one["timing_model"] == "standard"]
@@ -184,7 +193,7 @@ def test_refused_with_exit_2_and_nothing_written(
 
 
 def test_a_group_is_calibrated_by_its_name(run: Run, refused: Run, tmp_path: Path) -> None:
-    (tmp_path / "g.toml").write_text(load("gantry-24").document.text, encoding="utf-8")
+    (tmp_path / "g.toml").write_text((SHIPPED / "gantry-24.toml").read_text(encoding="utf-8"), encoding="utf-8")
     assert "gantry-24 has the groups drives, tool, io; give" in str(
         refused("calibrate", "g.toml", "table-1.csv", cwd=tmp_path)
     )
@@ -193,5 +202,5 @@ def test_a_group_is_calibrated_by_its_name(run: Run, refused: Run, tmp_path: Pat
     done = run("calibrate", "g.toml", "table-1.csv", "--group", "tool", "--apply", cwd=tmp_path)
     assert done.returncode == 0
     assert "\n[group.execution]  # of tool\n" in done.stdout
-    drives, tool, io = load(str(tmp_path / "g.toml")).profile.group
+    drives, tool, io = load_profile(tmp_path / "g.toml").group
     assert [one.execution.grade for one in (drives, tool, io)] == ["assumed", "derived", "assumed"]

@@ -11,11 +11,10 @@ from typing import Any
 import pytest
 from markdown_it import MarkdownIt
 
-from busplan.forms import ENDINGS
-
 Run = Callable[..., Any]
 Refused = Callable[..., str]
 
+ENDINGS = {".txt": "table", ".md": "markdown", ".html": "html", ".csv": "csv", ".json": "json"}
 QUESTIONS = (
     ("diff", "paper-1ms", "paper-optimal-gap"),
     ("diff", "paper-1ms", "paper-1ms"),

@@ -15,9 +15,6 @@ from typing import Any
 
 import pytest
 
-from busplan.errors import BusplanError
-from busplan.files import new_file, write_file
-
 Run = Callable[..., Any]
 Refused = Callable[..., str]
 
@@ -278,64 +275,60 @@ def test_init_refuses_a_path_without_a_name(refused: Refused, tmp_path: Path, na
 # --- writing a file ---------------------------------------------------------------------------------------
 
 
-def no_space(_descriptor: int) -> None:
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+def failing(number: int) -> Callable[..., None]:
+    """A call of the operating system that fails."""
+
+    def call(*_: object, **_options: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    return call
 
 
-@pytest.mark.parametrize("overwrite", [False, True])
+@pytest.mark.parametrize("name", ["new", "old"])
 def test_a_disk_that_fills_up_leaves_what_was_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overwrite: bool
+    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    (tmp_path / "old").write_bytes(b"old")
-    monkeypatch.setattr(os, "fsync", no_space)
-    with pytest.raises(BusplanError, match="cannot be written: No space left on device"):
-        write_file(tmp_path / ("old" if overwrite else "new"), b"new", overwrite=overwrite)
-    assert files(tmp_path) == {"old": b"old"}
+    (tmp_path / "old.toml").write_bytes(b"old")
+    monkeypatch.setattr(os, "fsync", failing(errno.ENOSPC))
+    said = refused("init", name, "--force", cwd=tmp_path)
+    assert said == f"{name}.toml: cannot be written: No space left on device"
+    assert files(tmp_path) == {"old.toml": b"old"}
 
 
-def test_a_name_taken_a_moment_ago_is_not_overwritten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def meanwhile(_descriptor: int) -> None:
-        (tmp_path / "x").write_bytes(b"theirs")
-
-    monkeypatch.setattr(os, "fsync", meanwhile)
-    with pytest.raises(BusplanError, match="already there"):
-        write_file(tmp_path / "x", b"ours", overwrite=False)
-    assert files(tmp_path) == {"x": b"theirs"}
+def test_a_name_taken_a_moment_ago_is_not_overwritten(
+    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "fsync", lambda _descriptor: (tmp_path / "x.toml").write_bytes(b"theirs"))
+    assert "x.toml: already there" in refused("init", "x", cwd=tmp_path)
+    assert files(tmp_path) == {"x.toml": b"theirs"}
 
 
 def test_a_file_system_without_hard_links_is_written_to_and_still_not_over(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def no_links(_source: Path, _target: Path, **_options: int) -> None:
-        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
-
-    monkeypatch.setattr(os, "link", no_links)
-    write_file(tmp_path / "x", b"one", overwrite=False)
-    with pytest.raises(BusplanError, match="already there"):
-        write_file(tmp_path / "x", b"two", overwrite=False)
-    assert files(tmp_path) == {"x": b"one"}
+    monkeypatch.setattr(os, "link", failing(errno.EPERM))
+    assert run("init", "x", cwd=tmp_path).returncode == 0
+    before = files(tmp_path)
+    assert "already there" in refused("init", "x", "--nodes", "9", cwd=tmp_path)
+    assert files(tmp_path) == before
 
 
 @pytest.mark.parametrize("nameless", [True, False])
 def test_a_new_file_has_the_permissions_of_any_other(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, nameless: bool
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, nameless: bool
 ) -> None:
     if not nameless:  # another system, or a network's file system
         monkeypatch.delattr(os, "O_TMPFILE", raising=False)
     (tmp_path / "other").touch()
-    with new_file(tmp_path / "x", overwrite=False) as file:
-        assert len(list(tmp_path.iterdir())) == (1 if nameless and hasattr(os, "O_TMPFILE") else 2)
-        file.write(b"one")
-    assert (tmp_path / "x").stat().st_mode == (tmp_path / "other").stat().st_mode
-    assert files(tmp_path) == {"other": b"", "x": b"one"}
+    assert run("init", "x", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "x.toml").stat().st_mode == (tmp_path / "other").stat().st_mode
+    assert set(files(tmp_path)) == {"other", "x.toml"}
 
 
-@pytest.mark.parametrize("name", ["pipe", "link"])
-def test_what_is_no_regular_file_is_not_replaced(tmp_path: Path, name: str) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "link").symlink_to("pipe")
-    with pytest.raises(BusplanError) as caught:
-        write_file(tmp_path / name, b"new", overwrite=True)
-    assert str(caught.value) == f"{tmp_path / name}: cannot be written: is not a regular file"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "pipe"]
-    assert (tmp_path / "pipe").is_fifo()
+@pytest.mark.parametrize("name", ["pipe.toml", "link.toml"])
+def test_what_is_no_regular_file_is_not_replaced(refused: Refused, tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "link.toml").symlink_to("pipe.toml")
+    assert refused("init", name, "--force", cwd=tmp_path) == f"{name}: cannot be written: is not a regular file"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link.toml", "pipe.toml"]
+    assert (tmp_path / "pipe.toml").is_fifo()

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from busplan.cli.lazy import COMMANDS
-from busplan.profile.sources import locate
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]
 
+SHIPPED = Path(__file__).parents[2] / "profiles"
 PROFILE = """\
 schema_version = 1
 name = "mine"
@@ -212,7 +212,7 @@ def test_a_new_profile_has_the_changes_and_a_plan_keeps_them(run: Run, folder: P
 
 def test_apply_of_a_calibration_does_not_write_the_bench(run: Run, tmp_path: Path) -> None:
     bench = tmp_path / "bench.toml"
-    bench.write_bytes(locate("paper-two-node")[0].read_bytes())
+    bench.write_bytes((SHIPPED / "paper-two-node.toml").read_bytes())
     before = tomllib.loads(bench.read_text(encoding="utf-8"))
     asked = ("--apply", "--set", "cycle.nonperiodic_us=5", "--set", "bus.nodes=2")
     done = run("calibrate", "bench.toml", "table-1.csv", *asked, cwd=tmp_path)

@@ -25,7 +25,6 @@ from busplan.forms.charts import (
     Lane,
     Lanes,
     Panel,
-    Shade,
     Span,
     choices,
     legend,
@@ -101,14 +100,6 @@ def test_a_file_has_its_title_its_legend_and_both_schemes_of_colours(name: str) 
 
 
 @EACH
-def test_in_a_page_it_has_no_title_and_no_styles(name: str) -> None:
-    root = fromstring(inline(shown()[name]))
-    assert root.find(f"{SVG}style") is None
-    assert root.findtext(f"{SVG}title") == shown()[name].title
-    assert shown()[name].title not in " ".join(texts(root))
-
-
-@EACH
 def test_words_are_no_wider_than_a_phone_and_those_of_a_png_use_its_width(name: str) -> None:
     drawing = shown()[name]._replace(title="word " * 30)
     root, png = fromstring(str(content(drawing, "svg"))), content(drawing, "png")
@@ -150,36 +141,9 @@ def test_cells_stand_in_their_rows_and_columns_with_their_marks() -> None:
     assert [text.text for text in marks] == ["##.", "#."]
 
 
-def test_a_line_parts_the_cells_inside_from_those_outside() -> None:
-    inside = {"#": True, ".": False, " ": None}
-    rows = ("##.", "# .", "...")
-    one = grid(*rows)
-    cells = tuple(
-        tuple(cell and cell._replace(is_inside=inside[mark]) for cell, mark in zip(row, marks, strict=True))
-        for row, marks in zip(one.rows, rows, strict=True)
-    )
-    (path,) = svg_of(one._replace(rows=cells)).iter(f"{SVG}path")
-    pieces = re.findall(r"M([\d.]+) ([\d.]+)L([\d.]+) ([\d.]+)", path.get("d") or "")
-    place = {
-        tuple(round(float(value) / size) for value, size in zip(piece, (194, 20, 194, 20), strict=True))
-        for piece in pieces
-    }
-    # Right of the second cell, and above the first of the second row; y from the top.
-    assert len(pieces) == len(place) == 2
-    assert not list(svg_of(one).iter(f"{SVG}path"))
-
-
 def test_the_largest_grid_is_a_small_picture() -> None:
     rows = ["#" * number + "." * (500 - number) for number in range(500)]
     assert len(inline(Drawing("t", (Panel(grid(*rows)),)))) < 500_000
-
-
-def test_this_design_is_framed_in_its_cell() -> None:
-    root = svg_of(grid("##.", "#..", own=(1, 0)))
-    (frame,) = (rect for rect in root.iter(f"{SVG}rect") if rect.get("class") == "frame")
-    cells = [rect for rect in root.iter(f"{SVG}rect") if (rect.get("class") or "").startswith("cell ")]
-    assert percent(frame, "x") == pytest.approx(100 / 3, abs=0.01)
-    assert (frame.get("y"), frame.get("height")) == (cells[0].get("y"), cells[0].get("height"))
 
 
 def test_a_grid_in_characters_has_its_marks_this_design_and_its_colours() -> None:
@@ -228,20 +192,6 @@ def test_a_logarithmic_scale_has_its_middle_at_the_geometric_mean() -> None:
     root = svg_of(curves((1, 0), (10, 50), (100, 100), across=across))
     assert [x for x, _ in points_of(root)[0]] == pytest.approx([0, 50, 100], abs=0.1)
     assert {"1", "10", "100"} <= set(texts(root))
-
-
-def test_guides_and_shades_stand_at_their_values() -> None:
-    guides = (Guide(Entry("own", "here", shape="line"), x=5), Guide(Entry("limit", "limit", shape="line"), y=50))
-    shades = (Shade(Entry("unsafe", "unsafe", "!"), 2, 4),)
-    root = svg_of(curves((0, 0), (10, 100), guides=guides, shades=shades))
-    lines = {line.get("class"): line for line in root.iter(f"{SVG}line") if (line.get("x2") or "").endswith("%")}
-    assert percent(lines["line own"], "x1") == 50
-    middle = float(lines["line limit"].get("y1") or 0)
-    ends = [float(lines["line own"].get(key) or 0) for key in ("y1", "y2")]
-    assert middle == pytest.approx(sum(ends) / 2)
-    (shade,) = (rect for rect in root.iter(f"{SVG}rect") if (rect.get("class") or "") == "shade unsafe")
-    assert (percent(shade, "x"), percent(shade, "width")) == (20, 20)
-    assert {"here", "limit", "unsafe", "!"} <= set(texts(root))
 
 
 # --- bars
@@ -318,18 +268,6 @@ def test_a_gap_in_a_circle_stays_a_gap() -> None:
     assert [len(piece) for piece in band(svg_of(dial(None, 1.0, 1.0, None, 1.0, 1.0)))] == [4, 4]
     # A part around the x axis is one.
     assert [len(piece) for piece in band(svg_of(dial(1.0, None, 1.0)))] == [4]
-
-
-@pytest.mark.parametrize("is_clockwise", [True, False])
-def test_the_arrow_points_in_the_direction_and_the_dot_is_the_start(is_clockwise: bool) -> None:
-    root = svg_of(dial(1.0, is_clockwise=is_clockwise))
-    (arrow,) = (path.get("d") or "" for path in root.iter(f"{SVG}path") if path.get("class") == "line arrow")
-    tail, *_, head, _ = re.findall(r"[ML ](-?[\d.]+) (-?[\d.]+)", arrow)
-    # y points down in SVG: the arrow stands right of the centre, above the x axis.
-    assert (float(head[1]) < float(tail[1])) is not is_clockwise
-    (dot,) = (one for one in root.iter(f"{SVG}circle") if one.get("class") == "start")
-    (nominal,) = (one for one in root.iter(f"{SVG}circle") if one.get("class") == "line nominal")
-    assert float(dot.get("cx") or 0) == float(nominal.get("r") or 0)
 
 
 # --- scales

@@ -5,12 +5,13 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any, get_args
 
 import pytest
 from markdown_it import MarkdownIt
 
-from busplan.english import to_json
+import busplan
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form, render
 from busplan.forms.blocks import (
@@ -35,13 +36,11 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
     Words,
-    first_drawing,
     sentence,
 )
 from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Entry, Panel, choices
-from busplan.forms.csv_rows import csv_cell, to_csv
 from busplan.forms.lines import Mark
-from busplan.forms.numbers import decimals_of, period, with_unit
+from busplan.forms.numbers import decimals_of, period_value
 from busplan.forms.terminal import block_lines
 
 MARGIN = ShownValue(3.96912, "margin_us", "us", 3)
@@ -220,11 +219,6 @@ def test_html_has_its_drawings_and_their_style_once() -> None:
     assert html.count("<title>A map</title>") == 2
 
 
-def test_the_picture_of_an_answer_is_its_first() -> None:
-    assert first_drawing([Sentence(("one",)), Chart(PICTURE, Sentence(("one",)))]) == PICTURE
-    assert first_drawing([Sentence(("one",))]) is None
-
-
 def test_markdown_has_a_drawing_in_characters() -> None:
     text = render(answer(*one_of_each()), "markdown")
     assert "```text\n  1 | # |\n" in text
@@ -280,7 +274,7 @@ def test_a_sentence_takes_as_many_parts_as_it_has_places(parts: tuple[ShownValue
 def test_json_and_csv_are_the_record() -> None:
     assert json.loads(render(answer(), "json")) == {"margin_us": 3.96912}
     assert render(answer(), "csv") == "a\n1\n"
-    assert to_csv([]) == ""
+    assert render(answer()._replace(records=[]), "csv") == ""
 
 
 def test_what_is_no_one_table_has_no_csv() -> None:
@@ -292,7 +286,7 @@ def test_what_is_no_one_table_has_no_csv() -> None:
 
 def test_json_refuses_what_is_not_finite() -> None:
     with pytest.raises(ValueError, match="Out of range"):
-        to_json({"value_us": math.nan})
+        render(answer()._replace(document={"value_us": math.nan}), "json")
 
 
 # --- numbers --------------------------------------------------------------------------------------------------------
@@ -302,16 +296,13 @@ def test_json_refuses_what_is_not_finite() -> None:
     ("value_us", "written"), [(999.99999, "999.99999 us"), (411.8349, "411.8349 us"), (1e9, "1000 s")]
 )
 def test_periods_keep_their_digits(value_us: float, written: str) -> None:
-    assert period(value_us) == written
-
-
-def test_numbers_too_small_for_their_decimals_keep_their_digits() -> None:
-    assert (decimals_of(1234.5678, 3), decimals_of(0.0, 3), decimals_of(-0.0004, 3)) == ("1234.568", "0.000", "-0.0004")
+    report = answer(Sentence((period_value(value_us),)))
+    assert render(report, "table") == f"{written}\n"
 
 
 def test_a_figure_is_not_written_in_a_unit_that_it_does_not_convert_to() -> None:
     with pytest.raises(KeyError):
-        with_unit(ShownValue(1.0, "margin_us", "mm"))
+        render(answer(Sentence((ShownValue(1.0, "margin_us", "mm"),))), "table")
 
 
 @pytest.mark.parametrize("caption", ["Reads take <most>, 3 us", "Reads take <most>, 3 us."])
@@ -322,8 +313,12 @@ def test_markdown_says_a_chart_that_it_cannot_draw(caption: str) -> None:
 
 
 def test_a_text_that_no_spreadsheet_takes_says_so_in_its_cell() -> None:
-    assert csv_cell("x" * 32_767) == "x" * 32_767
-    assert csv_cell("x" * 131_073) == "(131,073 characters, too long for a cell: --format json has them)"
+    def cell(text: str) -> str:
+        return render(answer()._replace(records=[{"a": text}]), "csv").splitlines()[1]
+
+    assert cell("x" * 32_767) == "x" * 32_767
+    assert cell("x" * 131_073) == '"(131,073 characters, too long for a cell: --format json has them)"'
+    assert cell("=1+1") == "'=1+1"
 
 
 def test_a_figure_below_zero_has_the_decimals_of_one_above(run: Callable[..., Any]) -> None:
@@ -334,3 +329,13 @@ def test_a_figure_below_zero_has_the_decimals_of_one_above(run: Callable[..., An
     assert [decimals_of(number, 3) for number in (-0.00012, 0.00012, -0.001, -123.4)] == [
         "-0.00012", "0.00012", "-0.001", "-123.400",
     ]  # fmt: skip
+
+
+def test_a_file_that_python_saves_speaks_of_no_option(run: Callable[..., Any], tmp_path: Path) -> None:
+    answer = busplan.compare("gantry-24")
+    for ending in ("md", "txt", "html"):
+        answer.save(tmp_path / f"x.{ending}")
+        text = (tmp_path / f"x.{ending}").read_text(encoding="utf-8")
+        assert ("Not shown" in text, "--all" in text) == (True, False)
+    assert "to_dict() has all figures." in str(answer)
+    assert "--all shows all." in run("compare", "gantry-24", "--format", "markdown").stdout

@@ -52,9 +52,9 @@ def capacity_command(
     timing_model: TimingModelOption = "both",
     sensitivity: Annotated[
         bool,
-        typer.Option(
+        option(
             "--sensitivity",
-            help="Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or "
+            "Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or "
             "one retry more, 10 us more host time, or a bus reset, one at a time; and what binds next. CSV has these "
             "rows instead.",
         ),
@@ -104,7 +104,7 @@ def latency_command(
         str | None,
         option(
             "--payload BYTES[,BYTES...]",
-            "Payload of read and write alike in bytes, or several with commas, as 4,16,32.  [default: the profile's "
+            "Payload of both read and write in bytes, or several with commas, as 4,16,32.  [default: the profile's "
             "payload.read_bytes and payload.write_bytes]",
         ),
     ] = None,
@@ -141,7 +141,7 @@ def circle_test_command(
     period: PeriodsOption = None,
     changes: KeyChanges = NO_CHANGES,
     contributions: Annotated[
-        bool, typer.Option("--contributions", help="Rank the error sources: run the test again without each of them.")
+        bool, option("--contributions", "Rank the error sources: run the test again without each of them.")
     ] = False,
     trace: Annotated[
         Path | None,
@@ -365,7 +365,7 @@ _REFUSED: Final[dict[DrawnForm, str]] = {
 }
 
 
-@takes_changes("Of all profiles, as --period.", period=True)
+@takes_changes("It holds for all profiles, as --period does.", period=True)
 def report_command(
     profiles: Annotated[
         list[str],

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from functools import partial
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -37,6 +37,8 @@ from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges, require_s
 
 if TYPE_CHECKING:
     from busplan.profile.document import LoadedProfile
+    from busplan.questions.calibrate import CalibrateAnswer
+    from busplan.questions.measured import MeasuredAnswer
     from busplan.questions.plan import PlanAnswer
 
 
@@ -77,25 +79,19 @@ def plan_command(
     ] = None,
     apply: Annotated[
         bool,
-        typer.Option(
-            "--apply", help="Write the recommended values into PROFILE, a file; comments and layout stay as they are."
-        ),
+        option("--apply", "Write the recommended values into PROFILE, a file; comments and layout stay as they are."),
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help=f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
+        option(
+            "--output,-o FILE",
+            f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
             "name, as NEW.toml: write a copy of PROFILE with the recommended values, whose name is that of the file; - "
             "is standard output, and the report goes to standard error.  [default: no file, and the report to standard "
             "output]",
         ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Let -o NEW.toml overwrite a file that is already there.")
-    ] = False,
+    force: Annotated[bool, option("--force", "Let -o NEW.toml overwrite a file that is already there.")] = False,
     all_: AllOption = False,
     format_: FormatOption = None,
 ) -> None:
@@ -215,7 +211,7 @@ def _say_report(changes: KeyChanges, result: "PlanAnswer") -> None:
     say(*(line.text for line in block_lines(blocks, width=message_width())))
 
 
-@takes_changes("Of the bench, where it was not as the profile: --apply does not write it.")
+@takes_changes("For a bench that differed from the profile: --apply does not write it.")
 def calibrate_command(
     profile: ProfileArgument,
     measurements: Annotated[
@@ -238,9 +234,9 @@ def calibrate_command(
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
-        typer.Option(
+        option(
             "--apply",
-            help="Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; "
+            "Write [node.execution], or that of the group, into the file PROFILE, with a comment on its origin; "
             "your own comments stay.",
         ),
     ] = False,
@@ -254,9 +250,10 @@ def calibrate_command(
     acknowledge, in us) and a line for each measurement; payloads may repeat, and lines that begin with # are comments.
     A column transaction says read or write (write without it).
 
-    T_exec is the latency less the time of its packets by the timing model, equation (3); of each payload the median. If
-    the bench differs from the profile, say so: --set bus.nodes=2 --set bus.gap_count=63. Of three or more measurements
-    of a payload, those far from their median are named by their line and left out; slow ones are in worst_extra_us.
+    T_exec is the latency less the time of its packets by the timing model, equation (3); each payload has the median.
+    Where the bench differs from the profile, give its values: --set bus.nodes=2 --set bus.gap_count=63. Of three or
+    more measurements of a payload, those far from their median are named by their line and left out; slow ones are in
+    worst_extra_us.
     Times are in us. Exits 0 with any figures.
 
     Example: busplan calibrate paper-two-node table-1.csv
@@ -284,13 +281,18 @@ def calibrate_command(
             source=name,
         )
         if apply:
-            for change in changes.by_set:
-                for key in calibration.edits:
-                    require_separate(change, key, typed="--apply")
-            apply_changes(loaded.document, calibration.edits, notes=calibration.notes)
-            kept = "your comments are kept: see whether they hold of the new values"
-            say(f"wrote [{' '.join(calibration.notes)}] of {profile}; {kept}")
+            _write_edits(loaded, changes, calibration, words=f"[{' '.join(calibration.notes)}]")
         give(calibration.report(applied_to=profile if apply else None))
+
+
+def _write_edits(
+    loaded: "LoadedProfile", changes: KeyChanges, answer: "CalibrateAnswer | MeasuredAnswer", *, words: str
+) -> None:
+    """Write what was measured into the profile's file, but for keys that --set gives for the measurement."""
+    for change, key in product(changes.by_set, answer.edits):
+        require_separate(change, key, typed="--apply")
+    apply_changes(loaded.document, answer.edits, notes=answer.notes)
+    say(f"wrote {words} of {loaded.document.name}; your comments are kept: see whether they hold of the new values")
 
 
 def _measurements_file(argument: str) -> Iterator[Path]:
@@ -301,7 +303,7 @@ def _measurements_file(argument: str) -> Iterator[Path]:
         yield locate_measurements(argument).path
 
 
-@takes_changes("Of the machine as it was recorded: --apply does not write it.")
+@takes_changes("For a machine that was recorded with another value: --apply does not write it.")
 def measured_command(
     profile: ProfileArgument,
     recording: Annotated[
@@ -322,9 +324,9 @@ def measured_command(
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
-        typer.Option(
+        option(
             "--apply",
-            help="Write the values that were measured into the file PROFILE, with a comment on their origin; your own "
+            "Write the values that were measured into the file PROFILE, with a comment on their origin; your own "
             "comments stay.",
         ),
     ] = False,
@@ -335,9 +337,9 @@ def measured_command(
     """Show what the machine does by a recording of its bus, beside what was planned.
 
     Each figure has the planned and the recorded value, the residual, its expanded uncertainty U, and whether it is
-    within the plan: jitter, times, load and bytes at most as planned, or no further beside than U. What the recording
-    does not show is said. Of EtherCAT record all packets of the master's port, both ways. Times are in us. `busplan
-    manual measured` says how each figure is found. Exits 0 with any figures.
+    within the plan: jitter, times, load and bytes at most as planned, or beyond it by no more than U. A figure that the
+    recording does not show has a reason. Of EtherCAT record all packets of the master's port, both ways. Times are in
+    us. `busplan manual measured` says how each figure is measured. Exits 0 with any figures.
 
     Example: busplan measured ethercat-servo-8 capture.pcapng --quantile 0.9
     """
@@ -354,11 +356,7 @@ def measured_command(
         if apply and not seen.edits:
             raise BusplanError(f"--apply: {recording} shows no value of a key")
         if apply:
-            for change in changes.by_set:
-                for key in seen.edits:
-                    require_separate(change, key, typed="--apply")
-            apply_changes(loaded.document, seen.edits, notes=seen.notes)
-            say(f"wrote {', '.join(seen.edits)} of {profile}; your comments are kept: see whether they hold")
+            _write_edits(loaded, changes, seen, words=", ".join(seen.edits))
         give(seen.report(applied_to=profile if apply else None))
 
 
@@ -378,7 +376,7 @@ def map_command(
     y: Annotated[str | None, _direction("--y", default="cycle.period_us about the smallest that fits [us]")] = None,
     changes: KeyChanges = NO_CHANGES,
     circle: Annotated[
-        bool, typer.Option("--circle", help="Also run the circle test of every cell that fits, up to 1,000.")
+        bool, option("--circle", "Also run the circle test of every cell that fits, up to 1,000.")
     ] = False,
     jobs: JobsOption = None,
     all_: AllOption = False,
@@ -419,7 +417,7 @@ def _complete_kinds(incomplete: str) -> list[str]:
     return [f"{before}{comma}{name}" for name in kind_names() if name.startswith(last)]
 
 
-@takes_changes("Of the profile, before it is put on other kinds.", period=True)
+@takes_changes("It changes the profile before that is put on other kinds.", period=True)
 def compare_command(
     profile: ProfileArgument,
     buses: Annotated[
@@ -463,15 +461,9 @@ def import_command(
     ],
     output: Annotated[
         Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="NEW.toml",
-            help="Write the profile to a new file.  [default: standard output]",
-            show_default=False,
-        ),
+        option("--output,-o NEW.toml", "Write the profile to a new file.  [default: standard output]"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
+    force: Annotated[bool, option("--force", "Let -o overwrite a file that is already there.")] = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
 

@@ -50,8 +50,8 @@ _BUILD_FORMATS: Final = [name for name, report_format in FORMATS.items() if repo
 
 
 @takes_changes(
-    words="Of all files, each of which must be valid without it; a finding is at the key's place in the file, or at "
-    "its section."
+    "It holds for all files, each of which must be valid without it; a finding is at the key in the file, or at its "
+    "section."
 )
 def check_command(
     paths: Annotated[
@@ -77,9 +77,9 @@ def check_command(
     ] = None,
     output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
     fail_on: Annotated[
-        Literal["error", "warning"], typer.Option("--fail-on", help="Least severity that fails the check.")
+        Literal["error", "warning"], option("--fail-on", "Least severity that fails the check.", show_default=True)
     ] = "error",
-    exit_zero: Annotated[bool, typer.Option("--exit-zero", help="Exit 0 even with findings; 2 stays 2.")] = False,
+    exit_zero: Annotated[bool, option("--exit-zero", "Exit 0 even with findings; 2 stays 2.")] = False,
     circle: Annotated[
         bool,
         typer.Option("--circle/--no-circle", help="Run the circle test of profiles that ask for one, or leave it out."),
@@ -99,16 +99,16 @@ def check_command(
     ] = None,
     update_baseline: Annotated[
         bool,
-        typer.Option(
+        option(
             "--update-baseline",
-            help="Record the present axes and margins in the --baseline file, and drop records without a profile.",
+            "Record the present axes and margins in the --baseline file, and drop records without a profile.",
         ),
     ] = False,
     pass_on_unmatched: Annotated[
         bool,
-        typer.Option(
+        option(
             "--pass-on-unmatched",
-            help="Let profiles without a record in the --baseline file pass, and records without a profile; without "
+            "Let profiles without a record in the --baseline file pass, and records without a profile; without "
             "it they exit 2.",
         ),
     ] = False,
@@ -128,18 +128,14 @@ def check_command(
         ),
     ] = 1.0,
     skip_others: Annotated[
-        bool, typer.Option("--skip-others", help="Skip named files without a `schema_version`, and count them.")
+        bool, option("--skip-others", "Skip named files without a `schema_version`, and count them.")
     ] = False,
-    jobs: Annotated[
-        int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Number of processes to check with.")
-    ] = 1,
+    jobs: Annotated[int, option("--jobs,-j N", "Number of processes to check with.", min=1, show_default=True)] = 1,
     stdin_filename: Annotated[
-        str, typer.Option("--stdin-filename", metavar="NAME", help="Name of standard input in the report.")
+        str, option("--stdin-filename NAME", "Name of standard input in the report.", show_default=True)
     ] = "<stdin>",
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on standard error.")] = False,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Also name files without findings and skipped files.")
-    ] = False,
+    quiet: Annotated[bool, option("--quiet,-q", "No summary on standard error.")] = False,
+    verbose: Annotated[bool, option("--verbose,-v", "Also name files without findings and skipped files.")] = False,
 ) -> None:
     """Fail a build when a profile no longer fits its bus or its circle.
 
@@ -256,7 +252,7 @@ def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -
         say(*FORMATS["concise"].write(report).splitlines())
 
 
-@takes_changes(words="Of both profiles.")
+@takes_changes("It holds for both profiles.")
 def diff_command(
     a: Annotated[
         str,
@@ -276,9 +272,7 @@ def diff_command(
     ],
     changes: KeyChanges = NO_CHANGES,
     timing_model: TimingModelOption = "both",
-    fail_on_regression: Annotated[
-        bool, typer.Option("--fail-on-regression", help="Exit 1 when a figure of B is worse.")
-    ] = False,
+    fail_on_regression: Annotated[bool, option("--fail-on-regression", "Exit 1 when a figure of B is worse.")] = False,
     tolerance: Annotated[
         float | None,
         option(

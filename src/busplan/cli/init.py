@@ -80,7 +80,7 @@ def init_command(
             autocompletion=complete_profile,
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is already there.")] = False,
+    force: Annotated[bool, option("--force", "Overwrite a file that is already there.")] = False,
 ) -> None:
     """Write a commented profile of your machine, and say whether it fits.
 

@@ -102,19 +102,19 @@ def chosen_model(timing_model: str | None) -> str | None:
 
 
 def option(usage: str, words: str, **settings: Any) -> Any:
-    """Make an option whose help states the default: in the code it is None.
+    """Make an option whose help states the default: in the code it is None, or False.
 
     Parameters
     ----------
     usage
-        Name and value as in the help: "--jobs N".
+        Names and value as in the help: "--output,-o FILE".
     words
         Text of its help, with the default in brackets at the end.
     settings
         Further settings of typer's option.
     """
-    name, _, value = usage.partition(" ")
-    return typer.Option(name, metavar=value, help=words, show_default=False, **settings)
+    names, _, value = usage.partition(" ")
+    return typer.Option(*names.split(","), metavar=value or None, help=words, **{"show_default": False, **settings})
 
 
 STANDARD_OUTPUT: Final = Path("-")
@@ -129,7 +129,7 @@ def output_option(words: str) -> Any:
         Beginning of its help: what is written where.
     """
     help_ = f"{words}; an old file is replaced; - is standard output.  [default: standard output]"
-    return typer.Option("--output", "-o", metavar="FILE", parser=_file_unless_dash, help=help_, show_default=False)
+    return option("--output,-o FILE", help_, parser=_file_unless_dash)
 
 
 def _file_unless_dash(text: str) -> Path | None:
@@ -147,12 +147,10 @@ def format_option(default: str, *, more: str = "") -> Any:
         What its help says of further forms.
     """
     help_ = f"Form of the answer; a table is plain text.{more}  [default: by the ending of --output, else {default}]"
-    return typer.Option("--format", help=help_, show_default=False)
+    return option("--format", help_)
 
 
-AllOption = Annotated[
-    bool, typer.Option("--all", help="Show everything: every row, and every column on a narrow terminal, too.")
-]
+AllOption = Annotated[bool, option("--all", "Show everything: every row, and every column on a narrow terminal, too.")]
 FormatOption = Annotated[Form | None, format_option("table")]
 JobsOption = Annotated[
     int | None, option("--jobs N", "Number of processes for --circle.  [default: one for each processor]", min=1)
@@ -202,21 +200,21 @@ def plot_form(path: Path) -> Picture:
 
 
 def require_company(company: str, options: Mapping[str, object], *, is_given: object) -> None:
-    """Refuse options that go with another, which is not given.
+    """Refuse options that go with another option.
 
     Parameters
     ----------
     company
         The other option, as in its help.
     options
-        Value by option; one that is empty is not given.
+        Value by option; an empty value is an option that is not given.
     is_given
         Whether the other option is given.
 
     Raises
     ------
     BusplanError
-        The first option without the other.
+        An option without its company.
     """
     for name, value in options.items():
         if value and not is_given:
@@ -272,23 +270,17 @@ def parse_axis(text: str, *, option: str) -> tuple[str, str]:
 _PERIOD: Final = "cycle.period_us"
 PeriodsOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--period",
-        metavar="TIME[,TIME...]",
-        help="Communication period with its unit, as 4ms, 250us or 0.001s, or several with commas.  [default: the "
+    option(
+        "--period TIME[,TIME...]",
+        "Communication period with its unit, as 4ms, 250us or 0.001s, or several with commas.  [default: the "
         "profile's cycle.period_us]",
-        show_default=False,
     ),
 ]
-
-
 _TakenPeriod = Annotated[
     str | None,
-    typer.Option(
-        "--period",
-        metavar="TIME",
-        help="Communication period with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
-        show_default=False,
+    option(
+        "--period TIME",
+        "Communication period with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
     ),
 ]
 
@@ -299,14 +291,13 @@ def _period_change(text: str) -> KeyChange:
 
 
 def _set_option(words: str) -> Any:
-    help_ = (
+    usage = (
         "Compute with another value of a key of the profile, as cycle.nonperiodic_us=50, bus.speed=S200 or "
         "node.execution.time_us=[30,40]. VALUE is TOML, a number without its unit, and is checked like the file; a "
         f"table replaces the whole section. May be given several times.{words and ' '}{words}  [default: the profile "
         "as it is]"
     )
-    option = typer.Option(SET, metavar="KEY=VALUE", help=help_, show_default=False)
-    return Annotated[list[str] | None, option]
+    return Annotated[list[str] | None, option(f"{SET} KEY=VALUE", usage)]
 
 
 def takes_changes(words: str = "", *, period: bool = False) -> Callable[[Callable[..., None]], Callable[..., None]]:

@@ -108,8 +108,8 @@ def rewrite(path: Path, content: bytes) -> None:
 
 
 def _keep_owner(file: NewFile, status: os.stat_result, path: Path) -> None:
-    own = os.fstat(file.fileno())
-    if (own.st_uid, own.st_gid) == (status.st_uid, status.st_gid):
+    new = os.fstat(file.fileno())
+    if (new.st_uid, new.st_gid) == (status.st_uid, status.st_gid):
         return
     try:
         os.fchown(file.fileno(), status.st_uid, status.st_gid)

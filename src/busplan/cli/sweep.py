@@ -8,8 +8,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
-import typer
-
 from busplan.cli.answering import profile_files, require_apart, write_report
 from busplan.cli.options import (
     VALUES_HELP,
@@ -48,7 +46,7 @@ _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_E
 _DEFAULT_TOP: Final = 20
 
 
-@takes_changes(words="Not of a key that varies.")
+@takes_changes("A key that varies takes none.")
 def sweep_command(
     profile: ProfileArgument,
     vary: Annotated[
@@ -63,12 +61,11 @@ def sweep_command(
     timing_model: TimingModelOption = "both",
     format_: Annotated[
         SweepForm | None,
-        typer.Option(
+        option(
             "--format",
-            help="Form of the answer: the top rows as a table (text in lines), markdown or html, or every row as csv, "
+            "Form of the answer: the top rows as a table (text in lines), markdown or html, or every row as csv, "
             "json (one document) or parquet (typed columns; needs the extra table, pyarrow).  [default: by the ending "
             "of --output, else table]",
-            show_default=False,
         ),
     ] = None,
     output: Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")] = None,
@@ -108,22 +105,20 @@ def sweep_command(
         str | None,
         option(
             "--group NAME",
-            "Of a profile with groups: the one whose nodes vary for max_axes, safe_axes and so on; the others are as "
+            "In a profile with groups: the one whose nodes vary for max_axes, safe_axes and so on; the others stay as "
             "they are.  [default: the one with the most axes]",
         ),
     ] = None,
     all_: AllOption = False,
     circle: Annotated[
         bool,
-        typer.Option(
-            "--circle", help="Also run the circle test of every point, and add its columns (errors in mm, margins)."
-        ),
+        option("--circle", "Also run the circle test of every point, and add its columns (errors in mm, margins)."),
     ] = False,
     summary: Annotated[
         bool,
-        typer.Option(
+        option(
             "--summary",
-            help="With --circle and --vary delivery.seed=1:1000: one row for all seeds, with mean, standard "
+            "With --circle and --vary delivery.seed=1:1000: one row for all seeds, with mean, standard "
             "deviation, 95th percentile and worst of each figure of the circle, and the share of seeds that fail.",
         ),
     ] = False,
@@ -137,7 +132,7 @@ def sweep_command(
         ),
     ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Run more than 1,000 circle tests, which --circle alone refuses.")
+        bool, option("--force", "Run more than 1,000 circle tests, which --circle alone refuses.")
     ] = False,
 ) -> None:
     """Compute capacity over a grid: every combination of values of any keys, under each timing model.

@@ -20,15 +20,15 @@ PICTURES: Final[Mapping[str, Picture]] = MappingProxyType({".svg": "svg", ".png"
 """Form by file name extension."""
 
 
-def ending_expected(ending: str, known: Iterable[str], *, otherwise: str = "") -> str:
-    """Say which endings a file name may have, instead of another one.
+def ending_expected(ending: str, endings: Iterable[str], *, otherwise: str = "") -> str:
+    """Say which endings a file name may have, instead of the one it has.
 
     Examples
     --------
     >>> ending_expected(".pdf", [".svg", ".png"])
     'expected a name ending in .svg, .png; for a PDF write .svg: a browser prints it'
     """
-    endings = list(known)
+    endings = list(endings)
     pdf = "; for a PDF write .svg: a browser prints it" if ending == ".pdf" and ".svg" in endings else ""
     return f"expected a name ending in {', '.join(endings)}{otherwise}{pdf}"
 

@@ -4,6 +4,7 @@ A question gives these records; `forms.svg` draws them as SVG and PNG, `forms.te
 """
 
 from collections.abc import Callable, Iterable, Iterator
+from math import log
 from string import ascii_letters
 from typing import Final, Literal, NamedTuple
 
@@ -36,6 +37,17 @@ class Ruler(NamedTuple):
     own: float | None = None
     """Tick of this design, which is always shown."""
     is_log: bool = False
+
+    def share(self, value: float) -> float:
+        """Place of a value on the scale, 0..1 between its ends."""
+        if self.is_log:
+            return log(value / self.low) / log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    @property
+    def own_tick(self) -> int | None:
+        """Number of the tick of this design."""
+        return next((number for number, tick in enumerate(self.ticks) if tick.at == self.own), None)
 
 
 class ChartCell(NamedTuple):

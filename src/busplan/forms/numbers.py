@@ -116,10 +116,10 @@ def period(period_us: float) -> str:
 
 def factor_of(value: ShownValue) -> float:
     """Factor to the unit a value is written in; KeyError for an unknown pair. A key without a unit has that unit."""
-    own = unit_of(value.key)
-    if own == value.unit or not value.unit or (not own and value.unit != "%"):
+    unit = unit_of(value.key)
+    if unit == value.unit or not value.unit or (not unit and value.unit != "%"):
         return 1.0
-    return _FACTORS[own, value.unit]
+    return _FACTORS[unit, value.unit]
 
 
 def _number(value: ShownValue) -> str:

@@ -132,10 +132,10 @@ def placed(
     {0: 1.0, 1: 3.5, 3: 9.5}
     """
     starts: dict[int, float] = {}
-    for number in sorted(range(len(labels)), key=lambda other: other != own):
+    for number in sorted(range(len(labels)), key=lambda label: label != own):
         place, size = labels[number]
         start = min(max(0.0, place - size / 2), room - size)
-        others = ((begin, begin + labels[other][1]) for other, begin in starts.items())
-        if all(start >= end + gap or start + size + gap <= begin for begin, end in others):
+        taken = ((begin, begin + labels[label][1]) for label, begin in starts.items())
+        if all(start >= end + gap or start + size + gap <= begin for begin, end in taken):
             starts[number] = start
     return dict(sorted(starts.items()))

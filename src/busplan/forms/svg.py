@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from importlib.resources import as_file, files
 from itertools import groupby
-from math import ceil, cos, log, radians, sin
+from math import ceil, cos, radians, sin
 from typing import TYPE_CHECKING, Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -170,13 +170,6 @@ def _percent(share: float) -> str:
     return f"{100 * share:.5g}%"
 
 
-def _share(ruler: Ruler, value: float) -> float:
-    """Place of a value on a scale, from 0 to 1."""
-    if ruler.is_log:
-        return log(value / ruler.low) / log(ruler.high / ruler.low)
-    return (value - ruler.low) / (ruler.high - ruler.low)
-
-
 class _Area(NamedTuple):
     """A plot between two scales."""
 
@@ -189,11 +182,11 @@ class _Area(NamedTuple):
 
     def x(self, value: float) -> str:
         """The x of a value, in percent."""
-        return _percent(_share(self.plot.across, value))
+        return _percent(self.plot.across.share(value))
 
     def y(self, value: float) -> float:
         """The y of a value, in px."""
-        return self.top + self.height * (1 - _share(self.plot.up, value))
+        return self.top + self.height * (1 - self.plot.up.share(value))
 
     def paths(self) -> Element:
         """A place for paths in the coordinates of `point`, clipped to the plot; stretched with it but in a PNG."""
@@ -291,12 +284,12 @@ class _Sheet:
         gutter = min(_GUTTER, 100 * (_SMALL_LETTER * longest + 12) / self._room)
         area = _inside(self._body, left=gutter, width=99 - gutter)
         width = WIDTH * (1 - 2 * _MARGIN / 100) * (99 - gutter) / 100
-        places = [(height * (1 - _share(up, tick.at)), _ROW) for tick in up.ticks]
-        for number in placed(places, room=height + _ROW, own=_own(up)):
+        places = [(height * (1 - up.share(tick.at)), _ROW) for tick in up.ticks]
+        for number in placed(places, room=height + _ROW, own=up.own_tick):
             y = top + places[number][0]
             if isinstance(plot, Curves):
                 _line(area, ("0", "100%"), (y, y), css="rule")
-            css = "small here" if number == _own(up) else "small"
+            css = "small here" if number == up.own_tick else "small"
             _text(self._body, up.ticks[number].label, x=f"{gutter - 2:.5g}%", y=round(y) + 4, css=css, anchor="end")
         self.y = top + height
         self._across(area, across, room=self._room * (99 - gutter) / 100)
@@ -306,13 +299,13 @@ class _Sheet:
 
     def _across(self, area: Element, ruler: Ruler, *, room: float) -> None:
         """Draw the ticks of a scale below a plot that is `room` px wide or more."""
-        labels = [(room * _share(ruler, tick.at), _SMALL_LETTER * len(tick.label)) for tick in ruler.ticks]
-        for number, start in placed(labels, room=room, gap=_SMALL_LETTER, own=_own(ruler)).items():
+        labels = [(room * ruler.share(tick.at), _SMALL_LETTER * len(tick.label)) for tick in ruler.ticks]
+        for number, start in placed(labels, room=room, gap=_SMALL_LETTER, own=ruler.own_tick).items():
             (at, size), tick = labels[number], ruler.ticks[number]
-            x, middle = _percent(_share(ruler, tick.at)), at - size / 2
+            x, middle = _percent(ruler.share(tick.at)), at - size / 2
             _line(area, (x, x), (self.y, self.y + 5), css="rule")
             anchor = "middle" if abs(start - middle) < 1 else "start" if start > middle else "end"
-            css = "small here" if number == _own(ruler) else "small"
+            css = "small here" if number == ruler.own_tick else "small"
             _text(area, tick.label, x=x, y=self.y + 19, css=css, anchor=anchor)
         self.y += _LINE + 2
 
@@ -345,7 +338,7 @@ class _Sheet:
             if is_fine:
                 _frame(place, x="-6", y=-6, width="12", height=12)
             else:
-                left = _percent(_share(grid.across, x) - wide / 2)
+                left = _percent(grid.across.share(x) - wide / 2)
                 _frame(area.area, x=left, y=area.y(y) - tall / 2, width=_percent(wide), height=tall)
 
     @staticmethod
@@ -366,7 +359,7 @@ class _Sheet:
     def _curves(self, curves: Curves) -> None:
         area = self._area(curves, height=_CURVES)
         for shade in curves.shades:
-            low, high = (_share(curves.across, end) for end in (shade.low, shade.high))
+            low, high = (curves.across.share(end) for end in (shade.low, shade.high))
             box = {"x": _percent(low), "width": _percent(high - low)}
             _rect(area.area, **box, y=area.top, height=_CURVES, css=f"shade {shade.entry.ink}")
             middle, foot = _percent((low + high) / 2), area.top + _CURVES - 6
@@ -380,8 +373,8 @@ class _Sheet:
             if curve.has_line:
                 SubElement(paths, "path", {"class": f"line {curve.entry.ink}", "d": _path(area, curve)})
         for curve in curves.curves:
-            known = [(number, x, y) for number, (x, y) in enumerate(curve.points) if y is not None]
-            for number, x, y in (known if curve.has_dots else known[-1:]) if curve.entry.mark else ():
+            points = [(number, x, y) for number, (x, y) in enumerate(curve.points) if y is not None]
+            for number, x, y in (points if curve.has_dots else points[-1:]) if curve.entry.mark else ():
                 title = curve.words[number] if curve.words else ""
                 _dot(area.area, curve.entry, x=area.x(x), y=area.y(y), title=title)
 
@@ -406,7 +399,7 @@ class _Sheet:
             for span in lane.spans:
                 _span(area, span, lanes.across, y=self.y, height=tall)
             for guide in lanes.guides:
-                x = _percent(_share(lanes.across, guide.x or 0.0))
+                x = _percent(lanes.across.share(guide.x or 0.0))
                 _line(area, (x, x), (self.y - 2, self.y + tall + 2), css=f"line {guide.entry.ink}")
             self.y += tall + 3
         self._across(area, lanes.across, room=self._room * (100 - gutter) / 100)
@@ -431,11 +424,6 @@ class _Sheet:
         self.y += tall
 
 
-def _own(ruler: Ruler) -> int | None:
-    """Number of the tick of this design."""
-    return next((number for number, tick in enumerate(ruler.ticks) if tick.at == ruler.own), None)
-
-
 def _borders(grid: ChartGrid) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
     """Edges between cells inside and outside, as shares of the plot."""
     wide, tall = 1 / len(grid.rows[0]), 1 / len(grid.rows)
@@ -454,7 +442,7 @@ def _path(area: _Area, curve: Curve) -> str:
     pieces, is_joined = [], False
     for x, y in curve.points:
         if y is not None:
-            point = area.point(_share(area.plot.across, x), _share(area.plot.up, y))
+            point = area.point(area.plot.across.share(x), area.plot.up.share(y))
             pieces.append(f"{'L' if is_joined else 'M'}{point}")
         is_joined = y is not None
     return "".join(pieces)
@@ -462,7 +450,7 @@ def _path(area: _Area, curve: Curve) -> str:
 
 def _span(area: Element, span: Span, ruler: Ruler, *, y: float, height: float) -> None:
     """Draw a bar, and its letter if there is room."""
-    start, end = (100 * min(1.0, max(0.0, _share(ruler, at))) for at in (span.start, span.end))
+    start, end = (100 * min(1.0, max(0.0, ruler.share(at))) for at in (span.start, span.end))
     width, ink = f"{end - start:.5g}%", span.entry.ink
     _rect(area, x=f"{start:.5g}%", y=y, width=width, height=height, css=ink, title=span.words)
     if end - start >= _LETTER_PERCENT and height >= _ROW - 3:

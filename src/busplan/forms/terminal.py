@@ -23,14 +23,14 @@ from busplan.forms.blocks import (
     Snippet,
     Table,
 )
-from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Lane, Lanes, Panel, Ruler, Span, legend
+from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Lane, Lanes, Panel, Ruler, legend
 from busplan.forms.lines import BLANK, Line, Mark, legend_lines, plain_text, styled_text, wrapped
 from busplan.forms.numbers import part_text, sentence_line, with_unit
 from busplan.forms.scale import placed
 from busplan.forms.text_table import table_lines
 
 _WIDTH: Final = 80
-"""Width without a terminal, and the largest width."""
+"""Width of a card and of a drawing without a terminal, and the largest width of a card, in columns."""
 _CARD_INDENT: Final = "  "
 _LABEL: Final = 18
 """Where the words of a line begin."""
@@ -38,23 +38,15 @@ _GAP: Final = 2
 """Fewest blanks between subject and verdict."""
 
 
-def card_lines(card: Card, width: int | None) -> list[Line]:
-    """Write a card as lines.
-
-    Parameters
-    ----------
-    card
-        The card.
-    width
-        Width of the terminal, in columns; None without one.
-    """
+def _card_lines(card: Card, width: int | None) -> list[Line]:
+    """A card as lines, in the width of the terminal, if there is one."""
     room = min(width or _WIDTH, _WIDTH)
     lines = [*_head(card, room), *([_bar(card.gauge, room)] if card.gauge else [])]
     for label, words in card.lines:
-        said = sentence_line(words)
+        line = sentence_line(words)
         before = f"{_CARD_INDENT}{label:<{_LABEL - len(_CARD_INDENT)}}"
-        marks = tuple(Mark(mark.start + len(before), mark.end + len(before), mark.tone) for mark in said.marks)
-        lines += wrapped(Line(f"{before}{said.text}", said.tone, marks), room if width else None, hang=_LABEL)
+        marks = tuple(Mark(mark.start + len(before), mark.end + len(before), mark.tone) for mark in line.marks)
+        lines += wrapped(Line(f"{before}{line.text}", line.tone, marks), room if width else None, hang=_LABEL)
     return lines
 
 
@@ -160,7 +152,7 @@ def _lanes(title: str, lanes: Lanes, width: int) -> Iterator[Line]:
         note = f"  {lane.note:>{notes}}" if gutter > labels else ""
         yield Line(f"{lane.label:<{labels}}{note} |{_cells(lane, ruler, columns)}|", "drawn")
     below = ""
-    places = [((tick.at - ruler.low) / column, len(tick.label)) for tick in ruler.ticks]
+    places = [(columns * ruler.share(tick.at), len(tick.label)) for tick in ruler.ticks]
     for number, start in placed(places, room=columns, gap=1).items():
         below = f"{below:<{int(start)}}{ruler.ticks[number].label}"
     yield Line(f"{ruler.label:<{gutter + 2}}{below.rstrip()}", "drawn")
@@ -169,27 +161,17 @@ def _lanes(title: str, lanes: Lanes, width: int) -> Iterator[Line]:
 def _cells(lane: Lane, ruler: Ruler, columns: int) -> str:
     """Fill each column with the mark that takes most of it, or a space."""
     size = (ruler.high - ruler.low) / columns
-    shares: list[dict[str, float]] = [{} for _ in range(columns)]
+    parts: list[dict[str, float]] = [{} for _ in range(columns)]
     for span in lane.spans:
-        for number, inside in _columns(span, ruler, columns, size=size):
-            shares[number][span.entry.mark] = shares[number].get(span.entry.mark, 0.0) + inside
-    return "".join(max(share, key=lambda mark: share[mark]) if share else " " for share in shares)
-
-
-def _columns(span: Span, ruler: Ruler, columns: int, *, size: float) -> Iterator[tuple[int, float]]:
-    """Columns that a bar touches, and how much of each it takes."""
-    first, last = (min(columns - 1, max(0, int((end - ruler.low) / size))) for end in (span.start, span.end))
-    # An overlap that is only float rounding is none.
-    least = min(size, span.end - span.start) * 1e-6
-    for number in range(first, last + 1):
-        start = ruler.low + number * size
-        inside = min(span.end, start + size) - max(span.start, start)
-        if inside > least:
-            yield number, inside
-
-
-WIDTH: Final = 80
-"""Width of a drawing if there is no terminal, in columns."""
+        first, last = (min(columns - 1, max(0, int((end - ruler.low) / size))) for end in (span.start, span.end))
+        # An overlap that is only float rounding is none.
+        least = min(size, span.end - span.start) * 1e-6
+        for number in range(first, last + 1):
+            start = ruler.low + number * size
+            inside = min(span.end, start + size) - max(span.start, start)
+            if inside > least:
+                parts[number][span.entry.mark] = parts[number].get(span.entry.mark, 0.0) + inside
+    return "".join(max(part, key=lambda mark: part[mark]) if part else " " for part in parts)
 
 
 def text(report: Report, *, width: int | None = None, height: int | None = None, styled: bool = False) -> str:
@@ -267,7 +249,7 @@ def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) ->
         case Chart():
             if not block.drawing.has_characters:
                 return []
-            drawn = drawing_lines(block.drawing, width or WIDTH)
+            drawn = drawing_lines(block.drawing, width or _WIDTH)
             return [*_caption(block.caption, width), *(piece for line in drawn for piece in _drawn_lines(line, width))]
         case Command():
             return [Line(f"$ {block.line}", "drawn")]
@@ -280,7 +262,7 @@ def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) ->
             inside: tuple[Block, ...] = (*block.sentences, block.facts)
             return [*wrapped(head, width), *block_lines(inside, width=width)]
         case Card():
-            return card_lines(block, width)
+            return _card_lines(block, width)
         case Detail():
             return [*block_lines(block.blocks, width=width, is_whole=True)] if is_whole else []
         case Chapter():

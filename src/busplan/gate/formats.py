@@ -1,4 +1,4 @@
-"""Formats of the gate's report; what writes them, `busplan.gate.report`, loads when it is asked."""
+"""Formats of the gate's report; `busplan.gate.report`, which writes them, loads when a report is written."""
 
 from collections.abc import Callable
 from importlib import import_module

@@ -79,7 +79,7 @@ def suppress(
     document
         The document.
     ran
-        Codes of the rules that have run; a suppression of any other rule is never said to have no effect.
+        Codes of the rules that have run; only their suppressions can have no effect.
     """
     left = list(violations)
     findings: list[Finding] = []
@@ -144,7 +144,7 @@ class FileResult(NamedTuple):
     fit: Fit | None = None
     """How the cycle fits; None if the profile cannot be read."""
     circle_not_run: bool = False
-    """If True, the profile asks for a circle test, which was not asked for."""
+    """If True, the profile asks for a circle test, which the check left out."""
 
     @property
     def status(self) -> Status:

@@ -45,7 +45,7 @@ class Located(NamedTuple):
 
 
 class CheckReport(NamedTuple):
-    """Result of one run of the gate."""
+    """Result of a run of the gate."""
 
     files: tuple[FileResult, ...]
     """Each file with its `status`, its `findings` and, if it could not be checked, its `failure`."""
@@ -201,9 +201,9 @@ def _heading(located: Located, width: int) -> Iterator[Line]:
     """Place, code and severity, which editors read, and the problem, wrapped."""
     place, words = finding_parts(located.path, located.finding)
     head = printable(f"{place} {words.removesuffix(located.finding.message)}")
-    first, *others = _wrapped(located.finding.problem, width, first=head)
+    first, *rest = _wrapped(located.finding.problem, width, first=head)
     yield marked_line(first, located.path, located.finding)
-    yield from (Line(line, "drawn") for line in others)
+    yield from (Line(line, "drawn") for line in rest)
 
 
 def _source(located: Located, width: int) -> Iterator[Line]:
