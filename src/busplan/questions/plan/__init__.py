@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from busplan.buses.limits import Value
 from busplan.buses.network import Network
@@ -38,8 +38,6 @@ from busplan.questions.plan.search import (
     stands_in_the_way,
 )
 from busplan.sections.profile import Profile
-
-_AS_IT_IS: Final = "as it is"
 
 
 @dataclass(frozen=True)
@@ -208,9 +206,9 @@ def plan(
     >>> busplan.capacity(answer.recommended.profile).verdicts[0].models_agree
     True
     """
-    own = load_profile(profile)
+    loaded = load_profile(profile)
     if nodes is not None or axes is not None:
-        with_cycle(own, question=f"a plan for {'nodes' if axes is None else 'axes'}")
+        with_cycle(loaded, question=f"a plan for {'nodes' if axes is None else 'axes'}")
     if nodes is not None and axes is not None:
         raise BusplanError(f"nodes {nodes} and axes {axes}: give one of them")
     given = {
@@ -222,15 +220,15 @@ def plan(
     kept = _changes({key: from_numpy(value) for key, value in given.items() if value is not None})
     kept += wanted.entries if isinstance(wanted, KeyChanges) else _changes(values_by_key(wanted, name="wanted"))
     if axes is not None:
-        kept = (_nodes(own, whole(axes, name="axes"), kept), *kept)
-    changes = KeyChanges(kept)
-    return _plan(own, changes, None if free is None else [str(name) for name in items(free, name="free")])
+        kept = (_nodes(loaded, whole(axes, name="axes"), kept), *kept)
+    changes, names = KeyChanges(kept), None if free is None else [str(name) for name in items(free, name="free")]
+    return _plan(loaded, changes, names)
 
 
 def _plan(profile: Profile, wanted: KeyChanges, names: Sequence[str] | None) -> PlanAnswer:
     goal = network_of(wanted.applied(profile))
-    asked: dict[str, Any] = dict(wanted.values)
-    kept = [*dict(flat(asked))]
+    given: dict[str, Any] = dict(wanted.values)
+    kept = [*dict(flat(given))]
     levels = freed(goal, names, kept=kept)
     steps = search(goal, levels, kept=kept)
     options = tuple(_option(goal, step, number) for number, step in enumerate(steps))
@@ -238,11 +236,11 @@ def _plan(profile: Profile, wanted: KeyChanges, names: Sequence[str] | None) -> 
     return PlanAnswer(
         profile=profile,
         goal=goal,
-        wanted={key: value for key, value in asked.items() if _differs(profile, goal.profile, key)},
+        wanted={key: value for key, value in given.items() if _differs(profile, goal.profile, key)},
         free=levels,
         options=options,
         binding=None if recommended else stands_in_the_way(goal, steps[-1]),
-        relaxations=() if recommended else tuple(_relaxations(goal, levels, asked)),
+        relaxations=() if recommended else tuple(_relaxations(goal, levels, kept)),
         after_reset=None if recommended is None else after_reset(recommended.network, recommended.deciding),
     )
 
@@ -250,7 +248,7 @@ def _plan(profile: Profile, wanted: KeyChanges, names: Sequence[str] | None) -> 
 def _option(goal: Network, step: PlanStep, number: int) -> Option:
     after = changed(goal, step.changes)
     model, ratio = after.bus.deciding_model, float(after.profile.cycle.slice_ratio)
-    label = _AS_IT_IS if step.freedom is None else step.freedom.label
+    label = "as it is" if step.freedom is None else step.freedom.label
     return Option(
         title=f"+ {label}" if number > 1 else label,
         changes=dict(step.changes),
@@ -262,23 +260,23 @@ def _option(goal: Network, step: PlanStep, number: int) -> Option:
     )
 
 
-def _relaxations(goal: Network, levels: Sequence[Freedom], asked: Changes) -> Iterator[Relaxation]:
-    """Further freedoms that would each be enough, those of values that were asked for among them."""
+def _relaxations(goal: Network, levels: Sequence[Freedom], kept: Sequence[str]) -> Iterator[Relaxation]:
+    """Further freedoms that would each be enough, those of values that are kept among them."""
     names = {level.name for level in levels}
     for freedom in freedoms(goal):
         if freedom.name not in names:
-            kept = {key for key, _ in flat(dict(asked))} - set(freedom.keys)
+            still_kept = set(kept) - set(freedom.keys)
             more = [level for level in freedoms(goal) if level.name in {*names, freedom.name}]
-            *_, last = search(goal, more, kept=kept)
+            *_, last = search(goal, more, kept=still_kept)
             if not last.unmet:
                 yield Relaxation(freedom.name, dict(last.changes))
 
 
 def _differs(profile: Profile, goal: Profile, key: str) -> bool:
     """Whether two profiles differ in a key, or in one of a section; other changes may be needed for either alone."""
-    own, asked = (dict(flat(side.model_dump())) for side in (profile, goal))
-    keys = [name for name in {**own, **asked} if name == key or name.startswith(f"{key}.")]
-    return any(own.get(key) != asked.get(key) for key in keys)
+    before, after = (dict(flat(side.model_dump())) for side in (profile, goal))
+    names = (name for name in {**before, **after} if name == key or name.startswith(f"{key}."))
+    return any(before.get(name) != after.get(name) for name in names)
 
 
 def _changes(values: Mapping[str, object]) -> tuple[KeyChange, ...]:

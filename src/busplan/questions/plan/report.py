@@ -12,7 +12,6 @@ from busplan.forms.blocks import (
     Block,
     Cell,
     Code,
-    JsonDocument,
     Part,
     Record,
     Report,
@@ -45,28 +44,41 @@ from busplan.questions.fit.figures import COUNTS, limits_behind
 from busplan.questions.fit.network import PERIOD
 from busplan.questions.plan import Option, PlanAnswer, Relaxation
 from busplan.questions.plan.search import freedoms
-from busplan.sections.base import TRANSACTION_KINDS, TransactionKind
-from busplan.sections.profile import Profile
+from busplan.sections.base import TRANSACTION_KINDS
 
 
 def plan_report(plan: PlanAnswer) -> Report:
-    """Report of `plan`."""
+    """Report of `plan`: the recommendation, or what stands in its way, and a row for each step of the search."""
+    records = [_record(plan, option) for option in plan.options]
+    rows = [{**record, "changes": [f"{key}={value}" for key, value in flat(record["changes"])]} for record in records]
     return Report(
         Sentence(("Plan of ", Code(plan.profile.name))),
         tuple(_blocks(plan)),
-        plan_document(plan),
-        with_profile(plan.profile.name, plan_records(plan)),
+        document(
+            "plan",
+            profile=plan.profile.name,
+            goal={"nodes": int(plain(plan.goal.nodes)), "axes": int(plain(plan.goal.axes))},
+            free=[freedom.name for freedom in plan.free],
+            period_is_kept=plan.period_is_kept,
+            recommended_changes=plan.recommended_changes,
+            binding=None if plan.binding is None else {"constraint": plan.binding.key, "why": plan.binding.why},
+            relaxations=[vars(relaxation) for relaxation in plan.relaxations],
+            options=records,
+        ),
+        with_profile(plan.profile.name, rows),
     )
 
 
 def _blocks(plan: PlanAnswer) -> Iterator[Block]:
-    """The recommendation, or what stands in its way, and a row for each step of the search."""
     yield _headline(plan)
     yield from (_relaxed(plan, relaxation) for relaxation in plan.relaxations)
-    yield from _warnings(plan)
-    yield options_table(plan)
+    network = plan.goal if plan.recommended is None else plan.recommended.network
+    yield from warning_sentences(network)
+    yield from reset_sentence(plan.after_reset, network)
+    yield _options_table(plan)
     mark = "" if plan.recommended is None else "* recommended. "
-    yield Sentence((f"{mark}'Held by' is what keeps a row from fitting.",))
+    circle = " No circle was run: a plan is of the bus alone." if plan.profile.asks_for_circle else ""
+    yield Sentence((f"{mark}'Held by' is what keeps a row from fitting.{circle}",))
 
 
 def settings(network: Network, changes: NewValues) -> str:
@@ -132,16 +144,6 @@ def _goal(plan: PlanAnswer) -> tuple[Part, ...]:
     )
 
 
-def _warnings(plan: PlanAnswer) -> Iterator[Sentence]:
-    network = plan.goal if plan.recommended is None else plan.recommended.network
-    yield from warning_sentences(network)
-    yield from reset_sentence(plan.after_reset, network)
-
-
-def _options(plan: PlanAnswer) -> list[Record]:
-    return [_record(plan, option) for option in plan.options]
-
-
 def _record(plan: PlanAnswer, option: Option) -> Record:
     figures, profile, others = option.deciding, option.profile, option.others
     values = figures.values()
@@ -158,43 +160,15 @@ def _record(plan: PlanAnswer, option: Option) -> Record:
         **fields(figures, "nodes", "axes", *COUNTS, "period_us"),
         "slice_ratio": profile.cycle.slice_ratio if profile.has_cycle else None,
         **{key: values[key] for key in option.network.bus.figures.planned},
-        **{f"{kind}_bytes": _payload_bytes(profile, kind) for kind in TRANSACTION_KINDS},
+        # Of the first nodes; a bus of messages alone has none.
+        **{
+            f"{kind}_bytes": next((int(alike.bytes_of(kind)) for alike in profile.node_groups), None)
+            for kind in TRANSACTION_KINDS
+        },
     }
 
 
-def _payload_bytes(profile: Profile, kind: TransactionKind) -> int | None:
-    """Payload of the first nodes in one direction [bytes]; None without nodes."""
-    return next((int(alike.bytes_of(kind)) for alike in profile.node_groups), None)
-
-
-def plan_records(plan: PlanAnswer) -> list[Record]:
-    """One row for each option, with its changes as text."""
-    return [
-        {
-            **record,
-            "changes": [f"{key}={value}" for key, value in flat(record["changes"])],
-        }
-        for record in _options(plan)
-    ]
-
-
-def plan_document(plan: PlanAnswer) -> JsonDocument:
-    """Document of `busplan plan --format json`."""
-    recommended = None if plan.recommended is None else plan.all_changes(plan.recommended)
-    return document(
-        "plan",
-        profile=plan.profile.name,
-        goal={"nodes": int(plain(plan.goal.nodes)), "axes": int(plain(plan.goal.axes))},
-        free=[freedom.name for freedom in plan.free],
-        period_is_kept=plan.period_is_kept,
-        recommended_changes=recommended,
-        binding=None if plan.binding is None else {"constraint": plan.binding.key, "why": plan.binding.why},
-        relaxations=[vars(relaxation) for relaxation in plan.relaxations],
-        options=_options(plan),
-    )
-
-
-def options_table(plan: PlanAnswer) -> Table:
+def _options_table(plan: PlanAnswer) -> Table:
     """Settings and results of each option; the recommended one has a mark."""
     columns = (
         TableColumn("option", kind="words"),
@@ -215,20 +189,14 @@ def _row(option: Option) -> TableRow:
         _short(option.network, option.changes),
         option.network.bus.figures.term_label(option.deciding.binding_term) if option.deciding.terms else MISSING,
         ShownValue(option.held_by, "held_by"),
-        *option_margin(option),
+        *_margin(option),
         *(attribute_value(figure, option.deciding) for figure in (SAFE_NODES, SAFE_AXES)),
     )
     return TableRow(cells, highlighted=option.recommended)
 
 
-def option_margin(option: Option) -> tuple[ShownValue, ShownValue]:
-    """Margin less the bias, and its uncertainty.
-
-    Parameters
-    ----------
-    option
-        The option.
-    """
+def _margin(option: Option) -> tuple[ShownValue, ShownValue]:
+    """Margin less the bias, and its uncertainty."""
     figures = option.deciding
     margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     # A margin beyond its uncertainty is none of the causes where limits of the bus are.
@@ -258,8 +226,8 @@ def _short(network: Network, changes: NewValues) -> Cell:
     sizes = {key: value for key, value in changes.items() if key in _BOTH}
     alike = len(sizes) == len(_BOTH) and len(set(sizes.values())) == 1
     shown = {key: value for key, value in changes.items() if not alike or key != _BOTH[-1]}
-    own = {name: key.short for name, key in network.bus.keys.items() if key.short}
-    words = {**_SHORT, **own, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
+    of_bus = {name: key.short for name, key in network.bus.keys.items() if key.short}
+    words = {**_SHORT, **of_bus, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
     return joined(
         *(
             sentence(_counted(words[key], value), _short_value(key, value))

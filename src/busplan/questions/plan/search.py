@@ -140,27 +140,17 @@ def missed_limits(network: Network) -> tuple[Need, ...]:
 def unmet(network: Network) -> list[Need]:
     """Needs that a network does not meet at its own period; empty where every constraint of a plan holds."""
     limits = network.bus.limits
-    found = [
-        Need(inf, limit.key, limit.words(network))
-        for limit in limits
-        if limit.role == "period" and limit.is_broken(network)
-    ]
-    found += _unmet([*to_be_shown(network), *_of_limits(network)], network)
-    if not found:
-        # What a limit needs of the slice was asked at the shortest period.
-        at = (limit for limit in limits if limit.period is not None and limit.shown.is_broken(network))
-        found = [Need(inf, limit.key, limit.words(network)) for limit in at]
-    return found
+    broken = [limit for limit in limits if limit.role == "period" and limit.is_broken(network)]
+    needs = list(_unmet([*to_be_shown(network), *_of_limits(network)], network))
+    if not broken and not needs:
+        # What a limit needs of the slice was computed at the shortest period.
+        broken = [limit for limit in limits if limit.period is not None and limit.shown.is_broken(network)]
+    return [*(Need(inf, limit.key, limit.words(network)) for limit in broken), *needs]
 
 
 def _unmet(needs: Iterable[Need], network: Network) -> Iterator[Need]:
     ratio, period_us = float(plain(network.slice_ratio)), float(plain(network.period_us))
     return (need for need in needs if not within(need.period_us(ratio), period_us))
-
-
-def longest_period_us(network: Network) -> float:
-    """The longest period that a profile may have and its bus allows [us]."""
-    return min(network.bus.periods.longest_us, MAX_TIME_US)
 
 
 class SmallestPeriod(NamedTuple):
@@ -176,8 +166,6 @@ _MOST_TRIES: Final = 64
 """Each try keeps one more limit, so that a few are enough."""
 _NEXT: Final = 1 + 1e-9
 """A limit that rounding alone breaks is kept a little later."""
-_HALVINGS: Final = 44
-"""Halvings of a period, down to the rounding of floats."""
 
 
 def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool = True) -> SmallestPeriod:
@@ -204,20 +192,16 @@ def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool
         broken = any(limit.period is not None and limit.shown.is_broken(at) for limit in bus.limits)
         return need if broken or not within(need.period_us(ratio), period_us) else None
 
-    need = most(network)
-    short_us, found_us = 0.0, _allowed_us(network, need.period_us(ratio))
+    need, longest_us = most(network), min(bus.periods.longest_us, MAX_TIME_US)
+    found_us = _allowed_us(network, need.period_us(ratio))
     for _ in range(_MOST_TRIES):
-        if found_us > longest_period_us(network):
+        if found_us > longest_us:
             break
-        lacks = missing(found_us)
-        if lacks is None:
-            for _ in range(_HALVINGS if short_us and not bus.periods.us else 0):
-                middle_us = (short_us + found_us) / 2
-                short_us, found_us = (short_us, middle_us) if missing(middle_us) is None else (middle_us, found_us)
+        lacking = missing(found_us)
+        if lacking is None:
             return SmallestPeriod(found_us, need)
-        need = lacks
-        short_us, found_us = found_us, _allowed_us(network, max(need.period_us(ratio), found_us * _NEXT))
-    why = need.words(ratio=ratio, most_us=longest_period_us(network))
+        need, found_us = lacking, _allowed_us(network, max(lacking.period_us(ratio), found_us * _NEXT))
+    why = need.words(ratio=ratio, most_us=longest_us)
     return SmallestPeriod(None, need._replace(why=why))
 
 
@@ -262,21 +246,21 @@ class PlanStep(NamedTuple):
 
 def freedoms(network: Network) -> tuple[Freedom, ...]:
     """Everything that may be changed in a network, the cheapest first."""
-    own = [
+    all_freedoms = [
         Freedom(setting.name, setting.label, setting.cost, setting.keys) for setting in network.bus.settings(network)
     ]
     if network.groups:
         sections = [f"group.{group.name}" for group in network.profile.group] or ["payload"]
         payloads = tuple(f"{section}.{key}" for section in sections for key in _PAYLOADS)
-        own += (
+        all_freedoms += (
             Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,)),
             Freedom("payload", "payload", Cost.PAYLOAD, payloads),
             Freedom("period", "period", Cost.PERIOD, (PERIOD,)),
         )
         if network.is_uniform:
             # Where nodes differ, nobody but the user knows which can go.
-            own.append(Freedom("nodes", "nodes", Cost.NODES, (NODES,)))
-    return tuple(sorted(own, key=lambda freedom: freedom.cost))
+            all_freedoms.append(Freedom("nodes", "nodes", Cost.NODES, (NODES,)))
+    return tuple(sorted(all_freedoms, key=lambda freedom: freedom.cost))
 
 
 def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collection[str] = ()) -> tuple[Freedom, ...]:
@@ -297,21 +281,21 @@ def freed(network: Network, names: Sequence[str] | None = None, *, kept: Collect
     BusplanError
         The network has no freedom of that name, or its value was given.
     """
-    known = freedoms(network)
-    still = [freedom for freedom in known if not set(freedom.keys) <= set(kept)]
+    possible = freedoms(network)
+    still = [freedom for freedom in possible if not set(freedom.keys) <= set(kept)]
     if names is None:
         return tuple(freedom for freedom in still if freedom.cost in _DEFAULT_COSTS or not network.groups)
     kind = f"{network.profile.bus.kind} with groups" if network.profile.group else network.profile.bus.kind
     problems = [
         f"free {name}: there is nothing of that name to free on a bus of kind {kind}; there are "
-        f"{', '.join(freedom.name for freedom in known)}"
+        f"{', '.join(freedom.name for freedom in possible)}"
         for name in names
-        if name not in {freedom.name for freedom in known}
+        if name not in {freedom.name for freedom in possible}
     ]
     problems += [
         f"free {freedom.name}: {' and '.join(key for key in freedom.keys if key in kept)} was given a value, which is "
         "kept; give one of them"
-        for freedom in known
+        for freedom in possible
         if freedom.name in names and freedom not in still
     ]
     if problems:
@@ -411,13 +395,10 @@ def _values(freedom: Freedom, network: Network, kept: Collection[str]) -> Iterat
             return _periods(network)
         case "nodes":
             return _fewer_nodes(network)
-    return _of_bus(freedom.name, network)
-
-
-def _of_bus(name: str, network: Network) -> Iterator[Changes]:
-    """Values of a setting of the bus, safe for all nodes that [limits] asks for."""
-    largest = max((network, *(room.network for room in rooms(network))), key=lambda each: float(plain(each.nodes)))
-    return (values for setting in network.bus.settings(largest) if setting.name == name for values in setting.values)
+    # A setting of the bus is safe for all nodes that [limits] asks for.
+    largest = max((network, *(room.network for room in rooms(network))), key=lambda room: float(plain(room.nodes)))
+    settings = (setting for setting in network.bus.settings(largest) if setting.name == freedom.name)
+    return (values for setting in settings for values in setting.values)
 
 
 def _ratios(network: Network) -> Iterator[Changes]:
@@ -537,14 +518,14 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
         Nodes differ, so that axes do not say how many of which.
     """
     if profile.group:
-        own = {alike: int(alike.nodes) * int(alike.node.axes) for alike in profile.node_groups}
-        needed = {alike: axes - sum(own.values()) + own[alike] for alike in own if alike.node.axes}
-        each = ", or ".join(
+        now = {alike: int(alike.nodes) * int(alike.node.axes) for alike in profile.node_groups}
+        needed = {alike: axes - sum(now.values()) + now[alike] for alike in now if alike.node.axes}
+        ways = ", or ".join(
             f"set {alike.nodes_key}={ceil(of_group / int(alike.node.axes))}"
             for alike, of_group in needed.items()
             if of_group > 0
         )
-        instead = f"say instead: {each}" if each else "set the nodes of a group instead"
+        instead = f"say instead: {ways}" if ways else "set the nodes of a group instead"
         raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
     (alike,) = profile.node_groups
     return ceil(axes / int(alike.node.axes))

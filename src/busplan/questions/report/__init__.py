@@ -53,9 +53,9 @@ def page_report(profiles: "Sequence[ReportedProfile]", *, title: str | None = No
     title
         Title of the page; by default the profile's name, or the number of profiles.
     """
-    own = Code(profiles[0].network.profile.name) if len(profiles) == 1 else plural(len(profiles), "profile")
+    usual = Code(profiles[0].network.profile.name) if len(profiles) == 1 else plural(len(profiles), "profile")
     return Report(
-        Sentence((own if title is None else title,)),
+        Sentence((usual if title is None else title,)),
         tuple(_blocks(profiles)),
         _document(profiles),
         is_page=True,
@@ -69,11 +69,11 @@ def _document(profiles: "Sequence[ReportedProfile]") -> JsonDocument:
         "report",
         profiles=[
             {
-                "profile": each.network.profile.name,
-                "answers": {section.key: dict(section.report.document) for section in each.sections},
-                "missing": list(each.missing),
+                "profile": reported.network.profile.name,
+                "answers": {section.key: dict(section.report.document) for section in reported.sections},
+                "missing": list(reported.missing),
             }
-            for each in profiles
+            for reported in profiles
         ],
     )
 
@@ -131,11 +131,11 @@ def _comparison(profiles: "Sequence[ReportedProfile]") -> Table:
     rows = tuple(
         TableRow(
             (
-                SectionLink(each.network.profile.name, f"p{number}", shell_word(each.argument)),
-                *(attribute_value(figure, each.verdict.deciding) for figure in figures),
+                SectionLink(reported.network.profile.name, f"p{number}", shell_word(reported.argument)),
+                *(attribute_value(figure, reported.verdict.deciding) for figure in figures),
             )
         )
-        for number, each in enumerate(profiles, start=1)
+        for number, reported in enumerate(profiles, start=1)
     )
     return Table(columns, rows, Sentence(("All profiles, each under the timing model that decides",)))
 
@@ -272,8 +272,9 @@ def _reported(
 
     def command(name: str, *more: str, takes_period: bool = True) -> str:
         # Neither latency nor the list of explain takes --period.
-        known = options if takes_period else [*change_options(_without_period(changes), period_us=0.0)]
-        return " ".join(("busplan", name, shell_word(argument), *more, *known))
+        without = KeyChanges(tuple(change for change in changes.entries if change.option != "--period"))
+        words = options if takes_period else [*change_options(without, period_us=0.0)]
+        return " ".join(("busplan", name, shell_word(argument), *more, *words))
 
     bus = capacity(profile, sensitivity=profile.has_cycle)
     more = ("--sensitivity",) if profile.has_cycle else ()
@@ -304,10 +305,6 @@ def _reported(
 
     answers = tuple(sections())
     return ReportedProfile(argument, changes, bus.verdicts[0], answers, tuple(missing))
-
-
-def _without_period(changes: KeyChanges) -> KeyChanges:
-    return KeyChanges(tuple(change for change in changes.entries if change.option != "--period"))
 
 
 def _asks_for_circle(profile: Profile, circle: bool | None) -> bool:
