@@ -6,7 +6,6 @@ arrays are.
 """
 
 import operator
-from array import array
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import repeat
@@ -464,59 +463,6 @@ def _points(number: "float | NDArray[Any]", shape: tuple[int, ...]) -> Iterator[
     return (point.item() for point in np.broadcast_to(number, shape).flat)
 
 
-def shape_of(numbers: Iterable[Number]) -> tuple[int, ...]:
-    """Shape of the points of some numbers together; () of plain numbers.
-
-    Examples
-    --------
-    >>> shape_of([1, 2.5])
-    ()
-    """
-    shapes = {getattr(number, "shape", ()) for number in numbers}
-    if shapes <= {()}:
-        return ()
-    import numpy as np
-
-    return np.broadcast_shapes(*shapes)
-
-
-def rows(numbers: Iterable[Number], shape: tuple[int, ...]) -> "memoryview[float] | NDArray[Any]":
-    """A row of some numbers for each point, which compiled code reads as double[:, ::1].
-
-    Parameters
-    ----------
-    numbers
-        The numbers, one or more, each plain or an array.
-    shape
-        That of the points, as `shape_of` gives it.
-
-    Examples
-    --------
-    >>> rows([1, 2.5], ()).tolist()
-    [[1.0, 2.5]]
-    """
-    if not shape:
-        row = array("d", map(plain, numbers))
-        return memoryview(row).cast("B").cast("d", (1, len(row)))
-    import numpy as np
-
-    return np.stack([np.broadcast_to(number, shape).ravel() for number in numbers], axis=1).astype(float)  # type: ignore[arg-type] # none is traced
-
-
-def from_rows(found: "memoryview[float] | NDArray[Any]", place: int, shape: tuple[int, ...]) -> Number:
-    """The number at a place of the row of each point.
-
-    Examples
-    --------
-    >>> from_rows(rows([1, 2.5], ()), 1, ())
-    2.5
-    """
-    if isinstance(found, memoryview):
-        number: Number = found[0, place]
-        return number
-    return found[:, place].reshape(shape)
-
-
 def named(number: Number, key: str, symbol: str) -> Number:
     """Give a step of a computation its name, for a derivation; any other number stays as it is."""
     return number.named(key, symbol) if isinstance(number, Traced) else number
@@ -529,8 +475,8 @@ def worded(number: Number, words: str) -> Number:
     return Traced(number.value, formula=words, numbers=short(number.value), parts=(number,))
 
 
-def alike(constant: Number, number: Number) -> Number:
-    """A constant that is computed with other constants before it meets a number: of that number's sort."""
+def traced_with(constant: Number, number: Number) -> Number:
+    """A constant, traced where a number is: so that it is an input, though it meets other constants first."""
     if isinstance(number, Traced) and isinstance(constant, Sourced):
         return Traced(float(constant), given=input_of(constant))
     return constant

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 
 import busplan
+from busplan.buses.ieee1394.doubts import residual
 from busplan.buses.ieee1394.section import Ieee1394Profile
-from busplan.buses.ieee1394.transactions import residual
 from busplan.profile.document import override
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Chunk, Grid
-from busplan.questions.sweep.table import CHUNK_POINTS, figure_table
+from busplan.questions.sweep.table import CHUNK_POINTS, Sweep, figure_table
 
 MODELS = ("paper", "standard")
 GRIDS: dict[str, Callable[[int], dict[str, Any]]] = {
@@ -172,7 +172,7 @@ def test_sweep_of_a_million_points(benchmark: Any, name: str, size: Callable[[in
     assert grid.points > 3 * CHUNK_POINTS
 
     def run() -> dict[str, Any]:
-        return figure_table(network_of(PROFILE), grid, timing_models=MODELS)
+        return figure_table(Sweep(network_of(PROFILE), grid, MODELS, group=""))
 
     # The hand-written one is the same mathematics.
     table, (chunk, written) = run(), next(all_by_hand(grid))

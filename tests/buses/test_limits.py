@@ -47,9 +47,9 @@ def test_the_limit_is_that_by_hand(kind: str, base_us: float, uncertainty_us: fl
     changes = {"base_us": base_us, "uncertainty_us": uncertainty_us, "worst_extra_us": extra_us}
     one = network_of(network(kind, **{f"node__execution__{key}": value for key, value in changes.items()}))
     busy_us, doubt_us = 2 * (base_us + extra_us), 2 * 2 * uncertainty_us
-    assert NODE_LIMIT.kept_from_us(one) == pytest.approx(busy_us + doubt_us)
+    assert NODE_LIMIT.shown.shortest_period_us(one) == pytest.approx(busy_us + doubt_us)
     expected = 0 if busy_us + doubt_us <= 1000 else 2 if busy_us - doubt_us > 1000 else 1
-    assert NODE_LIMIT.bound.verdict_code(one) == expected
+    assert NODE_LIMIT.verdict_code(one) == expected
 
 
 def test_the_slowest_group_counts() -> None:
@@ -71,7 +71,7 @@ def test_the_slowest_group_counts() -> None:
         ],
     }
     one = kind_named("sercos3").profile_model().model_validate(data)
-    assert NODE_LIMIT.kept_from_us(network_of(one)) == pytest.approx(2 * 470 + 4 * 20)
+    assert NODE_LIMIT.shown.shortest_period_us(network_of(one)) == pytest.approx(2 * 470 + 4 * 20)
     found = busplan.capacity(one).verdicts[0].deciding
     assert (found.verdict, found.not_shown) == ("not shown to fit", ("node",))
     assert "vague: a node executes for 940.0 +/- 80.0 us of 1000.0 us" in str(busplan.capacity(one))
@@ -94,4 +94,4 @@ def test_the_smallest_period_of_a_comparison_leaves_the_nodes_their_time() -> No
     found = busplan.compare("paper-1ms", buses=KINDS)
     for one in found.compared:
         assert one.smallest.us is not None
-        assert one.smallest.us >= NODE_LIMIT.kept_from_us(one.network)
+        assert one.smallest.us >= NODE_LIMIT.shown.shortest_period_us(one.network)

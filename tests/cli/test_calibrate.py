@@ -68,7 +68,7 @@ def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(bu
         "payload_bytes = [4, 64, 256]",
         *("uncertainty_us = 0.707", 'residual = "standard"', "measured_gap_count = 63", "worst_extra_us = 239.501"),
     ]
-    execution = load_profile(bench).alike_nodes[0].node.execution
+    execution = load_profile(bench).node_groups[0].node.execution
     assert (execution.grade, execution.uncertainty_us) == ("measured", 0.707)
     busplan("calibrate", "bench.toml", "m.csv", "--timing-model", "standard", "--apply", cwd=bench.parent)
     assert bench.read_text() == after

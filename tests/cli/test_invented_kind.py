@@ -24,7 +24,6 @@ from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut
 from busplan.buses.cycle import Run as EventRun
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
 from busplan.buses.limits import (
-    Bound,
     Cost,
     EventKind,
     Limit,
@@ -138,7 +137,8 @@ class Ring(Bus):
         Limit(
             "nodes",
             "{value:.0f} stations are over the {most:.0f} of a ring",
-            Bound(lambda network: network.nodes, lambda _network: MOST_STATIONS),
+            lambda network: network.nodes,
+            lambda _network: MOST_STATIONS,
             way_out="a second ring has room",
         ),
     )
@@ -362,7 +362,7 @@ def ring_with(limits: tuple[Limit, ...]) -> Bus:
 
 def limit_of(value: Callable[[Network], Number], most: Callable[[Network], Number], key: str = "own") -> Limit:
     """A limit of any form."""
-    return Limit(key, "{value} over {most}", Bound(value, most))
+    return Limit(key, "{value} over {most}", value, most)
 
 
 @pytest.mark.parametrize(

@@ -100,8 +100,8 @@ def test_keys_that_only_go_together_do_so_in_any_order() -> None:
             changes(one).applied(shipped())
     both = changes(*texts).applied(shipped())
     assert both == changes(*reversed(texts)).applied(shipped())
-    assert isinstance(both.alike_nodes[0].node.execution, TableExecution)
-    assert (both.alike_nodes[0].node.execution.payload_bytes, both.alike_nodes[0].node.execution.time_us) == (
+    assert isinstance(both.node_groups[0].node.execution, TableExecution)
+    assert (both.node_groups[0].node.execution.payload_bytes, both.node_groups[0].node.execution.time_us) == (
         (4, 64),
         (30.0, 50.0),
     )
@@ -111,7 +111,7 @@ def test_a_table_replaces_its_section_and_may_be_of_another_kind() -> None:
     found = (
         changes("node.execution={kind='linear', base_us=30, per_byte_us=0.1}")
         .applied(shipped())
-        .alike_nodes[0]
+        .node_groups[0]
         .node.execution
     )
     assert isinstance(found, LinearExecution)

@@ -234,8 +234,8 @@ def test_a_profile_keeps_nothing_of_the_data_it_was_made_of() -> None:
     source = data(node__execution=TABLE)
     loaded = Ieee1394Profile.model_validate(source)
     source["node"]["execution"]["time_us"][0] = 0.0
-    assert isinstance(loaded.alike_nodes[0].node.execution, TableExecution)
-    assert loaded.alike_nodes[0].node.execution.time_us == (40.0, 34.0, 58.0)
+    assert isinstance(loaded.node_groups[0].node.execution, TableExecution)
+    assert loaded.node_groups[0].node.execution.time_us == (40.0, 34.0, 58.0)
 
 
 # --- ranges -----------------------------------------------------------------------------------------------
@@ -295,22 +295,22 @@ def test_defaults_are_those_of_the_reference() -> None:
     assert loaded.bus.timing_model == "standard"
     assert (loaded.cycle.slice_ratio, loaded.cycle.nonperiodic_us) == (0.5, 0.0)
     assert (loaded.cycle.sync.ping_us, loaded.cycle.sync.ping_per_node_us) == (0.3, 0.1)
-    assert loaded.alike_nodes[0].payload.overhead_bytes == 20
+    assert loaded.node_groups[0].payload.overhead_bytes == 20
     # What no bus of the paper has is off.
     assert (loaded.bus.cycle_master, loaded.bus.isochronous_us, loaded.bus.phy_delay_us) == (False, 0.0, None)
     assert (loaded.cycle.retries, loaded.limits.reserve) == (0, 0.0)
     assert (
-        loaded.alike_nodes[0].node.read_response,
-        loaded.alike_nodes[0].node.write_response,
-        loaded.alike_nodes[0].node.response_us,
+        loaded.node_groups[0].node.read_response,
+        loaded.node_groups[0].node.write_response,
+        loaded.node_groups[0].node.response_us,
     ) == ("split", "split", 1.63)
-    assert (loaded.alike_nodes[0].node.execution.residual, loaded.alike_nodes[0].node.execution.measured_gap_count) == (
+    assert (loaded.node_groups[0].node.execution.residual, loaded.node_groups[0].node.execution.measured_gap_count) == (
         "none",
         63,
     )
     assert (
-        loaded.alike_nodes[0].node.execution.uncertainty_us,
-        loaded.alike_nodes[0].node.execution.worst_extra_us,
+        loaded.node_groups[0].node.execution.uncertainty_us,
+        loaded.node_groups[0].node.execution.worst_extra_us,
     ) == (None, 0.0)
     assert (loaded.host.transaction_us, loaded.host.uncertainty_us) == (0.0, None)
 
@@ -351,9 +351,9 @@ def test_isochronous_traffic_needs_a_cycle_master() -> None:
 def test_what_is_not_said_of_an_uncertainty_follows_from_the_grade_or_is_a_tenth() -> None:
     by_grade = {"measured": 0.1 / math.sqrt(12), "derived": 1 / math.sqrt(3), "calibrated": 4, "assumed": 4, None: 4}
     for grade, expected in by_grade.items():
-        execution = profile(node__execution__grade=grade).alike_nodes[0].node.execution
+        execution = profile(node__execution__grade=grade).node_groups[0].node.execution
         assert execution.standard_uncertainty_us(40.0) == pytest.approx(expected)
-        said = profile(node__execution__grade=grade, node__execution__uncertainty_us=0.25).alike_nodes[0].node.execution
+        said = profile(node__execution__grade=grade, node__execution__uncertainty_us=0.25).node_groups[0].node.execution
         assert said.standard_uncertainty_us(40.0) == 0.25
     assert profile(host__transaction_us=5).host.standard_uncertainty_us == 0.5
     assert profile(host__transaction_us=5, host__uncertainty_us=0).host.standard_uncertainty_us == 0
@@ -363,9 +363,9 @@ def test_what_is_not_said_of_an_uncertainty_follows_from_the_grade_or_is_a_tenth
     "execution", [{"kind": "linear", "base_us": 1, "per_byte_us": 0}, TABLE], ids=["linear", "table"]
 )
 def test_both_forms_of_execution_may_have_a_grade(execution: dict[str, object]) -> None:
-    assert profile(node__execution=execution).alike_nodes[0].node.execution.grade is None
+    assert profile(node__execution=execution).node_groups[0].node.execution.grade is None
     for grade in ("measured", "derived", "calibrated", "assumed", None):
-        assert profile(node__execution={**execution, "grade": grade}).alike_nodes[0].node.execution.grade == grade
+        assert profile(node__execution={**execution, "grade": grade}).node_groups[0].node.execution.grade == grade
 
 
 def test_every_default_is_a_value_that_the_schema_takes() -> None:

@@ -12,7 +12,8 @@ import tomli_w
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from busplan.profile.document import KeyPath, Place, comments, decode, places
+from busplan.profile.document import decode
+from busplan.profile.places import KeyPath, Place, comments, places
 
 # --- what holds of every document -------------------------------------------------------------------------
 

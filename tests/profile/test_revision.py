@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from busplan.errors import BusplanError
-from busplan.profile import edit as revision
-from busplan.profile.edit import load_revision
+from busplan.profile import sources as revision
+from busplan.profile.sources import load_revision
 
 Git = Callable[..., bytes]
 

@@ -82,11 +82,11 @@ def test_the_experiment_is_that_of_section_4() -> None:
     assert (plan.bus.cable_length_m, plan.bus.timing_model) == (4.5, "paper")
     assert (plan.cycle.slice_ratio, plan.cycle.sync.ping_us, plan.cycle.sync.ping_per_node_us) == (0.5, 0.3, 0.1)
     assert (
-        plan.alike_nodes[0].payload.read_bytes,
-        plan.alike_nodes[0].payload.write_bytes,
-        plan.alike_nodes[0].payload.overhead_bytes,
+        plan.node_groups[0].payload.read_bytes,
+        plan.node_groups[0].payload.write_bytes,
+        plan.node_groups[0].payload.overhead_bytes,
     ) == (12, 12, 20)
-    assert plan.alike_nodes[0].node.axes == 4
+    assert plan.node_groups[0].node.axes == 4
 
 
 def test_the_bench_is_that_of_table_1() -> None:
@@ -96,7 +96,7 @@ def test_the_bench_is_that_of_table_1() -> None:
 
 @pytest.mark.parametrize("name", ["paper-two-node", "paper-4ms", "paper-1ms", "paper-optimal-gap"])
 def test_execution_times_are_table_1_row_by_row(name: str) -> None:
-    execution = load(name).profile.alike_nodes[0].node.execution
+    execution = load(name).profile.node_groups[0].node.execution
     assert isinstance(execution, TableExecution)
     assert list(execution.payload_bytes) == [size for size, _, _ in TABLE_1]
     # The table measured writes. Their response has no payload: its half is that of 4 bytes, 6.0 us, less the 4 bytes
@@ -117,7 +117,7 @@ def test_the_optimal_gap_profile_leaves_the_gap_count_to_the_table() -> None:
 
 def test_the_what_if_states_its_assumption() -> None:
     plan = load("paper-dma").profile
-    assert plan.alike_nodes[0].node.execution.execution_us(100) == pytest.approx(10 + 0.05 * 100)
+    assert plan.node_groups[0].node.execution.execution_us(100) == pytest.approx(10 + 0.05 * 100)
     assert "assumption" in plan.description
 
 
@@ -245,7 +245,7 @@ def test_the_shipped_can_networks_are_those_that_they_say() -> None:
     arm: Any = load("can-fd-arm-7").profile
     machine: Any = load("canopen-6").profile
     assert (arm.bus.nodes, arm.bus.bit_rate_kbit_s, arm.bus.data_bit_rate_kbit_s) == (7, 1000, 5000)
-    (nodes,) = arm.alike_nodes
+    (nodes,) = arm.node_groups
     assert (nodes.bytes_of("read"), nodes.bytes_of("write")) == (16, 4)
     assert all(message.fd for message in arm.message)
     # Frames of 4 and 16 bytes: 32 nominal bits, and 75 and 195 data bits.

@@ -546,9 +546,9 @@ def test_what_cannot_be_read_says_why(path: str, message: str, tmp_path: Path, m
 def test_a_change_makes_a_new_profile_and_leaves_the_old() -> None:
     before = read(TEXT)
     after = override(before, {"bus.nodes": 5, "cycle.sync.ping_us": 1, "node.execution.time_us": (1, 2, 3)})
-    assert (after.alike_nodes[0].nodes, after.cycle.sync.ping_us, after.alike_nodes[0].node.axes) == (5, 1.0, 4)
-    assert isinstance(after.alike_nodes[0].node.execution, TableExecution)
-    assert after.alike_nodes[0].node.execution.time_us == (1.0, 2.0, 3.0)
+    assert (after.node_groups[0].nodes, after.cycle.sync.ping_us, after.node_groups[0].node.axes) == (5, 1.0, 4)
+    assert isinstance(after.node_groups[0].node.execution, TableExecution)
+    assert after.node_groups[0].node.execution.time_us == (1.0, 2.0, 3.0)
     assert before == read(TEXT)
 
 

@@ -15,7 +15,7 @@ def read(text: str) -> Profile:
 def test_a_written_profile_reads_to_the_same() -> None:
     for name in shipped_names():
         profile = load(name).profile
-        nodes_key = profile.alike_nodes[0].nodes_key
+        nodes_key = profile.node_groups[0].nodes_key
         key, value = {
             "ieee1394": ("bus.gap_count", "optimal"),
             "can": ("bus.sync_counter", True),

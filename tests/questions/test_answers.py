@@ -118,8 +118,8 @@ def test_a_notebook_draws_a_map() -> None:
     assert drawn.startswith("<svg ")
     assert "&lt;b&gt;&amp;x" in drawn
     assert "<b>" not in drawn
-    assert found.own is not None
-    assert (found.own.state, len(found.cells), found.regions[0].cells) == ("fits", 288, 104)
+    assert found.design is not None
+    assert (found.design.state, len(found.cells), found.regions[0].cells) == ("fits", 288, 104)
 
 
 def test_circles_of_a_map_run_on_any_executor_and_are_counted() -> None:

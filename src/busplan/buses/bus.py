@@ -128,9 +128,9 @@ class Bus(ABC):
         """Say how large a network is, in plain numbers: each number with its noun."""
         return (int(plain(network.nodes)), "node"), (int(plain(network.axes)), "axis")
 
-    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - most charge all alike
-        """Say which way on the wire the times of each node include."""
-        return "every node alike"
+    def path_words(self, network: Network) -> str:  # noqa: ARG002 - a kind may have a single way
+        """Say which way on the wire the times of a node include, where there are several."""
+        return ""
 
     def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none
         """Settings in force, each in a few words."""

@@ -83,59 +83,24 @@ KEPT, NOT_SHOWN_KEPT, BROKEN = range(3)
 """Verdicts on a limit, the better first."""
 
 
-class Bound(NamedTuple):
-    """A value that must not exceed another one. Value and doubt must not decrease as nodes are added."""
+class Limit(NamedTuple):
+    """A value that must not exceed another one, with what is said where it does.
 
+    Value and doubt must not decrease as nodes are added.
+    """
+
+    key: str
+    over: str | Callable[[Network], str]
+    """Sentence on a limit that is broken or not shown to be kept: a format of `value`, its `uncertainty`, `most` and
+    the profile's `bus`; or what writes it."""
     value: Callable[[Network], Number]
     most: Callable[[Network], Number]
     doubt: Callable[[Network], Number] | None = None
     """Standard uncertainty of the value, less that of the most; without it both are exact."""
     perhaps: Callable[[Network], Number] | None = None
     """Part of the value that may not be there: it counts where a limit must be shown to be kept, and breaks none."""
-
-    def uncertainty(self, network: Network) -> Number:
-        """Expanded uncertainty U of the value, two standard uncertainties; 0 where it is exact."""
-        return 0.0 if self.doubt is None else COVERAGE * self.doubt(network)
-
-    def least_value(self, network: Network) -> Number:
-        """Lower bound of the value: less U, and without what may not count."""
-        least = self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
-        return least if self.perhaps is None else least - self.perhaps(network)
-
-    @property
-    def nominal(self) -> "Bound":
-        """The bound of the value as it is, its uncertainty left out."""
-        return self._replace(doubt=None, perhaps=None)
-
-    @property
-    def shown(self) -> "Bound":
-        """The bound that a network keeps where it is shown to keep this one: of value + U."""
-        if self.doubt is None:
-            return self
-        return Bound(lambda network: self.value(network) + self.uncertainty(network), self.most)
-
-    def is_broken(self, network: Network) -> Number:
-        """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
-        return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
-
-    def verdict_code(self, network: Network) -> Number:
-        """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
-        surely = choose(self.is_broken(network), BROKEN, KEPT)
-        if self.doubt is None:
-            return surely
-        return larger(surely, choose(self.shown.is_broken(network), NOT_SHOWN_KEPT, KEPT))
-
-
-class Limit(NamedTuple):
-    """A bound of the bus that a network must keep, with what is said where it does not."""
-
-    key: str
-    over: str | Callable[[Network], str]
-    """Sentence on a limit that is broken or not shown to be kept: a format of `value`, its `uncertainty`, `most` and
-    the profile's `bus`; or what writes it."""
-    bound: Bound
-    period: Callable[[Bound, Network], Number] | None = None
-    """Shortest period that keeps a bound, by network [us]; None where no longer period does."""
+    period: "Callable[[Limit, Network], Number] | None" = None
+    """Shortest period that keeps the limit, by network [us]; None where no longer period does."""
     way_out: str = ""
     """Advice that makes room where this limit keeps nodes out."""
     role: Literal["cycle", "safety", "period"] = "cycle"
@@ -149,50 +114,76 @@ class Limit(NamedTuple):
     @property
     def nominal(self) -> "Limit":
         """The limit of the value as it is, its uncertainty left out."""
-        return self._replace(bound=self.bound.nominal)
+        return self._replace(doubt=None, perhaps=None)
 
     @property
     def shown(self) -> "Limit":
-        """The limit that a network keeps where it is shown to keep this one."""
-        return self._replace(bound=self.bound.shown)
+        """The limit that a network keeps where it is shown to keep this one: of value + U."""
+        if self.doubt is None:
+            return self
+        return self.nominal._replace(value=lambda network: self.value(network) + self.uncertainty(network))
+
+    def uncertainty(self, network: Network) -> Number:
+        """Expanded uncertainty U of the value, two standard uncertainties; 0 where it is exact."""
+        return 0.0 if self.doubt is None else COVERAGE * self.doubt(network)
+
+    def least_value(self, network: Network) -> Number:
+        """Lower bound of the value: less U, and without what may not be there."""
+        least = self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
+        return least if self.perhaps is None else least - self.perhaps(network)
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
-        return self.bound.is_broken(network)
+        return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
 
-    def kept_from_us(self, network: Network) -> float:
-        """Shortest period that is shown to keep it, of plain numbers; infinite where no longer one does [us]."""
-        return inf if self.period is None else plain(self.period(self.bound.shown, network))
+    def verdict_code(self, network: Network) -> Number:
+        """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
+        surely = choose(self.is_broken(network), BROKEN, KEPT)
+        if self.doubt is None:
+            return surely
+        return larger(surely, choose(self.shown.is_broken(network), NOT_SHOWN_KEPT, KEPT))
+
+    def shortest_period_us(self, network: Network) -> Number:
+        """Shortest period that keeps it; infinite where no longer one does [us]."""
+        return inf if self.period is None else self.period(self, network)
 
     def words(self, network: Network) -> str:
         """Say by how much a network breaks it."""
         if not isinstance(self.over, str):
             return self.over(network)
-        value, most = self.bound.value(network), self.bound.most(network)
-        uncertainty = self.bound.uncertainty(network)
+        value, most, uncertainty = self.value(network), self.most(network), self.uncertainty(network)
         return self.over.format(value=value, uncertainty=uncertainty, most=most, bus=network.profile.bus)
 
 
 def share_of_period(
-    value: Callable[[Network], Number],
+    key: str,
+    over: Callable[[Network], str],
     *,
+    us: Callable[[Network], Number],
     share: Callable[[Network], Number],
-    doubt: Callable[[Network], Number] | None = None,
+    doubt: Callable[[Network], Number],
     perhaps: Callable[[Network], Number] | None = None,
-) -> tuple[Bound, Callable[[Bound, Network], Number]]:
-    """The bound of a time that must be over within a share of the period, and the shortest period that keeps it.
+    way_out: str,
+) -> Limit:
+    """The limit of a time that must be over within a share of the period; a rule of its own reports it.
 
     Parameters
     ----------
-    value
+    key, over, doubt, perhaps, way_out
+        As `Limit` has them.
+    us
         The time, which rests on no period [us].
     share
         The share [1].
-    doubt, perhaps
-        As `Bound` has them.
     """
-    bound = Bound(value, lambda network: share(network) * network.period_us, doubt, perhaps)
-    return bound, lambda of, network: of.least_value(network) / share(network)
+
+    def most_us(network: Network) -> Number:
+        return share(network) * network.period_us
+
+    def period_us(limit: Limit, network: Network) -> Number:
+        return limit.least_value(network) / share(network)
+
+    return Limit(key, over, us, most_us, doubt, perhaps, period_us, way_out, has_rule=True)
 
 
 class Starter(NamedTuple):
@@ -375,7 +366,8 @@ def period_limit(periods: Periods) -> Limit:
     return Limit(
         PERIOD_LIMIT,
         lambda network: periods.refusal(plain(network.period_us)),
-        Bound(lambda network: choose(periods.from_us(network.period_us) > network.period_us, 1, 0), lambda _network: 0),
+        lambda network: choose(periods.from_us(network.period_us) > network.period_us, 1, 0),
+        lambda _network: 0,
         way_out="a period that the bus allows will do",
         role="period",
         has_rule=True,
@@ -417,73 +409,50 @@ NODE: Final = "node"
 """Key of the limit."""
 
 
-def busy_us(group: Group) -> Number:
-    """Execution time of a node in a cycle: a read and a write, the slowest of each [us]."""
-    return group.read_execution_us + group.write_execution_us + 2 * group.worst_extra_us
-
-
-def busy_doubt_us(group: Group) -> Number:
-    """Standard uncertainty of that time: read and write are known in the same way, so they err together [us]."""
-    return group.read_uncertainty_us + group.write_uncertainty_us
-
-
 def slow_groups(network: Network) -> Iterator[Group]:
     """Groups of plain numbers whose nodes are not shown to finish within the period."""
     for group in network.groups:
-        if _shown_us(group) > _period_us(group, network):
+        if _busy_us(group) + COVERAGE * _busy_doubt_us(group) > network.period_us * group.every:
             yield group
 
 
 def busy_words(group: Group, network: Network) -> str:
     """Say how much of each of its periods a node of a group executes; of plain numbers."""
-    doubt_us = COVERAGE * plain(busy_doubt_us(group))
+    doubt_us = COVERAGE * plain(_busy_doubt_us(group))
     either_way = f" +/- {doubt_us:.1f}" if doubt_us else ""
-    busy, most = told_apart(plain(busy_us(group)), plain(_period_us(group, network)))
+    busy, most = told_apart(plain(_busy_us(group)), plain(network.period_us * group.every))
     return f"a node executes for {busy}{either_way} us of {most} us"
 
 
-def _all_words(network: Network) -> str:
+def _busy_us(group: Group) -> Number:
+    """Execution time of a node in a cycle: a read and a write, the slowest of each [us]."""
+    return group.read_execution_us + group.write_execution_us + 2 * group.worst_extra_us
+
+
+def _busy_doubt_us(group: Group) -> Number:
+    """Standard uncertainty of that time: read and write are known in the same way, so they err together [us]."""
+    return group.read_uncertainty_us + group.write_uncertainty_us
+
+
+def _all_busy_words(network: Network) -> str:
     busy = ((group.name, busy_words(group, network)) for group in slow_groups(network))
     return "; ".join(f"{name}: {words}" if name else words for name, words in busy)
 
 
-def _period_us(group: Group, network: Network) -> Number:
-    """From a cycle with the group's data to the next [us]."""
-    return network.period_us * group.every if group.is_slower else network.period_us
-
-
-def _shown_us(group: Group) -> Number:
-    return busy_us(group) + COVERAGE * busy_doubt_us(group)
-
-
-def _of_a_cycle(us: Number, group: Group) -> Number:
-    """The share of a single cycle in a time that may take n of them [us]."""
-    return us / group.every if group.is_slower else us
-
-
-def _ends_us(network: Network) -> tuple[Number, Number]:
-    """Execution time of the slowest nodes in a cycle, less and plus its expanded uncertainty [us]."""
+def _busiest_us(network: Network, coverage: int) -> Number:
+    """Execution time of the slowest nodes in a cycle with some standard uncertainties; one of n cycles has 1/n [us]."""
     if not network.groups:
-        return 0.0, 0.0
-    least_us = (_of_a_cycle(busy_us(group) - COVERAGE * busy_doubt_us(group), group) for group in network.groups)
-    return reduce(larger, least_us), reduce(larger, (_of_a_cycle(_shown_us(group), group) for group in network.groups))
+        return 0.0
+    busy_us = ((_busy_us(group) + coverage * _busy_doubt_us(group)) / group.every for group in network.groups)
+    return reduce(larger, busy_us)
 
 
-def _middle_us(network: Network) -> Number:
-    least_us, most_us = _ends_us(network)
-    return (least_us + most_us) / 2
-
-
-def _doubt_us(network: Network) -> Number:
-    least_us, most_us = _ends_us(network)
-    return (most_us - least_us) / 2 / COVERAGE
-
-
-NODE_LIMIT: Final = Limit(
+NODE_LIMIT: Final = share_of_period(
     NODE,
-    _all_words,
-    *share_of_period(_middle_us, share=lambda _network: 1, doubt=_doubt_us),
+    _all_busy_words,
+    us=lambda network: (_busiest_us(network, -COVERAGE) + _busiest_us(network, COVERAGE)) / 2,
+    share=lambda _network: 1,
+    doubt=lambda network: (_busiest_us(network, COVERAGE) - _busiest_us(network, -COVERAGE)) / 2 / COVERAGE,
     way_out="a longer period or a faster node would do",
-    has_rule=True,
 )
 """T_exec(read) + T_exec(write) + both worst extras <= n T_s, of every group with data in every n-th cycle."""

@@ -6,7 +6,7 @@ from math import lcm
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from busplan.elementwise import Number, is_everywhere, larger, total
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.machine import ProfileGroup
 from busplan.sourced import SYMBOLS
 
 if TYPE_CHECKING:
@@ -60,8 +60,8 @@ def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int
 class Group(NamedTuple):
     """Nodes that are alike. The numbers may be of any sort."""
 
-    said: AlikeNodes
-    """The nodes as the profile says them."""
+    members: tuple[ProfileGroup, ...]
+    """The profile's groups that it joins, side by side: one, or several that differ in name and number alone."""
     nodes: Number
     """Number of nodes [1]."""
     axes: Number
@@ -80,18 +80,21 @@ class Group(NamedTuple):
     """Standard uncertainty of the execution time of a read [us]."""
     write_uncertainty_us: Number = 0.0
     """Standard uncertainty of the execution time of a write [us]."""
-    members: tuple[AlikeNodes, ...] = ()
-    """The profile's groups that are alike in all but their names, side by side."""
 
     @property
     def node(self) -> Any:
         """A node of the group, of its kind's own model: how it executes and answers."""
-        return self.said.node
+        return self.members[0].node
+
+    @property
+    def payload(self) -> Any:
+        """Payloads of a node, of its kind's own model."""
+        return self.members[0].payload
 
     @property
     def every(self) -> Number:
         """Cycles from one with the data of the group to the next: n [1]."""
-        number: Number = getattr(self.said.payload, "every", 1)
+        number: Number = getattr(self.payload, "every", 1)
         return number
 
     @property
@@ -102,17 +105,11 @@ class Group(NamedTuple):
     @property
     def name(self) -> str:
         """Name of the group, or names of its members; empty for the nodes of [node]."""
-        return " and ".join(nodes.name for nodes in self.members or (self.said,))
+        return " and ".join(nodes.name for nodes in self.members)
 
     def key(self, name: str) -> str:
-        """Dotted key of what the profile says of its nodes.
-
-        Parameters
-        ----------
-        name
-            The key within it, as "execution.worst_extra_us".
-        """
-        return self.said.node_key(name)
+        """Dotted key of a value of its nodes in the profile, by its key in [node], as "execution.worst_extra_us"."""
+        return self.members[0].node_key(name)
 
 
 class Network(NamedTuple):
@@ -126,7 +123,7 @@ class Network(NamedTuple):
     period_us: Number
     slice_ratio: Number
     nonperiodic_us: Number
-    asked: str | None = None
+    varied: str | None = None
     """Name of the profile's group that `with_nodes` changes; None where groups differ and none has been chosen."""
 
     @property
@@ -145,25 +142,10 @@ class Network(NamedTuple):
         sizes = [size for group in self.groups for size in (group.read_bytes, group.write_bytes)]
         return reduce(larger, sizes)
 
-    def asking(self, name: str) -> "Network":
-        """The same network, asked how many nodes a group of the profile may have.
-
-        Parameters
-        ----------
-        name
-            Name of the group; empty for the nodes of [node].
-        """
-        return self._replace(asked=name)
-
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the profile's groups, in the order of the chain; a single empty name for the nodes of [node]."""
-        return tuple(nodes.name for nodes in self.alike)
-
-    @property
-    def alike(self) -> tuple[AlikeNodes, ...]:
-        """The profile's groups, in the order of the chain."""
-        return tuple(nodes for group in self.groups for nodes in group.members or (group.said,))
+        return tuple(group.name for group in self.profile.node_groups)
 
     @property
     def is_uniform(self) -> bool:
@@ -171,12 +153,23 @@ class Network(NamedTuple):
         return self.names == ("",)
 
     @property
-    def asked_nodes(self) -> AlikeNodes:
-        """The nodes that `with_nodes` changes the number of."""
-        return next(nodes for nodes in self.alike if nodes.name == self.asked)
+    def varied_group(self) -> ProfileGroup:
+        """The profile's group that `with_nodes` changes."""
+        groups: tuple[ProfileGroup, ...] = self.profile.node_groups
+        return next(group for group in groups if group.name == self.varied)
+
+    def varying(self, name: str) -> "Network":
+        """The same network, where `with_nodes` changes a group of the profile.
+
+        Parameters
+        ----------
+        name
+            Name of the group; empty for the nodes of [node].
+        """
+        return self._replace(varied=name)
 
     def with_nodes(self, nodes: Number) -> "Network":
-        """The same network with another number of nodes in the group that it is asked for.
+        """The same network with another number of nodes in its varied group.
 
         Parameters
         ----------
@@ -186,8 +179,7 @@ class Network(NamedTuple):
         return self._replace(groups=tuple(self._with_nodes(group, nodes) for group in self.groups))
 
     def _with_nodes(self, group: Group, nodes: Number) -> Group:
-        members = group.members or (group.said,)
-        if all(member.name != self.asked for member in members):
+        others = [member.nodes for member in group.members if member.name != self.varied]
+        if len(others) == len(group.members):
             return group
-        unasked = [member.nodes for member in members if member.name != self.asked]
-        return group._replace(nodes=total((nodes, *unasked)) if unasked else nodes)
+        return group._replace(nodes=total((nodes, *others)) if others else nodes)

@@ -108,7 +108,7 @@ def plan_command(
     Example: busplan plan paper-1ms --axes 16
     """
     if nodes is not None:
-        changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.each))
+        changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.entries))
     report_file = output if output is not None and output.suffix.lower() in ENDINGS else None
     if report_file is None and output is not None and output.suffix.lower() not in _PROFILE_ENDINGS:
         raise BusplanError(
@@ -154,7 +154,7 @@ def _check_options(
 ) -> None:
     problems = []
     if axes is not None:
-        nodes = [change.typed for change in changes.each if change.key == "bus.nodes"]
+        nodes = [change.typed for change in changes.entries if change.key == "bus.nodes"]
         problems += [f"{typed} and --axes {axes}: give one of them" for typed in nodes]
     if apply and new is not None:
         problems.append(f"--apply and -o {new}: give one of them; -o leaves PROFILE as it is")

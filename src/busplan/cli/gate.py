@@ -152,7 +152,7 @@ def check_command(
     require_company("--baseline FILE", of_baseline, is_given=baseline)
     if update_baseline and pass_on_unmatched:
         raise BusplanError("--pass-on-unmatched: goes without --update-baseline")
-    if update_baseline and changes.each:
+    if update_baseline and changes.entries:
         raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
     updated = baseline if update_baseline else None
     if updated is not None:
@@ -299,7 +299,7 @@ def diff_command(
     if tolerance is not None and not (isfinite(tolerance) and tolerance >= 0):
         raise BusplanError(f"--tolerance {tolerance:g}: must be 0 or more, in percent")
     with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
-        from busplan.profile.edit import load_revision
+        from busplan.profile.sources import load_revision
         from busplan.questions.diff import diff
 
         first, second = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))

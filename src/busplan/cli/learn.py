@@ -88,7 +88,7 @@ def _profiles_report(profiles: "list[Profile]") -> "Report":
 
     records, chapters = [], []
     for profile in profiles:
-        nodes, model = sum(group.nodes for group in profile.alike_nodes), profile.bus.timing_model
+        nodes, model = sum(group.nodes for group in profile.node_groups), profile.bus.timing_model
         description = " ".join(profile.description.split())
         period_us: Any = profile.cycle.period_us if profile.has_cycle else None
         figures = {"name": profile.name, "nodes": nodes, "period_us": period_us, "timing_model": model}

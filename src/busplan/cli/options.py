@@ -328,7 +328,7 @@ def takes_changes(words: str = "", *, period: bool = False) -> Callable[[Callabl
             made = () if text is None else (_period_change(text),)
             changes = KeyChanges((*made, *parse_set(set_ or ())))
             # Periods to compute, such as 4ms, beside a change of the period.
-            for computed, change in product(given.get("period") or (), changes.each):
+            for computed, change in product(given.get("period") or (), changes.entries):
                 if change.key == _PERIOD:
                     require_separate(change, _PERIOD, typed=f"--period {computed}")
             command(*arguments, changes=changes, **given)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from busplan.forms.blocks import Report
     from busplan.questions.sweep import SweepAnswer
-    from busplan.questions.sweep.asked import Sweep
+    from busplan.questions.sweep.table import Sweep
 
 SweepForm = Literal[Form, RowsForm]
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
@@ -166,7 +166,7 @@ def sweep_command(
     from busplan.questions.sweep import checked_sweep, computed, require_drawable
 
     loaded, varied = load_changed(profile, changes), parse_axes(vary or [])
-    for change, key in product(changes.each, varied):
+    for change, key in product(changes.entries, varied):
         require_separate(change, key, typed=f"--vary {key}")
     model = chosen_model(timing_model)
     sweep = checked_sweep(

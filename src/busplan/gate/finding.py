@@ -179,15 +179,15 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
     if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
         return
     from busplan.questions.circle.failures import STABILITY
-    from busplan.questions.circle.roundness import circle_test, to_attack
+    from busplan.questions.circle.roundness import run_circles
 
     steps = path_steps(network)
     if steps > most_steps:
         words = f"the circle takes {steps:,} steps, more than {most_steps:,}: not run"
         yield LONG_CIRCLE, RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
         return
-    result = circle_test(network).results[0]
-    first = to_attack(result)
+    result = run_circles(network).results[0]
+    first = result.to_attack
     attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
     for failure in result.failures:
         if failure.is_of_bus:  # a cycle that is not shown to fit has a rule of its own

@@ -243,7 +243,7 @@ def check_document(
         ran.update(rule.code for rule in RECORDING)
     paths: dict[int, Any] = {}
     violations = [_placed(document, rule, problem, paths) for rule, problem in problems]
-    if changes.each:
+    if changes.entries:
         # Comments were written for the file as it is: with changes, none counts as without effect.
         ran = set()
     left, of_comments = suppress(violations, document, ran=ran)

@@ -24,17 +24,18 @@ from busplan.forms.blocks import (
     TableRow,
 )
 from busplan.questions.base.sentences import document, fields
-from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME, fits_in, limits_behind
+from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, TIME, fits_in
+from busplan.questions.fit.figures import limits_behind
 from busplan.questions.fit.inputs import heavy_assumptions
 from busplan.sections.cycle import TableExecution
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle does not fit, whatever the uncertainty."""
-    deciding, bus = subject.deciding, subject.network.bus
+    deciding = subject.deciding
     if deciding.verdict != DOES_NOT_FIT:
         return
-    broken = [limit for limit in map(bus.limit, deciding.exceeded) if limit is not None]
+    broken = limits_behind(deciding, subject.network)
     alone = [limit for limit in broken if not limit.has_rule]
     for limit in alone:
         yield RuleProblem("cycle.period_us", limit.words(subject.network), limit.way_out)
@@ -44,11 +45,11 @@ def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle may fit, but the uncertainty leaves that open."""
-    deciding, reserve, bus = subject.deciding, subject.profile.limits.reserve, subject.network.bus
+    deciding, reserve = subject.deciding, subject.profile.limits.reserve
     if deciding.verdict != NOT_SHOWN:
         return
-    for limit in map(bus.limit, limits_behind(deciding)):
-        if limit is not None and not limit.has_rule:
+    for limit in limits_behind(deciding, subject.network):
+        if not limit.has_rule:
             words = limit.words(subject.network)
             yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", limit.way_out)
     if TIME in (deciding.not_shown or ()):

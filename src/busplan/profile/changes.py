@@ -48,7 +48,7 @@ class KeyChanges:
 
     Parameters
     ----------
-    each
+    entries
         The changes.
 
     Raises
@@ -57,21 +57,21 @@ class KeyChanges:
         Two of them set the same key, or one sets a key inside the table of another.
     """
 
-    each: tuple[KeyChange, ...] = ()
+    entries: tuple[KeyChange, ...] = ()
 
     def __post_init__(self) -> None:
-        for first, second in combinations(self.each, 2):
+        for first, second in combinations(self.entries, 2):
             require_separate(first, second.key, typed=second.typed)
 
     @property
     def values(self) -> dict[str, object]:
         """New value by dotted key."""
-        return {change.key: change.value for change in self.each}
+        return {change.key: change.value for change in self.entries}
 
     @property
     def by_set(self) -> tuple[KeyChange, ...]:
         """Changes by --set; those by another option show in every answer."""
-        return tuple(change for change in self.each if change.option == SET)
+        return tuple(change for change in self.entries if change.option == SET)
 
     @property
     def words(self) -> str:
@@ -80,7 +80,7 @@ class KeyChanges:
 
     def without(self, *, key: str) -> "KeyChanges":
         """Leave out the change of a key."""
-        return KeyChanges(tuple(change for change in self.each if change.key != key))
+        return KeyChanges(tuple(change for change in self.entries if change.key != key))
 
     def applied(self, profile: "Profile") -> "Profile":
         """Return the profile with all changes, validated once.
@@ -93,7 +93,7 @@ class KeyChanges:
         from busplan.profile.document import override  # noqa: PLC0415 - loads pydantic, which --help does not need
 
         return override(
-            profile, self.values, origin={change.key: f"{change.typed}{change.note}" for change in self.each}
+            profile, self.values, origin={change.key: f"{change.typed}{change.note}" for change in self.entries}
         )
 
 

@@ -112,7 +112,7 @@ def _with_rates(machine: TomlTable, profile: Profile, left_out: tuple[str, ...],
 
 def _say_payloads(machine: TomlTable, profile: Profile) -> None:
     """Give payloads in bytes where the profile gives them only in keys of its own kind."""
-    for place, nodes in enumerate(profile.alike_nodes):
+    for place, nodes in enumerate(profile.node_groups):
         section = machine["group"][place] if nodes.name else machine["payload"]
         for kind, key in zip(TRANSACTION_KINDS, _SIZES, strict=True):
             if section.keys().isdisjoint({key, f"{key}_per_axis"}):
@@ -139,7 +139,7 @@ def _cables_m(profile: Profile) -> dict[str, float]:
     section, _, name = kind_named(profile.bus.kind).key_of("cable").partition(".")
     tables = [(f"bus.{name}", profile.bus)] if section == "bus" else []
     if section == "node":
-        tables = [(nodes.node_key(name), nodes.node) for nodes in profile.alike_nodes]
+        tables = [(nodes.node_key(name), nodes.node) for nodes in profile.node_groups]
     return {
         key: float(getattr(table, name))
         for key, table in tables

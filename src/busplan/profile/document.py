@@ -1,14 +1,12 @@
-"""A TOML text: its data, and the line and column of its parts."""
+"""The text of a profile, and the profile that it holds, validated; with changes, and with what its comments grade."""
 
 import re
 import sys
 import tomllib
-from bisect import bisect_right
 from codecs import BOM_UTF8
-from collections.abc import KeysView, Sequence
+from collections.abc import KeysView
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeAlias, cast, get_args
 
@@ -16,159 +14,10 @@ from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
 from busplan.files import is_unwritten_pipe
-from busplan.profile.kinds import holder, kind_of, profile_model
+from busplan.profile.kinds import holder, kind_of, named_path, profile_model
+from busplan.profile.places import KeyPath, Lines, Place, comments, places
 from busplan.sections.profile import Profile
 from busplan.sourced import Grade
-
-KeyPath = tuple[str | int, ...]
-"""Keys from the top, and indexes into arrays: ("node", "execution", "time_us", 0)."""
-
-
-class Place(NamedTuple):
-    """Place of a key and of its value, as offsets into the text, ends excluded.
-
-    An element of an array has no key: its key span is its value span. A table without a text of its own (`[a]`,
-    `a.b = 1`) has its key span as value span.
-    """
-
-    key_start: int
-    key_end: int
-    value_start: int
-    value_end: int
-
-
-_GAP: Final = re.compile(r"[ \t\n,]*(?:#[^\n]*[ \t\n,]*)*")
-"""Between two statements, or two values of an array or inline table."""
-_KEY: Final = re.compile(r"""[ \t]*([A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')[ \t]*([.=\]]?)[ \t]*""")
-"""One part of a key, and the sign after it."""
-# A multi-line string may end in one or two quotes before the closing three.
-_STRING: Final = (
-    r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\''''
-)
-# A date may contain a space.
-_SCALAR: Final = re.compile(_STRING + r"|[^,\]}#\s](?:[^,\]}#\n]*[^,\]}#\s])?", re.DOTALL)
-_STRING_OR_COMMENT: Final = re.compile(_STRING + r"|(#)[^\n]*", re.DOTALL)
-
-
-@dataclass(slots=True)
-class _Container:
-    """An array or inline table that the scanner is inside of."""
-
-    path: KeyPath
-    start: int
-    is_array: bool
-    length: int = 0
-    """Elements of an array that were read."""
-
-
-class _Scanner:
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.at = 0
-        self.places: dict[KeyPath, Place] = {}
-        self.newest: dict[KeyPath, int] = {}
-        """Index of the newest table of each array of tables."""
-
-    def document(self) -> dict[KeyPath, Place]:
-        text = self.text
-        table: KeyPath = ()
-        inside: list[_Container] = []
-        while (gap := _GAP.match(text, self.at)) and (start := gap.end()) < len(text):
-            self.at = start
-            container = inside[-1] if inside else None
-            if container is None and text[start] == "[":
-                table = self.header()
-                continue
-            if container is not None and text[start] in "]}":
-                self.at += 1
-                self.value(inside.pop().path, container.start)
-                continue
-            if container is not None and container.is_array:
-                path = (*container.path, container.length)
-                container.length += 1
-            else:
-                path, _ = self.key(table if container is None else container.path)
-            start = self.at
-            if text[start] in "[{":
-                inside.append(_Container(path, start, is_array=text[start] == "["))
-                self.at += 1
-            elif scalar := _SCALAR.match(text, start):
-                self.at = scalar.end()
-                self.value(path, start)
-        return self.places
-
-    def value(self, path: KeyPath, start: int) -> None:
-        """Record a value that ends here."""
-        key_start, key_end, *_ = self.places.get(path, (start, self.at))
-        self.places[path] = Place(key_start, key_end, start, self.at)
-
-    def key(self, path: KeyPath) -> tuple[KeyPath, Place]:
-        """Read a, "b" or a.b.c inside a table, and the sign after it: its path and the place of its last part."""
-        while match := _KEY.match(self.text, self.at):
-            if path in self.newest:
-                path = (*path, self.newest[path])
-            path = (*path, _key_value(match[1]))
-            place = Place(*match.span(1), *match.span(1))
-            self.places.setdefault(path, place)
-            self.at = match.end()
-            if match[2] != ".":
-                return path, place
-        raise ValueError(f"no key at offset {self.at}")  # impossible for text that tomllib has accepted
-
-    def header(self) -> KeyPath:
-        """Read [a.b] or [[a.b]]; return the table of the next line."""
-        several = self.text.startswith("[[", self.at)
-        self.at += 1 + several
-        path, place = self.key(())
-        self.at += several
-        if several:
-            self.newest[path] = self.newest.get(path, -1) + 1
-            path = (*path, self.newest[path])
-        # A table's own header replaces the place of an earlier [a.b] that implied it.
-        self.places[path] = place
-        return path
-
-
-def _key_value(written: str) -> str:
-    """Key without quotes and escapes, decoded by the standard library."""
-    if written[0] in "\"'":
-        return next(iter(tomllib.loads(f"{written} = 0")))
-    return written
-
-
-def places(text: str) -> dict[KeyPath, Place]:
-    r"""Find the place of every key and array element.
-
-    Parameters
-    ----------
-    text
-        TOML that `tomllib.loads` has accepted, with LF as line end.
-
-    References
-    ----------
-    TOML 1.0.0.
-
-    Examples
-    --------
-    >>> text = "[bus]\nnodes = 2  # two\n"
-    >>> place = places(text)["bus", "nodes"]
-    >>> text[place.key_start : place.key_end], text[place.value_start : place.value_end]
-    ('nodes', '2')
-    """
-    return _Scanner(text).document()
-
-
-def comments(text: str) -> list[int]:
-    r"""Find the hash of every comment of such a text.
-
-    Examples
-    --------
-    >>> text = 'name = "# no comment"  # two\n'
-    >>> [text[at:] for at in comments(text)]
-    ['# two\n']
-    """
-    return [match.start() for match in _STRING_OR_COMMENT.finditer(text) if match[1]]
-
 
 GRADING: Final = re.compile(rf"#\s*({'|'.join(get_args(Grade))})\b")
 """A comment that grades the key beside it: `master_us = 30  # measured: on the line's own host`."""
@@ -183,25 +32,6 @@ _LONG_KEY: Final = (
     f"{{{_MAX_KEY_PARTS}}})"
 )
 """A dotted key of many parts, for which the standard library's parser takes quadratic time."""
-
-
-class Lines:
-    """Convert between offsets in a text and lines and columns, both counted from 1, columns in characters."""
-
-    def __init__(self, text: str) -> None:
-        self._text = text
-        self._starts = [0, *accumulate(len(line) + 1 for line in text.split("\n")[:-1])]
-
-    def offset(self, line: int, column: int) -> int:
-        """Offset of a line and column."""
-        return self._starts[line - 1] + column - 1
-
-    def line_and_column(self, offset: int) -> tuple[int, int]:
-        """Line and column of an offset; one past the end belongs to the last line that has text."""
-        if offset >= len(self._text):
-            offset = len(self._text.rstrip("\r\n"))
-        line = bisect_right(self._starts, offset)
-        return line, offset - self._starts[line - 1] + 1
 
 
 def text_of(content: bytes, *, name: str, wanted: str) -> str:
@@ -246,7 +76,7 @@ class Document:
         return Lines(self.text)
 
     @cached_property
-    def places(self) -> "dict[KeyPath, Place]":
+    def places(self) -> dict[KeyPath, Place]:
         """Place of every key; only for text that tomllib accepts."""
         return places(self.text)
 
@@ -256,7 +86,7 @@ class Document:
         return comments(self.text)
 
     @cached_property
-    def comments_beside(self) -> "dict[KeyPath, int]":
+    def comments_beside(self) -> dict[KeyPath, int]:
         """Offset of the comment on the line of each key that has one there; that of a table is beside its header."""
         line_of = self.lines.line_and_column
         of_line = {line_of(offset)[0]: offset for offset in self.comments}
@@ -266,8 +96,6 @@ class Document:
     @cached_property
     def grades(self) -> dict[str, Grade]:
         """Grades in comments, by dotted key; the grade of a table is for all its keys."""
-        from busplan.profile.kinds import named_path  # loads pydantic
-
         grades: dict[str, Grade] = {}
         names: dict[int, Any] = {}
         for path in self.places:
@@ -277,13 +105,13 @@ class Document:
                 grades[".".join(map(str, named_path(self.data(), path, names)))] = cast("Grade", match[1])
         return grades
 
-    def nearest(self, path: "KeyPath") -> "KeyPath":
+    def nearest(self, path: KeyPath) -> KeyPath:
         """Path of a key; if it is missing, of the nearest table around it, () at the top."""
         while path and path not in self.places:
             path = path[:-1]
         return path
 
-    def spot(self, path: "KeyPath", *, marks_key: bool = False) -> Spot:
+    def spot(self, path: KeyPath, *, marks_key: bool = False) -> Spot:
         """Place of a key with its value marked; if the key is missing, of the nearest table around it.
 
         Parameters
@@ -360,7 +188,6 @@ def _first_deep_bracket(text: str) -> int:
 
 MAX_FILE_BYTES: Final = 2_000_000
 """Largest profile: some 10,000 messages of a CAN network with their comments."""
-PERIOD_KEY: Final = "cycle.period_us"
 _KINDS: Final = ("bus", "bus.kind")
 """Keys whose change may ask for tables of another kind of bus."""
 _SOURCE: Final = "_source"
@@ -530,22 +357,6 @@ def _unchanged_tables(profile: Profile, changes: KeysView[str]) -> dict[str, obj
     changed = {key.partition(".")[0] for key in changes}
     values = {name: getattr(profile, name) for name in profile.model_fields_set - changed}
     return {name: value for name, value in values.items() if isinstance(value, tuple)}
-
-
-def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Profile]:
-    """Return a profile at each of some communication periods [us]; without them, as it is.
-
-    Raises
-    ------
-    BusplanError
-        A period that the profile's schema refuses.
-    """
-    if periods_us is None:
-        return [profile]
-    return [
-        override(profile, {PERIOD_KEY: period_us}, origin={PERIOD_KEY: f"period {period_us}"})
-        for period_us in periods_us
-    ]
 
 
 def has_comment_grades(profile: Profile) -> bool:

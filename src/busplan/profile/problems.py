@@ -11,9 +11,10 @@ from pydantic_core import ErrorDetails
 from busplan.buses import kind_names
 from busplan.english import printable
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
-from busplan.profile.document import Document, KeyPath
+from busplan.profile.document import Document
 from busplan.profile.edit import value_text
 from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, named_path, path_of, profile_model
+from busplan.profile.places import KeyPath
 from busplan.sections.base import MISSING, Problem
 
 _TAG: Final = "kind"
@@ -208,9 +209,6 @@ def _example(model: type[BaseModel]) -> str:
 
 
 def _unknown(path: KeyPath, section: type[BaseModel]) -> str:
-    instead = getattr(section, "removed", {}).get(path[-1])
-    if instead is not None:
-        return f"removed key: {instead}"
     names = list(section.model_fields)
     close = get_close_matches(str(path[-1]), names, n=1)
     if close:

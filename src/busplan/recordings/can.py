@@ -1,12 +1,10 @@
-"""Frames of CAN logs as arrays, and the bits that each of them had on the wire."""
+"""Frames of CAN logs as arrays, and the bits that each had on the wire."""
 
 import logging
 import zlib
-from array import array
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
-from math import ceil
 from pathlib import Path
 from struct import Struct
 from typing import Any, Final, NamedTuple
@@ -18,9 +16,14 @@ from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.extras import require_extra
 from busplan.progress import Progress
-from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, Quantile, ahead, grid
+from busplan.recordings.statistics import Floats
 
 _EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
+_ROW: Final = Struct("<dIQBB")
+_ROW_FIELDS: Final = np.dtype(
+    [("stamp_s", "<f8"), ("identifier", "<u4"), ("data", "<u8"), ("dlc", "u1"), ("flags", "u1")]
+)
+"""A frame while a log is read."""
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader", b"(": "CanutilsLogReader"}
 """Readers of python-can, by the first bytes of a file."""
 _FORMATS: Final = "candump -l, Vector's ASC and BLF, PEAK's TRC"
@@ -36,11 +39,9 @@ _PIECE: Final = 50_000
 _CLASSICAL_BYTES: Final = 8
 _LONG_BYTES: Final = (16, 20, 24, 32, 48, 64)
 """Length codes 10 to 15, as python-can gives them even of classical frames; they have 8 bytes in those."""
-
-
 _DAY_S: Final = 86_400.0
 _LONGEST_S: Final = _DAY_S
-"""Longest time from one frame to the next that is no damage [s]."""
+"""Longest time from a frame to the next that is no damage [s]."""
 _END_S: Final = float(1 << 33)
 """Stamps from here on, in the year 2242, are no times [s]."""
 _MOST_CONTAINER_BYTES: Final = 16_000_000
@@ -61,7 +62,7 @@ class CanFrames(NamedTuple):
     identifiers: npt.NDArray[np.int64]
     extended: npt.NDArray[np.bool_]
     sizes: npt.NDArray[np.int64]
-    """Data, as the length code says it; codes of 9 to 15 are of 8 bytes in a classical frame [bytes]."""
+    """Data by the length code, whose values of 9 to 15 are 8 bytes in a classical frame [bytes]."""
     bits: npt.NDArray[np.int64]
     """On the wire, interframe space included; 0 of a CAN FD frame [bits]."""
     is_fd: npt.NDArray[np.bool_]
@@ -88,8 +89,8 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
     Raises
     ------
     BusplanError
-        The file cannot be read, is of no known format, has no frame, or those of several channels; or python-can is
-        not installed.
+        The file cannot be read, is of no known format, has no frame or frames of several channels; or python-can is not
+        installed.
     """
     if path.is_fifo():
         # Opening it may wait for ever, and it is opened twice.
@@ -106,7 +107,7 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
     require_extra("can", extra="import", option=str(path), module="can")
     import can  # noqa: PLC0415 - an extra
 
-    # What it warns of is said by the frames that are missing.
+    # The frames that are missing tell what it warns of.
     logging.getLogger("can").addHandler(logging.NullHandler())
     log = _Log()
     reader: Any = None
@@ -125,11 +126,11 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
 
 
 class _DamageError(Exception):
-    """What no log can say, in words."""
+    """A log has what no bus can send; the text says what."""
 
 
 def _bounded_blf() -> Any:
-    """The reader of BLF of python-can, with a bound for what a container is inflated to."""
+    """The reader of BLF of python-can, which inflates a container no further than a bound."""
     from can.io import blf  # noqa: PLC0415 - as above
 
     class Reader(blf.BLFReader):  # type: ignore[misc,unused-ignore]
@@ -147,7 +148,7 @@ def _bounded_blf() -> Any:
 
 
 def _inflated(content: bytes, *, held: int) -> bytes:
-    """Data of a container; with what is held of the container before, they are bounded."""
+    """Data of a container, bounded together with what is held of the container before."""
     (method,), data = _BLF_METHOD.unpack_from(content), content[_BLF_METHOD.size :]
     if method == 0:
         return data
@@ -165,21 +166,13 @@ class _Log:
     """Frames read so far."""
 
     def __init__(self) -> None:
-        self._times, self._identifiers, self._data = array("d"), array("I"), array("Q")
-        self._sizes, self._flags = array("B"), array("B")
+        self._rows = bytearray()
         self._channels: Counter[object] = Counter()
         self._errors = 0
         self.broken = ""
 
     def read(self, messages: Iterator[Any], report: Callable[[], None]) -> None:
         """Take all messages in."""
-        times, identifiers, data, sizes, flags = (
-            self._times.append,
-            self._identifiers.append,
-            self._data.append,
-            self._sizes.append,
-            self._flags.append,
-        )
         number, last_s = 0, None
         for message in messages:
             number += 1
@@ -192,19 +185,21 @@ class _Log:
             _require_frame(message, last_s)
             last_s = message.timestamp
             self._channels[message.channel] += 1
-            times(last_s)
-            identifiers(message.arbitration_id)
-            data(int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"))
-            sizes(message.dlc)
-            fd = message.is_fd
+            is_fd = message.is_fd
             # CAN FD has no remote frames: what a log marks so has data that it lost.
-            remote = message.is_remote_frame and not fd
-            switched = fd and message.bitrate_switch
-            flags(message.is_extended_id * _EXTENDED | remote * _REMOTE | fd * _FD | switched * _SWITCHED)
+            is_remote = message.is_remote_frame and not is_fd
+            is_switched = is_fd and message.bitrate_switch
+            self._rows += _ROW.pack(
+                last_s,
+                message.arbitration_id,
+                int.from_bytes(message.data[:_CLASSICAL_BYTES].ljust(_CLASSICAL_BYTES, b"\0"), "big"),
+                message.dlc,
+                message.is_extended_id * _EXTENDED | is_remote * _REMOTE | is_fd * _FD | is_switched * _SWITCHED,
+            )
 
     def frames(self, path: Path) -> CanFrames:
         """All frames as arrays."""
-        if not self._times:
+        if not self._rows:
             why = f" ({self.broken})" if self.broken else ""
             errors = f" but {plural(self._errors, 'error frame')}" if self._errors else ""
             raise BusplanError(f"{path}: has no CAN frame{errors}{why}")
@@ -213,20 +208,18 @@ class _Log:
                 f"{channel} ({plural(count, 'frame')})" for channel, count in self._channels.most_common()
             )
             raise BusplanError(f"{path}: has frames of {len(self._channels)} channels: {named}; keep those of one bus")
-        stamps = np.frombuffer(self._times, dtype=np.float64)
-        identifiers = np.frombuffer(self._identifiers, dtype=np.uint32).astype(np.int64)
-        flags = np.frombuffer(self._flags, dtype=np.uint8)
-        sizes = np.frombuffer(self._sizes, dtype=np.uint8).astype(np.int64)
+        rows = np.frombuffer(self._rows, dtype=_ROW_FIELDS)
+        stamps, flags = rows["stamp_s"], rows["flags"]
+        identifiers, sizes = rows["identifier"].astype(np.int64), rows["dlc"].astype(np.int64)
         codes = np.where(sizes < _LONG_BYTES[0], sizes, 10 + np.searchsorted(_LONG_BYTES[:-1], sizes))
         extended, remote, fd, switched = (flags & flag != 0 for flag in (_EXTENDED, _REMOTE, _FD, _SWITCHED))
-        data = np.frombuffer(self._data, dtype=np.uint64)
         return CanFrames(
             float(stamps[0]),
             (stamps - stamps[0]) * 1e6,
             identifiers,
             extended,
             np.where(fd, sizes, np.minimum(sizes, _CLASSICAL_BYTES)),
-            np.where(fd, 0, written_bits(identifiers, extended, remote, codes, data)),
+            np.where(fd, 0, written_bits(identifiers, extended, remote, codes, rows["data"])),
             fd,
             switched,
             int(np.count_nonzero(remote)),
@@ -236,7 +229,7 @@ class _Log:
 
 
 def _require_frame(message: Any, before_s: float | None) -> None:
-    """Refuse what is no frame at a time: then nothing of it is taken."""
+    """Refuse what no frame can be, before any of it is taken."""
     stamp_s, identifier = message.timestamp, message.arbitration_id
     if not 0 <= stamp_s < _END_S:  # which is so of no number, too
         raise _DamageError(f"a stamp of {stamp_s:g} s")
@@ -261,10 +254,10 @@ def written_bits(
     Parameters
     ----------
     identifiers, extended, remote, sizes
-        Of n frames: identifier, whether it has 29 bits, whether it asks for data, and the length code, 0..15; those
-        above 8 have 8 bytes.
+        Of n frames: identifier, whether it has 29 bits, whether it asks for data, and the length code, 0..15; codes
+        above 8 are 8 bytes.
     data
-        Up to 8 bytes, the first one highest.
+        Up to 8 bytes, the first highest.
 
     References
     ----------
@@ -272,8 +265,8 @@ def written_bits(
 
     Examples
     --------
-    >>> one = np.array([0x14]), np.array([False]), np.array([False]), np.array([1]), np.array([1 << 56], np.uint64)
-    >>> int(written_bits(*one)[0])
+    >>> frame = np.array([0x14]), np.array([False]), np.array([False]), np.array([1]), np.array([1 << 56], np.uint64)
+    >>> int(written_bits(*frame)[0])
     58
     """
     bits = np.zeros(len(identifiers), dtype=np.int64)
@@ -282,14 +275,10 @@ def written_bits(
         places = np.flatnonzero(sort == kind)
         for first in range(0, len(places), _PIECE):
             piece = places[first : first + _PIECE]
-            columns = _columns(
-                identifiers[piece],
-                data[piece],
-                is_extended=bool(kind & 2),
-                is_remote=bool(kind & 1),
-                size=int(kind) // 4,
+            is_extended, is_remote, size = bool(kind & 2), bool(kind & 1), int(kind) // 4
+            bits[piece] = _stuffed(
+                _columns(identifiers[piece], data[piece], is_extended=is_extended, is_remote=is_remote, size=size)
             )
-            bits[piece] = _stuffed(columns)
     return bits
 
 
@@ -301,24 +290,23 @@ def _columns(
     is_remote: bool,
     size: int,
 ) -> list[npt.NDArray[np.uint8]]:
-    """Bits of frames of one sort from their start to the CRC, of all frames a bit at a time."""
-    count = len(identifiers)
+    """Bits of frames of a sort from their start to the CRC, of all frames a bit at a time."""
 
-    def same(*values: int) -> list[npt.NDArray[np.uint8]]:
-        return [np.full(count, value, dtype=np.uint8) for value in values]
+    def constant(*bits: int) -> list[npt.NDArray[np.uint8]]:
+        return [np.full(len(identifiers), bit, dtype=np.uint8) for bit in bits]
 
-    def of(numbers: npt.NDArray[Any], width: int, *, above: int = 0) -> list[npt.NDArray[np.uint8]]:
+    def field(numbers: npt.NDArray[Any], width: int, *, above: int = 0) -> list[npt.NDArray[np.uint8]]:
         shifts = range(above + width - 1, above - 1, -1)
         return [(numbers >> numbers.dtype.type(shift) & numbers.dtype.type(1)).astype(np.uint8) for shift in shifts]
 
-    if is_extended:
-        head = [*same(0), *of(identifiers, 11, above=18), *same(1, 1), *of(identifiers, 18), *same(is_remote, 0, 0)]
-    else:
-        head = [*same(0), *of(identifiers, 11), *same(is_remote, 0, 0)]
-    length = same(*(size >> place & 1 for place in (3, 2, 1, 0)))
     data_bits = 0 if is_remote else 8 * min(size, _CLASSICAL_BYTES)
-    field = of(data, data_bits, above=64 - data_bits)
-    return [*head, *length, *field]
+    return [
+        *constant(0),
+        *field(identifiers, 11, above=18 if is_extended else 0),
+        *(constant(1, 1) + field(identifiers, 18) if is_extended else ()),
+        *constant(is_remote, 0, 0, *(size >> place & 1 for place in (3, 2, 1, 0))),
+        *field(data, data_bits, above=64 - data_bits),
+    ]
 
 
 def _stuffed(columns: list[npt.NDArray[np.uint8]]) -> npt.NDArray[np.int64]:
@@ -336,211 +324,3 @@ def _stuffed(columns: list[npt.NDArray[np.uint8]]) -> npt.NDArray[np.int64]:
         last = np.where(is_full, 1 - bit, bit).astype(np.uint8)
         run = np.where(is_full, np.uint8(1), run)
     return stuffed + len(columns) + _CRC_BITS + _NEVER_STUFFED
-
-
-CAN_BIT_RATE: Final = 1000.0
-"""No classical bus is faster [kbit/s]."""
-_WINDOWS: Final = (10, 20, 30)
-"""Frames over which stamps show a bit rate: of two the stamps may be wrong."""
-_LATE_SHARE: Final = 0.05
-"""By how much frames are closer than on any bus, as a share, where a driver took them at once."""
-_LATEST_US: Final = 1000.0
-"""No later does a driver take frames one after the other: later ones have stamps of no bus [us]."""
-_LATE_US: Final = 100.0
-"""How late a driver that takes each frame by itself may take one [us]."""
-_LEAST_US: Final = 1e-3
-_FEW: Final = 3
-_STEP_BACK_US: Final = -1000.0
-"""Stamps of neighbours are so far out of order only where a clock was set [us]."""
-_PERIODIC: Final = 0.15
-"""Largest standard deviation of a periodic message, as a share of its period."""
-_MISSING: Final = 0.1
-"""Most periods of a periodic message without a frame, as a share of its frames."""
-LISTED: Final = 6
-"""Most identifiers that a sentence lists."""
-
-_ROUNDING: Final = 1e-9
-"""Share of a period that the rounding of floats may add to several."""
-
-
-class SentFrames(NamedTuple):
-    """Frames of an identifier."""
-
-    identifier: int
-    extended: bool
-    """Whether the identifier has 29 bits."""
-    times_us: Floats
-    most_bytes: int
-    is_fd: bool
-    """Whether any of them is of CAN FD."""
-    switches: bool
-    """Whether all of CAN FD have their data at the data bit rate."""
-    grid: PeriodicEvents | None
-    """Its periods, where it comes periodically."""
-
-    @property
-    def mean(self) -> Quantile:
-        """Mean distance of its frames, of two or more, lost ones of a periodic message counted [us].
-
-        The first frame and the last one lie no further beside their places than all do.
-        """
-        span_us = float(self.times_us[-1] - self.times_us[0])
-        if self.grid is None:
-            return Quantile(span_us / (len(self.times_us) - 1), None)
-        return mean_period(self.times_us, self.grid)
-
-
-def mean_period(times_us: Floats, periods: PeriodicEvents) -> Quantile:
-    """The period of events over all of a recording, with its standard uncertainty [us]."""
-    number = int(periods.places[-1])
-    return Quantile(float(times_us[-1] - times_us[0]) / number, float(np.ptp(periods.late_us)) / number)
-
-
-class EventModel(NamedTuple):
-    """A message as a profile plans it: at most burst - 1 + ceil((w + jitter) / period) frames in a time w."""
-
-    burst: int
-    jitter_us: float
-
-
-def event_model(times_us: Floats, period_us: float, *, stamp_error_us: float, tolerance: float) -> EventModel:
-    """The least burst or jitter with which frames are those of a mean period.
-
-    Parameters
-    ----------
-    times_us
-        Ascending times, n of them [us].
-    period_us
-        The period [us].
-    stamp_error_us
-        How far a stamp may be wrong [us].
-    tolerance
-        By how much the period may be shorter by clocks, as a share.
-
-    Examples
-    --------
-    >>> event_model(np.array([0.0, 80, 200]), 100, stamp_error_us=1, tolerance=0)
-    EventModel(burst=1, jitter_us=21)
-    >>> event_model(np.array([0.0, 1, 2, 1000]), 300, stamp_error_us=1, tolerance=0)
-    EventModel(burst=3, jitter_us=0.0)
-    >>> event_model(np.array([38.0, 38, 38, 38]), 1.9, stamp_error_us=0, tolerance=0)
-    EventModel(burst=4, jitter_us=0.0)
-    """
-    jitter_us = float(ahead(times_us, period_us * (1 - tolerance)).max()) + stamp_error_us
-    if jitter_us <= period_us:
-        return EventModel(1, min(ceil(jitter_us), period_us))
-    return EventModel(1 + ceil(jitter_us / period_us - _ROUNDING), 0.0)
-
-
-class ClockStretch(NamedTuple):
-    """The longest part of a log in which its clock was not set back."""
-
-    taken: npt.NDArray[np.int64]
-    """Places of its frames in the log, by their stamps."""
-    times_us: Floats
-    """Their stamps, ascending [us]."""
-    steps_back: int
-    """How often the clock was set back in the whole log."""
-
-
-def longest_stretch(frames: CanFrames) -> ClockStretch:
-    """Find the longest part without a clock that was set back; queues may put neighbours out of order."""
-    steps_back = np.flatnonzero(np.diff(frames.times_us) < _STEP_BACK_US) + 1
-    ends = np.concatenate(([0], steps_back, [len(frames.times_us)]))
-    longest = int(np.argmax(np.diff(ends)))
-    taken = np.arange(ends[longest], ends[longest + 1])
-    taken = taken[np.argsort(frames.times_us[taken], kind="stable")]
-    return ClockStretch(taken, frames.times_us[taken], len(steps_back))
-
-
-def sent_messages(frames: CanFrames, stretch: ClockStretch) -> Mapping[tuple[int, bool], SentFrames]:
-    """Frames of each identifier, by the identifier and whether it has 29 bits, ascending."""
-    key = frames.identifiers[stretch.taken] * 2 + frames.extended[stretch.taken]
-    order = np.argsort(key, kind="stable")
-    messages = {}
-    for places in np.split(order, np.flatnonzero(np.diff(key[order])) + 1):
-        identifier, extended = divmod(int(key[places[0]]), 2)
-        times_us, taken = stretch.times_us[places], stretch.taken[places]
-        periods = grid(times_us)
-        if periods is not None and not _is_periodic(periods):
-            periods = None
-        messages[identifier, bool(extended)] = SentFrames(
-            identifier,
-            bool(extended),
-            times_us,
-            int(frames.sizes[taken].max()),
-            bool(frames.is_fd[taken].any()),
-            bool(frames.switched[taken][frames.is_fd[taken]].all()),
-            periods,
-        )
-    return messages
-
-
-def _is_periodic(periods: PeriodicEvents) -> bool:
-    late_us = float(np.std(periods.late_us))
-    return late_us <= _PERIODIC * periods.period_us and periods.missing <= _MISSING * len(periods.late_us)
-
-
-def step_us(stretch: ClockStretch) -> float:
-    """Step of the stamps: the time that all distances are multiples of [us].
-
-    Few distances, none of them 0, are those of frames that come to the microsecond: then it is that of logs.
-    """
-    apart_us = np.unique(np.diff(np.rint(stretch.times_us).astype(np.int64)))
-    if len(apart_us) < _FEW and apart_us.all():
-        return 1.0
-    return float(np.gcd.reduce(apart_us))
-
-
-class LeastBitRate(NamedTuple):
-    """A bit rate below which a log is not possible [kbit/s]."""
-
-    likely: float
-    """With stamps as late as those of most drivers."""
-    surely: float
-    """With stamps up to a millisecond late."""
-
-
-def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
-    """The bit rate that a bus has at least, for frames do not overlap; 0 where too few frames say it.
-
-    Frames are stamped at their ends, or by some controllers at their starts: the smaller sum of bits lies between both
-    stamps in either case. A stamp may be wrong by its step and by what a late one takes to be taken: where frames come
-    closer than on any bus, a driver took several at once, the first of them late by as much as they take.
-    """
-    bits, times_us = frames.bits[stretch.taken].astype(np.float64), stretch.times_us
-    sent, error_us = np.concatenate(([0.0], np.cumsum(bits))), step_us(stretch)
-
-    def rates(count: int, late_us: float) -> Floats:
-        window_us = times_us[count:] - times_us[:-count] + error_us + late_us
-        between = np.minimum(sent[count + 1 :] - sent[1:-count], sent[count:-1] - sent[: -count - 1])
-        return np.asarray(1000 * between / np.maximum(window_us, _LEAST_US), dtype=np.float64)
-
-    def most(windows: Sequence[int], late_us: float) -> float:
-        return max((float(rates(count, late_us).max()) for count in windows if len(bits) > count), default=0.0)
-
-    closer = rates(1, 0.0) > CAN_BIT_RATE * (1 + _LATE_SHARE) if len(bits) > 1 else np.zeros(0, dtype=np.bool_)
-    if np.count_nonzero(closer) < LEAST_EVENTS:
-        least = most((4, *_WINDOWS), _LATE_US)
-    else:
-        starts, ends = (np.flatnonzero(np.diff(np.concatenate(([0], closer, [0]))) == step) for step in (1, -1))
-        at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / CAN_BIT_RATE
-        least = most(_WINDOWS, min(at_once_us, _LATEST_US))
-    return LeastBitRate(least, most((4, *_WINDOWS), _LATEST_US))
-
-
-def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:
-    """Why stamps are not those of a bus, by the bit rate that it has at least; empty where they may be."""
-    if bit_rate_kbit_s <= CAN_BIT_RATE:
-        return ""
-    return (
-        f"its frames need {bit_rate_kbit_s:,.0f} kbit/s, more than a CAN bus has: the stamps are not those of the bus"
-    )
-
-
-def faults(frames: CanFrames, stretch: ClockStretch) -> Iterator[str]:
-    """Sentences on a log that is damaged, and on its clock."""
-    if frames.broken:
-        yield f"The log is cut or damaged after frame {len(frames.times_us):,}, read up to there: {frames.broken}."
-    if stretch.steps_back:
-        yield f"Its clock was set back {plural(stretch.steps_back, 'time')}: the longest stretch between is taken."

@@ -1,4 +1,4 @@
-"""CapturedPackets of pcap and pcapng files, in pieces, with exact stamps.
+"""Packets of pcap and pcapng files, in pieces, with exact stamps.
 
 Libraries such as dpkt give stamps of pcapng as floats, whose steps are 240 ns by now: more than the jitter of a good
 master. So the few fields of a record are read here.
@@ -60,15 +60,13 @@ class CapturedPackets(NamedTuple):
 
 @dataclass
 class CaptureNotes:
-    """What a reader has to say of a file."""
+    """What a file has beside its packets."""
 
     packets: int = 0
-    other_links: int = 0
-    """CapturedPackets of interfaces that are no Ethernet."""
-    without_time: int = 0
-    """CapturedPackets in records that have no stamp, or one that is no time."""
+    left_out: int = 0
+    """Packets of interfaces that are no Ethernet, without a stamp, or with a stamp that is no time."""
     dropped: int = 0
-    """Packets that the recorder says it dropped; a pcap file has no word of them."""
+    """Packets that the recorder says it dropped; a pcap file does not count them."""
     broken_at: int | None = None
     """Byte of the file from which on nothing can be read; None of a whole file."""
 
@@ -79,14 +77,14 @@ def is_capture(head: bytes) -> bool:
 
 
 def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[CapturedPackets]:
-    """CapturedPackets of a capture of Ethernet, in pieces.
+    """Packets of a capture of Ethernet, in pieces.
 
     Parameters
     ----------
     path
         A pcap or pcapng file.
     notes
-        Is filled in.
+        Counts of what is left out, filled in as the file is read.
     progress
         Called with the bytes read and those of the file.
 
@@ -109,7 +107,7 @@ def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress)
     head = file.read(24)
     walker: _Walker
     if head[:4] in _PCAP:
-        walker, held, at = _Pcap(head, path, notes), b"", len(head)
+        walker, held, at = _Pcap(head, path), b"", len(head)
     elif head[:4] == _SECTION:
         walker, held, at = _PcapNg(notes), head, 0
     else:
@@ -141,10 +139,10 @@ def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress)
 
 
 class _Walker(ABC):
-    """Reader of records one behind the other."""
+    """Reader of consecutive records."""
 
     is_broken = False
-    """Whether a record cannot be: no further one can be found."""
+    """Whether a record is damaged, so that the next cannot be found."""
 
     @abstractmethod
     def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
@@ -152,7 +150,7 @@ class _Walker(ABC):
 
 
 class _Pcap(_Walker):
-    def __init__(self, head: bytes, path: Path, notes: CaptureNotes) -> None:
+    def __init__(self, head: bytes, path: Path) -> None:
         order, self._tick_ns = _PCAP[head[:4]]
         if len(head) < 24:  # noqa: PLR2004 - the header of the file
             raise BusplanError(f"{path}: ends within the header of a pcap file")
@@ -160,19 +158,17 @@ class _Pcap(_Walker):
         if link != _ETHERNET:
             raise BusplanError(f"{path}: is a capture of link type {link}, expected 1, Ethernet")
         self._header = Struct(f"{order}IIII")
-        self._notes = notes
 
     def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
         rows, at, end = [], 0, len(content) - self._header.size
-        unpack, tick_ns = self._header.unpack_from, self._tick_ns
         while at <= end:
-            seconds, ticks, size, _ = unpack(content, at)
+            seconds, ticks, size, _ = self._header.unpack_from(content, at)
             if size > _MOST_RECORD_BYTES:
                 self.is_broken = True
                 break
             if at + 16 + size > len(content):
                 break
-            rows.append((at + 16, size, seconds * _NS + ticks * tick_ns))
+            rows.append((at + 16, size, seconds * _NS + ticks * self._tick_ns))
             at += 16 + size
         return rows, at
 
@@ -185,72 +181,66 @@ class _Interface(NamedTuple):
 
 
 class _PcapNg(_Walker):
+    _order: str
+    _head: Struct
+    _fields: Struct
+    """Byte order of a section, and kind and size of a block, and the fields of a packet, in it."""
+
     def __init__(self, notes: CaptureNotes) -> None:
         self._notes = notes
-        self._order = "<"
         self._interfaces: list[_Interface] = []
 
     def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
         rows: list[tuple[int, int, int]] = []
         at = 0
-        head, packet = self._structs()
         while at + 12 <= len(content):
-            if content[at : at + 4] == _SECTION:
+            is_section = content[at : at + 4] == _SECTION
+            if is_section:
                 if content[at + 8 : at + 12] not in _ORDER:
                     self.is_broken = True
                     break
-                self._order = _ORDER[content[at + 8 : at + 12]]
-                head, packet = self._structs()
-            kind, size = head.unpack_from(content, at)
+                self._order, self._interfaces = _ORDER[content[at + 8 : at + 12]], []
+                self._head, self._fields = Struct(f"{self._order}II"), Struct(f"{self._order}IIII")
+            kind, size = self._head.unpack_from(content, at)
             if size < 12 or size % 4 or size > _MOST_RECORD_BYTES:  # noqa: PLR2004 - the shortest block
                 self.is_broken = True
                 break
             if at + size > len(content):
                 break
-            if kind == _PACKET and size >= 32:  # noqa: PLR2004 - the fields of a packet
-                number, high, low, kept = packet.unpack_from(content, at + 8)
-                kept = min(kept, size - 32)
-                self._packet(rows, number, high << 32 | low, at + 28, kept)
-                options = at + 28 + (kept + 3) // 4 * 4
-                if options < at + size - 4:
-                    self._notes.dropped += self._dropped(content[options : at + size - 4], _PACKET)
-            else:
-                self._other(content, at, kind, size, rows)
+            if not is_section:
+                self._block(rows, kind, content, at, size)
             at += size
         return rows, at
 
-    def _structs(self) -> tuple[Struct, Struct]:
-        return Struct(f"{self._order}II"), Struct(f"{self._order}IIII")
-
-    def _packet(self, rows: list[tuple[int, int, int]], number: int, ticks: int, at: int, size: int) -> None:
-        if number >= len(self._interfaces):
-            self._notes.other_links += 1
-            return
-        interface = self._interfaces[number]
-        time_ns = ticks * _NS // interface.ticks + interface.offset_ns
-        if interface.link != _ETHERNET:
-            self._notes.other_links += 1
-        elif not 0 <= time_ns < _END_NS:
-            self._notes.without_time += 1
-        else:
-            rows.append((at, size, time_ns))
-
-    def _other(self, content: bytes, at: int, kind: int, size: int, rows: list[tuple[int, int, int]]) -> None:
-        order = self._order
-        if content[at : at + 4] == _SECTION:
-            self._interfaces = []
-        elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
-            self._interfaces.append(self._interface(content[at + 8 : at + size - 4]))
+    def _block(self, rows: list[tuple[int, int, int]], kind: int, content: bytes, at: int, size: int) -> None:
+        end, notes = at + size - 4, self._notes
+        if kind == _PACKET and size >= 32:  # noqa: PLR2004 - the fields of a packet
+            number, high, low, kept = self._fields.unpack_from(content, at + 8)
+            kept = min(kept, size - 32)
+            self._packet(rows, number, high << 32 | low, at + 28, kept)
+            options = at + 28 + (kept + 3) // 4 * 4
+            if options < end:
+                notes.dropped += self._dropped(content[options:end], _PACKET)
         elif kind == _OLD_PACKET and size >= 32:  # noqa: PLR2004 - its fields
-            number, dropped, high, low, kept = Struct(f"{order}HHIII").unpack_from(content, at + 8)
-            self._notes.dropped += dropped if dropped != _NOT_COUNTED else 0
+            number, dropped, high, low, kept = Struct(f"{self._order}HHIII").unpack_from(content, at + 8)
+            notes.dropped += dropped if dropped != _NOT_COUNTED else 0
             self._packet(rows, number, high << 32 | low, at + 28, min(kept, size - 32))
         elif kind == _SIMPLE_PACKET:
-            self._notes.without_time += 1
+            notes.left_out += 1
+        elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
+            self._interfaces.append(self._interface(content[at + 8 : end]))
         elif kind == _STATISTICS:
             # Each counts from the start of its interface, and what packets count is among it.
-            dropped = self._dropped(content[at + 20 : at + size - 4], _STATISTICS)
-            self._notes.dropped = max(self._notes.dropped, dropped)
+            notes.dropped = max(notes.dropped, self._dropped(content[at + 20 : end], _STATISTICS))
+
+    def _packet(self, rows: list[tuple[int, int, int]], number: int, ticks: int, at: int, size: int) -> None:
+        if number < len(self._interfaces):
+            interface = self._interfaces[number]
+            time_ns = ticks * _NS // interface.ticks + interface.offset_ns
+            if interface.link == _ETHERNET and 0 <= time_ns < _END_NS:
+                rows.append((at, size, time_ns))
+                return
+        self._notes.left_out += 1
 
     def _dropped(self, options: bytes, kind: int) -> int:
         """Packets that the options of a block say were dropped."""
@@ -280,25 +270,25 @@ class _PcapNg(_Walker):
         return _Interface(link, ticks, offset_ns)
 
 
-def interned(rows: npt.NDArray[Any], known: dict[bytes, int], made: Callable[[bytes], None]) -> Numbers:
-    """Number of each row of bytes, those alike with the same; new ones are made known.
+def interned(rows: npt.NDArray[Any], numbers: dict[bytes, int], on_new: Callable[[bytes], None]) -> Numbers:
+    """Number of each row of bytes: equal rows have the same; new rows are numbered on.
 
     Parameters
     ----------
     rows
         Bytes of each thing, of shape (n, width).
-    known
-        Numbers by bytes, of all pieces.
-    made
-        Called with the bytes of each new one, in the order of their numbers.
+    numbers
+        Number by the bytes of a row, of all pieces; new rows are added.
+    on_new
+        Called with the bytes of each new row, in the order of their numbers.
     """
     flat = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.shape[1]))).ravel()
     unique, inverse = np.unique(flat, return_inverse=True)
-    numbers = np.empty(len(unique), dtype=np.int64)
+    of_unique = np.empty(len(unique), dtype=np.int64)
     for place, row in enumerate(unique):
         content = row.tobytes().rstrip(b"\0")
-        if content not in known:
-            known[content] = len(known)
-            made(content)
-        numbers[place] = known[content]
-    return numbers[inverse.ravel()]
+        if content not in numbers:
+            numbers[content] = len(numbers)
+            on_new(content)
+        of_unique[place] = numbers[content]
+    return of_unique[inverse.ravel()]

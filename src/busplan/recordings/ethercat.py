@@ -37,7 +37,7 @@ _HEAD: Final = Struct("<BBHHH")
 
 
 class Datagram(NamedTuple):
-    """What tells datagrams apart."""
+    """Datagram of a frame, without its index and working counter."""
 
     command: int
     address: int
@@ -51,7 +51,7 @@ class Datagram(NamedTuple):
 
 
 class Latch(NamedTuple):
-    """A broadcast write that every device stamps at its ports, and the times that were read behind it."""
+    """A broadcast write that every device stamps at its ports, and the times that were read after it."""
 
     devices: int
     """Devices that the write passed: each adds 1 to its address."""
@@ -68,13 +68,13 @@ class EthercatFrames(NamedTuple):
     layout: Numbers
     """Number of its datagrams in `layouts`."""
     key: Numbers
-    """Number of its datagrams and their indexes: a frame returns with that it was sent with."""
+    """Number of its datagrams and their indexes: a frame returns with the key that it was sent with."""
     counters: Numbers
-    """Number of its working counters, alike where all of them are."""
+    """Number of its working counters: frames with the same counters have the same number."""
     layouts: tuple[tuple[Datagram, ...], ...]
     notes: CaptureNotes
     others: int
-    """CapturedPackets that are no EtherCAT frame of datagrams."""
+    """Packets that are no EtherCAT frame of datagrams."""
     cut: int
     """EtherCAT frames that are not whole."""
     latches: tuple[Latch, ...]

@@ -16,18 +16,18 @@ _BLOCKS: Final = range(8, 513)
 _ALONE: Final = 40
 """Fewer events are blocks of one."""
 _FEW: Final = 6.0
-"""Share of n events, over n, by which their scatter is taken for more: for 99.9 % of n - 2 degrees of freedom."""
+"""The scatter of n events is taken for larger by this over n, as a share: 99.9 % of n - 2 degrees of freedom."""
 _LEAST_ERROR_US: Final = 1e-6
 _DRIFT_SIGMAS: Final = 8.0
-"""How far beyond 1 the mean square of the distances of blocks from a line, in their standard errors, is a drift."""
+"""Standard errors of the mean square of blocks about a line by which it is over 1 where the clock drifts."""
 _REACH: Final = 4.0
-"""Standard errors within which a clock is looked for."""
-_EARLY_SHARE: Final = 0.999
-"""Share of the events that are taken for no earlier than the earliest: a stamp may be wrong."""
+"""Standard errors of the period within which the kindest clock is looked for."""
 _THIRDS: Final = 25
-"""Steps in which it is found."""
+"""Steps of that search."""
+_EARLY_SHARE: Final = 0.999
+"""Share of the events that are no earlier than the earliest: the stamps of the others may be wrong."""
 _AHEAD: Final = 20
-"""Events behind a block that tell a late one at its end."""
+"""Events behind a block that tell a late event at its end."""
 _COVERAGE: Final = 2
 """Standard uncertainties of an expanded one."""
 
@@ -37,7 +37,7 @@ class Quantile(NamedTuple):
 
     value: float
     uncertainty: float | None
-    """Standard uncertainty; None where too few values lie beyond to say it, as beyond the largest."""
+    """Standard uncertainty; None where too few values lie beyond, as beyond the largest."""
 
 
 class PeriodicEvents(NamedTuple):
@@ -45,11 +45,11 @@ class PeriodicEvents(NamedTuple):
 
     period_us: float
     uncertainty_us: float
-    """Standard uncertainty of the period, of what the events scatter."""
+    """Standard uncertainty of the period, from the scatter of the events."""
     late_us: Floats
-    """Each event behind its place in the period, the middle of them at 0, without the drift of clocks [us]."""
+    """Delay of each event after its place in the period, about 0, without the drift of clocks [us]."""
     doubt_us: float
-    """Standard uncertainty of the places by clocks that drift; that of the period is not in it [us]."""
+    """Standard uncertainty of the delays by clocks that drift; that of the period is not in it [us]."""
     places: npt.NDArray[np.int64]
     """Number of the period of each event, from 0."""
 
@@ -67,7 +67,7 @@ def quantile(values: Floats, share: float) -> Quantile:
     values
         Values, n of them, at least one.
     share
-        The share, 0..1; the value itself is one of those given, rounded up.
+        The share, 0..1; the quantile is one of the values, rounded up.
 
     Examples
     --------
@@ -86,10 +86,10 @@ def quantile(values: Floats, share: float) -> Quantile:
 
 
 def lateness(events: PeriodicEvents, share: float) -> Quantile:
-    """How much the latest events, but for a share of them, are behind the earliest ones [us].
+    """Delay of a quantile of the events after the earliest [us].
 
-    Of the even clocks that the events do not contradict, the kindest counts: by others it is more, which is in the
-    uncertainty. That of the rank is in it only where enough events lie beyond.
+    Of the even clocks that the events do not contradict the kindest counts, by which the delay is least: the
+    uncertainty has the others, and that of the rank where enough events lie beyond.
     """
     at, early = events.places - float(np.mean(events.places)), max(share, _EARLY_SHARE)
 
@@ -123,7 +123,7 @@ def _rank(count: int, share: float) -> int:
 
 
 def grid(times_us: Floats, near_us: float | None = None) -> PeriodicEvents | None:
-    """Find the period of events, and how late each is; None of too few events, or of several at once.
+    """The period of events and the delay of each; None of too few events, or of several at once.
 
     Parameters
     ----------
@@ -150,9 +150,9 @@ def grid(times_us: Floats, near_us: float | None = None) -> PeriodicEvents | Non
 
 
 def ahead(times_us: Floats, period_us: float) -> Floats:
-    """How much sooner each event comes than a period behind each other allows, seen from any event before it [us].
+    """Time by which each event comes sooner than whole periods after any event before it [us].
 
-    The largest is the least jitter with which events are those of the period.
+    The largest is the least jitter with which the events have the period.
 
     Parameters
     ----------
@@ -187,14 +187,14 @@ def _period(times_us: Floats, period_us: float) -> float:
 
 
 def _places(times_us: Floats, period_us: float) -> npt.NDArray[np.int64]:
-    """Number of the period of each event; blocks follow the drift of a clock."""
+    """Period of each event, from 0; blocks follow the drift of a clock."""
     places = np.empty(len(times_us), dtype=np.int64)
     planned_us, number = float(times_us[0]), 0
     for first in range(0, len(times_us), _BLOCK):
         ahead = times_us[first : first + _BLOCK + _AHEAD]
         order = np.arange(len(ahead))
         place = np.rint((ahead - planned_us) / period_us).astype(np.int64)
-        # Of two events with one place the first is late by more than half a period, for none has the place of another.
+        # Of two events with the same place the first is late by more than half a period: each has a place of its own.
         place = np.maximum(np.minimum.accumulate((place - order)[::-1])[::-1] + order, order)[:_BLOCK]
         places[first : first + _BLOCK] = number + place
         behind = int(place[-1]) + 1
@@ -204,22 +204,22 @@ def _places(times_us: Floats, period_us: float) -> npt.NDArray[np.int64]:
 
 
 class _Clock(NamedTuple):
-    """The clock of some events, as it goes beside an even one."""
+    """The clock of some events beside an even clock."""
 
     at_us: Floats
-    """What it differs by at each event [us]."""
+    """Difference at each event [us]."""
     slope_us: float
-    """What a period is longer by [us]."""
+    """Difference of a period [us]."""
     error_us: float
     """Standard uncertainty of the slope [us]."""
     doubt_us: float
-    """Standard uncertainty of where it goes, beside that of the slope [us]."""
+    """Standard uncertainty of the differences, without that of the slope [us]."""
 
 
 def _clock(places: Floats, late: Floats) -> _Clock:
-    """A straight line through the means of blocks of events; a bent one, of few pieces, where the clock drifts.
+    """A straight line through the means of blocks of events; of some pieces where the clock drifts.
 
-    Outliers count as the end of the others. Neighbours say how much events scatter, whatever the clock does.
+    Outliers count as the end of the others. The scatter is that of neighbours, whatever the clock does.
     """
     count = len(late)
     if count >= _ALONE:
@@ -237,7 +237,7 @@ def _clock(places: Floats, late: Floats) -> _Clock:
     while True:
         knots = np.interp(np.linspace(0, count - 1, pieces + 1), np.arange(count), at)
         knots[[0, -1]] = places[[0, -1]]
-        parts = np.stack([np.interp(at, knots, one) for one in np.eye(pieces + 1)], axis=1) * weight[:, None]
+        parts = np.stack([np.interp(at, knots, bend) for bend in np.eye(pieces + 1)], axis=1) * weight[:, None]
         heights = np.linalg.lstsq(parts, means, rcond=None)[0]
         free = count - pieces - 1
         misfit = float(np.sum((means - parts @ heights) ** 2)) / free
@@ -257,7 +257,7 @@ def _clock(places: Floats, late: Floats) -> _Clock:
 def line(sizes: Floats, values: Floats, doubt: float) -> tuple[float, float] | None:
     """Slope of the medians of values over their sizes, with its standard uncertainty; None of fewer than two sizes.
 
-    Sizes with fewer than ten values are left out. Where medians scatter more about the line than their own errors say,
+    Sizes with fewer than ten values are left out. Where the medians scatter more about the line than by their errors,
     the uncertainty is as much larger (Birge).
 
     Parameters
@@ -265,7 +265,7 @@ def line(sizes: Floats, values: Floats, doubt: float) -> tuple[float, float] | N
     sizes, values
         Of n things.
     doubt
-        Standard uncertainty that all values of a size have alike, in that of a value.
+        Standard uncertainty that all values of a size share, in their unit.
     """
     rows = []
     for size in np.unique(sizes):
@@ -287,9 +287,7 @@ def line(sizes: Floats, values: Floats, doubt: float) -> tuple[float, float] | N
 
 def step(times_ns: npt.NDArray[np.int64]) -> float:
     """Step of the stamps: the largest time that all distances are multiples of [us]."""
-    apart = np.diff(times_ns)
-    found = int(np.gcd.reduce(np.abs(apart))) if len(apart) else 0
-    return found / 1000
+    return int(np.gcd.reduce(np.abs(np.diff(times_ns)))) / 1000
 
 
 def expanded(*uncertainties: float | None) -> float | None:

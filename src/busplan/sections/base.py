@@ -1,7 +1,7 @@
 """Base of all sections of a profile: strictness, ranges, and errors in our own words."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -47,8 +47,6 @@ def _title(section: type) -> str:
 class Section(BaseModel):
     """Base of all sections of a profile."""
 
-    removed: ClassVar[Mapping[str, str]] = {}
-    """Keys that it had once, each with what to write instead."""
     model_config = ConfigDict(
         strict=True,
         frozen=True,

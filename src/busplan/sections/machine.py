@@ -25,8 +25,8 @@ from busplan.servo.parameters import (
 )
 
 
-class AlikeNodes(NamedTuple):
-    """Nodes that are alike, as a profile says them: in a section [[group]], or in [node] and [payload]."""
+class ProfileGroup(NamedTuple):
+    """Nodes of a profile that are alike: those of a section [[group]], or of [node] and [payload]."""
 
     name: str
     """Name of the group; empty for the nodes of [node]."""

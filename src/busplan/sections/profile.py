@@ -21,10 +21,10 @@ from busplan.sections.cycle import (
     TableExecution,
 )
 from busplan.sections.machine import (
-    AlikeNodes,
     CircleSection,
     DeliverySection,
     MechanicsSection,
+    ProfileGroup,
     ServoSection,
     ToleranceSection,
 )
@@ -90,11 +90,11 @@ class Profile(Section):
         return not self.model_fields_set.isdisjoint(CIRCLE_SECTIONS)
 
     @property
-    def alike_nodes(self) -> tuple[AlikeNodes, ...]:
-        """The nodes, as groups of which each is alike, in the order of the chain; none of a network without a cycle."""
+    def node_groups(self) -> tuple[ProfileGroup, ...]:
+        """The groups of nodes, in the order of the chain: one where all are alike, none where there is no cycle."""
         if self.group:
-            return tuple(AlikeNodes(group.name, group.nodes, group, group) for group in self.group)
-        return (AlikeNodes("", self.bus.nodes, self.node, self.payload),) if self.has_cycle else ()
+            return tuple(ProfileGroup(group.name, group.nodes, group, group) for group in self.group)
+        return (ProfileGroup("", self.bus.nodes, self.node, self.payload),) if self.has_cycle else ()
 
     @property
     def has_cycle(self) -> bool:
@@ -140,7 +140,7 @@ class Profile(Section):
                 key=key,
                 kind="execution-unknown",
             )
-            for place, nodes in enumerate(self.alike_nodes)
+            for place, nodes in enumerate(self.node_groups)
             if isinstance(execution := nodes.node.execution, TableExecution)
             for key, size, sum_ in _payloads(nodes, place)
             if not execution.covers(size)
@@ -150,7 +150,7 @@ class Profile(Section):
         return self
 
 
-def _payloads(nodes: AlikeNodes, place: int) -> Iterator[tuple[str, int, str]]:
+def _payloads(nodes: ProfileGroup, place: int) -> Iterator[tuple[str, int, str]]:
     """Key of each payload, its bytes, and a word on how they add up where the key does not hold all of them."""
     section = f"group.{place}" if nodes.name else "payload"
     for kind in TRANSACTION_KINDS:

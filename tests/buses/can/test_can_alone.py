@@ -222,7 +222,7 @@ def test_the_limit_of_deadlines_is_the_largest_response_over_its_deadline() -> N
     late = car(**{"message.doors.deadline_us": 8000, "message.lights.deadline_us": 10_000})
     largest = max(us / own.deadline_us for us, own in zip(responses(late)[1:], late.message[1:], strict=True) if us)
     assert largest > 1
-    assert deadline.bound.value(network_of(late)) == pytest.approx(largest)
+    assert deadline.value(network_of(late)) == pytest.approx(largest)
     assert deadline.is_broken(network_of(late))
     assert not deadline.is_broken(network_of(car()))
 

@@ -148,7 +148,7 @@ def test_pdos_have_the_lengths_that_they_are_given() -> None:
         (0x301, 8),
         (0x401, 1),
     ]
-    assert own.alike_nodes[0].bytes_of("read") == 12
+    assert own.node_groups[0].bytes_of("read") == 12
 
 
 @pytest.mark.parametrize(("size", "frames"), [(5, [5]), (6, [6]), (7, [6, 1]), (12, [6, 6])])
@@ -169,7 +169,7 @@ def test_a_payload_over_its_pdos_breaks_the_limit(run: Run, tmp_path: Path) -> N
 
 def test_pdos_of_each_axis_have_those_lengths_each() -> None:
     own = profile(payload={"feedback_pdos": [4, 2], "command_pdos": [4], "pdo_per": "axis"})
-    assert own.alike_nodes[0].bytes_of("read") == 2 * 6
+    assert own.node_groups[0].bytes_of("read") == 2 * 6
     each = streams(traffic_of_profile(own), is_stuffed=True)
     assert [(stream.identifiers, stream.data_bytes) for stream in each if stream.name == "feedback"] == [(6, 4), (6, 2)]
 
@@ -215,7 +215,7 @@ def test_a_machine_on_another_bus_keeps_its_payload() -> None:
     same = profile(payload={"read_bytes": 12, "write_bytes": 8})
     for kind in ("ethercat", "sercos3"):
         one, other = (converted(machine, kind).profile for machine in (own, same))
-        assert one.alike_nodes == other.alike_nodes
+        assert one.node_groups == other.node_groups
 
 
 def test_no_pdo_is_empty_or_too_long() -> None:
@@ -329,4 +329,4 @@ def test_every_question_takes_an_fd_machine(run: Run, tmp_path: Path) -> None:
     said = run("diff", "old.toml", "arm.toml", cwd=tmp_path).stdout
     assert "bus.data_bit_rate_kbit_s" in said
     for kind in ("ethercat", "sercos3"):
-        assert converted(own, kind).profile.alike_nodes[0].bytes_of("read") == 20
+        assert converted(own, kind).profile.node_groups[0].bytes_of("read") == 20

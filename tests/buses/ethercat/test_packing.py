@@ -1,33 +1,66 @@
 """Frames against a writer that puts them together byte by byte, and against published sizes."""
 
+from collections import defaultdict
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, Final, NamedTuple
 
-import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+import busplan
 from busplan.buses.ethercat.equations import datagram_bytes, frame_bytes, room_bytes, sending_us
-from busplan.buses.ethercat.frames import Devices, frames_of, pack
-from busplan.elementwise import Traced, plain
+from busplan.buses.ethercat.section import EthercatProfile
+from busplan.elementwise import plain
 
-MOST, LEAST = 1538, 84
+MOST: Final = 1538
+BYTE_US: Final = 0.08
+Sized = tuple[int, int, int]
+"""Devices, inputs and outputs of a group."""
 
 
-class Written(NamedTuple):
-    """A frame as bytes, and which devices have data in it."""
+def profile(groups: Sequence[Sized], layout: str = "LRW-shared", *, clocks: bool = False) -> busplan.Profile:
+    return EthercatProfile.model_validate(
+        {
+            "schema_version": 1,
+            "name": "press",
+            "bus": {"kind": "ethercat", "master": "SOEM", "process_data": layout, "distributed_clocks": clocks},
+            "cycle": {"period_us": 5000.0},
+            "group": [
+                {"name": f"g{place}", "nodes": nodes, "read_bytes": read, "write_bytes": write, "axes": 0}
+                for place, (nodes, read, write) in enumerate(groups)
+            ],
+        }
+    )
 
-    bytes: bytes
+
+class Frame(NamedTuple):
+    """Length of a frame on the wire [bytes], and which devices have data in it."""
+
+    wire_bytes: int
     devices: tuple[int, ...]
 
 
-def one_by_one(
-    devices: Sequence[Devices], *, datagrams: int, first_bytes: float
-) -> list[tuple[float, tuple[int, ...]]]:
-    """Bytes and devices of each frame."""
-    runs = frames_of(devices, datagrams=datagrams, first_bytes=first_bytes)
-    return [(plain(frame_bytes(run.datagrams_bytes)), tuple(held)) for run in runs for held in run.each()]
+def sent(plan: busplan.Profile) -> list[Frame]:
+    """The frames of a cycle, as its timeline has them."""
+    lengths_us: list[float] = []
+    devices: dict[int, list[int]] = defaultdict(list)
+    for event in busplan.timeline(plan, timing_model="last-byte").cycle_events:
+        if event.kind == "overhead":
+            lengths_us.append(event.duration_us)
+        elif event.kind == "data":
+            lengths_us[-1] += event.duration_us
+            devices[len(lengths_us)].append(event.node or 0)
+    return [Frame(round(us / BYTE_US), tuple(devices[number])) for number, us in enumerate(lengths_us, start=1)]
+
+
+def results(plan: busplan.Profile) -> tuple[Any, dict[str, float]]:
+    """The result of the deciding model, and the terms of the vendors' [us]."""
+    vendors, last_byte = sorted(busplan.capacity(plan).results, key=lambda result: result.timing_model == "last-byte")
+    return last_byte, {term.name: plain(term.us) for term in vendors.terms}
+
+
+# --- the writer -----------------------------------------------------------------------------------------
 
 
 def datagram(data: bytes) -> bytes:
@@ -41,33 +74,33 @@ def on_wire(datagrams: bytes) -> bytes:
 
 
 def body(held: list[tuple[bytes, bytes]], *, is_shared: bool, clocks: bool) -> bytes:
-    found = datagram(b"t" * 8) if clocks else b""
+    opened = datagram(b"t" * 8) if clocks else b""
     if not held:
-        return found
+        return opened
     if is_shared:
-        return found + datagram(b"".join(max(one, key=len) for one in held))
-    return found + datagram(b"".join(one for one, _ in held)) + datagram(b"".join(one for _, one in held))
+        return opened + datagram(b"".join(max(both, key=len) for both in held))
+    return opened + datagram(b"".join(read for read, _ in held)) + datagram(b"".join(write for _, write in held))
 
 
-def written(devices: list[tuple[int, int]], *, is_shared: bool, clocks: bool) -> list[Written]:
+def written(groups: Sequence[Sized], *, is_shared: bool, clocks: bool) -> list[Frame]:
     """Put devices into a frame as long as the whole frame stays within the longest one."""
-    found: list[Written] = []
+    frames: list[Frame] = []
     held: list[tuple[bytes, bytes]] = []
-    place: list[int] = []
-    for number, (read, write) in enumerate(devices, start=1):
-        own = b"r" * read, b"w" * write
-        more = on_wire(body([*held, own], is_shared=is_shared, clocks=clocks and not found))
-        if len(more) > MOST:
-            found.append(Written(on_wire(body(held, is_shared=is_shared, clocks=clocks and not found)), tuple(place)))
-            held, place = [], []
-        held.append(own)
-        place.append(number)
-    found.append(Written(on_wire(body(held, is_shared=is_shared, clocks=clocks and not found)), tuple(place)))
-    return found
+    devices: list[int] = []
 
+    def frame(held: list[tuple[bytes, bytes]]) -> bytes:
+        return on_wire(body(held, is_shared=is_shared, clocks=clocks and not frames))
 
-def sized(read: int, write: int, *, is_shared: bool) -> int:
-    return max(read, write) if is_shared else read + write
+    both_ways = [(b"r" * read, b"w" * write) for nodes, read, write in groups for _ in range(nodes)]
+    for number, both in enumerate(both_ways, start=1):
+        if not any(both):
+            continue
+        if len(frame([*held, both])) > MOST:
+            frames.append(Frame(len(frame(held)), tuple(devices)))
+            held, devices = [], []
+        held.append(both)
+        devices.append(number)
+    return [*frames, Frame(len(frame(held)), tuple(devices))]
 
 
 GROUPS = st.lists(
@@ -81,53 +114,39 @@ GROUPS = st.lists(
 )
 
 
-@given(GROUPS, st.booleans(), st.booleans())
-@example([(1, 1466, 1)], True, True)  # all the room beside the clocks
-@example([(2, 1467, 1)], True, True)  # one byte more: the clocks go alone, in a padded frame
-@example([(1, 727, 727), (1, 1, 1)], False, True)
-@example([(3, 737, 737)], False, False)
-def test_frames_are_those_of_a_writer(groups: list[tuple[int, int, int]], is_shared: bool, clocks: bool) -> None:
-    each = [(read, write) for nodes, read, write in groups for _ in range(nodes)]
-    whole = written(each, is_shared=is_shared, clocks=clocks)
-    own = [Devices(nodes, sized(read, write, is_shared=is_shared)) for nodes, read, write in groups]
-    datagrams, first = 1 if is_shared else 2, 20.0 if clocks else 0.0
-    found = pack(own, datagrams=datagrams, first_bytes=first)
-    assert found.frames == len(whole)
-    assert found.frames * 40 + found.datagrams_bytes + found.padding_bytes == sum(len(one.bytes) for one in whole)
-    assert frame_bytes(found.last_bytes) == len(whole[-1].bytes)
-    assert found.before_bytes == 0 if len(whole) == 1 else frame_bytes(found.before_bytes) == len(whole[-2].bytes)
-    assert one_by_one(own, datagrams=datagrams, first_bytes=first) == [(len(one.bytes), one.devices) for one in whole]
+@settings(max_examples=40)
+@given(GROUPS, st.booleans(), st.booleans(), st.integers(0, 4))
+@example([(1, 1466, 1)], True, True, 0)  # all the room beside the clocks
+@example([(2, 1467, 1)], True, True, 0)  # one byte more: the clocks go alone, in a padded frame
+@example([(1, 727, 727), (1, 1, 1)], False, True, 1)
+@example([(3, 737, 737)], False, False, 2)
+def test_frames_are_those_of_a_writer(groups: list[Sized], is_shared: bool, clocks: bool, coupler: int) -> None:
+    groups = [*groups[:coupler], (20, 0, 0), *groups[coupler:]]
+    plan = profile(groups, "LRW-shared" if is_shared else "LRD-LWR", clocks=clocks)
+    frames = written(groups, is_shared=is_shared, clocks=clocks)
+    result, vendors_us = results(plan)
+    assert sent(plan) == frames
+    assert result.own["frames"] == len(frames)
+    sending = sum(frame.wire_bytes for frame in frames) * BYTE_US
+    assert vendors_us["frames"] + vendors_us["data"] == pytest.approx(sending)
+    assert vendors_us["receive"] == pytest.approx(frames[-1].wire_bytes * BYTE_US)
 
 
-@given(GROUPS, st.booleans(), st.integers(0, 4))
-@example([(1, 1466, 1)], True, 0)
-@example([(2, 1467, 1)], True, 0)
-def test_devices_without_data_are_in_no_frame(groups: list[tuple[int, int, int]], clocks: bool, place: int) -> None:
-    own = [Devices(nodes, max(read, write)) for nodes, read, write in groups]
-    couplers = [*own[:place], Devices(2000, 0), *own[place:]]
-    first = 20.0 if clocks else 0.0
-    found = pack(own, datagrams=1, first_bytes=first)
-    assert pack(couplers, datagrams=1, first_bytes=first) == found
-    frames = list(frames_of(couplers, datagrams=1, first_bytes=first))
-    alone = list(frames_of(own, datagrams=1, first_bytes=first))
-    assert [one.datagrams_bytes for one in frames] == [one.datagrams_bytes for one in alone]
-    sizes = np.array([0, 5])
-    together = pack([*own, Devices(3, sizes)], datagrams=1, first_bytes=first)
-    with_five = pack([*own, Devices(3, 5)], datagrams=1, first_bytes=first)
-    for one, without, five in zip(together, found, with_five, strict=True):
-        assert np.broadcast_to(np.asarray(one), sizes.shape).tolist() == [without, five]
-
-
+@settings(max_examples=10)
 @given(st.integers(1, 1486), st.booleans(), st.integers(1, 200))
-def test_an_array_and_a_traced_number_pack_as_each_number(size: int, clocks: bool, other: int) -> None:
-    first, nodes = 20.0 if clocks else 0.0, np.arange(1, 60)
-    together = pack([Devices(nodes, size), Devices(3, other)], datagrams=1, first_bytes=first)
-    for index, count in enumerate(nodes.tolist()):
-        alone = pack([Devices(count, size), Devices(3, other)], datagrams=1, first_bytes=first)
-        assert [float(np.broadcast_to(np.asarray(one), nodes.shape)[index]) for one in together] == list(alone)
-    traced = pack([Devices(Traced(7.0), size), Devices(3, other)], datagrams=1, first_bytes=first)
-    plain = pack([Devices(7, size), Devices(3, other)], datagrams=1, first_bytes=first)
-    assert [one.value if isinstance(one, Traced) else one for one in traced] == list(plain)
+def test_a_sweep_and_a_derivation_have_what_each_number_of_devices_has(size: int, clocks: bool, other: int) -> None:
+    plan = profile([(1, size, 0), (3, other, 0)], clocks=clocks)
+    nodes = list(range(1, 60))
+    swept = busplan.sweep(
+        plan, vary={"group.g0.nodes": nodes, "group.g1.read_bytes": [0, other]}, timing_model=["vendors"]
+    )
+    for place in range(0, len(swept["required_us"]), 7):
+        changes = {key: swept[key][place].item() for key in ("group.g0.nodes", "group.g1.read_bytes")}
+        (alone,) = busplan.capacity(busplan.load_profile(plan, changes=changes), timing_model=["vendors"]).results
+        assert swept["required_us"][place] == pytest.approx(alone.required_us, rel=1e-12)
+        assert swept["frames"][place] == alone.own["frames"]
+    explained = busplan.explain(plan, "required_us", timing_model=["vendors"]).derivations[0]
+    assert explained.value == busplan.capacity(plan, timing_model=["vendors"]).results[0].required_us
 
 
 @pytest.mark.parametrize(("data", "wire"), [(1, 84), (32, 84), (33, 85), (125, 177), (1486, 1538)])
@@ -138,30 +157,32 @@ def test_frames_have_published_lengths(data: int, wire: int) -> None:
 
 def test_a_frame_has_room_for_1486_bytes_and_20_less_beside_the_clocks() -> None:
     assert room_bytes(1) == 1486
-    assert pack([Devices(1, 1486)], datagrams=1, first_bytes=0.0).frames == 1
-    assert pack([Devices(2, 743)], datagrams=1, first_bytes=0.0).frames == 1
-    assert pack([Devices(2, 733)], datagrams=1, first_bytes=20.0).frames == 1
-    assert pack([Devices(2, 734)], datagrams=1, first_bytes=20.0).frames == 2
+    for devices, clocks, frames in (
+        ((1, 1486, 0), False, 1),
+        ((2, 743, 0), False, 1),
+        ((2, 733, 0), True, 1),
+        ((2, 734, 0), True, 2),
+    ):
+        assert len(sent(profile([devices], clocks=clocks))) == frames
 
 
 def test_a_first_device_that_has_no_room_beside_the_clocks_leaves_them_alone() -> None:
-    assert one_by_one([Devices(1, 1486)], datagrams=1, first_bytes=20.0) == [(84, ()), (1538, (1,))]
+    assert sent(profile([(1, 1486, 0)], clocks=True)) == [(84, ()), (1538, (1,))]
 
 
 def test_a_device_is_never_split() -> None:
-    frames = one_by_one([Devices(3, 800)], datagrams=1, first_bytes=0.0)
-    assert [devices for _, devices in frames] == [(1,), (2,), (3,)]
+    assert [frame.devices for frame in sent(profile([(3, 800, 0)]))] == [(1,), (2,), (3,)]
 
 
 def test_groups_share_a_frame_at_their_boundary() -> None:
-    frames = one_by_one([Devices(150, 10), Devices(2, 700), Devices(1, 100)], datagrams=1, first_bytes=0.0)
-    assert [devices[:1] + devices[-1:] for _, devices in frames] == [(1, 148), (149, 152), (153, 153)]
+    frames = sent(profile([(150, 10, 0), (2, 700, 0), (1, 100, 0)]))
+    assert [frame.devices[:1] + frame.devices[-1:] for frame in frames] == [(1, 148), (149, 152), (153, 153)]
 
 
 def test_frames_of_many_devices_are_counted_and_not_listed() -> None:
-    runs = list(frames_of([Devices(10**6, 16), Devices(10**6, 8)], datagrams=1, first_bytes=20.0))
-    assert len(runs) <= 2 * 3
-    assert (
-        sum(run.frames for run in runs)
-        == pack([Devices(10**6, 16), Devices(10**6, 8)], datagrams=1, first_bytes=20.0).frames
-    )
+    (result,) = busplan.capacity(
+        profile([(10**6, 16, 0), (10**6, 8, 0)], clocks=True), timing_model=["last-byte"]
+    ).results
+    # 92 devices have room in a frame, 91 beside the clocks, and 185 of the smaller ones.
+    whole, left = divmod(10**6 - 91, 92)
+    assert result.own["frames"] == 1 + whole + -(-(10**6 + left * 2) // 185)

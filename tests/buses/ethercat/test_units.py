@@ -11,11 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses import kind_named
-from busplan.buses.ethercat.frames import Unit, starts
 from busplan.buses.ethercat.section import EthercatProfile
 from busplan.errors import BusplanError
-from busplan.questions.fit.network import network_of
+from tests.oracles.ethercat_recording import first_cycles
 
 BYTE_US: Final = 0.08
 E_BUS_US: Final = 2 * 0.1507
@@ -74,14 +72,23 @@ def written_us(groups: Sequence[Rated], first: Sequence[int], *, clocks: bool) -
     return [way_us + BYTE_US * sum(frames_of_cycle(groups, first, cycle, clocks=clocks)) for cycle in cycles]
 
 
-def placed(groups: Sequence[Rated], units: str) -> tuple[int, ...]:
-    return starts(
-        [Unit(every, nodes, read + write) for every, nodes, read, write in groups], is_spread=units == "spread"
-    )
+def placed(groups: Sequence[Rated], units: str) -> list[int]:
+    """First cycle of each group, from 0, as the emulated master places them."""
+    sizes = [nodes * (read + write) for _, nodes, read, write in groups]
+    return first_cycles([{"every": every} for every, *_ in groups], sizes, is_spread=units == "spread")
 
 
-def deciding(one: busplan.Profile) -> Any:
-    return busplan.capacity(one, timing_model=["last-byte"]).results[0]
+def seen(groups: Sequence[Rated], units: str = "spread") -> list[int]:
+    """First cycle of each group, from 0, as a timeline lists the cycles."""
+    cycles = busplan.timeline(profile(groups, units=units)).to_dict()["distinct_cycles"]
+    names = [f"g{place}" for place in range(len(groups))]
+    return [
+        min(number for cycle in cycles if name in cycle["groups"] for number in cycle["numbers"]) - 1 for name in names
+    ]
+
+
+def deciding(plan: busplan.Profile) -> Any:
+    return busplan.capacity(plan, timing_model=["last-byte"]).results[0]
 
 
 GROUPS = st.lists(
@@ -96,22 +103,22 @@ GROUPS = st.lists(
 def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
     groups: list[Rated], units: str, clocks: bool
 ) -> None:
-    one = profile(groups, units=units, distributed_clocks=clocks)
+    plan = profile(groups, units=units, distributed_clocks=clocks)
     each_us = written_us(groups, placed(groups, units), clocks=clocks)
-    found = deciding(one)
-    assert found.required_us == pytest.approx(max(each_us), rel=1e-12)
-    assert found.own["mean_utilisation"] == pytest.approx(fmean(each_us) / 500, rel=1e-12)
-    events = busplan.timeline(one).cycle_events
-    assert sum(event.duration_us for event in events if event.term) == pytest.approx(found.required_us, rel=1e-12)
+    result = deciding(plan)
+    assert result.required_us == pytest.approx(max(each_us), rel=1e-12)
+    assert result.own["mean_utilisation"] == pytest.approx(fmean(each_us) / 500, rel=1e-12)
+    events = busplan.timeline(plan).cycle_events
+    assert sum(event.duration_us for event in events if event.term) == pytest.approx(result.required_us, rel=1e-12)
 
 
 @settings(max_examples=40)
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans())
 def test_a_timeline_draws_each_cycle_of_the_common_multiple(groups: list[Rated], units: str, clocks: bool) -> None:
-    own, first = profile(groups, units=units, distributed_clocks=clocks), placed(groups, units)
+    plan, first = profile(groups, units=units, distributed_clocks=clocks), placed(groups, units)
     ends = [*accumulate(nodes for _, nodes, _, _ in groups)]
     for cycle, us in enumerate(written_us(groups, first, clocks=clocks)):
-        drawn = busplan.timeline(own, timing_model="last-byte", cycle=cycle + 1)
+        drawn = busplan.timeline(plan, timing_model="last-byte", cycle=cycle + 1)
         assert drawn.required_us == pytest.approx(us, rel=1e-12)
         assert sum(event.duration_us for event in drawn.cycle_events if event.term) == pytest.approx(us, rel=1e-12)
         due = [(cycle - start) % every == 0 for (every, *_), start in zip(groups, first, strict=True)]
@@ -124,17 +131,17 @@ def test_a_timeline_draws_each_cycle_of_the_common_multiple(groups: list[Rated],
         (alike,) = (alike for alike in drawn.to_dict()["distinct_cycles"] if cycle + 1 in alike["numbers"])
         assert alike["groups"] == [f"g{place}" for place, is_due in enumerate(due) if is_due]
         assert alike["required_us"] == drawn.required_us
-    whole = busplan.timeline(own)
-    assert whole.cycle_events == busplan.timeline(own, cycle=whole.to_dict()["cycle"]).cycle_events
+    whole = busplan.timeline(plan)
+    assert whole.cycle_events == busplan.timeline(plan, cycle=whole.to_dict()["cycle"]).cycle_events
 
 
 @given(GROUPS)
 def test_together_the_fullest_cycle_is_that_without_rates(groups: list[Rated]) -> None:
     without = deciding(profile([(1, nodes, read, write) for _, nodes, read, write in groups]))
-    found = deciding(profile(groups, units="together"))
-    assert found.required_us == pytest.approx(without.required_us, rel=1e-12)
-    assert found.own["process_bytes"] == without.own["process_bytes"]
-    assert found.uncertainty_us == pytest.approx(without.uncertainty_us, rel=1e-12)
+    result = deciding(profile(groups, units="together"))
+    assert result.required_us == pytest.approx(without.required_us, rel=1e-12)
+    assert result.own["process_bytes"] == without.own["process_bytes"]
+    assert result.uncertainty_us == pytest.approx(without.uncertainty_us, rel=1e-12)
 
 
 def test_the_fullest_cycle_has_its_number() -> None:
@@ -144,58 +151,57 @@ def test_the_fullest_cycle_has_its_number() -> None:
 
 
 def test_a_cycle_without_process_data_sends_no_frame() -> None:
-    own = profile([(2, 1, 100, 0)])
-    last_byte, vendors = (busplan.timeline(own, timing_model=model, cycle=2) for model in ("last-byte", "vendors"))
+    plan = profile([(2, 1, 100, 0)])
+    last_byte, vendors = (busplan.timeline(plan, timing_model=model, cycle=2) for model in ("last-byte", "vendors"))
     assert {event.kind for event in vendors.cycle_events} == {"master", "device", "idle"}
     assert vendors.required_us == last_byte.required_us == 20 + E_BUS_US
-    (found,) = busplan.capacity(own, timing_model=["vendors"]).results
-    assert found.own["mean_utilisation"] == pytest.approx((found.required_us + vendors.required_us) / 2 / 500)
+    (result,) = busplan.capacity(plan, timing_model=["vendors"]).results
+    assert result.own["mean_utilisation"] == pytest.approx((result.required_us + vendors.required_us) / 2 / 500)
 
 
 @given(st.lists(st.integers(1, 100), min_size=2, max_size=5), st.integers(2, 4))
 def test_units_of_one_rate_are_spread_within_a_third_of_the_most_even(sizes: list[int], every: int) -> None:
     def fullest(first: Sequence[int]) -> int:
-        return max(sum(size for size, own in zip(sizes, first, strict=True) if own == cycle) for cycle in range(every))
+        return max(
+            sum(size for size, plan in zip(sizes, first, strict=True) if plan == cycle) for cycle in range(every)
+        )
 
     best = min(map(fullest, product(range(every), repeat=len(sizes))))
-    assert best <= fullest(starts([Unit(every, 1, size) for size in sizes], is_spread=True)) <= best * 4 / 3
+    assert best <= fullest(seen([(every, 1, size, 0) for size in sizes])) <= best * 4 / 3
 
 
 def test_units_of_several_rates_find_the_gaps_of_each_other() -> None:
-    faster_last = [Unit(4, 1, 8), Unit(4, 1, 8), Unit(2, 1, 6), Unit(1, 1, 5)]
-    assert starts(faster_last, is_spread=True) == (1, 3, 0, 0)
-    assert starts(faster_last, is_spread=False) == (0, 0, 0, 0)
+    faster_last = [(4, 1, 8, 0), (4, 1, 8, 0), (2, 1, 6, 0), (1, 1, 5, 0)]
+    assert seen(faster_last) == [1, 3, 0, 0]
+    assert seen(faster_last, "together") == [0, 0, 0, 0]
     # The last one goes where no cycle gets over 11, although there are more bytes in those cycles together.
-    assert starts([Unit(2, 1, 6), Unit(4, 1, 10), Unit(4, 1, 1), Unit(6, 1, 5)], is_spread=True) == (0, 1, 3, 0)
+    assert seen([(2, 1, 6, 0), (4, 1, 10, 0), (4, 1, 1, 0), (6, 1, 5, 0)]) == [0, 1, 3, 0]
 
 
 def test_a_rate_of_1_is_what_no_rate_is() -> None:
     groups = [(1, 8, 20, 12), (1, 3, 60, 0)]
-    one = profile(groups, distributed_clocks=True)
-    data = one.model_dump(exclude_unset=True)
+    plan = profile(groups, distributed_clocks=True)
+    data = plan.model_dump(exclude_unset=True)
     for group in data["group"]:
         del group["every"]
     del data["bus"]["units"]
-    assert deciding(one).by_key() == deciding(EthercatProfile.model_validate(data)).by_key()
-    assert deciding(one).own["mean_utilisation"] == deciding(one).utilisation
+    assert deciding(plan).by_key() == deciding(EthercatProfile.model_validate(data)).by_key()
+    assert deciding(plan).own["mean_utilisation"] == deciding(plan).utilisation
 
 
-def test_neighbours_that_are_alike_have_cycles_of_their_own() -> None:
-    found = deciding(profile([(2, 20, 60, 0), (2, 20, 60, 0)]))
-    assert found.own["process_bytes"] == 20 * 60
-    assert len(network_of(profile([(2, 20, 60, 0), (2, 20, 60, 0)])).groups) == 2
-    assert len(network_of(profile([(1, 20, 60, 0), (1, 20, 60, 0)])).groups) == 1
+def test_neighbours_with_the_same_keys_have_cycles_of_their_own() -> None:
+    assert deciding(profile([(2, 20, 60, 0), (2, 20, 60, 0)])).own["process_bytes"] == 20 * 60
 
 
 def test_a_sweep_has_what_each_profile_has() -> None:
-    one = profile([(1, 4, 20, 12), (2, 10, 60, 0), (4, 8, 90, 30), (4, 5, 33, 0)], distributed_clocks=True)
+    plan = profile([(1, 4, 20, 12), (2, 10, 60, 0), (4, 8, 90, 30), (4, 5, 33, 0)], distributed_clocks=True)
     keys = ("group.g1.every", "group.g2.nodes", "group.g3.read_bytes")
     values: dict[str, list[Any]] = {keys[0]: [1, 2, 4, 6], keys[1]: [1, 30, 60], keys[2]: [0, 33, 300]}
-    swept = busplan.sweep(one, vary=values, timing_model=["last-byte", "vendors"])
+    swept = busplan.sweep(plan, vary=values, timing_model=["last-byte", "vendors"])
     rows = [dict(zip(swept, row, strict=True)) for row in zip(*(swept[name].tolist() for name in swept), strict=True)]
     assert len(rows) == 2 * 4 * 3 * 3
     for row in rows[::5]:
-        at = busplan.load_profile(one, changes={key: row[key] for key in keys})
+        at = busplan.load_profile(plan, changes={key: row[key] for key in keys})
         (alone,) = busplan.capacity(at, timing_model=[row["timing_model"]]).results
         for key in ("required_us", "mean_utilisation", "frames", "process_bytes", "command_us", "utilisation"):
             assert row[key] == pytest.approx(alone.values()[key], rel=1e-12), key
@@ -207,17 +213,9 @@ def test_a_node_of_a_slower_group_has_its_own_period_to_finish_in() -> None:
     assert "node" in deciding(busplan.load_profile(profile([(1, 4, 20, 12), (2, 4, 20, 12)]), changes=slow)).exceeded
 
 
-def test_a_device_that_is_not_in_the_fullest_cycle_has_its_command_with_its_own() -> None:
-    one = profile([(1, 1, 100, 0), (2, 1, 400, 0), (2, 1, 200, 0)])
-    cycle = kind_named("ethercat").cycle(network_of(one), model="last-byte")
-    sent_us = [BYTE_US * (52 + size) for size in (500, 500, 300)]
-    found = [cycle.arrival_us(device) for device in (1, 2, 3)]
-    assert found == pytest.approx([20 + us + device * E_BUS_US / 2 for device, us in enumerate(sent_us, start=1)])
-
-
 def test_latencies_of_a_slower_group_are_of_its_own_period() -> None:
     both = busplan.latency(profile([(1, 4, 20, 12), (4, 4, 20, 12)]), timing_model=["last-byte"]).transactions
-    by_name = {(one.group, one.transaction): one.phases for one in both}
+    by_name = {(latency.group, latency.transaction): latency.phases for latency in both}
     assert by_name["g0", "command"]["pipeline_us"] == 500
     assert by_name["g1", "command"]["pipeline_us"] == 2000
     assert by_name["g1", "feedback"]["frame_wait_us"] == 2000 - 40
@@ -232,12 +230,12 @@ def test_rates_that_meet_too_seldom_are_refused() -> None:
 
 
 def test_a_circle_needs_axes_in_every_cycle() -> None:
-    one = profile([(1, 4, 20, 12), (2, 4, 20, 12)], axes=1, distributed_clocks=True)
-    asked = busplan.load_profile(one, changes={"circle.radius_mm": 10.0})
-    assert busplan.circle_test(asked).results
+    plan = profile([(1, 4, 20, 12), (2, 4, 20, 12)], axes=1, distributed_clocks=True)
+    circle = busplan.load_profile(plan, changes={"circle.radius_mm": 10.0})
+    assert busplan.circle_test(circle).results
     with pytest.raises(BusplanError, match=r"group\.g0\.every"):
-        busplan.circle_test(busplan.load_profile(asked, changes={"group.g0.every": 2}))
-    assert deciding(busplan.load_profile(asked, changes={"group.g0.every": 2})).verdict == "fits"
+        busplan.circle_test(busplan.load_profile(circle, changes={"group.g0.every": 2}))
+    assert deciding(busplan.load_profile(circle, changes={"group.g0.every": 2})).verdict == "fits"
 
 
 def test_the_largest_device_counts_whatever_its_cycle() -> None:
@@ -245,12 +243,12 @@ def test_the_largest_device_counts_whatever_its_cycle() -> None:
 
 
 def test_the_timeline_lists_the_cycles_of_the_common_multiple() -> None:
-    one = profile([(1, 1, 100, 0), (2, 1, 400, 0), (2, 1, 200, 0)])
+    plan = profile([(1, 1, 100, 0), (2, 1, 400, 0), (2, 1, 200, 0)])
     us = [20 + 3 * E_BUS_US + BYTE_US * (52 + size) for size in (500, 300)]
-    said = "The groups meet every 2 cycles; this is the fullest. "
-    assert f"{said}Cycles 1: g0, g1 ({us[0]:.3f} us); 2: g0, g2 ({us[1]:.3f} us).\n" in str(busplan.timeline(one))
-    many = str(busplan.timeline(busplan.load_profile(one, changes={"group.g1.every": 65})))
+    words = "The groups meet every 2 cycles; this is the fullest. "
+    assert f"{words}Cycles 1: g0, g1 ({us[0]:.3f} us); 2: g0, g2 ({us[1]:.3f} us).\n" in str(busplan.timeline(plan))
+    many = str(busplan.timeline(busplan.load_profile(plan, changes={"group.g1.every": 65})))
     assert "every 130 cycles; this is the fullest. More than 64 cycles are not listed.\n" in many
     assert "cycles" not in str(busplan.timeline(profile([(1, 1, 100, 0)])))
-    _, vendors = busplan.capacity(one).results
-    assert f"({vendors.required_us:.3f} us)" in str(busplan.timeline(one, timing_model="vendors"))
+    _, vendors = busplan.capacity(plan).results
+    assert f"({vendors.required_us:.3f} us)" in str(busplan.timeline(plan, timing_model="vendors"))

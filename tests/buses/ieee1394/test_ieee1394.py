@@ -7,13 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses import kind_named
 from busplan.buses.ieee1394 import constants as ieee1394
-from busplan.elementwise import plain
-from busplan.questions.evidence import sections_of
-from busplan.questions.fit.circle_refusal import loop_delays_us
-from busplan.questions.fit.network import network_of
-from busplan.sourced import Sourced
 
 
 def test_gap_count_table_follows_from_cable_and_phy_delay() -> None:
@@ -46,13 +40,13 @@ def test_rates_and_limits_by_speed() -> None:
 
 @given(st.integers(0, 5000))
 def test_padding_fills_the_last_quadlet(payload_bytes: int) -> None:
-    padded = plain(ieee1394.padded_bytes(payload_bytes))
+    padded = int(ieee1394.padded_bytes(payload_bytes))
     assert padded % 4 == 0
     assert 0 <= padded - payload_bytes < 4
 
 
 def test_every_number_names_its_source() -> None:
-    numbers = [value for value in vars(ieee1394).values() if isinstance(value, Sourced)]
+    numbers = ieee1394.CONSTANTS.values()
     assert len(numbers) > 15
     assert all(number.source and number.meaning and number.unit and number.grade for number in numbers)
     # What no opened source confirms must be called so.
@@ -60,27 +54,29 @@ def test_every_number_names_its_source() -> None:
 
 
 def test_published_machines_fit_their_periods() -> None:
-    found = [
-        one
-        for each in sections_of(kind_named("ieee1394"), "ieee1394")
-        for one in each.comparisons
-        if "axes of a" in one.section
+    (kind,) = busplan.evidence("ieee1394").kinds
+    comparisons = [
+        comparison
+        for section in kind.sections
+        for comparison in section.comparisons
+        if "axes of a" in comparison.section
     ]
-    assert [(one.quantity, one.published) for one in found[::2]] == [("4 axes", 250), ("8 axes", 500)]
-    assert all(one.published is not None and 0 < one.computed < one.published for one in found)
+    periods_us = [(comparison.quantity, comparison.published) for comparison in comparisons[::2]]
+    assert periods_us == [("4 axes", 250), ("8 axes", 500)]
+    assert all(0 < comparison.computed < (comparison.published or 0.0) for comparison in comparisons)
 
 
 def test_a_command_that_is_executed_beside_the_bus_counts_as_it_is_executed() -> None:
-    bench = busplan.load_profile("paper-two-node")
     host = {"servo.loop": "host", "cycle.period_us": 1000.0, "servo.step_us": 100.0}
 
     def delay_us(update: str, **changes: object) -> float:
-        own = {**host, "servo.update": update, **{key.replace("__", "."): one for key, one in changes.items()}}
-        return max(loop_delays_us(network_of(busplan.load_profile(bench, changes=own))))
+        changed = {**host, "servo.update": update, **{key.replace("__", "."): us for key, us in changes.items()}}
+        (circle,) = busplan.circle_test(busplan.load_profile("paper-two-node", changes=changed)).results
+        return circle.delay_us
 
     assert delay_us("next_sync") == delay_us("next_sync", node__write_response="unified") == 1000
     # A unified write is acknowledged at once, and the node takes 36.8 us for it then.
-    slower = delay_us("on_arrival", node__write_response="unified", node__execution__worst_extra_us=100.0)
-    assert slower - delay_us("on_arrival", node__write_response="unified") == pytest.approx(100 + 100, abs=1e-9)
+    slower_us = delay_us("on_arrival", node__write_response="unified", node__execution__worst_extra_us=100.0)
+    assert slower_us - delay_us("on_arrival", node__write_response="unified") == pytest.approx(100 + 100, abs=1e-9)
     extra: dict[str, object] = {"node__execution__worst_extra_us": 900.0}
     assert delay_us("next_sync", node__read_response="concatenated", node__write_response="unified", **extra) == 2000

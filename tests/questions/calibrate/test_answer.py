@@ -70,7 +70,7 @@ def test_the_changes_are_those_that_apply_writes(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.stderr
     written = busplan.load_profile(own)
     assert busplan.load_profile(before, changes=changes) == written
-    (nodes,) = written.alike_nodes
+    (nodes,) = written.node_groups
     assert (nodes.node.execution.kind, nodes.node.execution.worst_extra_us) == ("table", 2.5)
 
 

@@ -76,7 +76,7 @@ def test_latencies_of_a_profile_give_its_own_execution_time(
     sizes = data.draw(st.lists(st.integers(1, most), min_size=2, max_size=8, unique=True))
     plain = override(profile, {"node.execution.worst_extra_us": 0.0})
     rows = [(size, latency_us(plain, kind, size, model), kind) for size in sizes for kind in ("read", "write")]
-    own = profile.alike_nodes[0].node.execution
+    own = profile.node_groups[0].node.execution
     answer = run(profile, rows, timing_model=model)
     assert answer.execution.payload_bytes == tuple(sorted(sizes))
     assert answer.execution.time_us == pytest.approx([own.execution_us(size) for size in sorted(sizes)], abs=1e-3)

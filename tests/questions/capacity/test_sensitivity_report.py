@@ -38,7 +38,7 @@ def test_every_figure_of_the_blocks_stands_in_the_document(
     own = busplan.load_profile(name)
     assert values_of_the_document(busplan.capacity(own, period_us=[4000.0, 300.0], sensitivity=True).report()) > 100
     tree = {"bus.max_hops": 3, "bus.charge_hops": "farthest"} if own.bus.kind == "ieee1394" else {}
-    other = busplan.load_profile(own, changes={**tree, own.alike_nodes[0].payload_key("write"): 16})
+    other = busplan.load_profile(own, changes={**tree, own.node_groups[0].payload_key("write"): 16})
     assert values_of_the_document(busplan.capacity(other, sensitivity=True).report()) > 60
 
 

@@ -1,5 +1,6 @@
 """The picture of a circle test: magnified alike, in units that can be read, with its verdict and its tolerances."""
 
+from dataclasses import replace
 from functools import cache
 from typing import TypeVar
 
@@ -43,8 +44,8 @@ def values(plot: Curves, ink: str) -> list[tuple[float, float]]:
     return [(x, y or 0.0) for curve in plot.curves if curve.entry.ink == ink for x, y in curve.points]
 
 
-def farthest(one: Dial) -> float:
-    return max(abs(radius - 1) for radius in (*one.inner, *one.outer) if radius is not None)
+def farthest(circle: Dial) -> float:
+    return max(abs(radius - 1) for radius in (*circle.inner, *circle.outer) if radius is not None)
 
 
 # --- scales
@@ -54,22 +55,22 @@ def farthest(one: Dial) -> float:
 def test_all_periods_have_one_scale(changes: dict[str, object]) -> None:
     test = run(*changes.items(), *PERFECT.items(), periods_us=(2000.0, 8000.0))
     drawing = test.drawing()
-    one, other = plots(drawing, Curves)
-    assert one.up == other.up
+    short, long = plots(drawing, Curves)
+    assert short.up == long.up
     # The error of the longer period is 16 times the other one: the drawn radius has it, too.
-    short, long = map(farthest, plots(drawing, Dial))
+    least, most = map(farthest, plots(drawing, Dial))
     largest = [result.radial_deviation_min_mm or 0.0 for result in test.results]
-    assert long / short == pytest.approx(largest[1] / largest[0], rel=0.05)
-    assert long > 10 * short
+    assert most / least == pytest.approx(largest[1] / largest[0], rel=0.05)
+    assert most > 10 * least
 
 
 def test_a_period_whose_loop_is_unstable_flattens_no_other() -> None:
     test = run(*HOST.items(), periods_us=(1000.0, 16000.0))
     assert [result.stable for result in test.results] == [True, False]
     drawing = test.drawing()
-    one, other = plots(drawing, Curves)
-    assert one.up == other.up
-    assert one.up.high < 100
+    short, long = plots(drawing, Curves)
+    assert short.up == long.up
+    assert short.up.high < 100
     assert len(plots(drawing, Dial)) == 1
     assert heads(drawing)[1].words.startswith("circle not drawn: the loop is unstable")
 
@@ -137,7 +138,7 @@ def test_the_measured_part_is_shaded_and_apart_from_the_rest(changes: dict[str, 
 def test_a_verdict_is_a_word_and_a_colour(passed: bool | None, word: str, tone: str) -> None:
     test = run(*SMALL.items())
     (result,) = test.results
-    (head,) = heads(test._replace(results=(result._replace(passed=passed),)).drawing())
+    (head,) = heads(replace(test, results=(result._replace(passed=passed),)).drawing())
     assert head.title == f"{word}: 4 ms, 2500 mm/min, r 25 mm"
     assert head.tone == tone
 
@@ -173,9 +174,9 @@ def test_error_sources_stand_below_the_circle_by_rank() -> None:
     assert both[0].across == both[1].across
     for plot, result in zip(both, test.results, strict=True):
         ranked = result.contributions or ()
-        assert [lane.label for lane in plot.lanes] == [one.source.replace("_", " ") for one in ranked]
+        assert [lane.label for lane in plot.lanes] == [source.words for source in ranked]
         sizes = np.array([span.end + span.start for lane in plot.lanes for span in lane.spans])
-        assert sizes == pytest.approx([one.removed_mm * 1e3 for one in ranked])
+        assert sizes == pytest.approx([source.removed_mm * 1e3 for source in ranked])
 
 
 def test_each_kind_of_line_is_explained_once() -> None:

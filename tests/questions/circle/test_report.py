@@ -5,6 +5,7 @@ import io
 import json
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from typing import Literal, TypeVar
 
@@ -47,7 +48,7 @@ def blocks(test: busplan.CircleTestAnswer, kind: type[Of]) -> list[Of]:
 
 
 def texts(test: busplan.CircleTestAnswer) -> list[str]:
-    return [sentence_text(said) for said in blocks(test, Sentence)]
+    return [sentence_text(words) for words in blocks(test, Sentence)]
 
 
 @pytest.mark.parametrize("ranked", [True, False])
@@ -97,12 +98,12 @@ def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None
     (result,) = test.results
     assert (result.passed, result.sources_matter, result.failures) == (None, False, ())
     assert test.passed is None
-    said = blocks(test, Sentence)[0]
-    assert sentence_text(said) == (
+    verdict = blocks(test, Sentence)[0]
+    assert sentence_text(verdict) == (
         "ethercat-servo-8 at 1 ms and 3000 mm/min: no error source of this profile matters; circular deviation G "
         "below 0.1 um, which says nothing of how round a machine is."
     )
-    assert said.state == "warns"
+    assert verdict.state == "warns"
     forms: tuple[Literal["table", "markdown", "html"], ...] = ("table", "markdown", "html")
     for form in forms:
         shown = render(test.report(), form)
@@ -122,9 +123,9 @@ def test_a_circle_that_no_error_source_shapes_is_no_claim_of_roundness() -> None
 
 
 def test_a_circle_that_holds_says_so() -> None:
-    said, margins = blocks(small(ranked=False), Sentence)[:2]
-    assert sentence_text(said) == "mine at 4 ms and 2500 mm/min: the circle holds every tolerance."
-    assert said.state == "passes"
+    verdict, margins = blocks(small(ranked=False), Sentence)[:2]
+    assert sentence_text(verdict) == "mine at 4 ms and 2500 mm/min: the circle holds every tolerance."
+    assert verdict.state == "passes"
     assert sentence_text(margins) == (
         "The loop is stable, with a phase margin of 30 deg (default) or more "
         "and a gain margin of 6 dB (default) or more."
@@ -147,20 +148,22 @@ def test_a_margin_that_the_profile_asks_for_is_no_default() -> None:
 def test_a_circle_without_a_tolerance_leads_with_its_figure(path: str, measure: str, key: str) -> None:
     test = uncached(tolerance={}, circle__path=path)
     (result,) = test.results
-    said = blocks(test, Sentence)[0]
+    verdict = blocks(test, Sentence)[0]
     um = f"{getattr(result, key) * 1e3:.3f}"
-    assert sentence_text(said) == (
+    assert sentence_text(verdict) == (
         f"mine at 4 ms and 2500 mm/min: {measure} {um} um; no tolerance set: tolerance.{key}."
     )
-    assert said.state == "warns"
+    assert verdict.state == "warns"
     assert ">NOT JUDGED: 4 ms, " in test.svg()
 
 
 def test_a_circle_that_the_bus_does_not_carry_is_not_run() -> None:
     test = circle_of(*SMALL.items(), periods_us=(100.0,))
-    said = blocks(test, Sentence)[0]
-    assert sentence_text(said).startswith("mine at 100 us and 2500 mm/min: NOT RUN, the cycle does not fit the bus: ")
-    assert said.state == "fails"
+    verdict = blocks(test, Sentence)[0]
+    assert sentence_text(verdict).startswith(
+        "mine at 100 us and 2500 mm/min: NOT RUN, the cycle does not fit the bus: "
+    )
+    assert verdict.state == "fails"
     assert not [text for text in texts(test) if "servo values" in text]
 
 
@@ -174,22 +177,21 @@ def test_a_circle_that_fails_says_by_how_much_and_what_to_attack(values_in: Valu
     assert {value.key for value in values_in(failed) if getattr(result, value.key, None) == value.value} == {
         *("period_us", "feed_mm_per_min", "mean_contour_error_mm", "max_contour_error_mm"),
     }
-    best = min(result.contributions or (), key=lambda one: one.mean_contour_error_mm)
-    source = best.source.replace("_", " ")
-    assert sentence_text(attack).startswith(f"Attack {source} first: without it the mean contour error is ")
+    best = min(result.contributions or (), key=lambda source: source.mean_contour_error_mm)
+    assert sentence_text(attack).startswith(f"Attack {best.words} first: without it the mean contour error is ")
     assert next(values_in(attack)).value == best.mean_contour_error_mm
 
 
 def test_what_no_single_source_explains_is_said() -> None:
     test = circle_of(*TIGHT.items())
-    none = test._replace(results=(test.results[0]._replace(contributions=()),))
+    none = replace(test, results=(test.results[0]._replace(contributions=()),))
     assert "No single error source of the profile explains the mean contour error." in texts(none)
     assert "The profile has no error source that could be removed." in texts(none)
 
 
 def test_how_the_servo_values_are_known_is_said_once() -> None:
     both = circle_of(*SMALL.items(), periods_us=(100.0, 4000.0, 2000.0))
-    (mixed,) = (said for said in blocks(both, Sentence) if "servo values" in sentence_text(said))
+    (mixed,) = (words for words in blocks(both, Sentence) if "servo values" in sentence_text(words))
     assert (sentence_text(mixed), mixed.state) == (
         "The servo values that the profile gives are 6 assumed, 4 calibrated, 2 published.",
         "warns",
@@ -208,7 +210,7 @@ def test_sources_are_ranked_with_bars_of_one_scale_beside_their_figures() -> Non
     bars = [cell for row in table.rows for cell in row.cells if isinstance(cell, Bar)]
     takes = [row.cells[2] for row in table.rows]
     assert [bar.value for bar in bars] == takes
-    removed = [one.removed_mm for one in result.contributions or ()]
+    removed = [source.removed_mm for source in result.contributions or ()]
     assert {(bar.least, bar.most) for bar in bars} == {(min(0.0, *removed), max(0.0, *removed))}
     assert removed == sorted(removed, reverse=True)
     assert figure_text(takes[0]).startswith("+")  # type: ignore[arg-type]
@@ -216,8 +218,8 @@ def test_sources_are_ranked_with_bars_of_one_scale_beside_their_figures() -> Non
 
 def test_sources_that_take_nothing_have_no_bar() -> None:
     (result,) = small().results
-    nothing = tuple(one._replace(removed_mm=0.0) for one in result.contributions or ())
-    _, table = blocks(small()._replace(results=(result._replace(contributions=nothing),)), Table)
+    nothing = tuple(source._replace(removed_mm=0.0) for source in result.contributions or ())
+    _, table = blocks(replace(small(), results=(result._replace(contributions=nothing),)), Table)
     assert table.rows
     assert not [cell for row in table.rows for cell in row.cells if isinstance(cell, Bar)]
 
@@ -276,7 +278,7 @@ def test_documents_hold_the_results_own_numbers() -> None:
         assert (record["contributions"] is None) == (result.contributions is None)
     flat, _ = csv.DictReader(io.StringIO(render(test.report(), "csv")))
     assert flat["centre_offset_x_mm"] == str((test.results[0].centre_offset_mm or (None,))[0] or "")
-    removed = {one.source: one.removed_mm for one in test.results[0].contributions or ()}
+    removed = {source.source: source.removed_mm for source in test.results[0].contributions or ()}
     assert {key: float(value) for key, value in flat.items() if key.startswith("removed_")} == {
         f"removed_{source}_mm": value for source, value in sorted(removed.items())
     }

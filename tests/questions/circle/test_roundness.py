@@ -8,11 +8,7 @@ from typing import Any
 import pytest
 
 import busplan
-from busplan.errors import BusplanError
 from busplan.profile.sources import shipped_names
-from busplan.questions.circle import CircleFigures
-from busplan.questions.circle.failures import CONTOUR_SECTORS, contour_profile, drawn_profile
-from busplan.questions.circle.roundness import to_attack
 
 Make = Callable[..., busplan.Profile]
 
@@ -34,8 +30,8 @@ def changed(profile: busplan.Profile | str, changes: Mapping[str, object]) -> bu
     return busplan.load_profile(profile, changes=changes)
 
 
-def only(profile: busplan.Profile, **options: bool) -> CircleFigures:
-    return busplan.circle_test(profile, **options).results[0]  # type: ignore[arg-type]  # the one option is a bool
+def only(profile: busplan.Profile, *, contributions: bool = False) -> Any:
+    return busplan.circle_test(profile, contributions=contributions).results[0]
 
 
 def figures(profile: busplan.Profile, model: str = "standard") -> Any:
@@ -85,17 +81,17 @@ def test_a_cycle_that_does_not_fit_fails_before_any_simulation(small: busplan.Pr
     capacity = figures(changed(small, {"bus.nodes": 16, "cycle.period_us": 500}))
     assert test.runs == (None,)
     assert (result.bus_fits, result.passed, result.stable) == (False, False, None)
-    assert [(one.name, one.value, one.limit) for one in result.failures] == [
+    assert [(failure.name, failure.value, failure.limit) for failure in result.failures] == [
         ("required_us", capacity.required_us, capacity.available_us)
     ]
     assert (result.max_contour_error_mm, result.phase_margin_deg, result.centre_offset_mm) == (None, None, None)
     assert result.setpoints > 0
 
 
-@pytest.mark.parametrize("own", ["paper", "standard"])
-def test_one_model_decides_whether_there_is_a_circle(small: busplan.Profile, own: str) -> None:
+@pytest.mark.parametrize("model", ["paper", "standard"])
+def test_one_model_decides_whether_there_is_a_circle(small: busplan.Profile, model: str) -> None:
     # 250 us lie between the 197.0 that paper needs and the 253.2 of standard.
-    tight = changed(small, {"cycle.period_us": 500, "servo.step_us": 100, "bus.timing_model": own})
+    tight = changed(small, {"cycle.period_us": 500, "servo.step_us": 100, "bus.timing_model": model})
     result = only(tight)
     assert (result.timing_model, result.bus_fits, result.stable) == ("standard", False, None)
     assert figures(tight, "paper").fits
@@ -106,7 +102,7 @@ def test_a_circle_that_the_bus_is_not_shown_to_carry_is_simulated_and_fails(smal
     tight = changed(small, {"cycle.period_us": 560, "servo.step_us": 80})
     result, capacity = only(tight), figures(tight)
     assert (result.bus_fits, result.verdict, result.stable, result.passed) == (True, "not shown to fit", True, False)
-    assert [(one.name, one.value, one.limit) for one in result.failures] == [
+    assert [(failure.name, failure.value, failure.limit) for failure in result.failures] == [
         ("safe_required_us", capacity.safe_required_us, capacity.available_us)
     ]
     assert result.failures[0].text == (
@@ -126,7 +122,7 @@ def test_a_circle_that_the_bus_is_not_shown_to_carry_is_simulated_and_fails(smal
 )
 def test_limits_of_the_standard_fail_by_name(small: busplan.Profile, changes: dict[str, object], name: str) -> None:
     result = only(changed(small, {**changes, "circle.feed_mm_per_min": 10, "circle.ramp_periods": 1}))
-    assert [one.name for one in result.failures] == [name]
+    assert [failure.name for failure in result.failures] == [name]
 
 
 def test_an_unstable_loop_fails_whatever_its_circle(small: busplan.Profile) -> None:
@@ -134,14 +130,14 @@ def test_an_unstable_loop_fails_whatever_its_circle(small: busplan.Profile) -> N
     unstable = changed(small, {"servo.position_gain_per_s": 25_000})
     result = only(unstable)
     assert (result.stable, result.passed) == (False, False)
-    assert [one.name for one in result.failures] == ["stability"]
+    assert [failure.name for failure in result.failures] == ["stability"]
     assert result.phase_margin_deg is result.gain_margin_db is None
 
 
 def test_a_loop_with_too_little_margin_fails_however_round_its_circle(small: busplan.Profile) -> None:
     result = only(changed(small, {"servo.position_gain_per_s": 15_000, "servo.velocity_feedforward": 1.0}))
     assert result.stable
-    assert {one.name for one in result.failures} >= {"min_gain_margin_db"}
+    assert {failure.name for failure in result.failures} >= {"min_gain_margin_db"}
     assert result.max_contour_error_mm is not None
     assert result.max_contour_error_mm < 1e-3
 
@@ -162,9 +158,9 @@ def test_the_papers_loop_on_the_host_fails_by_its_margin_and_names_the_key() -> 
     result = only(changed("paper-4ms", {"servo.loop": "host"}))
     assert result.delay_us == 4000.0
     assert result.phase_margin_deg == pytest.approx(12.93, abs=0.005)
-    failures = {one.name: one for one in result.failures}
+    failures = {failure.name: failure for failure in result.failures}
     assert failures["min_phase_margin_deg"].is_default
-    text = " ".join(one.text for one in result.failures)
+    text = " ".join(failure.text for failure in result.failures)
     assert "under its 30 deg (default)" in text
     assert text.count("servo.update") == 1
 
@@ -214,15 +210,15 @@ def test_tolerances_fail_by_name_value_and_limit(small: busplan.Profile) -> None
         },
     )
     result = only(tight)
-    assert [one.name for one in result.failures] == [
+    assert [failure.name for failure in result.failures] == [
         "min_phase_margin_deg",
         "mean_contour_error_mm",
         "max_contour_error_mm",
         "circular_deviation_mm",
     ]
-    for one in result.failures[1:]:
-        assert one.value == getattr(result, one.name)
-        assert one.limit == getattr(tight.tolerance, one.name)
+    for failure in result.failures[1:]:
+        assert failure.value == getattr(result, failure.name)
+        assert failure.limit == getattr(tight.tolerance, failure.name)
     # A contour that fails asks for its sources by itself.
     assert result.contributions is not None
 
@@ -258,9 +254,9 @@ def test_contributions_are_ranked_and_only_of_sources_that_are_there(small: busp
     )
     result = only(rough, contributions=True)
     assert result.contributions is not None
-    removed = [one.removed_mm for one in result.contributions]
+    removed = [source.removed_mm for source in result.contributions]
     assert removed == sorted(removed, reverse=True)
-    assert {one.source for one in result.contributions} == {
+    assert {source.source for source in result.contributions} == {
         "velocity_feedforward",
         "drive_lag",
         "drive_offset",
@@ -268,7 +264,7 @@ def test_contributions_are_ranked_and_only_of_sources_that_are_there(small: busp
         "period",
     }
     chords = only(changed(small, {"servo.velocity_feedforward": 1.0}), contributions=True).contributions
-    assert [one.source for one in chords or ()] == ["period"]
+    assert [source.source for source in chords or ()] == ["period"]
 
 
 def test_the_chords_of_the_period_are_a_source(small: busplan.Profile) -> None:
@@ -277,14 +273,14 @@ def test_the_chords_of_the_period_are_a_source(small: busplan.Profile) -> None:
     result = only(coarse, contributions=True)
     chord_mm = 25 * (1 - cos(50 / 25 * 0.02 / 2))
     assert result.max_contour_error_mm == pytest.approx(chord_mm, rel=0.02)
-    (source,) = result.contributions or ()
+    (source,) = result.contributions
     assert source.source == "period"
     assert source.removed_mm == pytest.approx(chord_mm, rel=0.02)
 
 
 def test_acceleration_feedforward_is_a_source(small: busplan.Profile) -> None:
     wrong = changed(small, {"servo.velocity_feedforward": 1.0, "servo.acceleration_feedforward_s": 0.01})
-    assert (only(wrong, contributions=True).contributions or ())[0].source == "acceleration_feedforward"
+    assert only(wrong, contributions=True).contributions[0].source == "acceleration_feedforward"
 
 
 def test_what_is_attacked_first_takes_most_of_the_measure_that_failed(small: busplan.Profile) -> None:
@@ -300,9 +296,7 @@ def test_what_is_attacked_first_takes_most_of_the_measure_that_failed(small: bus
     )
     for measure, source in (("max_contour_error_mm", "velocity_feedforward"), ("circular_deviation_mm", "scale")):
         result = only(changed(rough, {f"tolerance.{measure}": 1e-4}))
-        found = to_attack(result)
-        assert found is not None
-        contribution, removed_mm = found
+        contribution, removed_mm = result.to_attack
         assert contribution.source == source
         assert removed_mm == pytest.approx(getattr(result, measure) - getattr(contribution, measure))
         assert removed_mm > 0
@@ -311,14 +305,14 @@ def test_what_is_attacked_first_takes_most_of_the_measure_that_failed(small: bus
 def test_a_margin_that_fails_has_no_source(small: busplan.Profile) -> None:
     result = only(changed(small, {"tolerance.min_phase_margin_deg": 179.0}), contributions=True)
     assert not result.passed
-    assert to_attack(result) is None
+    assert result.to_attack is None
 
 
 def test_a_bus_that_does_not_fit_needs_no_path(small: busplan.Profile) -> None:
     # A path of so many steps has no room in memory.
     huge = {"cycle.period_us": 1.0, "servo.step_us": 1.0, "circle.radius_mm": 10_000.0}
     result = only(changed(small, huge))
-    assert [one.name for one in result.failures] == ["required_us"]
+    assert [failure.name for failure in result.failures] == ["required_us"]
     assert result.setpoints == result.steps > 1e9
 
 
@@ -334,7 +328,7 @@ def test_all_periods_are_checked_before_the_first_is_simulated(
     small: busplan.Profile, changes: dict[str, object], message: str
 ) -> None:
     simulated: list[int] = []
-    with pytest.raises(BusplanError, match=message):
+    with pytest.raises(busplan.BusplanError, match=message):
         busplan.circle_test(
             changed(small, changes), period_us=[4000.0, 2000.0], progress=lambda done, _total: simulated.append(done)
         )
@@ -343,9 +337,9 @@ def test_all_periods_are_checked_before_the_first_is_simulated(
 
 def test_the_seed_decides_what_is_lost(small: busplan.Profile) -> None:
     lossy = changed(small, {"delivery.loss_probability": 0.05})
-    one, again, other = (only(changed(lossy, {"delivery.seed": seed})) for seed in (1, 1, 2))
-    assert one == again
-    assert one.max_contour_error_mm != other.max_contour_error_mm
+    first, again, second = (only(changed(lossy, {"delivery.seed": seed})) for seed in (1, 1, 2))
+    assert first == again
+    assert first.max_contour_error_mm != second.max_contour_error_mm
 
 
 def test_a_row_a_period(small: busplan.Profile) -> None:
@@ -382,36 +376,35 @@ def test_progress_never_runs_back_and_ends_at_its_total(small: busplan.Profile) 
 def test_what_cannot_be_simulated_is_refused_by_name(
     small: busplan.Profile, changes: dict[str, object], message: str
 ) -> None:
-    with pytest.raises(BusplanError, match=message):
+    with pytest.raises(busplan.BusplanError, match=message):
         busplan.circle_test(changed(small, changes))
+
+
+def dial_of(test: busplan.CircleTestAnswer) -> Any:
+    """The drawn circle: smallest and largest radius of the path in each sector, the nominal radius is 1."""
+    return next(panel.plot for panel in test.drawing().panels if hasattr(panel.plot, "inner"))
 
 
 def test_the_error_around_the_circle_lies_between_f_min_and_f_max(small: busplan.Profile) -> None:
     test = busplan.circle_test(changed(small, {"servo.reversal_mm_s": 2.0}))
-    result, run = test.results[0], test.runs[0]
-    assert run is not None
-    profile = contour_profile(run)
-    assert len(profile.low_mm) == len(profile.high_mm) == CONTOUR_SECTORS
-    assert min(value for value in profile.low_mm if value is not None) == result.radial_deviation_min_mm
-    assert max(value for value in profile.high_mm if value is not None) == result.radial_deviation_max_mm
+    result, dial = test.results[0], dial_of(test)
+    least, most = (
+        min(radius for radius in dial.inner if radius is not None) - 1,
+        max(radius for radius in dial.outer if radius is not None) - 1,
+    )
+    assert result.radial_deviation_min_mm is not None
+    assert result.radial_deviation_max_mm is not None
+    assert least / most == pytest.approx(result.radial_deviation_min_mm / result.radial_deviation_max_mm)
 
 
 @pytest.mark.parametrize("ramp_periods", [20, 600])
 def test_the_ramps_leave_a_part_of_the_circle_without_an_error(small: busplan.Profile, ramp_periods: int) -> None:
-    run = busplan.circle_test(changed(small, {"circle.ramp_periods": ramp_periods})).runs[0]
-    assert run is not None
-    profile = contour_profile(run)
-    gaps = [error is None for error in profile.low_mm]
+    test = busplan.circle_test(changed(small, {"circle.ramp_periods": ramp_periods}))
+    gaps = [radius is None for radius in dial_of(test).inner]
     assert 0 < sum(gaps) < len(gaps)
     # It is one part, about the x axis.
     assert sum(here != after for here, after in pairwise((*gaps, gaps[0]))) == 2
-
-
-def test_what_did_not_go_round_is_not_drawn(small: busplan.Profile) -> None:
-    run = busplan.circle_test(changed(small, {"servo.position_gain_per_s": 30_000.0})).runs[0]
-    assert run is not None
-    assert drawn_profile(run) is None
-    assert drawn_profile(None) is None
+    assert (gaps[0] or gaps[-1], gaps[len(gaps) // 2]) == (True, False)
 
 
 @pytest.mark.parametrize(
@@ -426,7 +419,7 @@ def test_what_did_not_go_round_is_not_drawn(small: busplan.Profile) -> None:
 def test_a_table_that_does_not_go_round_fails(small: busplan.Profile, changes: dict[str, object]) -> None:
     result = only(changed(small, changes))
     assert result.stable
-    (failure,) = (one for one in result.failures if one.name == "circle_not_followed")
+    (failure,) = (failure for failure in result.failures if failure.name == "circle_not_followed")
     assert failure.limit == 360
     assert "did not follow the circle" in failure.text
 
@@ -443,14 +436,14 @@ def test_each_margin_is_the_smaller_one_of_both_axes(small: busplan.Profile) -> 
     x = {"servo.x.position_gain_per_s": 15_000}
     y = {"servo.y.position_gain_per_s": 50, "servo.y.drive_lag_us": 60_000}
     both = only(changed(small, {**x, **y}))
-    one, other = (
+    on_x, on_y = (
         only(changed(small, {key.replace(".x.", ".").replace(".y.", "."): value for key, value in axis.items()}))
         for axis in (x, y)
     )
-    phases, gains = ([getattr(each, name) for each in (one, other)] for name in ("phase_margin_deg", "gain_margin_db"))
+    phases, gains = ([getattr(axis, name) for axis in (on_x, on_y)] for name in ("phase_margin_deg", "gain_margin_db"))
     assert phases.index(min(phases)) != gains.index(min(gains))
     assert (both.phase_margin_deg, both.gain_margin_db) == (min(phases), min(gains))
-    assert both.crossover_hz == (one, other)[phases.index(min(phases))].crossover_hz
+    assert both.crossover_hz == (on_x, on_y)[phases.index(min(phases))].crossover_hz
 
 
 def test_a_short_arc_at_constant_speed_has_no_centre(small: busplan.Profile) -> None:
@@ -469,7 +462,7 @@ def test_a_tolerance_of_g_fails_without_a_whole_turn_and_names_the_way_out(small
     assert (failure.name, failure.value, failure.limit) == ("circular_deviation_mm", None, 1.0)
     assert 'set circle.path = "iso230-4"' in failure.text
     # It is no error of the circle: nothing is to be attacked.
-    assert (to_attack(result), result.contributions) == (None, None)
+    assert (result.to_attack, result.contributions) == (None, None)
     assert only(changed(arc, {"circle.path": "iso230-4"})).failures == ()
 
 
@@ -520,7 +513,7 @@ def test_a_loop_that_does_not_settle_fails_and_its_turn_is_not_measured(small: b
     assert (result.circular_deviation_mm, result.max_contour_error_mm, result.centre_offset_mm) == (None, None, None)
     # Nor is it said how far the table went on it.
     behind = changed(small, {**slow, "servo.integral_gain_per_s2": 0.0, "servo.drive_lag_us": 1e9})
-    assert "not_settled" in (names := [one.name for one in only(behind).failures])
+    assert "not_settled" in (names := [failure.name for failure in only(behind).failures])
     assert "circle_not_followed" not in names
     # The paper's move has no turn to settle for.
     assert only(changed(small, {**slow, "circle.path": "trapezoid"})).settled is None
@@ -564,10 +557,10 @@ def test_a_long_test_says_what_it_costs_before_it_runs(
     long = {"circle.radius_mm": 10_000.0, "servo.step_us": 50.0, "servo.drive_offset_mm_s": 0.1}
     with pytest.raises(StoppedError):
         busplan.circle_test(changed(small, long), contributions=True, progress=stop)
-    (said,) = caplog.messages
+    (message,) = caplog.messages
     # 628,339 set-points, 40 steps each, both axes; the same without each of two sources.
-    assert said.startswith("circle test: 150,801,360 steps, about ")
-    assert said.endswith(("GB", "GB, in plain Python"))
+    assert message.startswith("circle test: 150,801,360 steps, about ")
+    assert message.endswith(("GB", "GB, in plain Python"))
 
 
 def test_the_step_is_the_longest_that_divides_the_period(small: busplan.Profile) -> None:
@@ -583,7 +576,7 @@ def test_a_failure_without_a_value_is_null_and_says_why() -> None:
     test = busplan.circle_test(changed("can-servo-8", {"cycle.period_us": 1000.0}), contributions=True)
     (result,) = test.to_dict()["results"]
     assert "null" in test.to_json()
-    late = {one["name"]: one for one in result["failures"]}
+    late = {failure["name"]: failure for failure in result["failures"]}
     assert late["deadline"]["value"] is None
     assert late["deadline"]["text"] == "sdo-request and 2 more have no worst-case response time"
     assert late["required_us"]["value"] == 2950.0
@@ -598,20 +591,22 @@ def test_a_skew_that_is_too_long_is_refused_at_the_clock_that_is_missing() -> No
     # Twenty devices with frames of their own: the last frame arrives most of a period behind the first.
     changes = {"bus.nodes": 20, "payload.write_bytes": 400, "payload.read_bytes": 1000, "cycle.period_us": 3000.0}
     profile = changed("ethercat-servo-8", {**changes, "bus.distributed_clocks": False})
-    with pytest.raises(BusplanError, match=r"bus\.distributed_clocks = false: the last axis then takes its set-points"):
+    with pytest.raises(
+        busplan.BusplanError, match=r"bus\.distributed_clocks = false: the last axis then takes its set-points"
+    ):
         busplan.circle_test(profile)
-    assert [one.key for one in findings(profile) if one.code == "BP203"] == ["bus.distributed_clocks"]
+    assert [finding.key for finding in findings(profile) if finding.code == "BP203"] == ["bus.distributed_clocks"]
 
 
 @pytest.mark.parametrize("key", ["skew_us", "jitter_us"])
 def test_a_circle_that_is_refused_names_the_key_that_was_set(key: str) -> None:
     found = findings(changed("paper-1ms", {"delivery": {key: 600.0}}))
-    assert [one.key for one in found if one.code == "BP203"] == [f"delivery.{key}"]
+    assert [finding.key for finding in found if finding.code == "BP203"] == [f"delivery.{key}"]
 
 
 def test_what_the_bus_lacks_is_said_of_the_bus_alone() -> None:
     profile = changed("gantry-24", {"limits.reserve": 0.6})
-    assert "safe_required_us" in {one.name for one in busplan.circle_test(profile).results[0].failures}
-    found = {one.code for one in findings(profile)}
+    assert "safe_required_us" in {failure.name for failure in busplan.circle_test(profile).results[0].failures}
+    found = {finding.code for finding in findings(profile)}
     assert "BP114" in found
     assert "BP201" not in found

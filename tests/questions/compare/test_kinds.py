@@ -12,7 +12,6 @@ from busplan.buses import kind_named, kind_names
 from busplan.profile.conversion import converted
 from busplan.profile.kinds import dotted_keys
 from busplan.questions.compare import MachineOnKind, NotOnKind
-from busplan.questions.fit.network import network_of
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, TRANSACTION_KINDS
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
@@ -48,13 +47,13 @@ def on_kind(profile: Profile | str, kind: str | None = None) -> MachineOnKind:
 
 def assert_same_machine(one: Profile, other: Profile) -> None:
     """The nodes in their order, what travels, how they execute, and all that a circle rests on."""
-    assert [each.name for each in other.alike_nodes] == [each.name for each in one.alike_nodes]
-    for mine, its in zip(network_of(one).alike, network_of(other).alike, strict=True):
+    assert [each.name for each in other.node_groups] == [each.name for each in one.node_groups]
+    for mine, its in zip(one.node_groups, other.node_groups, strict=True):
         for kind in TRANSACTION_KINDS:
             size = int(mine.bytes_of(kind))
             assert its.bytes_of(kind) == size
             assert its.node.execution.execution_us(size) == mine.node.execution.execution_us(size)
-    for mine, its in zip(one.alike_nodes, other.alike_nodes, strict=True):
+    for mine, its in zip(one.node_groups, other.node_groups, strict=True):
         assert (mine.nodes, mine.node.axes) == (its.nodes, its.node.axes)
         said, found = mine.node.execution.model_dump(), its.node.execution.model_dump()
         if other.bus.kind != one.bus.kind:  # nobody has measured it on that bus
@@ -118,7 +117,7 @@ def test_the_machine_stays_and_every_key_is_accounted_for(
 ) -> None:
     profile = data.draw(profiles_by_kind[kind])
     for other in kind_names():
-        longest_m = max(getattr(one.node, "cable_m", 0) for one in profile.alike_nodes)
+        longest_m = max(getattr(one.node, "cable_m", 0) for one in profile.node_groups)
         if other == "ieee1394" and longest_m > 4.5:
             with pytest.raises(busplan.BusplanError, match="cable_length_m"):
                 converted(profile, other)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from busplan.buses import time_slice
 from busplan.buses.ieee1394 import equations
 from busplan.elementwise import Traced, choose, plain, total
-from busplan.questions.explain.derivation import formula_of, formula_text, inputs, lines
+from busplan.questions.explain.formula import formula_of, formula_text, inputs, lines
 from busplan.sourced import EQUATIONS, Input
 
 # As the paper prints them, in this program's symbols; hop and the delay of a PHY, which the paper writes out in each,

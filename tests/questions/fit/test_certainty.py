@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import busplan
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS
-from busplan.questions.fit.figures import CapacityFigures, capacity_figures
+from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import network_of
 
 Maker = Callable[..., busplan.Profile]
@@ -28,7 +28,8 @@ def changed(profile: busplan.Profile, changes: dict[str, object]) -> busplan.Pro
 
 
 def of(profile: busplan.Profile, model: str = "standard") -> CapacityFigures:
-    return capacity_figures(network_of(profile), model=model)
+    (figures,) = busplan.capacity(profile, timing_model=model).results
+    return figures
 
 
 def with_fixed_execution(profile: busplan.Profile, execution_us: float, **changes: Any) -> busplan.Profile:
@@ -163,7 +164,7 @@ def _drawn_us(profile: busplan.Profile) -> NDArray[np.float64]:
     (group,) = network.groups
     own: Any = profile
     cycle: Any = network.bus.cycle(network, model="standard")
-    halves = profile.alike_nodes[0].nodes * (3 if own.node.write_response == "unified" else 4) + own.cycle.retries
+    halves = profile.node_groups[0].nodes * (3 if own.node.write_response == "unified" else 4) + own.cycle.retries
     gap_term_us = 2 * (63 - cycle.figures()["gap_count"]) / 98.304
     normal = random.standard_normal
     uniform = random.uniform(-1, 1, draws)
@@ -212,7 +213,7 @@ def test_no_faster_node_and_no_shorter_cable_makes_a_verdict_worse(
 ) -> None:
     profile = changed(data.draw(any_profile), {"node.execution.uncertainty_us": 0.5})
     before = of(profile)
-    execution: Any = profile.alike_nodes[0].node.execution
+    execution: Any = profile.node_groups[0].node.execution
     share = data.draw(st.floats(0.0, 1.0))
     faster = of(changed(profile, {"node.execution.base_us": execution.base_us * share}))
     shorter = of(changed(profile, {"bus.cable_length_m": profile.bus.cable_length_m * max(share, 0.01)}))

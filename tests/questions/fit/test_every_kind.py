@@ -15,7 +15,7 @@ from busplan.elementwise import Traced, plain
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.sources import shipped_names
 from busplan.questions.fit.certainty import FITS, certainty, deciding_cycle, limits_to_be_safe, limits_with_time
-from busplan.questions.fit.figures import figures, largest_nodes, safe_nodes
+from busplan.questions.fit.figures import figures, node_counts
 from busplan.questions.fit.network import changed, model_names, network_of
 
 Profiles = Mapping[str, st.SearchStrategy[busplan.Profile]]
@@ -116,10 +116,11 @@ def test_of_the_most_nodes_no_limit_is_broken_and_one_more_breaks_it(
     network = network_of(data.draw(profiles_by_kind[kind]))
     for model in model_names(network):
         limits = {limit.key: limit for limit in limits_with_time(network, model=model)}
-        count, limit = largest_nodes(network, model=model)
+        (count,) = node_counts(network, model=model)
         # Once broken, a limit stays broken: of any number, these two decide.
-        assert count == 0 or not any(one.is_broken(network.with_nodes(count)) for one in limits.values())
-        assert limits[limit].is_broken(network.with_nodes(count + 1))
+        most = network.with_nodes(count.max_nodes)
+        assert count.max_nodes == 0 or not any(limit.is_broken(most) for limit in limits.values())
+        assert limits[count.limited_by].is_broken(network.with_nodes(count.max_nodes + 1))
 
 
 @KINDS
@@ -157,14 +158,16 @@ def test_the_safe_nodes_are_safe_and_one_more_is_not(
     network = network_of(data.draw(profiles_by_kind[kind]))
 
     def is_safe(nodes: int) -> bool:
-        one = figures(changed(network, {"bus.nodes": nodes}), model=network.bus.deciding_model)
-        return one.verdict == FITS and one.safe
+        then = figures(changed(network, {"bus.nodes": nodes}), model=network.bus.deciding_model)
+        return then.verdict == FITS and then.safe
 
-    count, limit = safe_nodes(network)
-    assert count == 0 or is_safe(count)
-    assert not is_safe(count + 1)
-    (broken,) = (one for one in limits_to_be_safe(network) if one.key == limit)
-    assert broken.is_broken(network.with_nodes(count + 1))
+    (count,) = node_counts(network, model=network.bus.deciding_model)
+    most = count.safe_nodes
+    assert most is not None
+    assert most == 0 or is_safe(most)
+    assert not is_safe(most + 1)
+    (broken,) = (limit for limit in limits_to_be_safe(network) if limit.key == count.safe_limited_by)
+    assert broken.is_broken(network.with_nodes(most + 1))
 
 
 @KINDS

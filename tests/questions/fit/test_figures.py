@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from fractions import Fraction
+from functools import partial
 from math import fsum
 
 import pytest
@@ -9,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.questions.fit.figures import CapacityFigures, capacity_figures, largest_nodes
-from busplan.questions.fit.network import at_period, model_names, network_of
+from busplan.questions.fit.figures import CapacityFigures
 
 Make = Callable[..., busplan.Profile]
 Exact = Callable[[busplan.Profile, str, int], Fraction]
@@ -32,39 +32,43 @@ def test_max_nodes_is_the_largest_that_fits_in_exact_arithmetic(
     around: Around,
 ) -> None:
     profile = data.draw(any_profile)
-    model = data.draw(st.sampled_from(model_names(network_of(profile))))
     limit = {"S100": 512, "S200": 1024, "S400": 2048}[profile.bus.speed]
     available = Fraction(profile.cycle.slice_ratio) * Fraction(profile.cycle.period_us)
 
-    def good(nodes: int) -> bool:
+    largest_bytes = max(profile.node_groups[0].bytes_of(kind) for kind in ("read", "write"))
+
+    def good(nodes: int, model: str) -> bool:
         hops = nodes if profile.bus.max_hops is None else profile.bus.max_hops
         # A float's rounding in the product of two floats is no reason to refuse an exact fit.
         return (
-            bool(network_of(profile).largest_payload_bytes <= limit)
+            bool(largest_bytes <= limit)
             and hops <= 16
             and carries(profile, nodes)
             and start(profile, nodes) <= 124
             and exact(profile, model, nodes) <= available * (1 + Fraction(1, 10**12))
         )
 
-    found, _ = largest_nodes(network_of(profile), model=model)
-    assert around(found, good) == [found][:found]
+    for figures in busplan.capacity(profile).results:
+        most = figures.max_nodes
+        assert most is not None
+        assert around(most, partial(good, model=figures.timing_model)) == [most][:most]
 
 
-@given(data=st.data(), model=MODELS, nodes=st.integers(1, 62))
+@given(data=st.data(), nodes=st.integers(1, 62))
 def test_a_cycle_that_fits_exactly_fits(
-    data: st.DataObject, model: str, nodes: int, any_profile: st.SearchStrategy[busplan.Profile]
+    data: st.DataObject, nodes: int, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
-    network = network_of(data.draw(any_profile))
-    required_us = network.bus.cycle(network.with_nodes(nodes), model=model).required_us
-    exact_us = required_us / network.slice_ratio
-    found, limit = largest_nodes(at_period(network, exact_us), model=model)
-    if limit == "time":
+    profile = busplan.load_profile(data.draw(any_profile), changes={"bus.nodes": nodes})
+    for figures in busplan.capacity(profile).results:
+        exact_us = figures.required_us / profile.cycle.slice_ratio
+        at, below = busplan.capacity(
+            profile, period_us=[exact_us, exact_us * (1 - 1e-9)], timing_model=figures.timing_model
+        ).results
+        assert at.max_nodes is not None
+        assert below.max_nodes is not None
         # One node more needs at least the time of its transactions: nothing rounds up to it.
-        assert found == nodes
-    else:
-        assert found <= nodes
-    assert largest_nodes(at_period(network, exact_us * (1 - 1e-9)), model=model)[0] < nodes
+        assert at.max_nodes == nodes if at.limited_by == "time" else at.max_nodes <= nodes
+        assert below.max_nodes < nodes
 
 
 @given(data=st.data())
@@ -72,9 +76,10 @@ def test_required_time_equals_the_exact_one(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile], exact: Exact
 ) -> None:
     profile = data.draw(any_profile)
-    model = data.draw(st.sampled_from(model_names(network_of(profile))))
-    (found,) = busplan.capacity(profile, timing_model=model).results
-    assert found.required_us == pytest.approx(float(exact(profile, model, profile.alike_nodes[0].nodes)), rel=1e-13)
+    nodes = profile.node_groups[0].nodes
+    for figures in busplan.capacity(profile).results:
+        expected_us = float(exact(profile, figures.timing_model, nodes))
+        assert figures.required_us == pytest.approx(expected_us, rel=1e-13)
 
 
 @given(data=st.data())
@@ -82,8 +87,7 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
-    model = data.draw(st.sampled_from(model_names(network_of(profile))))
-    (found,) = busplan.capacity(profile, timing_model=model).results
+    found = data.draw(st.sampled_from(busplan.capacity(profile).results))
     assert fsum(term.us for term in found.terms) == pytest.approx(found.required_us, rel=1e-12)
     assert {term.key: found.own[term.key] for term in found.terms} == {term.key: term.us for term in found.terms}
     assert found.required_time_slice_us * found.nodes == pytest.approx(found.required_us, rel=1e-13)
@@ -93,14 +97,14 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     assert ("time" in found.exceeded) == (found.margin_us < 0)
     assert found.margin_us == pytest.approx(found.available_us - found.required_us, abs=1e-9 * found.required_us)
     assert found.utilisation == pytest.approx(found.required_us / found.available_us)
-    assert found.max_axes == profile.alike_nodes[0].node.axes * found.max_nodes
-    assert found.axes == profile.alike_nodes[0].node.axes * found.nodes
+    assert found.max_axes == profile.node_groups[0].node.axes * found.max_nodes
+    assert found.axes == profile.node_groups[0].node.axes * found.nodes
     assert found.time_slice_us * found.nodes == pytest.approx(found.available_us)
     assert values["gaps_us"] == pytest.approx(values["subaction_gap_us"] + values["arbitration_reset_gap_us"])
     assert found.min_period_us is not None
     assert found.min_period_us * profile.cycle.slice_ratio == pytest.approx(found.required_us)
     assert found.min_slice_ratio * profile.cycle.period_us == pytest.approx(found.required_us)
-    if model == "paper":
+    if found.timing_model == "paper":
         assert {found.bias_us, found.safe_required_us, found.safe_nodes, found.verdict, found.doubts} == {None, ()}
         return
     assert found.bias_us is not None
@@ -111,24 +115,24 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     shown_us = found.required_us + found.bias_us + (found.uncertainty_us or 0)
     assert found.safe_required_us == pytest.approx(shown_us)
     assert found.safe_min_period_us == pytest.approx(found.safe_required_us / profile.cycle.slice_ratio)
-    assert found.safe_axes == profile.alike_nodes[0].node.axes * found.safe_nodes
+    assert found.safe_axes == profile.node_groups[0].node.axes * found.safe_nodes
     assert (found.verdict == "fits" and found.safe) == (found.nodes <= found.safe_nodes)
 
 
-@given(data=st.data(), model=MODELS)
+@given(data=st.data())
 def test_the_smallest_period_fits_and_nothing_below_it(
-    data: st.DataObject, model: str, any_profile: st.SearchStrategy[busplan.Profile]
+    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
-    network = network_of(data.draw(any_profile))
-    smallest_us = capacity_figures(network, model=model).min_period_us
-    assert smallest_us is not None
-    at, below = (
-        capacity_figures(at_period(network, period_us), model=model)
-        for period_us in (smallest_us, smallest_us * (1 - 1e-9))
-    )
-    assert "time" not in at.exceeded
-    assert at.margin_us == pytest.approx(0.0, abs=1e-9 * at.required_us)
-    assert "time" in below.exceeded
+    profile = data.draw(any_profile)
+    for figures in busplan.capacity(profile).results:
+        smallest_us = figures.min_period_us
+        assert smallest_us is not None
+        at, below = busplan.capacity(
+            profile, period_us=[smallest_us, smallest_us * (1 - 1e-9)], timing_model=figures.timing_model
+        ).results
+        assert "time" not in at.exceeded
+        assert at.margin_us == pytest.approx(0.0, abs=1e-9 * at.required_us)
+        assert "time" in below.exceeded
 
 
 GROWING = {
@@ -152,10 +156,9 @@ def test_max_nodes_never_grows_with_what_costs_time(
     key: str, data: st.DataObject, model: str, period_us: float, make: Make
 ) -> None:
     small, large = sorted((data.draw(GROWING[key]), data.draw(GROWING[key])))
-    few, many = (
-        largest_nodes(network_of(make(cycle__period_us=period_us, **{key: value})), model=model)[0]
-        for value in (large, small)
-    )
+    few, many = (only(make(cycle__period_us=period_us, **{key: value}), model).max_nodes for value in (large, small))
+    assert few is not None
+    assert many is not None
     assert few <= many
 
 
@@ -167,13 +170,13 @@ def test_a_payload_of_exactly_a_quadlet_is_cheaper_than_a_smaller_one(make: Make
     assert quadlet < small
 
 
-@given(data=st.data(), model=MODELS, periods=st.lists(st.floats(1, 50_000), min_size=2, max_size=2))
+@given(data=st.data(), periods=st.lists(st.floats(1, 50_000), min_size=2, max_size=2))
 def test_max_nodes_never_shrinks_with_the_period(
-    data: st.DataObject, model: str, periods: list[float], any_profile: st.SearchStrategy[busplan.Profile]
+    data: st.DataObject, periods: list[float], any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
-    network = network_of(data.draw(any_profile))
-    few, many = (largest_nodes(at_period(network, period_us), model=model)[0] for period_us in sorted(periods))
-    assert few <= many
+    shorter, longer = busplan.capacity(data.draw(any_profile), period_us=sorted(periods)).periods
+    for few, many in zip(shorter, longer, strict=True):
+        assert (few.max_nodes or 0) <= (many.max_nodes or 0)
 
 
 def only(profile: busplan.Profile, model: str = "standard") -> CapacityFigures:

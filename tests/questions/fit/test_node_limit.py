@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.limits import Bound, Limit
+from busplan.buses.limits import Limit
 from busplan.buses.network import Network
 from busplan.elementwise import Number, choose, rounded_up
 from busplan.questions.fit.figures import most_nodes
@@ -27,7 +27,7 @@ def limit_of(form: str, most: Number, is_slow: bool, *, less: Number = 0) -> Lim
     def value(network: Network) -> Number:
         return FORMS[form](network.nodes) - less
 
-    return Limit(form, "", Bound(value, lambda _network: most), is_slow=is_slow)
+    return Limit(form, "", value, lambda _network: most, is_slow=is_slow)
 
 
 limits = st.lists(st.tuples(st.sampled_from(list(FORMS)), st.integers(-1, 120), st.booleans()), min_size=1, max_size=5)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan.errors import BusplanError
 from busplan.questions.import_ import ImportAnswer
-from busplan.recordings.can import event_model
+from busplan.recordings.can_timing import event_model
 from tests.oracles.can_recording import Logged, Queued, arbitrated, bits_of, candump
 
 Run = Callable[..., Any]

@@ -230,7 +230,7 @@ def test_a_second_pdo_goes_where_the_profile_can_say_it(case: str, tmp_path: Pat
     path = tmp_path / "axis.dcf"
     path.write_text(text, encoding="utf-8")
     profile: Any = busplan.import_profile(path).profile
-    assert profile.alike_nodes[0].bytes_of("read") == size
+    assert profile.node_groups[0].bytes_of("read") == size
     assert (profile.group[0].feedback_pdos == (first, second)) is (size == 10)
     found = [(each.identifier, each.payload_bytes, each.period_us) for each in profile.message]
     assert [each for each in found if each[0] != 0x705] == messages

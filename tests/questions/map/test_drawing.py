@@ -6,14 +6,9 @@ from typing import Any
 import pytest
 
 import busplan
-from busplan.forms import terminal
-from busplan.forms.charts import ChartCell, ChartGrid, legend
-from busplan.forms.inks import INKS
-from busplan.questions.map import MapAnswer, NotDrawn
-from busplan.questions.map.report import LOOKS
 
 MAPS: dict[str, tuple[str, Any, Any]] = {
-    "shown": ("paper-4ms", {}, {}),
+    "default": ("paper-4ms", None, None),
     "gaps": ("paper-4ms", {"bus.gap_count": range(7, 71)}, {"bus.nodes": range(5)}),
     "words": ("paper-4ms", {"bus.gap_count": [5, 7, 63, "optimal"]}, {"bus.speed": ["S100", "S400"]}),
     "holes": ("paper-4ms", {"axes": range(1, 17)}, {"node.axes": [1, 2, 3, 4]}),
@@ -23,90 +18,81 @@ EVERY = pytest.mark.parametrize("name", MAPS)
 
 
 @cache
-def mapped(name: str) -> MapAnswer:
+def mapped(name: str) -> busplan.MapAnswer:
     profile, x, y = MAPS[name]
-    return busplan.map_(profile, x=x or None, y=y or None)
+    return busplan.map_(profile, x=x, y=y)
 
 
-def grid_of(name: str) -> ChartGrid:
-    (panel,) = mapped(name).drawing().panels
-    assert isinstance(panel.plot, ChartGrid)
+def grid_of(answer: busplan.MapAnswer) -> Any:
+    (panel,) = answer.drawing().panels
     return panel.plot
 
 
-def text_of(name: str, width: int = 80) -> list[str]:
-    return terminal.text(mapped(name).report(), width=width).splitlines()
+def lines_of(name: str) -> list[str]:
+    return str(mapped(name)).splitlines()
 
 
 @EVERY
-def test_each_cell_has_the_look_of_its_state_and_says_its_setting(name: str) -> None:
-    found, grid = mapped(name), grid_of(name)
-    marks = {entry.mark: entry.words for entry in grid.legend}
+def test_each_cell_has_the_mark_of_its_state_and_says_its_setting(name: str) -> None:
+    answer = mapped(name)
+    grid = grid_of(answer)
+    meanings = {entry.mark: entry.words for entry in grid.legend}
     tips = []
-    for row, cells in zip(found.rows, grid.rows, strict=True):
-        for setting, cell in zip(row, cells, strict=True):
-            assert (cell is None) == isinstance(setting, NotDrawn)
-            if cell is not None and not isinstance(setting, NotDrawn):
-                assert marks[cell.mark].startswith(setting.state.replace("unsafe", "unsafe gap count"))
-                assert cell.ink == LOOKS[setting.state].ink or cell.ink == "barred"
+    for settings, cells in zip(answer.rows, grid.rows, strict=True):
+        for setting, cell in zip(settings, cells, strict=True):
+            assert (cell is None) == (setting in answer.not_drawn)
+            if isinstance(setting, type(answer.cells[0])):
+                assert meanings[cell.mark].startswith(setting.state.replace("unsafe", "unsafe gap count"))
                 tips.append(cell.words)
-    assert len(set(tips)) == len(tips) == len(found.cells)
+    assert len(set(tips)) == len(tips) == len(answer.cells)
 
 
 @EVERY
 def test_the_legend_explains_every_mark_once_and_this_design(name: str) -> None:
-    entries = legend(mapped(name).drawing().panels)
-    cells = {cell for row in grid_of(name).rows for cell in row if isinstance(cell, ChartCell)}
-    assert sorted(entry.mark for entry in entries if entry.mark) == sorted({cell.mark for cell in cells})
-    words = [entry.words for entry in entries]
-    assert ("blank: cannot exist" in words) == bool(mapped(name).not_drawn)
-    assert ("this design" in words) == (mapped(name).own is not None)
+    answer = mapped(name)
+    grid = grid_of(answer)
+    marks = {cell.mark for row in grid.rows for cell in row if cell is not None}
+    assert sorted(entry.mark for entry in grid.legend if entry.mark) == sorted(marks)
+    words = [entry.words for entry in grid.legend]
+    assert ("blank: cannot exist" in words) == bool(answer.not_drawn)
+    assert ("this design" in words) == (answer.design is not None)
 
 
 @EVERY
-def test_in_characters_it_fits_its_width_in_ascii(name: str) -> None:
-    for width in (80, 100, 200):
-        lines = text_of(name, width)
-        drawn = [line for line in lines if line.endswith("|")]
-        assert len(drawn) == len(mapped(name).rows)
-        assert max(map(len, drawn)) <= width
-        assert all(line.isascii() for line in lines)
+def test_in_characters_it_fits_80_columns_in_ascii(name: str) -> None:
+    lines = lines_of(name)
+    drawn = [line for line in lines if line.endswith("|")]
+    assert len(drawn) == len(mapped(name).rows)
+    assert max(map(len, drawn)) <= 80
+    assert all(line.isascii() for line in lines)
 
 
 def test_the_longest_labels_and_the_most_cells_fit_80_columns() -> None:
-    found = busplan.map_(
+    answer = busplan.map_(
         "paper-4ms", x={"bus.nodes": range(1, 65)}, y={"node.execution.worst_extra_us": [0.0000123456789, 1234.56789]}
     )
-    assert max(len(line) for line in str(found).splitlines() if line.endswith("|")) <= 80
+    assert max(len(line) for line in str(answer).splitlines() if line.endswith("|")) <= 80
 
 
-def test_states_differ_in_more_than_colour() -> None:
-    assert len({look.mark for look in LOOKS.values()}) == len(LOOKS)
-    assert len({INKS[look.ink] for look in LOOKS.values()}) == len(LOOKS)
-
-
-def test_limits_that_no_time_helps_have_letters_of_their_own() -> None:
-    entries = {entry.mark: entry.words for entry in grid_of("crowded").legend}
+def test_limits_where_no_period_helps_have_letters() -> None:
+    entries = {entry.mark: entry.words for entry in grid_of(mapped("crowded")).legend}
     assert entries == {"#": "fits", "h": "does not fit: hops", "n": "does not fit: nodes and hops", "": "this design"}
 
 
 def test_this_design_is_framed_and_marked_in_characters() -> None:
-    grid = grid_of("shown")
-    assert grid.own is not None
-    column, row = map(int, grid.own)
-    cell = grid.rows[row][column]
-    assert cell is not None
-    assert cell.words == "8 axes, period 4 ms: fits"
-    lines = text_of("shown")
-    (own,) = [line for line in lines if line.startswith("> ")]
-    assert own.startswith(">   4 ms | # [#] #")
+    grid = grid_of(mapped("default"))
+    column, row = grid.own
+    assert grid.rows[row][column].words == "8 axes, period 4 ms: fits"
+    lines = lines_of("default")
+    (design,) = [line for line in lines if line.startswith("> ")]
+    assert design.startswith(">   4 ms | # [#] #")
     (pointer,) = [line for line in lines if line.strip() == "^"]
-    assert own[pointer.index("^")] == "#"
+    assert design[pointer.index("^")] == "#"
     assert lines[lines.index(pointer) + 1][pointer.index("^")] == "8"
 
 
 def test_values_stand_below_their_columns() -> None:
-    lines = text_of("words")
+    lines = lines_of("words")
     (row,) = [line for line in lines if line.startswith("> ")]
     below = lines[lines.index(row) + 3]
     assert below.split() == ["5", "7", "63", "optimal"]
@@ -118,9 +104,9 @@ def test_values_stand_below_their_columns() -> None:
     [([500, 1000, 1500], "period"), ([500, 1000, 4000], "period in unequal steps"), ([500], "period")],
 )
 def test_rows_have_equal_steps_or_say_that_they_do_not(periods_us: list[int], label: str) -> None:
-    found = busplan.map_("paper-4ms", x={"axes": [4, 8]}, y={"cycle.period_us": periods_us})
-    (panel,) = found.drawing().panels
-    assert isinstance(panel.plot, ChartGrid)
-    assert (panel.plot.up.label, panel.plot.across.label) == (label, "axes (bus.nodes)")
-    assert ("period against axes (bus.nodes), in unequal steps" in str(found)) == ("unequal" in label)
-    assert (grid_of("words").up.label, grid_of("words").across.label) == ("bus.speed", "bus.gap_count")
+    answer = busplan.map_("paper-4ms", x={"axes": [4, 8]}, y={"cycle.period_us": periods_us})
+    grid = grid_of(answer)
+    assert (grid.up.label, grid.across.label) == (label, "axes (bus.nodes)")
+    assert ("period against axes (bus.nodes), in unequal steps" in str(answer)) == ("unequal" in label)
+    words = grid_of(mapped("words"))
+    assert (words.up.label, words.across.label) == ("bus.speed", "bus.gap_count")

@@ -62,6 +62,6 @@ def test_the_document_has_every_cell_and_what_is_not_drawn() -> None:
         (4, 4000, "fits"),
         (8, 4000, "fits"),
     ]
-    assert [(one["axes"], one["cycle.period_us"]) for one in document["not_drawn"]] == [(6, 500), (6, 4000)]
+    assert [(setting["axes"], setting["cycle.period_us"]) for setting in document["not_drawn"]] == [(6, 500), (6, 4000)]
     assert document["design"] == document["cells"][3]
     assert sum(region["cells"] for region in document["regions"]) == 4

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.questions.map import Cell, NotDrawn
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 
 AXES, PERIOD, TIME = "axes", "cycle.period_us", "time"
+SHORTEST_US, LONGEST_US = 1e-3, 1e9
+"""Ends of a period."""
 PAPER = busplan.load_profile("paper-4ms")
 VALUES: dict[str, st.SearchStrategy[Any]] = {
     AXES: st.integers(0, 90),
@@ -32,36 +32,44 @@ def at(profile: busplan.Profile, changes: dict[str, Any]) -> busplan.Profile | N
     """The profile with other values, a number of axes among them; None if there is none."""
     axes = changes.pop(AXES, None)
     try:
-        found = busplan.load_profile(profile, changes=changes)
+        changed = busplan.load_profile(profile, changes=changes)
         if axes is None:
-            return found
-        (alike,) = found.alike_nodes
-        nodes, rest = divmod(axes, alike.node.axes)
-        return None if rest else busplan.load_profile(found, changes={"bus.nodes": nodes})
+            return changed
+        (group,) = changed.node_groups
+        nodes, rest = divmod(axes, group.node.axes)
+        return None if rest else busplan.load_profile(changed, changes={"bus.nodes": nodes})
     except busplan.BusplanError:
         return None
 
 
-def assert_cells_are_those_of_capacity(found: busplan.MapAnswer, *, step: int = 1) -> None:
+def is_drawn(cell: Any) -> bool:
+    return hasattr(cell, "state")
+
+
+def assert_cells_are_those_of_capacity(answer: busplan.MapAnswer, *, step: int = 1) -> None:
     """Each cell, or one in so many."""
-    columns = len(found.x.values)
-    assert [len(row) for row in found.rows] == [columns] * len(found.y.values)
-    for place, (y, x) in islice(enumerate(product(found.y.values, found.x.values)), 0, None, step):
-        cell = found.rows[place // columns][place % columns]
-        wanted = at(found.profile, {found.x.key: x, found.y.key: y})
+    columns = len(answer.x.values)
+    assert [len(row) for row in answer.rows] == [columns] * len(answer.y.values)
+    for place, (y, x) in islice(enumerate(product(answer.y.values, answer.x.values)), 0, None, step):
+        cell: Any = answer.rows[place // columns][place % columns]
+        wanted = at(answer.profile, {answer.x.key: x, answer.y.key: y})
         assert (cell.x, cell.y) == (x, y)
         if wanted is None:
-            assert isinstance(cell, NotDrawn)
-            assert cell.reason
+            assert cell in answer.not_drawn
             continue
-        assert isinstance(cell, Cell), cell
-        (one,) = busplan.capacity(wanted, timing_model="standard").results
-        assert (cell.nodes, cell.axes, cell.verdict, cell.is_safe) == (one.nodes, one.axes, one.verdict, one.safe)
-        assert repr(cell.margin_corrected_us) == repr(one.margin_corrected_us)
-        assert repr(cell.uncertainty_us) == repr(one.uncertainty_us)
-        assert cell.binding_term == one.binding_term
-        assert cell.state == (one.verdict if one.safe or one.verdict == "does not fit" else "unsafe")
-        broken = tuple(key for key in one.exceeded if key != TIME)
+        assert is_drawn(cell), cell
+        (figures,) = busplan.capacity(wanted, timing_model="standard").results
+        assert (cell.nodes, cell.axes, cell.verdict, cell.is_safe) == (
+            figures.nodes,
+            figures.axes,
+            figures.verdict,
+            figures.safe,
+        )
+        assert repr(cell.margin_corrected_us) == repr(figures.margin_corrected_us)
+        assert repr(cell.uncertainty_us) == repr(figures.uncertainty_us)
+        assert cell.binding_term == figures.binding_term
+        assert cell.state == (figures.verdict if figures.safe or figures.verdict == "does not fit" else "unsafe")
+        broken = tuple(key for key in figures.exceeded if key != TIME)
         limits = {
             "fits": (),
             "unsafe": ("gap table",),
@@ -78,11 +86,11 @@ def test_every_cell_is_what_capacity_says(data: st.DataObject, any_profile: st.S
     keys = data.draw(pairs.filter(lambda two: set(two) != {AXES, "bus.nodes"}))
     x, y = ({key: data.draw(st.lists(VALUES[key], min_size=1, max_size=4, unique=True))} for key in keys)
     try:
-        found = busplan.map_(profile, x=x, y=y)
+        answer = busplan.map_(profile, x=x, y=y)
     except busplan.BusplanError as error:
         assert str(error).startswith("no setting of this map can exist: ")  # noqa: PT017 - others are failures
         return
-    assert_cells_are_those_of_capacity(found)
+    assert_cells_are_those_of_capacity(answer)
 
 
 @settings(max_examples=12)
@@ -91,27 +99,27 @@ def test_the_default_map_has_this_design_and_a_longer_period_never_hurts(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
-    found = busplan.map_(profile)
-    assert (found.x.key, found.y.key) == (AXES, PERIOD)
-    assert found.own is not None
-    (nodes,) = profile.alike_nodes
-    assert (found.own.x, found.own.y) == (nodes.nodes * nodes.node.axes, profile.cycle.period_us)
-    assert max(len(found.x.values), len(found.y.values)) <= 24
-    assert list(found.y.values) == sorted(set(found.y.values))
-    assert not found.not_drawn
-    for column in range(len(found.x.values)):
-        fits = [row[column].verdict == "fits" for row in found.rows if isinstance(row[column], Cell)]  # type: ignore[union-attr]
+    answer = busplan.map_(profile)
+    assert (answer.x.key, answer.y.key) == (AXES, PERIOD)
+    assert answer.design is not None
+    (nodes,) = profile.node_groups
+    assert (answer.design.x, answer.design.y) == (nodes.nodes * nodes.node.axes, profile.cycle.period_us)
+    assert max(len(answer.x.values), len(answer.y.values)) <= 24
+    assert list(answer.y.values) == sorted(set(answer.y.values))
+    assert not answer.not_drawn
+    for x in answer.x.values:
+        fits = [cell.verdict == "fits" for cell in answer.cells if cell.x == x]
         assert fits == sorted(fits)
-    assert_cells_are_those_of_capacity(found, step=7)
+    assert_cells_are_those_of_capacity(answer, step=7)
 
 
 @pytest.mark.parametrize("name", ["paper-4ms", "paper-1ms", "paper-dma", "paper-optimal-gap", "paper-two-node"])
 def test_the_edge_of_what_fits_is_in_the_picture(name: str) -> None:
-    found = busplan.map_(busplan.load_profile(name))
-    assert {cell.state for cell in found.cells} >= {"fits", "not shown to fit", "does not fit"}
-    assert {cell.state for cell in found.cells if cell.y == found.profile.cycle.period_us} >= {"fits", "does not fit"}
-    assert found.regions[0].state == "fits"
-    assert sum(region.cells for region in found.regions) == len(found.cells)
+    answer = busplan.map_(busplan.load_profile(name))
+    assert {cell.state for cell in answer.cells} >= {"fits", "not shown to fit", "does not fit"}
+    assert {cell.state for cell in answer.cells if cell.y == answer.profile.cycle.period_us} >= {"fits", "does not fit"}
+    assert answer.regions[0].state == "fits"
+    assert sum(region.cells for region in answer.regions) == len(answer.cells)
 
 
 @pytest.mark.parametrize(
@@ -120,28 +128,28 @@ def test_the_edge_of_what_fits_is_in_the_picture(name: str) -> None:
         ({"bus.gap_count": 13}, {"fits", "not shown to fit", "unsafe", "does not fit"}),
         ({"bus.nodes": 900, "bus.max_hops": 3}, {"fits", "not shown to fit", "does not fit"}),
         ({"bus.nodes": 1_000_000}, {"fits", "does not fit"}),
-        ({"cycle.period_us": MIN_STEP_US}, {"fits", "does not fit"}),
-        ({"cycle.period_us": MAX_TIME_US}, {"fits", "not shown to fit", "does not fit"}),
+        ({"cycle.period_us": SHORTEST_US}, {"fits", "does not fit"}),
+        ({"cycle.period_us": LONGEST_US}, {"fits", "not shown to fit", "does not fit"}),
         ({"cycle.slice_ratio": 1e-6}, {"fits", "does not fit"}),
-        ({"cycle.nonperiodic_us": MAX_TIME_US}, {"does not fit"}),
+        ({"cycle.nonperiodic_us": LONGEST_US}, {"does not fit"}),
         ({"limits.reserve": 0.99}, {"fits", "not shown to fit"}),
     ],
 )
 def test_a_strange_design_has_a_map_with_its_edge_too(changes: dict[str, object], states: set[str]) -> None:
-    found = busplan.map_(busplan.load_profile(PAPER, changes=changes))
-    assert found.own is not None
-    assert {cell.state for cell in found.cells} == states
-    assert max(len(found.x.values), len(found.y.values)) <= 24
+    answer = busplan.map_(busplan.load_profile(PAPER, changes=changes))
+    assert answer.design is not None
+    assert {cell.state for cell in answer.cells} == states
+    assert max(len(answer.x.values), len(answer.y.values)) <= 24
 
 
 def test_a_number_of_axes_that_no_nodes_have_is_not_drawn() -> None:
-    found = busplan.map_(PAPER, x={AXES: range(1, 9)}, y={"node.axes": (2, 3, 4)})
-    drawn = [[isinstance(cell, Cell) for cell in row] for row in found.rows]
+    answer = busplan.map_(PAPER, x={AXES: range(1, 9)}, y={"node.axes": (2, 3, 4)})
+    drawn = [[is_drawn(cell) for cell in row] for row in answer.rows]
     assert drawn == [[axes % each == 0 for axes in range(1, 9)] for each in (2, 3, 4)]
-    assert found.not_drawn[0].reason == "axes = 1: no whole number of nodes, with 2 axes each"
+    assert answer.not_drawn[0].reason == "axes = 1: no whole number of nodes, with 2 axes each"
     turned = busplan.map_(PAPER, x={"node.axes": (2, 3, 4)}, y={AXES: range(1, 9)})
-    assert [[isinstance(cell, Cell) for cell in row] for row in turned.rows] == [
-        list(one) for one in zip(*drawn, strict=True)
+    assert [[is_drawn(cell) for cell in row] for row in turned.rows] == [
+        list(column) for column in zip(*drawn, strict=True)
     ]
 
 
@@ -149,26 +157,30 @@ GANTRY = busplan.load_profile("gantry-24")
 
 
 def test_of_unlike_nodes_the_axes_are_by_the_group_that_has_the_most() -> None:
-    found = busplan.map_(GANTRY)
-    assert found.own is not None
-    assert (found.own.x, found.own.y, found.own.nodes) == (24, 1000, 6)
+    answer = busplan.map_(GANTRY)
+    assert answer.design is not None
+    assert (answer.design.x, answer.design.y, answer.design.nodes) == (24, 1000, 6)
     # Four axes of the tool beside five of each drive.
-    assert found.x.values == tuple(4 + 5 * nodes for nodes in range(1, 17))
-    assert {cell.state for cell in found.cells} == {"fits", "not shown to fit", "does not fit"}
-    for cell in found.cells[::7]:
+    assert answer.x.values == tuple(4 + 5 * nodes for nodes in range(1, 17))
+    assert {cell.state for cell in answer.cells} == {"fits", "not shown to fit", "does not fit"}
+    for cell in answer.cells[::7]:
         changes: dict[str, object] = {"group.drives.nodes": (int(cell.x) - 4) // 5, PERIOD: cell.y}
-        (one,) = busplan.capacity(busplan.load_profile(GANTRY, changes=changes), timing_model="standard").results
-        assert (cell.axes, cell.verdict, cell.margin_corrected_us) == (one.axes, one.verdict, one.margin_corrected_us)
+        (figures,) = busplan.capacity(busplan.load_profile(GANTRY, changes=changes), timing_model="standard").results
+        assert (cell.axes, cell.verdict, cell.margin_corrected_us) == (
+            figures.axes,
+            figures.verdict,
+            figures.margin_corrected_us,
+        )
 
 
 def test_groups_are_directions_too() -> None:
-    found = busplan.map_(GANTRY, x={AXES: (8, 9, 18, 24)}, y={"group.tool.axes": (3, 4)})
-    assert [[isinstance(cell, Cell) for cell in row] for row in found.rows] == [
+    answer = busplan.map_(GANTRY, x={AXES: (8, 9, 18, 24)}, y={"group.tool.axes": (3, 4)})
+    assert [[is_drawn(cell) for cell in row] for row in answer.rows] == [
         [True, False, True, False],
         [False, True, False, True],
     ]
-    assert found.not_drawn[0].reason == "axes = 9: no whole number of nodes, with 5 axes each beside 3 others"
-    assert found.own_place == (1, 3)
+    assert answer.not_drawn[0].reason == "axes = 9: no whole number of nodes, with 5 axes each beside 3 others"
+    assert answer.design_place == (1, 3)
     with pytest.raises(busplan.BusplanError, match=r"both vary group\.drives\.nodes"):
         busplan.map_(GANTRY, x={AXES: (24,)}, y={"group.drives.nodes": (1, 2)})
     with pytest.raises(busplan.BusplanError, match=r"x bus\.nodes: "):
@@ -178,22 +190,22 @@ def test_groups_are_directions_too() -> None:
 def test_nodes_without_axes_are_counted_themselves() -> None:
     sizes = {f"group.{name}.{kind}_bytes": 8 for name in ("drives", "tool") for kind in ("read", "write")}
     still = busplan.load_profile(GANTRY, changes={"group.drives.axes": 0, "group.tool.axes": 0, **sizes})
-    found = busplan.map_(still)
-    assert (found.x.key, found.y.key) == ("group.drives.nodes", PERIOD)
-    assert found.own is not None
+    answer = busplan.map_(still)
+    assert (answer.x.key, answer.y.key) == ("group.drives.nodes", PERIOD)
+    assert answer.design is not None
     with pytest.raises(busplan.BusplanError, match="axes = 5: no whole number of nodes, with 0 axes each"):
         busplan.map_(still, x={AXES: (5,)})
 
 
 def test_a_combination_that_the_schema_refuses_is_not_drawn() -> None:
     x, y = {"bus.gap_count": (63, 64, "optimal")}, {"bus.cable_length_m": (4.5, 9.0)}
-    found = busplan.map_(PAPER, x=x, y=y)
-    assert [[isinstance(cell, Cell) for cell in row] for row in found.rows] == [
+    answer = busplan.map_(PAPER, x=x, y=y)
+    assert [[is_drawn(cell) for cell in row] for row in answer.rows] == [
         [True, False, True],
         [True, False, False],
     ]
-    assert "bus.gap_count 64: expected a whole number from 0 to 63" in found.not_drawn[0].reason
-    assert "the table behind it holds for cables of up to 4.5 m" in found.not_drawn[2].reason
+    assert "bus.gap_count 64: expected a whole number from 0 to 63" in answer.not_drawn[0].reason
+    assert "the table behind it holds for cables of up to 4.5 m" in answer.not_drawn[2].reason
 
 
 def test_one_key_alone_chooses_the_other() -> None:
@@ -204,10 +216,10 @@ def test_one_key_alone_chooses_the_other() -> None:
 
 
 def test_a_design_with_other_values_is_not_on_its_map() -> None:
-    found = busplan.map_(PAPER, x={"bus.gap_count": (7, 10)})
-    assert (found.own, found.own_place) == (None, None)
+    answer = busplan.map_(PAPER, x={"bus.gap_count": (7, 10)})
+    assert (answer.design, answer.design_place) == (None, None)
     beside = busplan.map_(PAPER, x={"bus.gap_count": (7, 63)})
-    assert beside.own_place == (beside.y.values.index(4000), 1)
+    assert beside.design_place == (beside.y.values.index(4000), 1)
 
 
 @pytest.mark.parametrize(
@@ -249,9 +261,9 @@ def test_circles_are_run_where_the_bus_fits_and_nowhere_else() -> None:
     x, y = {"bus.nodes": (1, 2, 3, 17)}, {PERIOD: (500, 1000, 4000)}
     done: list[tuple[int, int]] = []
     plain = busplan.map_(SMALL, x=x, y=y)
-    found = busplan.map_(SMALL, x=x, y=y, circle=True, progress=lambda *counts: done.append(counts))
-    assert {cell.state for cell in found.cells} == {"fits", "circle fails", "does not fit"}
-    for cell, before in zip(found.cells, plain.cells, strict=True):
+    answer = busplan.map_(SMALL, x=x, y=y, circle=True, progress=lambda *counts: done.append(counts))
+    assert {cell.state for cell in answer.cells} == {"fits", "circle fails", "does not fit"}
+    for cell, before in zip(answer.cells, plain.cells, strict=True):
         if before.state != "fits":
             assert cell == before
             continue
@@ -267,19 +279,19 @@ def test_circles_are_run_where_the_bus_fits_and_nowhere_else() -> None:
 def test_what_no_tolerance_judges_and_what_cannot_be_simulated_is_said() -> None:
     y = {"circle.feed_mm_per_min": (4000, 500_000)}
     free = busplan.load_profile(SMALL, changes={"tolerance": {}})
-    found = busplan.map_(free, x={"bus.nodes": (2,)}, y=y, circle=True)
-    assert [cell.state for cell in found.cells] == ["circle not judged", "circle cannot be run"]
-    assert [cell.limited_by for cell in found.cells] == [(), ("circle.feed_mm_per_min",)]
+    answer = busplan.map_(free, x={"bus.nodes": (2,)}, y=y, circle=True)
+    assert [cell.state for cell in answer.cells] == ["circle not judged", "circle cannot be run"]
+    assert [cell.limited_by for cell in answer.cells] == [(), ("circle.feed_mm_per_min",)]
     judged = busplan.map_(SMALL, x={"bus.nodes": (2,)}, y=y, circle=True)
     assert [cell.circle_passed is None for cell in judged.cells] == [False, True]
 
 
 def test_a_step_that_does_not_divide_a_period_is_the_longest_that_does() -> None:
     y = {PERIOD: (4000, 4001)}
-    found = busplan.map_(SMALL, x={"bus.nodes": (2,)}, y=y, circle=True)
+    answer = busplan.map_(SMALL, x={"bus.nodes": (2,)}, y=y, circle=True)
     changes = {"bus.nodes": 2, PERIOD: 4001}
     (result,) = busplan.circle_test(busplan.load_profile(SMALL, changes=changes)).results
-    assert [cell.circle_passed for cell in found.cells] == [True, result.passed]
+    assert [cell.circle_passed for cell in answer.cells] == [True, result.passed]
 
 
 def test_too_many_circles_are_refused_before_any_is_run() -> None:

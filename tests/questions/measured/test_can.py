@@ -150,10 +150,22 @@ def test_a_plan_that_is_too_full_has_no_response_to_stand_beside(tmp_path: Path)
     assert "Infinity" not in answer.to_json()
 
 
-def test_a_burst_is_counted(tmp_path: Path) -> None:
-    burst = [Queued(10_000.0 * cycle, 0x300 + number, b"\xaa" * 8) for cycle in range(20) for number in range(7)]
-    answer = of_log(candump(arbitrated(burst)), tmp_path)
-    assert figure(answer, "frames directly after each other").recorded == 7
+def test_stamps_that_are_late_are_said_and_doubted(tmp_path: Path) -> None:
+    frame = Queued(0.0, 0x300, b"\xaa" * 8, False, False)
+    bits = bits_of(frame)  # at 1000 kbit/s a microsecond each
+
+    def answer(late_us: float) -> MeasuredAnswer:
+        """Frames directly after each other, of which each fourth is stamped late."""
+        stamps_us = (bits * place + (late_us if place % 4 == 1 else 0.0) for place in range(400))
+        return of_log(candump([Logged(us, 0x300, frame.data, False, bits) for us in stamps_us]), tmp_path)
+
+    # Of a frame that none follows nobody sees how late it is: as late again as it is long.
+    in_time, late = answer(0.0), answer(40.0)
+    words = "Frames come up to {} us closer than the bus allows: stamps are late, and U holds it."
+    assert words.format(40 + bits) in late.remarks
+    assert not any("closer than the bus allows" in remark for remark in in_time.remarks)
+    doubts = [figure(log, "load ").uncertainty or 0.0 for log in (late, in_time)]
+    assert doubts[0] - doubts[1] == pytest.approx((40 + bits) / (399 * bits), rel=1e-3)
 
 
 def test_a_clock_that_is_set_back_is_said(tmp_path: Path) -> None:

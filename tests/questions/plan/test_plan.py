@@ -81,8 +81,8 @@ def test_shipped_profiles_have_a_plan(name: str) -> None:
 
 def single_changes(profile: Profile, name: str) -> Iterator[dict[str, Any]]:
     """Every value of a single thing, the least change first."""
-    write = profile.alike_nodes[0].payload.write_bytes or 0
-    read = profile.alike_nodes[0].payload.read_bytes or 0
+    write = profile.node_groups[0].payload.write_bytes or 0
+    read = profile.node_groups[0].payload.read_bytes or 0
     match name:
         case "slice_ratio":
             own = profile.cycle.slice_ratio
@@ -97,7 +97,7 @@ def single_changes(profile: Profile, name: str) -> Iterator[dict[str, Any]]:
                 if cut:
                     yield cut
         case "nodes":
-            yield from ({"bus.nodes": nodes} for nodes in range(profile.alike_nodes[0].nodes - 1, 0, -1))
+            yield from ({"bus.nodes": nodes} for nodes in range(profile.node_groups[0].nodes - 1, 0, -1))
 
 
 @pytest.mark.parametrize("name", ["slice_ratio", "period", "payload", "nodes"])
@@ -237,7 +237,7 @@ def test_capacity_and_check_advise_what_plan_finds(
         assert (verdict.change, verdict.no_change) == (None, "")
     elif verdict.change is not None:
         more = override(profile, {"bus.nodes": verdict.change.nodes, **dict(verdict.change.changes)})
-        assert verdict.change.nodes == profile.alike_nodes[0].nodes + 1
+        assert verdict.change.nodes == profile.node_groups[0].nodes + 1
         assert errors_of(override(more, {"limits.min_spare_nodes": 0, "limits.min_spare_axes": 0})) == []
 
 

@@ -250,7 +250,7 @@ def test_what_makes_no_sweep_is_refused() -> None:
         (
             {"circle.feed_mm_per_min": [1000.0, 500_000.0]},
             {"circle": True},
-            "at circle.feed_mm_per_min = 500000: circle.feed_mm_per_min",
+            "circle.feed_mm_per_min = 500000.0: axis x reaches 23965.7 mm/min",
         ),
     ]
     for vary, options, message in cases:

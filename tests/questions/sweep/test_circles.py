@@ -28,7 +28,7 @@ class Shuffled(Executor):
         self.order: list[int] = []
 
     def submit(self, fn: Callable[..., Any], /, *args: object, **_kwargs: object) -> "Future[Any]":
-        number, future = len(self._calls) + len(self.order), _Asked(self._run)
+        number, future = len(self._calls) + len(self.order), _Lazy(self._run)
 
         def call() -> None:
             self.order.append(number)
@@ -46,13 +46,13 @@ class Shuffled(Executor):
             call()
 
 
-class _Asked(Future[Any]):
-    def __init__(self, ask: Callable[[], None]) -> None:
+class _Lazy(Future[Any]):
+    def __init__(self, run_all: Callable[[], None]) -> None:
         super().__init__()
-        self._ask = ask
+        self._run_all = run_all
 
     def result(self, timeout: float | None = None) -> Any:
-        self._ask()
+        self._run_all()
         return super().result(timeout)
 
 
@@ -62,8 +62,8 @@ def test_a_sweep_is_the_same_on_every_executor() -> None:
 
     alone, summary, shuffled = document(None), document(None, summary=True), Shuffled(7)
     assert alone.count('"passed"') == 12 * 2
-    with ThreadPoolExecutor(3) as threads, workers(1) as own:
-        for executor in (shuffled, threads, own):
+    with ThreadPoolExecutor(3) as threads, workers(1) as processes:
+        for executor in (shuffled, threads, processes):
             assert document(executor) == alone
             assert document(executor, summary=True) == summary
             # It is the caller's, and goes on.
@@ -80,22 +80,22 @@ def test_progress_counts_the_tests() -> None:
     assert done == [(8, 8)]
 
 
-@pytest.mark.parametrize("name", ["paper-4ms", "paper-two-node"])
-def test_the_first_point_that_cannot_be_run_is_named_before_any_is(name: str) -> None:
+@pytest.mark.parametrize(("beside", "place"), [({}, ""), ({"bus.nodes": [1, 2]}, "at bus.nodes = 1: ")])
+def test_the_first_point_that_cannot_be_run_is_named_before_any_is(beside: dict[str, Any], place: str) -> None:
     executor = Shuffled(1)
+    vary = {"circle.feed_mm_per_min": [1000.0, 500_000.0, 600_000.0], **beside}
     with pytest.raises(busplan.BusplanError) as caught:
-        busplan.sweep(
-            name, vary={"circle.feed_mm_per_min": [1000.0, 500_000.0, 600_000.0]}, circle=True, executor=executor
-        )
-    assert str(caught.value).startswith("at circle.feed_mm_per_min = 500000: circle.feed_mm_per_min")
+        busplan.sweep("paper-4ms", vary=vary, circle=True, executor=executor)
+    # The key that is refused is named once.
+    assert str(caught.value).startswith(f"{place}circle.feed_mm_per_min = 500000.0: axis x reaches ")
     assert not executor.order
 
 
 def test_a_step_that_does_not_divide_a_period_is_the_longest_that_does() -> None:
     answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": [4000, 4001]}, timing_model="standard", circle=True)
     for period_us, error_mm in zip((4000, 4001), answer["mean_contour_error_mm"], strict=True):
-        own = busplan.load_profile("paper-4ms", changes={"cycle.period_us": period_us})
-        assert error_mm == busplan.circle_test(own).results[0].mean_contour_error_mm
+        changed = busplan.load_profile("paper-4ms", changes={"cycle.period_us": period_us})
+        assert error_mm == busplan.circle_test(changed).results[0].mean_contour_error_mm
 
 
 @pytest.mark.parametrize(
@@ -124,21 +124,21 @@ def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
         def map(self, *_: Any, **__: Any) -> Iterator[Any]:
             raise KeyboardInterrupt
 
-    def told(vary: dict[str, Any], **options: Any) -> list[str]:
+    def announced(vary: dict[str, Any], **options: Any) -> list[str]:
         caplog.clear()
         with pytest.raises(KeyboardInterrupt):
             busplan.sweep(big, vary=vary, circle=True, executor=Stopped(), **options)
         return caplog.messages
 
     # 50,267,120 steps at 2 ms, which take about 5 s; where the cycle does not fit, nothing is simulated.
-    assert told({"cycle.period_us": [2000, 100]}) == []
-    (said,) = told({"delivery.seed": [1, 2, 3]})
-    assert said.startswith("circle test: 150,801,360 steps, about ")
+    assert announced({"cycle.period_us": [2000, 100]}) == []
+    (message,) = announced({"delivery.seed": [1, 2, 3]})
+    assert message.startswith("circle test: 150,801,360 steps, about ")
     # The memory of one: they run one behind the other.
-    assert " and 0.58 GB" in said
+    assert " and 0.58 GB" in message
     # Of more points than are looked at, the number is that of all.
-    (said,) = told({"delivery.seed": range(1, 1001)}, force=True)
-    assert said.startswith("circle test: 50,267,120,000 steps, about ")
+    (message,) = announced({"delivery.seed": range(1, 1001)}, force=True)
+    assert message.startswith("circle test: 50,267,120,000 steps, about ")
 
 
 # --- worker processes --------------------------------------------------------------------------

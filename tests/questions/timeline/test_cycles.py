@@ -183,7 +183,7 @@ def test_the_words_say_which_cycle_is_drawn_and_what_each_needs() -> None:
     listed = "; ".join(f"{words} ({us:.3f} us)" for words, us in zip(alike, needs, strict=True))
     assert f"\nThe groups meet every 6 cycles; this is the fullest. Cycles {listed}.\n" in whole
     assert f"\nThe groups meet every 6 cycles; this is cycle 3, with g0, g1. Cycles {listed}.\n" in third
-    assert f"0.000 to {needs[1]:.3f} us of cycle 3 of 6," in third
+    assert f"0.000 to {needs[1]:.3f} us of cycle 3 of 6" in third
     assert "by the worst-stuffing model in the fullest cycle; verdict: fits." in third
     assert "fullest cycle;" not in whole
     assert f"{4000 - needs[1]:.3f} us by the worst-stuffing model" in third.splitlines()[1]
@@ -251,7 +251,7 @@ def test_windows_and_transactions_are_of_the_cycle_that_is_drawn() -> None:
         busplan.timeline(profile, cycle=2, transaction=("command", 3))
     window = busplan.timeline(profile, cycle=2, from_us=100, to_us=200)
     assert [window.events[0].start_us, window.events[-1].end_us] == [100, 200]
-    assert "100.000 to 200.000 us of cycle 2 of 6," in str(window)
+    assert "100.000 to 200.000 us of cycle 2 of 6" in str(window)
 
 
 def test_every_form_has_the_cycle_that_is_asked_for(run: Run, tmp_path: Path) -> None:
@@ -259,7 +259,7 @@ def test_every_form_has_the_cycle_that_is_asked_for(run: Run, tmp_path: Path) ->
     for ending in ("txt", "md", "html", "svg"):
         assert run("timeline", "arm.toml", "--cycle", "2", "-o", f"a.{ending}", cwd=tmp_path).returncode == 0
         said = (tmp_path / f"a.{ending}").read_text(encoding="utf-8")
-        assert "of cycle 2 of 6, every frame" in said, ending
+        assert "of cycle 2 of 6" in said, ending
     rows = run("timeline", "arm.toml", "--cycle", "2", "--format", "csv", cwd=tmp_path).stdout.splitlines()
     assert sum("command_frame" in row for row in rows) == 2
     assert run("timeline", "arm.toml", "--cycle", "2", "-o", "a.png", cwd=tmp_path).returncode == 0

@@ -241,6 +241,22 @@ def test_a_page_of_many_events_says_that_a_bar_is_a_transaction() -> None:
     assert "A bar is a whole transaction." not in plan().html
 
 
+@pytest.mark.parametrize("name", ["paper-4ms", "ethercat-servo-8"])
+def test_a_drawing_of_a_thousand_nodes_can_be_read(name: str) -> None:
+    many = busplan.timeline(busplan.load_profile(name, changes={"bus.nodes": 1000, "cycle.period_us": 1e6}))
+    bus, *shared = [each for each in lanes(many).lanes if each.label != "over"]
+    assert sum(len(each.spans) for number in (0, 1) for each in lanes(many, number).lanes) < 1500
+    assert "A bar is what takes most of a 400th of the scale." in many.html
+    assert [each.label for each in shared] == [f"nodes {first} to {first + 7}" for first in range(1, 1001, 8)]
+    busy = [event for event in many.events if event.kind != "idle"]
+    for each, nodes in (
+        (bus, {None}),
+        *zip(shared, (range(first, first + 8) for first in range(1, 1001, 8)), strict=True),
+    ):
+        events = [event for event in busy if event.node in nodes]
+        assert (each.spans[0].start, each.spans[-1].end) == (events[0].start_us, events[-1].end_us)
+
+
 def spans(one: busplan.TimelineAnswer) -> list[tuple[str, float, float]]:
     return [(event.kind, event.start_us, event.end_us) for event in one.events]
 

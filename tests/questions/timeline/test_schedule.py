@@ -38,7 +38,7 @@ def test_the_last_event_ends_at_the_closed_forms_required_time(
         assert plan.figures.required_us < MOST_REQUIRED_US
         assert abs(plan.used_us - plan.figures.required_us) <= 1e-9
         # The addition itself is better than that: a unit in the last place of the exact sum of rounded phases.
-        assert abs(plan.used_us - float(exact(profile, model, profile.alike_nodes[0].nodes))) <= 1e-9
+        assert abs(plan.used_us - float(exact(profile, model, profile.node_groups[0].nodes))) <= 1e-9
 
 
 @given(data=st.data())
@@ -78,7 +78,7 @@ def test_every_phase_of_a_shipped_profile_stands_in_the_order_of_the_protocol(na
             else ("arbitration_reset_gap",)
         )
     for kind in ("read", "write"):
-        for node in range(1, profile.alike_nodes[0].nodes + 1):
+        for node in range(1, profile.node_groups[0].nodes + 1):
             wanted += [
                 ("arbitration", node, kind, "request"),
                 ("request_data", node, kind, "request"),

@@ -31,10 +31,10 @@ cpdef (double, double, double) worst_instance(
 @cython.locals(
     senders=Py_ssize_t, point=Py_ssize_t, ends=double[::1], frames=double[::1], blocking=double[::1], sent=double[::1],
     once=double[::1], periods=double[::1], jitters=double[::1], rank=Py_ssize_t, load=double, first_us=double,
-    number=Py_ssize_t, own=Py_ssize_t, other=Py_ssize_t, ahead_us=double, worst=double, wait=double, response=double,
+    number=Py_ssize_t, sender=Py_ssize_t, index=Py_ssize_t, ahead_us=double, worst=double, wait=double, response=double,
 )
 cpdef object responses(
-    Py_ssize_t[::1] asked, Py_ssize_t[::1] group, double[::1] place, double[:, ::1] last, double[:, ::1] frame_us,
+    Py_ssize_t[::1] answered, Py_ssize_t[::1] group, double[::1] place, double[:, ::1] last, double[:, ::1] frame_us,
     double[:, ::1] blocking_us, double[:, ::1] sent_us, double[:, ::1] enough_us, double[:, ::1] period_us,
     double[:, ::1] bit_us, double[:, ::1] once_us, double[:, ::1] jitter_us, double[::1] longest_us,
     double[::1] before_us, double[:, ::1] blocked_us, double[:, ::1] instance, double[:, ::1] wait_us,

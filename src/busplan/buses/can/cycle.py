@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, partial, reduce
-from itertools import islice
+from itertools import chain
 from math import inf
 from typing import Final, Literal
 
-from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, TERMS, bit_us, frame_us, payload_us
+from busplan.buses.can.equations import BUS_LOAD, EXPECTED_STUFFING, TERMS, bit_us, payload_us
 from busplan.buses.can.frames import (
     LOOP,
     NAMES,
@@ -99,8 +99,8 @@ class CanCycle(BusCycle):
         """Groups whose PDOs are in it."""
         if self.number is None:
             return self.network.groups
-        both = zip(self.network.groups, self.rates, strict=True)
-        return tuple(group for group, rate in both if rate.is_due(self.number))
+        groups = zip(self.network.groups, self.rates, strict=True)
+        return tuple(group for group, rate in groups if rate.is_due(self.number))
 
     @cached_property
     def _due(self) -> frozenset[str] | None:
@@ -112,48 +112,40 @@ class CanCycle(BusCycle):
         """SYNC, PDOs and other messages."""
         return traffic_of(self.network)
 
-    @cached_property
-    def _wire(self) -> dict[str, Number]:
-        keys = ("identifier_bits", "bit_rate_kbit_s", "data_bit_rate_kbit_s")
-        return {key: getattr(self.traffic, key) for key in keys}
-
-    def _frame_us(self, data_bytes: Number, **wire: Number) -> Number:
-        return frame_us(data_bytes, **(self._wire | wire), is_stuffed=self.is_stuffed)
-
-    def _message_us(self, message: Message) -> Number:
-        us = self._frame_us(
-            message.payload_bytes,
-            identifier_bits=message.identifier_bits,
-            data_bit_rate_kbit_s=message.data_bit_rate_kbit_s,
-        )
-        return named(us, f"{message.name}_us", f"C,{message.name}")
-
-    def _pdo_us(self, pdos: Pdos) -> Number:
-        pdo_us = payload_us(pdos.payload_bytes, frame_bytes=pdos.frame_bytes, **self._wire, is_stuffed=self.is_stuffed)
-        return named(pdo_us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
+    def _frame_us(self, data_bytes: Number, form: Traffic | Message | None = None) -> Number:
+        """Time of a frame of the cycle, or of a message [us]."""
+        return self.traffic.frame_us(data_bytes, form or self.traffic, is_stuffed=self.is_stuffed)
 
     @cached_property
     def _pdos(self) -> tuple[tuple[Pdos, Number], ...]:
         """All PDOs, each with its time."""
-        return tuple((pdos, self._pdo_us(pdos)) for pdos in self.traffic.pdos)
+
+        def time(pdos: Pdos) -> Number:
+            us = payload_us(
+                pdos.payload_bytes,
+                frame_bytes=pdos.frame_bytes,
+                identifier_bits=self.traffic.identifier_bits,
+                bit_rate_kbit_s=self.traffic.bit_rate_kbit_s,
+                data_bit_rate_kbit_s=self.traffic.data_bit_rate_kbit_s,
+                is_stuffed=self.is_stuffed,
+            )
+            return named(us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
+
+        return tuple((pdos, time(pdos)) for pdos in self.traffic.pdos)
 
     @cached_property
     def _messages(self) -> tuple[tuple[Message, Number], ...]:
         """All other messages, each with the time of its frame."""
-        if self.traffic.is_ordered:
-            us = (stream.frame_us for stream in self._streams if stream.is_message)
-            return tuple(zip(self.traffic.messages, us, strict=True))
-        return tuple((message, self._message_us(message)) for message in self.traffic.messages)
-
-    @property
-    def _streams(self) -> tuple[Stream, ...]:
-        return streams(self.traffic, is_stuffed=self.is_stuffed)
+        return tuple(
+            (message, named(self._frame_us(message.payload_bytes, message), f"{message.name}_us", f"C,{message.name}"))
+            for message in self.traffic.messages
+        )
 
     @cached_property
     def _before(self) -> tuple[tuple[Message, Number, Number], ...]:
         """Messages that may go before the last PDO, each with the time of its frame, and whether it does."""
-        each = ((message, us, self._goes_before_last(message)) for message, us in self._messages)
-        return tuple(one for one in each if one[2] is not False)
+        messages = ((message, us, self._goes_before_last(message)) for message, us in self._messages)
+        return tuple(message for message in messages if message[2] is not False)
 
     @cached_property
     def sync_us(self) -> Number:
@@ -168,77 +160,71 @@ class CanCycle(BusCycle):
 
     def _frames(self, kind: TransactionKind) -> Iterator[Run]:
         """All PDOs of one direction, node by node; a timeline shows their frames."""
-        name, own = NAMES[kind], (pair for pair in self._pdos if pair[0].kind == kind)
-        for number, (pdos, us) in enumerate(own):
-            if self._due is not None and pdos.group not in self._due:
-                continue
-            pdo = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
-            yield Run((pdo,), pdos.pdos, number, partial(self._of_pdo, pdo, pdos))
+        name = NAMES[kind]
+        for number, (pdos, us) in enumerate(pair for pair in self._pdos if pair[0].kind == kind):
+            if self._due is None or pdos.group in self._due:
+                event = BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", transaction=name)
+                yield Run((event,), pdos.pdos, number, partial(self._of_pdo, event, pdos))
 
-    def _of_pdo(self, pdo: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
-        return (pdo._replace(us=self._frame_us(size)) for size in frame_sizes(pdos))
+    def _of_pdo(self, event: BusEvent, pdos: Pdos, _number: Number) -> Iterator[BusEvent]:
+        return (event._replace(us=self._frame_us(size)) for size in frame_sizes(pdos))
 
     @cached_property
-    def _opening(self) -> tuple[Run, ...]:
-        """SYNC, and the wait for the slowest feedback."""
+    def _parts(self) -> tuple[tuple[Run, ...], ...]:
+        """SYNC and the wait for feedback; feedback and the host; commands and the wait for their execution."""
         sync = BusEvent("sync", "cycle_sync_us", self.sync_us, "SYNC")
-        wait = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest feedback")
-        return Run((sync,)), Run((wait,))
-
-    @cached_property
-    def _feedback(self) -> tuple[Run, ...]:
-        """All feedback, and the host."""
+        ready = BusEvent("wait", "cycle_wait_us", self._wait_us("read"), "wait for the slowest feedback")
         host_us = self.traffic.host_us if self._groups else 0.0
         host = BusEvent("host", "cycle_host_us", host_us, "host", rests_on="bus.host_us")
-        return (*self._frames("read"), Run((host,)))
-
-    @cached_property
-    def _commands(self) -> tuple[Run, ...]:
-        """All commands, and the wait for the slowest execution."""
-        slowest = "wait for the slowest execution of a command"
-        return (*self._frames("write"), Run((BusEvent("wait", "cycle_wait_us", self._wait_us("write"), slowest),)))
+        executed_us = self._wait_us("write")
+        executed = BusEvent("wait", "cycle_wait_us", executed_us, "wait for the slowest execution of a command")
+        return (
+            (Run((sync,)), Run((ready,))),
+            (*self._frames("read"), Run((host,))),
+            (*self._frames("write"), Run((executed,))),
+        )
 
     def written(self) -> Iterator[BusEvent | Run]:
         """The cycle node by node, with other messages as late for the commands as they can be."""
         if not self.traffic.has_cycle:
             return
-        blocking_us, counts = self._own_waits
+        opening, feedback, commands = self._parts
+        blocking_us, counts = self._waits
         blocking = BusEvent("blocking", "cycle_blocking_us", blocking_us, "messages of a lower priority")
         yield Run((blocking,), laid_out=lambda _: self._blocks(blocking, 0, 1))
-        yield from self._opening
+        yield from opening
         yield Run((), laid_out=lambda _: self._blocks(blocking, 1, 2))
-        yield from self._feedback
+        yield from feedback
         yield Run((), laid_out=lambda _: self._blocks(blocking, 2, None))
         for count, (message, us, _) in zip(counts, self._before, strict=True):
             yield Run((BusEvent("message", "cycle_interference_us", us, f"message {message.name}"),), count)
-        yield from self._commands
+        yield from commands
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
         """Some of the frames of lower priorities: before SYNC, before the feedback, or behind it."""
         waited = waits(self.traffic, plain(self._on_bus_us), self._due, is_stuffed=self.is_stuffed)
-        for message in islice(waited.blocks(), first, end):
-            label = f"message {message.name} of a lower priority"
-            yield blocking._replace(us=plain(message.frame_us), label=label)
+        for message in waited.blocks()[first:end]:
+            yield blocking._replace(us=message.frame_us, label=f"message {message.name} of a lower priority")
 
     @cached_property
-    def _own(self) -> dict[str, Number]:
-        """The terms without those of other messages."""
+    def _terms(self) -> dict[str, Number]:
+        """Time of the terms without those of other messages [us]."""
         keys = ("cycle_sync_us", "cycle_wait_us", "cycle_feedback_us", "cycle_host_us", "cycle_command_us")
         if not self.traffic.has_cycle:
             return dict.fromkeys(keys, 0.0)
-        return summed((*self._opening, *self._feedback, *self._commands), keys)
+        return summed(chain.from_iterable(self._parts), keys)
 
     @cached_property
     def by_term(self) -> Mapping[str, Number]:
         """Time of each term, by its key [us]."""
-        rest = (run for run in self.runs if not any(event.term in self._own for event in run.events))
-        return summed(rest, (figure.key for figure in TERMS)) | self._own
+        rest = (run for run in self.runs if not any(event.term in self._terms for event in run.events))
+        return summed(rest, (figure.key for figure in TERMS)) | self._terms
 
     @cached_property
     def _on_bus_us(self) -> Number:
         """From SYNC to the end of the last command, without other messages [us]."""
-        return total((self._own | {"cycle_wait_us": self._wait_us("read")}).values())
+        return total((self._terms | {"cycle_wait_us": self._wait_us("read")}).values())
 
     def _waits_us(self, extra_us: Number) -> Number:
         """Blocking by frames of lower priorities, and interference by those of higher ones [us].
@@ -248,12 +234,11 @@ class CanCycle(BusCycle):
         extra_us
             By how much the rest takes longer [us].
         """
-        is_own = is_off(extra_us)
-        blocking_us, counts = self._own_waits if is_own else self._waits_beside(self._on_bus_us + extra_us)
+        blocking_us, counts = self._waits if is_off(extra_us) else self._waits_beside(self._on_bus_us + extra_us)
         return blocking_us + total(count * us for count, (_, us, _) in zip(counts, self._before, strict=True))
 
     @cached_property
-    def _own_waits(self) -> tuple[Number, tuple[Number, ...]]:
+    def _waits(self) -> tuple[Number, tuple[Number, ...]]:
         return self._waits_beside(self._on_bus_us + 0.0)
 
     def _waits_beside(self, others_us: Number) -> tuple[Number, tuple[Number, ...]]:
@@ -263,7 +248,11 @@ class CanCycle(BusCycle):
         others_us = named(others_us, "others_us", "others")
 
         def figure(key: str, words: str) -> Number:
-            return self.traffic.ask(partial(_waits, self.is_stuffed, key, self._due), others_us, words=words)
+            def of(traffic: Traffic, others_us: Number) -> Number:
+                number: Number = getattr(waits(traffic, others_us, self._due, is_stuffed=self.is_stuffed), key)
+                return number
+
+            return self.traffic.ask(of, others_us, words=words)
 
         words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
         lasts_us = named(figure("lasts_us", words), "busy_us", "w")
@@ -274,28 +263,33 @@ class CanCycle(BusCycle):
         """Frames of each message that may go before the last PDO, in a span of time [1]."""
         window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
         for message, _, goes_before in self._before:
-            each = rounded_up((window_us + message.jitter_us) / message.period_us)
-            count = _of_all(message, each if is_off(message.burst - 1) else each + message.burst - 1)
-            yield choose(goes_before, count, 0)
+            of_node = rounded_up((window_us + message.jitter_us) / message.period_us)
+            of_node = of_node if is_off(message.burst - 1) else of_node + message.burst - 1
+            yield choose(goes_before, _of_all(message, of_node), 0)
 
     def _goes_before_last(self, message: Message) -> Number:
         """Whether a message goes before the last of SYNC and all PDOs."""
-        bits = message.identifier_bits, self.traffic.identifier_bits
-        if bits[0] is bits[1]:
+        if message.identifier_bits is self.traffic.identifier_bits:
             return message.identifier <= self._last
 
         def is_before(*numbers: float) -> bool:
-            identifier, own_bits, last, last_bits = map(int, numbers)
-            return bool(place(identifier, own_bits) <= place(last, last_bits))
+            identifier, bits, last, last_bits = map(int, numbers)
+            return bool(place(identifier, bits) <= place(last, last_bits))
 
-        numbers = message.identifier, bits[0], self._last, bits[1]
+        numbers = message.identifier, message.identifier_bits, self._last, self.traffic.identifier_bits
         return pointwise(is_before, *numbers, words="the first 11 bits decide, then the base frame goes first")
 
     @cached_property
     def _last(self) -> Number:
         """The largest identifier of SYNC and all PDOs."""
-        sent, words = self.traffic.without_times(), "the largest identifier of SYNC and all PDOs"
-        return named(sent.ask(partial(_last, self._due), words=words), "last_identifier", "id_last")
+
+        def last(traffic: Traffic) -> Number:
+            cyclic = [stream for stream in streams(traffic, is_stuffed=True) if not stream.is_message]
+            identifier: Number = last_identifier(cyclic if self._due is None else sent_in(cyclic, self._due))
+            return identifier
+
+        identifier = self.traffic.ask(last, words="the largest identifier of SYNC and all PDOs")
+        return named(identifier, "last_identifier", "id_last")
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """Growth of the cycle if its nodes take longer: more messages may arrive, too [us]."""
@@ -349,7 +343,7 @@ class CanCycle(BusCycle):
 
     @property
     def _in_cycle_us(self) -> Number:
-        return self.sync_us + self._own["cycle_feedback_us"] + self._own["cycle_command_us"]
+        return self.sync_us + self._terms["cycle_feedback_us"] + self._terms["cycle_command_us"]
 
     @property
     def _mean_us(self) -> Number:
@@ -380,18 +374,21 @@ class CanCycle(BusCycle):
         load = ("load", words)
         if not self._messages:
             return (load,)
-        each = message_responses(self.traffic, is_stuffed=self.is_stuffed)
-        latest, worst = max(each, key=lambda pair: plain(pair[1].us) / plain(pair[0].deadline_us))
+        answers = message_responses(self.traffic, is_stuffed=self.is_stuffed)
+        latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)
         if worst.us == inf:
             return load, ("latest message", f"{latest.name}, without a worst-case response time")
         return load, ("latest message", f"{latest.name}, {_short(worst.us)} us of {_short(latest.deadline_us)}")
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
-        ends = ((SYNC, ""), *((pdos.name, pdos.group) for pdos in self.traffic.pdos)) if self.traffic.has_cycle else ()
-        names = (*ends, *((message.name, "") for message in self.traffic.messages))
-        each = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
-        return (*each, *((BusLatency(LOOP, None, self._loop()),) if self.traffic.has_cycle else ()))
+        cycle = ((SYNC, ""), *((pdos.name, pdos.group) for pdos in self.traffic.pdos)) if self.traffic.has_cycle else ()
+        names = (*cycle, *((message.name, "") for message in self.traffic.messages))
+        loop = (BusLatency(LOOP, None, self._loop()),) if cycle else ()
+        return (
+            *(BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names)),
+            *loop,
+        )
 
     def _loop(self) -> dict[str, Number]:
         """Parts of the way from SYNC to the last executed command that rests on it."""
@@ -421,53 +418,56 @@ class CanCycle(BusCycle):
         return super().loop_periods(at_sync=at_sync) + int(plain(self.network.profile.bus.pipeline_cycles))
 
     def sync_jitter_us(self) -> Number:
-        """Half of what messages may hold SYNC up [us]."""
-        return self.sync_spread_us / 2
+        """Half of what messages may hold SYNC up; infinite where that has no end, 0 where no SYNC is sent [us]."""
 
-    @cached_property
-    def sync_spread_us(self) -> Number:
-        """Delay of SYNC by other messages, B + I [us]; infinite where it has no end, 0 where no SYNC is sent."""
+        def held_up_us(traffic: Traffic) -> Number:
+            worst = sync_response(traffic, is_stuffed=self.is_stuffed)
+            return choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)
+
         if not self.traffic.has_cycle:
             return 0.0
-        if self.traffic.is_ordered:
-            worst = sync_response(self.traffic, is_stuffed=self.is_stuffed)
-            return choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)
-        blocking_us, interference_us = self._waits_of(0, SYNC)
-        return named(blocking_us + interference_us, "sync_spread_us", "B + I")
-
-    def _figure(self, place: int, key: str, words: str) -> Number:
-        """A figure of the stream at a place among those that end a PDO or a message."""
-        return self.traffic.ask_points(partial(_phase, self.is_stuffed, place, key), words=words)
-
-    def _waits_of(self, place: int, name: str) -> tuple[Number, Number]:
-        """Blocking and interference of such a stream [us]."""
-        blocks, before = self._counted(place)
-        blocking = f"the longest frame of a lower priority than {name}{blocks}"
-        interference = f"frames of higher priorities before {name}, in its worst instance{before}"
-        return (
-            named(self._figure(place, "blocking_us", blocking), "blocking_us", "B"),
-            named(self._figure(place, "interference_us", interference), "interference_us", "I"),
-        )
+        return self.traffic.ask(held_up_us, words="frames before SYNC, B + I") / 2
 
     def _phases(self, place: int, name: str) -> dict[str, Number]:
-        """Figures of such a stream; of no arrays."""
-        figure = partial(self._figure, place)
-        jitter_us = figure("jitter_us", f"how late {name} may be queued")
-        frame_us_ = figure("frame_us", f"the last frame of {name}")
-        blocking_us, interference_us = self._waits_of(place, name)
+        """Figures of the stream at a place among those that end a PDO or a message; of no arrays."""
+
+        def figure(key: str, words: str) -> Number:
+            def of(traffic: Traffic) -> float:
+                stream, worst = responses(traffic, is_stuffed=self.is_stuffed)[place]
+                if key in Stream._fields or key == "last":
+                    number: float = getattr(stream, key)
+                else:
+                    number = getattr(worst, key) if worst.us < inf else inf
+                return number
+
+            return self.traffic.ask(of, words=words)
+
+        # A derivation says which frames were counted.
+        point, words = self.traffic.point, ("", "")
+        if isinstance(point, Traced):
+            words = counted(self.traffic.at(point.value), place, is_stuffed=self.is_stuffed)
+        blocks, before = (f": {frames}" if frames else "" for frames in words)
+        frame_us = figure("frame_us", f"the last frame of {name}")
         instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")
         period_us = named(figure("period_us", f"period of {name}"), "period_us", "T")
         periods = instance
         if any(value_of(message.burst) > 1 for message in self.traffic.messages if message.name == name):
             burst = named(figure("burst", f"frames of {name} that may come at once"), "burst", "b")
             periods = instance - burst + 1
-        backlog_us = choose(instance < inf, instance * frame_us_ - periods * period_us, instance)
         parts_us = {
-            "jitter_us": named(jitter_us, "jitter_us", "J"),
-            "blocking_us": blocking_us,
-            "interference_us": interference_us,
-            "backlog_us": named(backlog_us, "backlog_us", "q (C - T)"),
-            "frame_us": named(frame_us_, "frame_us", "C"),
+            "jitter_us": named(figure("jitter_us", f"how late {name} may be queued"), "jitter_us", "J"),
+            "blocking_us": named(
+                figure("blocking_us", f"the longest frame of a lower priority than {name}{blocks}"), "blocking_us", "B"
+            ),
+            "interference_us": named(
+                figure("interference_us", f"frames of higher priorities before {name}, in its worst instance{before}"),
+                "interference_us",
+                "I",
+            ),
+            "backlog_us": named(
+                choose(instance < inf, instance * frame_us - periods * period_us, instance), "backlog_us", "q (C - T)"
+            ),
+            "frame_us": named(frame_us, "frame_us", "C"),
             "execution_us": 0.0,
             "pipeline_us": 0.0,
         }
@@ -478,13 +478,6 @@ class CanCycle(BusCycle):
             instance=instance,
             deadline_us=figure("deadline_us", f"deadline of {name}"),
         )
-
-    def _counted(self, place: int) -> Iterator[str]:
-        """The frames that a derivation of a response says were counted: the one that blocks, and those before it."""
-        at, words = self.traffic.place, ("", "")
-        if isinstance(at, Traced):
-            words = counted(self.traffic.at(at.value), place, is_stuffed=self.is_stuffed)
-        return (f": {one}" if one else "" for one in words)
 
 
 def _numbered(parts_us: Mapping[str, Number], **figures: Number) -> dict[str, Number]:
@@ -500,36 +493,15 @@ def _short(number: float) -> str:
 
 def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Number:
     """The slowest execution of a group's nodes, with some standard uncertainties [us]."""
-    own = group.read_execution_us if kind == "read" else group.write_execution_us
-    slowest_us = own + group.worst_extra_us
-    if not uncertainties:
-        return slowest_us
-    doubt_us = group.read_uncertainty_us if kind == "read" else group.write_uncertainty_us
-    return slowest_us + uncertainties * doubt_us
-
-
-def _waits(is_stuffed: bool, key: str, due: frozenset[str] | None, traffic: Traffic, others_us: Number) -> Number:
-    """One figure of what a cycle waits for."""
-    number: Number = getattr(waits(traffic, others_us, due, is_stuffed=is_stuffed), key)
-    return number
+    execution_us, doubt_us = (
+        (group.read_execution_us, group.read_uncertainty_us)
+        if kind == "read"
+        else (group.write_execution_us, group.write_uncertainty_us)
+    )
+    slowest_us = execution_us + group.worst_extra_us
+    return slowest_us + uncertainties * doubt_us if uncertainties else slowest_us
 
 
 def _of_all(message: Message, number: Number) -> Number:
     """A number of a message, of all nodes that send it."""
     return number if is_off(message.senders - 1) else message.senders * number
-
-
-def _last(due: frozenset[str] | None, traffic: Traffic) -> Number:
-    cyclic = [stream for stream in streams(traffic, is_stuffed=True) if not stream.is_message]
-    last: Number = last_identifier(cyclic if due is None else sent_in(cyclic, due))
-    return last
-
-
-def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:
-    """One figure of the stream at a place among those that end a PDO or a message, and of its response.
-
-    It is infinite where it does not exist.
-    """
-    own, worst = responses(traffic, is_stuffed=is_stuffed)[place]
-    said: float = getattr(own, key) if hasattr(own, key) else getattr(worst, key) if worst.us < inf else inf
-    return said

@@ -1,7 +1,6 @@
 """CAN frames in equations: sourced constants, lengths and times of frames, and the figures made of them."""
 
-from collections.abc import Callable, Mapping
-from functools import lru_cache
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -20,6 +19,7 @@ MOST_DATA_BIT_RATE: Final = DATA_BIT_RATES[-1]
 IdentifierBits = Literal[11, 29]
 
 _DAVIS: Final = "Davis, Burns, Bril, Lukkien 2007; linux-can/can-utils, canframelen"
+_EQUATIONS: Final = "Davis 2007"
 _ISO: Final = "ISO 11898-1:2015, CAN FD frame with bit-rate switch"
 _CIA_301: Final = "CiA 301, pre-defined connection set; esd C.3032.21, 8.5"
 
@@ -28,8 +28,12 @@ def _bits(value: int, meaning: str, *, symbol: str = "", source: str = _DAVIS) -
     return Sourced(value, unit="bits", grade="published", source=source, meaning=meaning, symbol=symbol)
 
 
-def _identifier(value: int, meaning: str) -> Sourced:
-    return Sourced(value, unit="1", grade="published", source=_CIA_301, meaning=meaning)
+def _canopen(value: int, meaning: str, *, source: str = _CIA_301) -> Sourced:
+    return Sourced(value, unit="1", grade="published", source=source, meaning=meaning)
+
+
+def _chosen(value: float, meaning: str, *, why: str) -> Sourced:
+    return Sourced(value, unit="1", grade="assumed", source=f"chosen: {why}", meaning=meaning)
 
 
 BASE_BITS: Final = 11
@@ -64,33 +68,23 @@ FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 
 MAX_IDENTIFIER: Final[Mapping[int, int]] = MappingProxyType({11: (1 << 11) - 1, 29: (1 << 29) - 1})
 
-SYNC_IDENTIFIER: Final = _identifier(0x80, "identifier of SYNC")
-FEEDBACK_IDENTIFIER: Final = _identifier(0x181, "identifier of TPDO1 of node 1, 180h + node-ID")
-COMMAND_IDENTIFIER: Final = _identifier(0x201, "identifier of RPDO1 of node 1, 200h + node-ID")
-PDO_STEP: Final = _identifier(0x100, "from the identifier of a PDO to that of the next PDO of the same node")
-MOST_PDOS: Final = _identifier(4, "PDOs of one node in one direction")
-MOST_NODES: Final = _identifier(127, "node-IDs")
-MOST_EVERY: Final = Sourced(
-    240,
-    unit="1",
-    grade="published",
-    source="CiA 301, transmission types",
-    meaning="SYNCs from a PDO to the next, at most",
-)
+SYNC_IDENTIFIER: Final = _canopen(0x80, "identifier of SYNC")
+FEEDBACK_IDENTIFIER: Final = _canopen(0x181, "identifier of TPDO1 of node 1, 180h + node-ID")
+COMMAND_IDENTIFIER: Final = _canopen(0x201, "identifier of RPDO1 of node 1, 200h + node-ID")
+PDO_STEP: Final = _canopen(0x100, "from the identifier of a PDO to that of the next PDO of the same node")
+MOST_PDOS: Final = _canopen(4, "PDOs of one node in one direction")
+MOST_NODES: Final = _canopen(127, "node-IDs")
+MOST_EVERY: Final = _canopen(240, "SYNCs from a PDO to the next, at most", source="CiA 301, transmission types")
 
-PIPELINE_CYCLES: Final = Sourced(
+PIPELINE_CYCLES: Final = _chosen(
     0,
-    unit="1",
-    grade="assumed",
-    source="chosen: commands follow the feedback that they rest on, in one cycle",
-    meaning="cycles from the one that brings feedback to the one that takes the command computed from it",
+    "cycles from the one that brings feedback to the one that takes the command computed from it",
+    why="commands follow the feedback that they rest on, in one cycle",
 )
-UNMEASURED_SHARE: Final = Sourced(
+UNMEASURED_SHARE: Final = _chosen(
     0.5,
-    unit="1",
-    grade="assumed",
-    source="chosen: the host's time of like machines differs by ten times",
-    meaning="standard uncertainty of a host's time that nobody has measured, as a share of it",
+    "standard uncertainty of a host's time that nobody has measured, as a share of it",
+    why="the host's time of like machines differs by ten times",
 )
 MOST_BLOCKS: Final = Sourced(
     3,
@@ -103,19 +97,15 @@ MOST_BLOCKS: Final = Sourced(
 MAX_LOAD: Final = Sourced(
     0.8, unit="1", grade="published", source="Lenze system-bus manual", meaning="largest bus load of a plan"
 )
-SATURATED: Final = Sourced(
+SATURATED: Final = _chosen(
     0.9999,
-    unit="1",
-    grade="assumed",
-    source="chosen: a load so near 1 has a busy period without use",
-    meaning="load from which on no response time is computed",
+    "load from which on no response time is computed",
+    why="a load so near 1 has a busy period without use",
 )
-MOST_STEPS: Final = Sourced(
+MOST_STEPS: Final = _chosen(
     2000,
-    unit="1",
-    grade="assumed",
-    source="chosen: a bus below a load of 0.9 takes some ten",
-    meaning="steps of a busy period from which on no response time is computed",
+    "steps of a busy period from which on no response time is computed",
+    why="a bus below a load of 0.9 takes some ten",
 )
 EXPECTED_STUFFING: Final = Sourced(
     0.4,
@@ -128,7 +118,6 @@ EXPECTED_STUFFING: Final = Sourced(
 CONSTANTS: Final = constants(globals())
 
 
-_PLAIN = (int, float)
 KBIT_US = 1000
 """Microseconds of a bit at 1 kbit/s."""
 
@@ -283,20 +272,7 @@ def payload_us(
     >>> payload_us(10, **wire), payload_us(12, frame_bytes=(6, 6), **wire)
     (210.0, 230.0)
     """
-    wire = identifier_bits, bit_rate_kbit_s, data_bit_rate_kbit_s
-    if all(isinstance(number, _PLAIN) for number in (payload_bytes, *wire)):
-        return _plain_payload_us(payload_bytes, frame_bytes, *wire, is_stuffed)
-    return _payload_us(payload_bytes, frame_bytes, *wire, is_stuffed)
 
-
-def _payload_us(
-    payload_bytes: Number,
-    frame_bytes: tuple[float, ...],
-    identifier_bits: Number,
-    bit_rate_kbit_s: Number,
-    data_bit_rate_kbit_s: Number,
-    is_stuffed: bool,
-) -> Number:
     def of_frame(data_bytes: Number) -> Number:
         return frame_us(
             data_bytes,
@@ -320,10 +296,6 @@ def _payload_us(
     return first_us + others_us if first_bytes else others_us
 
 
-_plain_payload_us: Callable[..., Number] = lru_cache(maxsize=1024)(_payload_us)
-"""The groups of a network have few sizes of payloads between them."""
-
-
 def share_bytes(payload_bytes: Number, *, pdos: Number) -> Number:
     """Payload of each of a node's PDOs in one direction, shared out evenly [bytes].
 
@@ -342,13 +314,11 @@ def share_bytes(payload_bytes: Number, *, pdos: Number) -> Number:
     return rounded_up(payload_bytes / pdos)
 
 
-_DAVIS_2007: Final = "Davis 2007"
-
 BIT_RATE: Final = Figure("bit_rate_kbit_s", "f", "profile", "bit rate of the bus", "bit rate, kbit/s", decimals=None)
 BUS_LOAD: Final = Figure(
     "bus_load",
     "load",
-    _DAVIS_2007,
+    _EQUATIONS,
     "share of the bus that all messages take, 0..1",
     "bus load",
     "%",
@@ -367,7 +337,7 @@ EXPECTED_LOAD: Final = Figure(
 )
 LOADS: Final = (BUS_LOAD, EXPECTED_LOAD)
 TERMS: Final = (
-    Figure("cycle_sync_us", "SYNC", _DAVIS_2007, "the frame that opens a cycle", "SYNC", ink="sync", letter="S"),
+    Figure("cycle_sync_us", "SYNC", _EQUATIONS, "the frame that opens a cycle", "SYNC", ink="sync", letter="S"),
     Figure(
         "cycle_wait_us",
         "wait",
@@ -377,7 +347,7 @@ TERMS: Final = (
         ink="work",
         letter="W",
     ),
-    Figure("cycle_feedback_us", "feedback", _DAVIS_2007, "PDOs from all nodes", "feedback", ink="in", letter="F"),
+    Figure("cycle_feedback_us", "feedback", _EQUATIONS, "PDOs from all nodes", "feedback", ink="in", letter="F"),
     Figure(
         "cycle_host_us",
         "host",
@@ -387,11 +357,11 @@ TERMS: Final = (
         ink="idle",
         letter="H",
     ),
-    Figure("cycle_command_us", "command", _DAVIS_2007, "PDOs to all nodes", "command", ink="out", letter="C"),
+    Figure("cycle_command_us", "command", _EQUATIONS, "PDOs to all nodes", "command", ink="out", letter="C"),
     Figure(
         "cycle_blocking_us",
         "3 B",
-        _DAVIS_2007,
+        _EQUATIONS,
         "frames of lower priorities, one before SYNC, one before the last feedback and one before the commands",
         "blocking",
         ink="gap",
@@ -400,7 +370,7 @@ TERMS: Final = (
     Figure(
         "cycle_interference_us",
         "I",
-        _DAVIS_2007,
+        _EQUATIONS,
         "other messages of higher priorities than the last PDO that arrive while the cycle lasts",
         "interference",
         ink="contention",
@@ -422,17 +392,17 @@ LATENCY_TABLE: Final = (
     ),
     Figure("data_bytes", "s", "profile", "data of the last frame", "data, bytes", sort="count"),
     Figure("jitter_us", "J", "profile", "how late it may be queued", "jitter J"),
-    Figure("blocking_us", "B", _DAVIS_2007, "longest frame of a lower priority", "blocking B"),
-    Figure("interference_us", "I", _DAVIS_2007, "frames of higher priorities before it", "interference I"),
-    Figure("instance", "q", _DAVIS_2007, "worst instance of the busy period, from 0", "worst instance q", sort="count"),
-    Figure("backlog_us", "q (C - T)", _DAVIS_2007, "instances before it, less their periods", "backlog q (C - T)"),
-    Figure("frame_us", "C", _DAVIS_2007, "the frame itself", "frame C"),
+    Figure("blocking_us", "B", _EQUATIONS, "longest frame of a lower priority", "blocking B"),
+    Figure("interference_us", "I", _EQUATIONS, "frames of higher priorities before it", "interference I"),
+    Figure("instance", "q", _EQUATIONS, "worst instance of the busy period, from 0", "worst instance q", sort="count"),
+    Figure("backlog_us", "q (C - T)", _EQUATIONS, "instances before it, less their periods", "backlog q (C - T)"),
+    Figure("frame_us", "C", _EQUATIONS, "the frame itself", "frame C"),
     Figure("execution_us", "T_exec", "profile", "waits for nodes and host, of a loop over both", "execution"),
     Figure("pipeline_us", "n T_s", "profile", "cycles that the host computes in, of a loop over both", "host's cycles"),
     Figure(
         "worst_response_us",
         "R",
-        _DAVIS_2007,
+        _EQUATIONS,
         "worst-case response time, J + B + I + q (C - T) + C; of a loop all of it, from SYNC to the executed command",
         "response R",
     ),

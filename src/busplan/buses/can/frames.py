@@ -1,11 +1,9 @@
 """The frames of a CAN network: who sends them, how often, and with what priority."""
 
-from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache, reduce
-from itertools import accumulate, chain, combinations, islice, product, repeat
-from math import inf
+from itertools import chain, islice, repeat
 from typing import Any, Final, NamedTuple, TypeAlias
 
 from busplan.buses.can.equations import (
@@ -21,7 +19,7 @@ from busplan.buses.can.equations import (
     share_bytes,
 )
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, Traced, choose, is_off, larger, plain, pointwise, smaller
+from busplan.elementwise import Number, Traced, choose, is_everywhere, is_off, larger, plain, pointwise, smaller
 from busplan.sections.base import MAX_TIME_US, TRANSACTION_KINDS, TransactionKind
 
 FOLLOWS: Final = -1
@@ -104,6 +102,26 @@ class Traffic:
         """Whether some PDOs are not in every cycle."""
         return not all(is_off(pdos.every - 1) for pdos in self.pdos)
 
+    def frame_us(self, data_bytes: Number, form: "Traffic | Message", *, is_stuffed: bool) -> Number:
+        """Time of a frame [us].
+
+        Parameters
+        ----------
+        data_bytes
+            Its data [bytes].
+        form
+            What gives its format: this traffic for SYNC and PDOs, or a message.
+        is_stuffed
+            Whether the stuff bits of the worst case are counted.
+        """
+        return frame_us(
+            data_bytes,
+            identifier_bits=form.identifier_bits,
+            bit_rate_kbit_s=self.bit_rate_kbit_s,
+            data_bit_rate_kbit_s=form.data_bit_rate_kbit_s,
+            is_stuffed=is_stuffed,
+        )
+
     def ask(self, function: Callable[..., Any], *arguments: Number, words: str) -> Number:
         """Result of a function of the traffic.
 
@@ -120,15 +138,11 @@ class Traffic:
         if self.is_ordered:
             result: Number = function(self, *arguments)
             return result
-        return self.ask_points(function, *arguments, words=words)
-
-    def ask_points(self, function: Callable[..., float], *arguments: Number, words: str) -> Number:
-        """Result of a function of traffic of plain numbers, point by point; arguments as `ask` has them."""
-        return pointwise(lambda at, *more: function(self.at(at), *more), self.place, *arguments, words=words)
+        return pointwise(lambda point, *more: function(self.at(point), *more), self.point, *arguments, words=words)
 
     @cached_property
     def is_ordered(self) -> bool:
-        """Whether identifiers are plain, formats alike or plain, and no number is traced."""
+        """Whether identifiers are plain, formats equal or plain, and no number is traced."""
         order = [self.sync_identifier, *(pdos.identifier for pdos in self.pdos)]
         order += (message.identifier for message in self.messages)
         if not all(message.identifier_bits is self.identifier_bits for message in self.messages):
@@ -138,90 +152,45 @@ class Traffic:
         )
 
     @cached_property
-    def place(self) -> Number:
-        """The place of the traffic of each point; points that are alike share it, and plain traffic has one."""
-        places = self._places
+    def point(self) -> Number:
+        """Number of each point; equal points share theirs, and plain traffic has one."""
+        points = self._points
         return pointwise(
-            lambda *numbers: places.setdefault(numbers, len(places)), *self._numbers, words="all that is sent"
+            lambda *numbers: points.setdefault(numbers, len(points)), *self._numbers, words="all that is sent"
         )
 
-    def at(self, place: float) -> "Traffic":
-        """The traffic of plain numbers at a place."""
-        return self if isinstance(self.place, int) else self._made(int(place))
+    @cached_property
+    def at(self) -> Callable[[float], "Traffic"]:
+        """Function of the number of a point to its traffic of plain numbers."""
+        if isinstance(self.point, int):
+            return lambda _: self
+        points = tuple(self._points)
+        return lru_cache(maxsize=1024)(lambda point: self._with_numbers(points[int(point)]))
 
     @cached_property
-    def _places(self) -> dict[tuple[float, ...], int]:
+    def _points(self) -> dict[tuple[float, ...], int]:
+        """Numbers of all points that differ, each with its own number."""
         return {}
-
-    @cached_property
-    def _made(self) -> Callable[[int], "Traffic"]:
-        rows = tuple(self._places)
-        return lru_cache(maxsize=1024)(lambda place: self._with_numbers(iter(rows[place])))
 
     @cached_property
     def _numbers(self) -> tuple[Number, ...]:
         """All its numbers in a row, as `_with_numbers` takes them."""
-        own = (getattr(self, key) for key in _OWN)
+        cycle = (getattr(self, key) for key in _OF_CYCLE)
         pdos = (getattr(pdos, key) for pdos in self.pdos for key in _OF_PDOS)
-        return (*own, *pdos, *(number for message in self.messages for number in message[_MESSAGE_WORDS:]))
+        return (*cycle, *pdos, *(number for _, *numbers in self.messages for number in numbers))
 
-    def _with_numbers(self, rest: Iterator[Any]) -> "Traffic":
+    def _with_numbers(self, numbers: Iterable[Any]) -> "Traffic":
         """The same senders with other numbers."""
-        own = dict(zip(_OWN, islice(rest, len(_OWN)), strict=True))
-        pdos = [each._replace(**dict(zip(_OF_PDOS, islice(rest, len(_OF_PDOS)), strict=True))) for each in self.pdos]
-        count = len(Message._fields) - _MESSAGE_WORDS
-        messages = (Message(each.name, *islice(rest, count)) for each in self.messages)
-        return Traffic(**own, pdos=tuple(pdos), messages=tuple(messages))
-
-    def without_times(self) -> "Traffic":
-        """The same identifiers with all times alike, where a point is asked alone: alike points are computed once."""
-        if self.is_ordered:
-            return self
-        messages = (
-            each._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0, data_bit_rate_kbit_s=0.0, burst=1)
-            for each in self.messages
-        )
-        return replace(
-            self,
-            period_us=1.0,
-            bit_rate_kbit_s=1.0,
-            data_bit_rate_kbit_s=0.0,
-            read_us=0.0,
-            host_us=0.0,
-            messages=tuple(messages),
-        )
+        left = iter(numbers)
+        cycle = {key: next(left) for key in _OF_CYCLE}
+        pdos = [pdos._replace(**{key: next(left) for key in _OF_PDOS}) for pdos in self.pdos]
+        messages = [Message(name, *(next(left) for _ in rest)) for name, *rest in self.messages]
+        return Traffic(**cycle, pdos=tuple(pdos), messages=tuple(messages))
 
 
-_OWN: Final = tuple(field.name for field in fields(Traffic))[:-2]
+_OF_CYCLE: Final = tuple(field.name for field in fields(Traffic))[:-2]
 """Fields before the PDOs and the messages."""
 _OF_PDOS: Final = ("identifier", "pdos", "payload_bytes", "every")
-_MESSAGE_WORDS: Final = 1
-"""Fields of words, which stand before the numbers."""
-
-
-class _Senders(NamedTuple):
-    """Nodes that send alike, as a network or a profile has them."""
-
-    name: str
-    payload: Any
-    pdos: Number
-    """PDOs of all its nodes in either direction [1]."""
-    pdos_each: Number
-    """PDOs of a node in either direction [1]."""
-    payloads_bytes: tuple[Number, ...]
-    """Of a node, in the order of `TRANSACTION_KINDS` [bytes]."""
-    read_us: Number
-    """Slowest execution of a read [us]."""
-
-
-def _pdos_each(payload: Any, axes: Number) -> Number:
-    """PDOs of a node in either direction [1]."""
-    return larger(axes, 1) if payload.pdo_per == "axis" else 1
-
-
-def pdos_of(group: Group) -> Number:
-    """PDOs of all nodes of a group in either direction [1]."""
-    return group.nodes * _pdos_each(group.said.payload, group.axes)
 
 
 _last: tuple[Network, Traffic] | None = None
@@ -231,75 +200,43 @@ def traffic_of(network: Network) -> Traffic:
     """Traffic of a network. The last result is remembered, for every limit of a network asks for it."""
     global _last  # noqa: PLW0603 - a network may hold arrays, and is told apart by identity alone
     if _last is None or _last[0] is not network:
-        senders = [
-            _Senders(
-                group.name,
-                group.said.payload,
-                pdos_of(group),
-                _pdos_each(group.said.payload, group.axes),
-                (group.read_bytes, group.write_bytes),
-                group.read_execution_us + group.worst_extra_us,
-            )
-            for group in network.groups
-        ]
-        _last = network, _traffic(network.profile, senders, network.period_us, network.nodes)
+        _last = network, _traffic(network)
     return _last[1]
 
 
-def traffic_of_profile(profile: Any) -> Traffic:
-    """Traffic of a profile with plain numbers, each of its groups by itself."""
-    senders = []
-    for nodes in profile.alike_nodes:
-        payloads_bytes = tuple(nodes.bytes_of(kind) for kind in TRANSACTION_KINDS)
-        each, execution = _pdos_each(nodes.payload, nodes.node.axes), nodes.node.execution
-        read_us = execution.execution_us(payloads_bytes[0]) + execution.worst_extra_us
-        senders.append(_Senders(nodes.name, nodes.payload, nodes.nodes * each, each, payloads_bytes, read_us))
-    return _traffic(profile, senders, profile.cycle.period_us, sum(alike.nodes for alike in profile.alike_nodes))
-
-
-def host_us(bus: Any) -> Number:
-    """The host's own time within the cycle: none where it computes in a cycle of its own [us].
-
-    Parameters
-    ----------
-    bus
-        Section [bus]; its numbers may be of any sort.
-    """
-    return choose(bus.pipeline_cycles > 0, 0.0, bus.host_us)
-
-
-def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number, nodes: Number) -> Traffic:
-    bus = profile.bus
+def _traffic(network: Network) -> Traffic:
+    bus, groups = network.profile.bus, network.groups
     alone = Traffic(
         bit_rate_kbit_s=bus.bit_rate_kbit_s,
         data_bit_rate_kbit_s=0.0 if bus.data_bit_rate_kbit_s is None else bus.data_bit_rate_kbit_s,
         identifier_bits=bus.identifier_bits,
-        messages=tuple(_message(message, bus, nodes) for message in profile.message),
+        messages=tuple(_message(message, bus, network.nodes) for message in network.profile.message),
     )
-    if not senders:
+    if not groups:
         return alone
     return replace(
         alone,
-        period_us=period_us,
+        period_us=network.period_us,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
-        read_us=reduce(larger, (sender.read_us for sender in senders)),
-        host_us=host_us(bus),
+        read_us=reduce(larger, (group.read_execution_us + group.worst_extra_us for group in groups)),
+        # Where the host computes in a cycle of its own, it takes no time of this one.
+        host_us=choose(bus.pipeline_cycles > 0, 0.0, bus.host_us),
         pdos=tuple(
-            _pdos(sender, bus, kind, number, is_first=not place)
-            for number, kind in enumerate(TRANSACTION_KINDS)
-            for place, sender in enumerate(senders)
+            _pdos(group, bus, kind, is_first=group is groups[0]) for kind in TRANSACTION_KINDS for group in groups
         ),
     )
 
 
-def _pdos(sender: _Senders, bus: Any, kind: TransactionKind, number: int, *, is_first: bool) -> Pdos:
-    identifier = getattr(sender.payload, f"{NAMES[kind]}_identifier")
+def _pdos(group: Group, bus: Any, kind: TransactionKind, *, is_first: bool) -> Pdos:
+    payload = group.payload
+    identifier = getattr(payload, f"{NAMES[kind]}_identifier")
     if identifier is None:
         identifier = int(_FIRST[kind]) if is_first else FOLLOWS
-    payload_bytes = share_bytes(sender.payloads_bytes[number], pdos=sender.pdos_each)
-    pdos = Pdos(kind, sender.name, identifier, sender.pdos, payload_bytes, every=sender.payload.every)
-    lengths = getattr(sender.payload, f"{NAMES[kind]}_pdos")
+    of_node: Number = larger(group.axes, 1) if payload.pdo_per == "axis" else 1
+    payload_bytes = share_bytes(group.read_bytes if kind == "read" else group.write_bytes, pdos=of_node)
+    pdos = Pdos(kind, group.name, identifier, group.nodes * of_node, payload_bytes, every=payload.every)
+    lengths = getattr(payload, f"{NAMES[kind]}_pdos")
     if lengths is not None:
         return pdos._replace(frame_bytes=lengths, most_bytes=sum(lengths))
     if bus.data_bit_rate_kbit_s is None:
@@ -307,20 +244,19 @@ def _pdos(sender: _Senders, bus: Any, kind: TransactionKind, number: int, *, is_
     return pdos._replace(frame_bytes=(FD_FRAME_BYTES,), most_bytes=int(MOST_PDOS * FD_FRAME_BYTES))
 
 
-def _message(said: Any, bus: Any, nodes: Number) -> Message:
-    deadline_us = said.period_us if said.deadline_us is None else said.deadline_us
+def _message(message: Any, bus: Any, nodes: Number) -> Message:
     return Message(
-        said.name,
-        said.identifier + 1 if said.per_node else said.identifier,
-        said.payload_bytes,
-        said.period_us,
-        said.jitter_us,
-        deadline_us,
-        bus.identifier_bits if said.identifier_bits is None else said.identifier_bits,
-        nodes if said.per_node else 1,
-        0.0 if not said.fd else bus.data_bit_rate_kbit_s if said.brs else bus.bit_rate_kbit_s,
+        message.name,
+        message.identifier + 1 if message.per_node else message.identifier,
+        message.payload_bytes,
+        message.period_us,
+        message.jitter_us,
+        message.period_us if message.deadline_us is None else message.deadline_us,
+        bus.identifier_bits if message.identifier_bits is None else message.identifier_bits,
+        nodes if message.per_node else 1,
+        0.0 if not message.fd else bus.data_bit_rate_kbit_s if message.brs else bus.bit_rate_kbit_s,
         # A burst of one is none, and no input of a derivation.
-        1 if isinstance(said.burst, Traced) and said.burst.value == 1 else said.burst,
+        1 if isinstance(message.burst, Traced) and message.burst.value == 1 else message.burst,
     )
 
 
@@ -360,8 +296,6 @@ class Stream(NamedTuple):
     deadline_us: Points
     identifier_bits: Points
     is_message: bool = False
-    is_end: bool = True
-    """Whether the PDO, or the message, is complete with it."""
     burst: Points = 1
     """Frames of each identifier that may come at once [1]."""
 
@@ -407,31 +341,23 @@ def streams(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
     is_stuffed
         Whether the stuff bits of the worst case are counted.
     """
-    messages = (_of_message(message, traffic.bit_rate_kbit_s, is_stuffed) for message in traffic.messages)
-    return (*_cyclic(traffic, is_stuffed), *messages)
+    return (*_cyclic(traffic, is_stuffed), *(_of_message(message, traffic, is_stuffed) for message in traffic.messages))
 
 
-def _of_message(message: Message, bit_rate_kbit_s: Points, is_stuffed: bool) -> Stream:
-    first, bits = int(plain(message.identifier)), message.identifier_bits
-    us = frame_us(
-        message.payload_bytes,
-        identifier_bits=bits,
-        bit_rate_kbit_s=bit_rate_kbit_s,
-        data_bit_rate_kbit_s=message.data_bit_rate_kbit_s,
-        is_stuffed=is_stuffed,
-    )
+def _of_message(message: Message, traffic: Traffic, is_stuffed: bool) -> Stream:
+    first = int(message.identifier)
     return Stream(
         message.name,
         group="",
-        block=place(first, bits),
+        block=place(first, message.identifier_bits),
         first=first,
         identifiers=_whole(message.senders),
         data_bytes=_whole(message.payload_bytes),
-        frame_us=us,
+        frame_us=traffic.frame_us(message.payload_bytes, message, is_stuffed=is_stuffed),
         period_us=message.period_us,
         jitter_us=message.jitter_us,
         deadline_us=message.deadline_us,
-        identifier_bits=bits,
+        identifier_bits=message.identifier_bits,
         is_message=True,
         burst=message.burst,
     )
@@ -441,65 +367,53 @@ def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
     """SYNC and all PDOs; none of messages alone."""
     if not traffic.has_cycle:
         return
-
-    def sent(name: str, block: int, size: Points, every: Points = 1, **more: Any) -> Stream:
-        us = frame_us(
-            size,
-            identifier_bits=traffic.identifier_bits,
-            bit_rate_kbit_s=traffic.bit_rate_kbit_s,
-            data_bit_rate_kbit_s=traffic.data_bit_rate_kbit_s,
-            is_stuffed=is_stuffed,
-        )
-        own: dict[str, Any] = {"group": "", "first": block, "identifiers": 1, **more}
-        return Stream(
-            name,
-            block=place(block, traffic.identifier_bits),
-            data_bytes=size,
-            frame_us=us,
-            period_us=traffic.period_us * every,
-            jitter_us=0.0,
-            deadline_us=traffic.period_us,
-            identifier_bits=traffic.identifier_bits,
-            **own,
-        )
-
-    yield sent(SYNC, int(plain(traffic.sync_identifier)), _whole(traffic.sync_bytes))
-    block = {"read": FOLLOWS, "write": FOLLOWS}
-    free: dict[str, Points] = dict(block)
+    first, size = int(traffic.sync_identifier), _whole(traffic.sync_bytes)
+    sync = Stream(
+        SYNC,
+        group="",
+        block=place(first, traffic.identifier_bits),
+        first=first,
+        identifiers=1,
+        data_bytes=size,
+        frame_us=traffic.frame_us(size, traffic, is_stuffed=is_stuffed),
+        period_us=traffic.period_us,
+        jitter_us=0.0,
+        deadline_us=traffic.period_us,
+        identifier_bits=traffic.identifier_bits,
+    )
+    yield sync
+    blocks: dict[str, int] = {}
+    free: dict[str, Points] = {}
     for pdos in traffic.pdos:
-        said, count = int(plain(pdos.identifier)), _whole(pdos.pdos)
-        first = free[pdos.kind] if said == FOLLOWS else said
-        if said != FOLLOWS:
-            block[pdos.kind] = said
+        if (identifier := int(pdos.identifier)) != FOLLOWS:
+            blocks[pdos.kind] = free[pdos.kind] = identifier
+        first, count, left_bytes = free[pdos.kind], _whole(pdos.pdos), _whole(pdos.payload_bytes)
         free[pdos.kind] = first + count
-        frames, left_bytes = _most_frames(pdos), _whole(pdos.payload_bytes)
-        for number, most_bytes in enumerate(islice(_most_bytes(pdos), frames)):
+        for number, most_bytes in enumerate(islice(_most_bytes(pdos), _MOST_FRAMES)):
+            is_there, size = left_bytes > 0, larger(smaller(left_bytes, most_bytes), 0)
+            if is_everywhere(left_bytes <= 0):
+                break
             step = number * int(PDO_STEP)
-            own = sent(
-                pdos.name,
-                block[pdos.kind] + step,
-                larger(smaller(left_bytes, most_bytes), 0),
-                pdos.every,
+            yield sync._replace(
+                name=pdos.name,
                 group=pdos.group,
+                block=place(blocks[pdos.kind] + step, traffic.identifier_bits),
                 first=first + step,
-                identifiers=count,
-                is_end=number == frames - 1,
+                identifiers=choose(is_there, count, 0),
+                data_bytes=size,
+                frame_us=choose(is_there, traffic.frame_us(size, traffic, is_stuffed=is_stuffed), 0.0),
+                period_us=traffic.period_us * pdos.every,
             )
-            is_there = left_bytes > 0  # not at every point of an array
-            yield own._replace(identifiers=choose(is_there, count, 0), frame_us=choose(is_there, own.frame_us, 0.0))
             left_bytes = left_bytes - most_bytes
+
+
+_MOST_FRAMES: Final = int(MOST_PDOS) + 1
+"""Frames of a PDO that have streams: one more than a bus allows breaks its limit already."""
 
 
 def _most_bytes(pdos: Pdos) -> Iterator[int]:
     """The most data of each frame of a PDO, without end [bytes]."""
     return map(int, chain(pdos.frame_bytes, repeat(pdos.frame_bytes[-1])))
-
-
-def _most_frames(pdos: Pdos) -> int:
-    """Frames of a PDO that have streams, the most at any point."""
-    payload: Any = pdos.payload_bytes
-    most_bytes = int(payload.max() if hasattr(payload, "max") else payload)
-    return sum(1 for before in islice(accumulate(_most_bytes(pdos), initial=0), _MOST_FRAMES) if before < most_bytes)
 
 
 def frame_sizes(pdos: Pdos) -> Iterator[int]:
@@ -512,58 +426,17 @@ def frame_sizes(pdos: Pdos) -> Iterator[int]:
         left_bytes -= most_bytes
 
 
-_MOST_FRAMES: Final = int(MOST_PDOS) + 1
-"""Frames of a PDO that have streams: one more than a bus allows breaks its limit already."""
-
-
 def _whole(number: Points) -> Points:
     """A number that is whole, as an int where it is plain."""
     return int(number) if isinstance(number, int | float) else number
 
 
-def last_identifier(each: Iterable[Stream]) -> Points:
+def last_identifier(sent: Iterable[Stream]) -> Points:
     """The largest identifier of some streams; 0 of none."""
     none: Points = 0
-    return reduce(larger, (choose(stream.identifiers > 0, stream.last, 0) for stream in each), none)
+    return reduce(larger, (choose(stream.identifiers > 0, stream.last, 0) for stream in sent), none)
 
 
-def last_place(each: Iterable[Stream]) -> Points:
+def last_place(sent: Iterable[Stream]) -> Points:
     """Place of the last identifier of some streams in the arbitration."""
-    return reduce(larger, (choose(stream.identifiers > 0, stream.last_place, 0) for stream in each))
-
-
-def identifiers_twice(traffic: Traffic) -> Points:
-    """Number of identifiers that stand twice or more often [1].
-
-    Parameters
-    ----------
-    traffic
-        What is sent, as `Traffic.ask` gives it.
-    """
-    each = streams(traffic, is_stuffed=True)
-    fixed = [stream for stream in each if isinstance(stream.last, int)]
-    varied = [stream for stream in each if not isinstance(stream.last, int)]
-    twice: Points = sum(shared for *_, shared in collisions(fixed))
-    for early, late in chain(combinations(varied, 2), product(varied, fixed)):
-        if has_format(early, late.identifier_bits):
-            twice = twice + larger(smaller(early.last, late.last) - larger(early.first, late.first) + 1, 0)
-    return twice
-
-
-def has_format(stream: Stream, identifier_bits: Points) -> bool:
-    """Whether a stream has identifiers of a length; lengths that vary from point to point are alike."""
-    bits = stream.identifier_bits, identifier_bits
-    return bits[0] is bits[1] or not all(isinstance(length, int | float) for length in bits) or bits[0] == bits[1]
-
-
-def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, int]]:
-    """Pairs of streams of plain numbers that share identifiers, with the first they share, and how many."""
-    ordered = sorted((int(plain(stream.first)), place) for place, stream in enumerate(each))
-    pairs = [
-        sorted((place, behind))
-        for number, (_, place) in enumerate(ordered)
-        for _, behind in ordered[number + 1 : bisect_right(ordered, (each[place].last, inf), number)]
-    ]
-    for early, late in sorted(pair for pair in pairs if has_format(each[pair[0]], each[pair[1]].identifier_bits)):
-        first = max(each[early].first, each[late].first)
-        yield each[early], each[late], first, min(each[early].last, each[late].last) - first + 1
+    return reduce(larger, (choose(stream.identifiers > 0, stream.last_place, 0) for stream in sent))

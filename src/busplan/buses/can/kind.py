@@ -1,10 +1,9 @@
 """CAN, as a kind of bus."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
-from busplan.buses.can import rules
 from busplan.buses.can.cycle import EVENTS, NONE, STRETCHES, WORST, CanCycle
 from busplan.buses.can.equations import (
     BASE_BITS,
@@ -18,7 +17,7 @@ from busplan.buses.can.equations import (
     SYNC_IDENTIFIER,
 )
 from busplan.buses.can.frames import streams, traffic_of
-from busplan.buses.can.rules import LIMITS
+from busplan.buses.can.rules import LIMITS, RULES
 from busplan.buses.limits import Cost, Key, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded
@@ -29,65 +28,45 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def settings(network: Network) -> tuple[Setting, ...]:
-    """PDOs of each axis, a higher bit rate, of CAN FD a higher data bit rate, identifiers of 11 bits.
-
-    Parameters
-    ----------
-    network
-        The network, of plain numbers.
-    """
-    several = any(nodes.node.axes > 1 for nodes in network.alike)
-    is_fd = network.profile.bus.data_bit_rate_kbit_s is not None
-    return (
-        *((_pdo_per(network),) if several else ()),
-        _bit_rate(network),
-        *((_data_bit_rate(network),) if is_fd else ()),
-        _identifier_bits(network),
-    )
-
-
 def _pdo_per(network: Network) -> Setting:
     """PDOs of each axis, where a node has several: its parameters map them."""
-    keys = {nodes.name: f"group.{nodes.name}.pdo_per" if nodes.name else "payload.pdo_per" for nodes in network.alike}
+    keys = {
+        nodes.name: f"group.{nodes.name}.pdo_per" if nodes.name else "payload.pdo_per"
+        for nodes in network.profile.node_groups
+    }
     several = {
-        keys[nodes.name]: "axis" for nodes in network.alike if nodes.payload.pdo_per == "node" and nodes.node.axes > 1
+        keys[nodes.name]: "axis"
+        for nodes in network.profile.node_groups
+        if nodes.payload.pdo_per == "node" and nodes.node.axes > 1
     }
     reason = "" if several else "each axis has one already"
     values = (several,) if several else ()
     return Setting("pdo_per", "PDOs of each axis", Cost.REGISTER, tuple(keys.values()), values, reason)
 
 
-def _bit_rate(network: Network) -> Setting:
-    """Higher bit rates, the next higher first: the cable must be short enough."""
-    key, bus = "bus.bit_rate_kbit_s", network.profile.bus
-    most = BIT_RATES[-1] if bus.data_bit_rate_kbit_s is None else bus.data_bit_rate_kbit_s
-    higher = tuple({key: rate} for rate in BIT_RATES if bus.bit_rate_kbit_s < rate <= most)
-    return Setting("bit_rate", "bit rate", Cost.SCHEDULE, (key,), higher, "" if higher else "it is the highest")
-
-
-def _data_bit_rate(network: Network) -> Setting:
-    """Higher data bit rates of CAN FD, the next higher first: transceivers and cable must carry it."""
-    key = "bus.data_bit_rate_kbit_s"
-    higher = tuple({key: rate} for rate in DATA_BIT_RATES if rate > network.profile.bus.data_bit_rate_kbit_s)
-    return Setting(
-        "data_bit_rate", "data bit rate", Cost.SCHEDULE, (key,), higher, "" if higher else "it is the highest"
-    )
+def _higher(name: str, rate_kbit_s: float, rates_kbit_s: Sequence[float]) -> Setting:
+    """Higher bit rates, the next higher first: cable, and for the data of CAN FD transceivers, must carry them."""
+    key = f"bus.{name}_kbit_s"
+    higher = tuple({key: rate} for rate in rates_kbit_s if rate > rate_kbit_s)
+    reason = "" if higher else "it is the highest"
+    return Setting(name, name.replace("_", " "), Cost.SCHEDULE, (key,), higher, reason)
 
 
 def _identifier_bits(network: Network) -> Setting:
     """Identifiers of 11 bits, where all are small enough."""
     key, traffic = "bus.identifier_bits", traffic_of(network)
-    empty = Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), ())
+    last = [
+        stream.last for stream in streams(traffic, is_stuffed=True) if stream.identifier_bits == traffic.identifier_bits
+    ]
+    reason = ""
     if plain(traffic.identifier_bits) == BASE_BITS:
-        return empty._replace(reason=f"they have {BASE_BITS} bits")
-    each = streams(traffic, is_stuffed=True)
-    own = [stream.last for stream in each if stream.identifier_bits == traffic.identifier_bits]
-    if not own:
-        return empty._replace(reason="no message has the length of the bus")
-    if max(own) > MAX_IDENTIFIER[BASE_BITS]:
-        return empty._replace(reason=f"some are over {MAX_IDENTIFIER[BASE_BITS]:#x}")
-    return empty._replace(values=({key: BASE_BITS},))
+        reason = f"they have {BASE_BITS} bits"
+    elif not last:
+        reason = "no message has the length of the bus"
+    elif max(last) > MAX_IDENTIFIER[BASE_BITS]:
+        reason = f"some are over {MAX_IDENTIFIER[BASE_BITS]:#x}"
+    values = () if reason else ({key: BASE_BITS},)
+    return Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), values, reason)
 
 
 _HOST_STEP_US: Final = 10.0
@@ -110,7 +89,7 @@ class Can(Bus):
     deciding_model = WORST
     figures = FIGURES
     limits = LIMITS
-    rules = rules.RULES
+    rules = RULES
     starter = Starter(
         """\
 [bus]
@@ -182,8 +161,15 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         return not of_latency
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """PDOs of each axis, higher bit rates, identifiers of 11 bits."""
-        return settings(network)
+        """PDOs of each axis, a higher bit rate, of CAN FD a higher data bit rate, identifiers of 11 bits."""
+        rate, data_rate = network.profile.bus.bit_rate_kbit_s, network.profile.bus.data_bit_rate_kbit_s
+        most = BIT_RATES[-1] if data_rate is None else data_rate
+        return (
+            *((_pdo_per(network),) if any(nodes.node.axes > 1 for nodes in network.profile.node_groups) else ()),
+            _higher("bit_rate", rate, [higher for higher in BIT_RATES if higher <= most]),
+            *(() if data_rate is None else (_higher("data_bit_rate", data_rate, DATA_BIT_RATES),)),
+            _identifier_bits(network),
+        )
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """A slower host, SYNC with its counter, and identifiers of 29 bits; of a network with a cycle."""
@@ -191,40 +177,38 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         counted = "SYNC has its counter already" if bus.sync_counter else ""
         extended = "they have 29 bits already" if bus.identifier_bits > BASE_BITS else ""
         elsewhere = "the host computes in cycles of its own" if bus.pipeline_cycles else ""
+        slower = {"bus.host_us": bus.host_us + _HOST_STEP_US}
         return (
-            Perturbation(
-                f"host +{_HOST_STEP_US:g} us", {"bus.host_us": bus.host_us + _HOST_STEP_US}, why_not=elsewhere
-            ),
-            Perturbation("SYNC with counter", {"bus.sync_counter": True}, why_not=counted),
-            Perturbation("identifiers of 29 bits", {"bus.identifier_bits": 29}, why_not=extended),
+            Perturbation(f"host +{_HOST_STEP_US:g} us", slower, elsewhere),
+            Perturbation("SYNC with counter", {"bus.sync_counter": True}, counted),
+            Perturbation("identifiers of 29 bits", {"bus.identifier_bits": 29}, extended),
         )
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Whole bytes up to four frames."""
-        largest = min(pdos.most_bytes for pdos in traffic_of(network).pdos)
-        each = min((plain(group.axes) for group in network.groups if group.said.payload.pdo_per == "axis"), default=1)
-        return PayloadRange(1, largest * max(int(each), 1), carrier="four frames")
+        """Whole bytes up to four frames of each PDO."""
+        most_bytes = min(pdos.most_bytes for pdos in traffic_of(network).pdos)
+        axes = (int(plain(group.axes)) for group in network.groups if group.payload.pdo_per == "axis")
+        return PayloadRange(1, most_bytes * max(min(axes, default=1), 1), carrier="four frames")
 
     def setpoints_every(self, network: Network) -> tuple[str, int]:
-        """Those of the group with axes whose PDOs go most often."""
-        with_axes = [group for group in network.groups if plain(group.axes)] or network.groups
-        said = min((group.said for group in with_axes), key=lambda nodes: int(plain(nodes.payload.every)))
-        return f"group.{said.name}.every" if said.name else "payload.every", int(plain(said.payload.every))
+        """Cycles between set-points of the fastest group."""
+        groups = [group for group in network.groups if plain(group.axes)] or network.groups
+        fastest = min(groups, key=lambda group: plain(group.every)).members[0]
+        return f"group.{fastest.name}.every" if fastest.name else "payload.every", int(plain(fastest.payload.every))
 
     def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
         """Nodes and axes; of a network without them its messages."""
         return super().counted(network) if network.groups else ((len(network.profile.message), "message"),)
 
-    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
-        """Say what each frame is charged."""
-        return "every frame with the stuff bits of its length"
-
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The bit rate, or both of CAN FD, and PDOs that are not in every cycle."""
         bus = network.profile.bus
         data = "" if bus.data_bit_rate_kbit_s is None else f", {bus.data_bit_rate_kbit_s:g} kbit/s of data"
-        rates = ((nodes.name, int(plain(nodes.payload.every))) for nodes in network.alike)
-        seldom = (f"PDOs {name and f'of {name} '}every {every} cycles" for name, every in rates if every > 1)
+        seldom = (
+            f"PDOs {nodes.name and f'of {nodes.name} '}every {int(plain(nodes.payload.every))} cycles"
+            for nodes in network.profile.node_groups
+            if nodes.payload.every > 1
+        )
         return (f"{bus.bit_rate_kbit_s:g} kbit/s{data}", *seldom)
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:

@@ -13,20 +13,19 @@ from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.equations import BASE_BITS, FD_FRAME_BYTES, FD_LENGTHS, FRAME_BYTES, bit_us, frame_us
 from busplan.buses.can.frames import SYNC, Stream, streams
 from busplan.buses.network import Network
-from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, Sense, day_of
+from busplan.buses.rule import CLOCK_TOLERANCE, SURE, Recorded, RecordedFigure, day_of
 from busplan.elementwise import plain
 from busplan.english import first_of, plural
 from busplan.progress import Progress
-from busplan.recordings.can import (
+from busplan.recordings.can import CanFrames, read_can
+from busplan.recordings.can_timing import (
     LISTED,
-    CanFrames,
     SentFrames,
     event_model,
     faults,
     least_bit_rate,
     longest_stretch,
     mean_period,
-    read_can,
     sent_messages,
     stamps_of_no_bus,
     step_us,
@@ -37,8 +36,6 @@ _NOT_SHOWN: Final = (
     "Not shown by a log: the bit rate, frames that the recorder did not take, when a frame was queued, commands that "
     "are always late by whole periods, and the nodes' own time."
 )
-_GAP_BITS: Final = 3
-"""Idle bits between two frames that still follow each other at once, beside the step of the stamps."""
 _MADE_UP: Final = 10
 """Due cycles within which a PDO that is missing may still come."""
 _BLOCK: Final = 50
@@ -68,21 +65,16 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
         No log of a single channel with frames.
     """
     frames = read_can(path, progress=progress)
-    seen = _Seen(network, frames, share)
-    return Recorded(
-        tuple(seen.figures()),
-        tuple(seen.remarks()),
-        seen.edits,
-        day_of(int(frames.start_s * 1e9)),
-        tuple(seen.shows_nothing()),
-    )
+    log = _Log(network, frames, share)
+    day = day_of(int(frames.start_s * 1e9))
+    return Recorded(tuple(log.figures()), tuple(log.remarks()), log.edits, day, tuple(log.shows_nothing()))
 
 
-class Due(NamedTuple):
-    """PDOs of an identifier beside the SYNCs that asked for them."""
+class DuePdos(NamedTuple):
+    """PDOs of an identifier beside the SYNCs that they were due at."""
 
     cycles: npt.NDArray[np.int64]
-    """Number of the SYNC that asked for each PDO."""
+    """Number of the SYNC that each PDO was due at."""
     late_us: Floats
     """Each PDO after it [us]."""
     due: int
@@ -91,8 +83,8 @@ class Due(NamedTuple):
     twice: int
 
 
-def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDArray[np.bool_] | None = None) -> Due:
-    """Tell which SYNC asked for each PDO.
+def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDArray[np.bool_] | None = None) -> DuePdos:
+    """Tell which SYNC each PDO was due at.
 
     A PDO comes once for each SYNC that it is due at. Two after one SYNC, where one before had none, are late: they came
     in their order. One that never comes is missing. A lag of whole periods that never changes cannot be seen.
@@ -116,18 +108,18 @@ def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDAr
     (array([ 30., 110.,  30.,  30.]), 4, 0, 0)
     """
     sent = np.ones(len(sync_us), dtype=np.bool_) if is_sent is None else is_sent
-    asked = _due_at(sync_us, times_us, every, sent)
-    cycles = np.searchsorted(sync_us[asked], times_us, side="right") - 1
+    due = _due_at(sync_us, times_us, every, sent)
+    cycles = np.searchsorted(sync_us[due], times_us, side="right") - 1
     times_us, cycles = times_us[cycles >= 0], cycles[cycles >= 0]
     # After the last SYNC the log may end.
-    whole = len(asked) - 1
-    counts = np.bincount(cycles, minlength=len(asked))[:whole]
-    first = np.searchsorted(cycles, np.arange(len(asked) + 1))
+    whole = len(due) - 1
+    counts = np.bincount(cycles, minlength=len(due))[:whole]
+    first = np.searchsorted(cycles, np.arange(len(due) + 1))
     missing: list[int] = []
     twice = 0
     for place in np.flatnonzero(counts != 1).tolist():
         if not counts[place]:
-            missing += [place] if sent[asked[place]] else []
+            missing += [place] if sent[due[place]] else []
             continue
         for number in range(int(counts[place]) - 1):
             if not missing or place - missing[-1] > _MADE_UP:
@@ -135,7 +127,7 @@ def due_pdos(sync_us: Floats, times_us: Floats, *, every: int, is_sent: npt.NDAr
                 twice += int(counts[place]) - 1 - number if place else 0
                 break
             cycles[first[missing.pop() + 1] : first[place + 1] - 1 - number] -= 1
-    return Due(asked[cycles], times_us - sync_us[asked[cycles]], int(sent[asked[:whole]].sum()), len(missing), twice)
+    return DuePdos(due[cycles], times_us - sync_us[due[cycles]], int(sent[due[:whole]].sum()), len(missing), twice)
 
 
 def _due_at(sync_us: Floats, times_us: Floats, every: int, is_sent: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
@@ -143,36 +135,36 @@ def _due_at(sync_us: Floats, times_us: Floats, every: int, is_sent: npt.NDArray[
 
     Nodes count the SYNCs that they get, a host counts periods: of both the one is taken by which more PDOs are due.
     """
-    count = np.arange(len(sync_us))
+    periods = np.arange(len(sync_us))
     if every == 1:
-        return count
+        return periods
     comes = np.bincount(np.searchsorted(sync_us, times_us, side="right"), minlength=len(sync_us) + 1)[1:] > 0
-    found = (_most_common(comes, number % every, every) for number in (count, is_sent.cumsum()))
-    return max(found, key=lambda due: int(np.count_nonzero(comes[due])))
+    ways = (_most_common(comes, count % every, every) for count in (periods, is_sent.cumsum()))
+    return max(ways, key=lambda due: int(np.count_nonzero(comes[due])))
 
 
 def _most_common(comes: npt.NDArray[np.bool_], rest: npt.NDArray[np.int64], every: int) -> npt.NDArray[np.int64]:
     """Numbers of the SYNCs whose rest is the most common one of their block among those after which a PDO comes."""
     blocks = np.array_split(np.arange(len(rest)), max(len(rest) // (_BLOCK * every), 1))
     most = [int(np.bincount(rest[block[comes[block]]], minlength=every).argmax()) for block in blocks]
-    return np.concatenate([block[rest[block] == own] for block, own in zip(blocks, most, strict=True)])
+    return np.concatenate([block[rest[block] == common] for block, common in zip(blocks, most, strict=True)])
 
 
-class _Seen:
-    """A log, with what is derived of it once."""
+class _Log:
+    """A log beside the plan, with what is derived of it once."""
 
     def __init__(self, network: Network, frames: CanFrames, share: float) -> None:
         self.network, self.frames, self.share = network, frames, share
         self.cycle = CanCycle(network, WORST)
-        self.bit_us = plain(bit_us(self.cycle.traffic.bit_rate_kbit_s))
+        self.traffic = self.cycle.traffic
+        self.bit_us = plain(bit_us(self.traffic.bit_rate_kbit_s))
         self.edits: dict[str, Any] = {}
         self.stretch = longest_stretch(frames)
         self.taken, self.times_us = self.stretch.taken, self.stretch.times_us
         self.by_identifier = sent_messages(frames, self.stretch)
-        self.streams = streams(self.cycle.traffic, is_stuffed=True)
         self.unplanned = dict(self.by_identifier)
         self.unseen: list[str] = []
-        self.missed_cycles = network.profile.limits.missed_cycles
+        self.messages = {message.name: message for message in network.profile.message}
         self.least_bit_rate = least_bit_rate(frames, self.stretch)
         self.step_us = step_us(self.stretch)
         self.stamp_error_us = self.step_us + self._late_stamps_us()
@@ -186,84 +178,74 @@ class _Seen:
         # A frame that no other one follows so soon may be as late, and as late again as the longest frame is.
         return late_us + float(self.frames.bits.max()) * self.bit_us if late_us > self.step_us else late_us
 
+    @property
+    def has_switch(self) -> bool:
+        """Whether the plan has a data bit rate of CAN FD."""
+        return bool(self.traffic.data_bit_rate_kbit_s)
+
     def figures(self) -> Iterator[RecordedFigure]:
         """All figures."""
-        yield from self._bit_rate()
-        yield from self._load()
-        yield RecordedFigure(
-            "error frames",
-            "1",
-            self.missed_cycles,
-            self.frames.errors,
-            None,
-            "at most",
-            len(self.times_us) + self.frames.errors,
-            "limits.missed_cycles",
-        )
-        yield from self._cycles()
-        responses = {(each.group, each.name): each.phases for each in self.cycle.latencies()}
-        unstuffed = streams(self.cycle.traffic, is_stuffed=False)
-        labels = _labels(self.streams)
-        for stream, least, label in zip(self.streams, unstuffed, labels, strict=True):
-            response = responses.get((stream.group, stream.name))
-            yield from self._stream(stream, label, self._spread_us(stream, plain(least.frame_us), response))
-        if self.unseen:
-            yield RecordedFigure(
-                "frames of the plan never in the log",
-                "1",
-                0,
-                len(self.unseen),
-                None,
-                "at most",
-                len(self.taken),
-                hidden=f"never in the log: {first_of(self.unseen, LISTED)}",
-            )
-        frames = sum(len(sent.times_us) for sent in self.unplanned.values())
-        note = first_of([f"{sent.identifier:#x}" for sent in self.unplanned.values()], LISTED)
-        yield RecordedFigure("frames of no message of the plan", "1", 0, frames, None, "at most", frames, note=note)
-
-    def shows_nothing(self) -> Iterator[str]:
-        """Why the log as a whole shows no machine within its plan."""
-        often = max(len(sent.times_us) for sent in self.by_identifier.values())
-        if often < LEAST_EVENTS:
-            yield f"no identifier comes {LEAST_EVENTS} times: the log is too short"
-        if not self.step_us:
-            yield "all frames have one stamp"
-        elif reason := stamps_of_no_bus(self.least_bit_rate.likely):
-            yield reason
-        period_us = plain(self.cycle.traffic.period_us) if self.cycle.traffic.has_cycle else np.inf
-        if 2 * self.step_us > period_us:
-            yield f"its stamps have steps of {self.step_us:,.0f} us, and a cycle lasts {period_us:,.0f}"
-
-    def _bit_rate(self) -> Iterator[RecordedFigure]:
         least = self.least_bit_rate
         if least.likely:
             yield RecordedFigure(
                 "bit rate that the frames need",
                 "kbit/s",
-                plain(self.cycle.traffic.bit_rate_kbit_s),
+                plain(self.traffic.bit_rate_kbit_s),
                 least.likely,
                 (least.likely - least.surely) / SURE,
                 "at most",
                 len(self.taken),
                 "bus.bit_rate_kbit_s",
             )
+        yield from self._load()
+        yield self._missed("error frames", self.frames.errors, len(self.times_us) + self.frames.errors)
+        each = streams(self.traffic, is_stuffed=True)
+        yield from self._cycles(each)
+        responses = {(answer.group, answer.name): answer.phases for answer in self.cycle.latencies()}
+        unstuffed = streams(self.traffic, is_stuffed=False)
+        for stream, shortest, label in zip(each, unstuffed, _labels(each), strict=True):
+            phases = responses.get((stream.group, stream.name))
+            yield from self._stream(stream, label, self._spread_us(stream, shortest.frame_us, phases))
+        count = len(self.taken)
+        if self.unseen:
+            hidden = f"never in the log: {first_of(self.unseen, LISTED)}"
+            unseen = len(self.unseen)
+            yield _limited("frames of the plan never in the log", 0, unseen, count, hidden=hidden)
+        frames = sum(len(sent.times_us) for sent in self.unplanned.values())
+        note = first_of([f"{sent.identifier:#x}" for sent in self.unplanned.values()], LISTED)
+        yield _limited("frames of no message of the plan", 0, frames, frames, note=note)
+
+    def shows_nothing(self) -> Iterator[str]:
+        """Why the log as a whole shows no machine within its plan."""
+        if max(len(sent.times_us) for sent in self.by_identifier.values()) < LEAST_EVENTS:
+            yield f"no identifier comes {LEAST_EVENTS} times: the log is too short"
+        if not self.step_us:
+            yield "all frames have one stamp"
+        elif reason := stamps_of_no_bus(self.least_bit_rate.likely):
+            yield reason
+        period_us = plain(self.traffic.period_us)
+        if self.traffic.has_cycle and 2 * self.step_us > period_us:
+            yield f"its stamps have steps of {self.step_us:,.0f} us, and a cycle lasts {period_us:,.0f}"
+
+    def _missed(
+        self, quantity: str, number: int | None, events: int, *, note: str = "", hidden: str = ""
+    ) -> RecordedFigure:
+        most = self.network.profile.limits.missed_cycles
+        return _limited(quantity, most, number, events, "limits.missed_cycles", note=note, hidden=hidden)
 
     def _wire_us(self, *, is_stuffed: bool) -> Floats:
         """Each frame on the wire with the most stuff bits or with none [us]."""
-        frames, traffic, taken = self.frames, self.cycle.traffic, self.taken
+        taken = self.taken
         us = np.zeros(len(taken))
-        nominal, data = plain(traffic.bit_rate_kbit_s), plain(traffic.data_bit_rate_kbit_s)
-        is_fd, switched = frames.is_fd[taken], frames.switched[taken]
-        sorts = [(~is_fd, 0.0), (is_fd & ~switched, nominal)]
-        if data:
-            sorts.append((is_fd & switched, data))
-        for own, rate in sorts:
-            us[own] = frame_us(
-                np.minimum(frames.sizes[taken[own]], FD_FRAME_BYTES if rate else FRAME_BYTES),
-                identifier_bits=np.where(frames.extended[taken[own]], 29, BASE_BITS),
+        nominal, data = plain(self.traffic.bit_rate_kbit_s), plain(self.traffic.data_bit_rate_kbit_s)
+        is_fd, switched = self.frames.is_fd[taken], self.frames.switched[taken]
+        # Without a data bit rate the frames that switch take no time.
+        for places, data_rate in ((~is_fd, 0.0), (is_fd & ~switched, nominal), (is_fd & switched & bool(data), data)):
+            us[places] = frame_us(
+                np.minimum(self.frames.sizes[taken[places]], FD_FRAME_BYTES if data_rate else FRAME_BYTES),
+                identifier_bits=np.where(self.frames.extended[taken[places]], 29, BASE_BITS),
                 bit_rate_kbit_s=nominal,
-                data_bit_rate_kbit_s=rate,
+                data_bit_rate_kbit_s=data_rate,
                 is_stuffed=is_stuffed,
             )
         return us
@@ -272,226 +254,173 @@ class _Seen:
         """Load as it was, beside that of the plan and those of the same frames with worst and without stuff bits."""
         count, is_fd = len(self.taken), self.frames.is_fd[self.taken]
         span_us = float(self.times_us[-1] - self.times_us[0])
-        if count < 2 or span_us <= 0:  # noqa: PLR2004 - a distance
+        is_whole = self.has_switch or not self.frames.switched[self.taken].any()
+        if count < 2 or span_us <= 0 or (is_fd.all() and not is_whole):  # noqa: PLR2004 - a distance
             return
         worst_us, none_us = self._wire_us(is_stuffed=True), self._wire_us(is_stuffed=False)
         # Of CAN FD the stuff bits are not known: any number of the possible ones.
-        own_us = np.where(is_fd, (worst_us + none_us) / 2, self.frames.bits[self.taken] * self.bit_us)
-        stuffing_us = float((worst_us - none_us)[1:][is_fd[1:]].sum()) / 2
+        wire_us = np.where(is_fd, (worst_us + none_us) / 2, self.frames.bits[self.taken] * self.bit_us)
         # The first frame ended with its stamp.
-        load, worst, none = (float(us[1:].sum()) / span_us for us in (own_us, worst_us, none_us))
-        note = "exact bits of each classical frame, at the bit rate of the profile"
-        sense: Sense = "at most"
-        unknown = self.frames.switched[self.taken].any() and not self.has_switch
-        if unknown:
-            if is_fd.all():
-                return
-            note, sense = f"{note}; without frames of CAN FD that switch", "shown"
+        load, worst, none = (float(us[1:].sum()) / span_us for us in (wire_us, worst_us, none_us))
         # A log begins and ends anywhere: it may have a frame more of each identifier than its length has periods.
-        _, each = np.unique(
-            self.frames.identifiers[self.taken] * 2 + self.frames.extended[self.taken], return_index=True
-        )
-        doubt_us = float(own_us[each].sum() + load * self.stamp_error_us + stuffing_us)
-        doubt = doubt_us / span_us if sense == "at most" else None
-        yield RecordedFigure("load", "share", plain(self.cycle.load), load, doubt, sense, count, note=note)
+        keys = self.frames.identifiers[self.taken] * 2 + self.frames.extended[self.taken]
+        more_us = wire_us[np.unique(keys, return_index=True)[1]].sum()
+        stuffing_us = (worst_us - none_us)[1:][is_fd[1:]].sum() / 2
+        doubt = float(more_us + load * self.stamp_error_us + stuffing_us) / span_us
+        note, planned = "exact bits of each classical frame, at the bit rate of the profile", plain(self.cycle.load)
+        if is_whole:
+            yield RecordedFigure("load", "share", planned, load, doubt, "at most", count, note=note)
+        else:
+            note = f"{note}; without frames of CAN FD that switch"
+            yield RecordedFigure("load", "share", planned, load, None, "shown", count, note=note)
         yield RecordedFigure("load, worst stuffing of these frames", "share", None, worst, None, "shown", count)
         yield RecordedFigure("load, no stuffing of these frames", "share", None, none, None, "shown", count)
-        possible_us = float((worst_us - none_us)[~is_fd].sum())
+        classical, possible_us = ~is_fd, float((worst_us - none_us)[~is_fd].sum())
         if possible_us:
-            stuffing = float((own_us - none_us)[~is_fd].sum()) / possible_us
-            number = int(np.count_nonzero(~is_fd))
+            stuffing, number = float((wire_us - none_us)[classical].sum()) / possible_us, int(classical.sum())
             yield RecordedFigure("stuff bits of the possible ones", "share", None, stuffing, None, "shown", number)
-        apart_us = np.diff(self.times_us) - own_us[1:]
-        gap_us = _GAP_BITS * self.bit_us
-        runs = np.diff(
-            np.concatenate(([-1], np.flatnonzero(apart_us > gap_us + min(self.step_us, gap_us)), [count - 1]))
-        )
-        yield RecordedFigure("frames directly after each other", "1", None, int(runs.max()), None, "shown", count)
 
-    def _cycles(self) -> Iterator[RecordedFigure]:
+    def _cycles(self, each: Sequence[Stream]) -> Iterator[RecordedFigure]:
         """SYNCs and PDOs that are missing, and the last PDO after its SYNC."""
-        if not self.cycle.traffic.has_cycle:
+        if not self.traffic.has_cycle:
             return
-        sync = next(stream for stream in self.streams if stream.name == SYNC)
-        known = self.by_identifier.get((_whole(sync.first), sync.identifier_bits > BASE_BITS))
-        periods = None if known is None else grid(known.times_us)
-        if known is None or periods is None:
-            few = f"SYNC comes {plural(0 if known is None else len(known.times_us), 'time')}"
+        sync, *others = each
+        is_extended = sync.identifier_bits > BASE_BITS
+        sent = self.by_identifier.get((sync.first, is_extended))
+        periods = None if sent is None else grid(sent.times_us)
+        if sent is None or periods is None:
+            few = f"SYNC comes {plural(0 if sent is None else len(sent.times_us), 'time')}"
             yield self._missed("cycles without SYNC", None, 0, hidden=few)
             return
         yield self._missed("cycles without SYNC", periods.missing, int(periods.places[-1]) + 1)
-        number = np.arange(periods.places[-1] + 1)
-        sync_us, is_sent = np.interp(number, periods.places, known.times_us), np.isin(number, periods.places)
-        behind_us = np.full(len(number), -np.inf)
+        cycles = np.arange(periods.places[-1] + 1)
+        sync_us, is_sent = np.interp(cycles, periods.places, sent.times_us), np.isin(cycles, periods.places)
+        behind_us = np.full(len(cycles), -np.inf)
         lost: dict[str, list[str]] = {"missing": [], "twice": []}
         counts = Counter[str]()
-        for stream in self.streams:
-            if stream.is_message or stream.name == SYNC:
-                continue
-            every = round(plain(stream.period_us) / plain(sync.period_us))
-            for identifier in range(_whole(stream.first), _whole(stream.last) + 1):
-                sent = self.by_identifier.get((identifier, stream.identifier_bits > BASE_BITS))
+        for stream in others:
+            for identifier in () if stream.is_message else range(stream.first, stream.last + 1):
+                sent = self.by_identifier.get((identifier, is_extended))
                 times_us = np.zeros(0) if sent is None else sent.times_us
-                due = due_pdos(sync_us, times_us, every=every, is_sent=is_sent)
-                np.maximum.at(behind_us, due.cycles, due.late_us)
-                counts.update(due=due.due, missing=due.missing, twice=due.twice)
+                every = round(stream.period_us / sync.period_us)
+                pdos = due_pdos(sync_us, times_us, every=every, is_sent=is_sent)
+                np.maximum.at(behind_us, pdos.cycles, pdos.late_us)
+                counts.update(due=pdos.due, missing=pdos.missing, twice=pdos.twice)
                 for name, notes in lost.items():
-                    if number := getattr(due, name):
+                    if number := getattr(pdos, name):
                         notes.append(f"{number:,} of {identifier:#x}")
         for name, notes in lost.items():
             yield self._missed(f"PDOs {name}", counts[name], counts["due"], note=first_of(notes, LISTED))
         behind_us = behind_us[behind_us >= 0]
-        if not len(behind_us):
-            return
-        behind = quantile(behind_us, self.share)
-        planned_us = _finite(plain(self.cycle.required_us) - plain(self.network.nonperiodic_us))
-        doubt = expanded(*(plain(doubt.us) for doubt in self.cycle.doubts()), behind.uncertainty or 0.0)
-        yield RecordedFigure(
-            "last PDO after SYNC",
-            "us",
-            planned_us,
-            behind.value,
-            None if doubt is None else doubt + self.stamp_error_us,
-            "at most",
-            len(behind_us),
-            "cycle.period_us",
-        )
-
-    def _missed(
-        self, quantity: str, number: int | None, events: int, *, note: str = "", hidden: str = ""
-    ) -> RecordedFigure:
-        key = "limits.missed_cycles"
-        return RecordedFigure(
-            quantity, "1", self.missed_cycles, number, None, "at most", events, key, note, hidden=hidden
-        )
-
-    def _of(self, stream: Stream) -> list[SentFrames]:
-        """What was recorded of its identifiers."""
-        is_extended = stream.identifier_bits > BASE_BITS
-        first, last = _whole(stream.first), _whole(stream.last)
-        return [
-            sent
-            for (identifier, extended), sent in self.by_identifier.items()
-            if extended == is_extended and first <= identifier <= last
-        ]
-
-    def _stream(self, stream: Stream, label: str, spread_us: float | None) -> Iterator[RecordedFigure]:
-        each = self._of(stream)
-        for sent in each:
-            self.unplanned.pop((sent.identifier, stream.identifier_bits > BASE_BITS), None)
-        missing = _whole(stream.identifiers) - len(each)
-        if missing:
-            self.unseen.append(label if not each else f"{missing} of {label}")
-        if not each:
-            return
-        if stream.is_message:
-            yield from self._message(stream, label, each, spread_us)
-        elif stream.name == SYNC:
-            yield from self._sync(stream, each[0], spread_us)
-        fullest = max(each, key=lambda sent: sent.most_bytes)
-        planned_bytes = plain(stream.data_bytes)
-        if self._planned_format(stream) != _CLASSICAL:
-            planned_bytes = next(length for length in FD_LENGTHS if length >= planned_bytes)
-        key = f"message.{stream.name}" if stream.is_message else ""
-        count = sum(len(sent.times_us) for sent in each)
-        if key and fullest.most_bytes > planned_bytes:
-            self.edits[f"{key}.payload_bytes"] = fullest.most_bytes
-        yield RecordedFigure(
-            f"{label}: data",
-            "bytes",
-            planned_bytes,
-            fullest.most_bytes,
-            None,
-            "at most",
-            count,
-            key and f"{key}.payload_bytes",
-        )
-        others = [sent for sent in each if self._format(sent) != self._planned_format(stream)]
-        if others:
-            note = f"{self._format(others[0])} recorded, {self._planned_format(stream)} planned"
-            frames = sum(len(sent.times_us) for sent in others)
+        if len(behind_us):
+            behind = quantile(behind_us, self.share)
             yield RecordedFigure(
-                f"{label}: frames of another format", "1", 0, frames, None, "at most", count, key, note
+                "last PDO after SYNC",
+                "us",
+                _finite(plain(self.cycle.required_us) - plain(self.network.nonperiodic_us)),
+                behind.value,
+                self._with_stamps(*(plain(doubt.us) for doubt in self.cycle.doubts()), behind.uncertainty or 0.0),
+                "at most",
+                len(behind_us),
+                "cycle.period_us",
             )
 
-    def _format(self, sent: SentFrames) -> str:
-        if not sent.is_fd:
-            return _CLASSICAL
-        return "CAN FD" if sent.switches else "CAN FD without a switch of bit rate"
+    def _with_stamps(self, *uncertainties: float) -> float | None:
+        """Expanded uncertainty of some standard ones, with the error of the stamps; None where it is not known [us]."""
+        doubt_us = expanded(*uncertainties)
+        return None if doubt_us is None else doubt_us + self.stamp_error_us
 
-    def _planned_format(self, stream: Stream) -> str:
-        if not stream.is_message:
-            return "CAN FD" if self.has_switch else _CLASSICAL
-        message = self._said(stream)
-        if not message.fd:
-            return _CLASSICAL
-        return "CAN FD" if message.brs else "CAN FD without a switch of bit rate"
+    def _stream(self, stream: Stream, label: str, spread_us: float | None) -> Iterator[RecordedFigure]:
+        """Period, jitter, data and format of a message or of SYNC; of a PDO its data and format."""
+        is_extended = stream.identifier_bits > BASE_BITS
+        identifiers = range(stream.first, stream.last + 1)
+        sent_frames = [self.by_identifier.get((identifier, is_extended)) for identifier in identifiers]
+        recorded = [sent for sent in sent_frames if sent is not None]
+        for sent in recorded:
+            self.unplanned.pop((sent.identifier, is_extended), None)
+        if missing := len(sent_frames) - len(recorded):
+            self.unseen.append(f"{missing} of {label}" if recorded else label)
+        if not recorded:
+            return
+        message = self.messages[stream.name] if stream.is_message else None
+        key = f"message.{stream.name}" if message else ""
+        if message:
+            yield from self._message(stream, label, recorded, spread_us)
+        elif stream.name == SYNC:
+            yield from self._sync(stream, recorded[0], spread_us)
+        count, most_bytes = sum(len(sent.times_us) for sent in recorded), max(sent.most_bytes for sent in recorded)
+        planned = _format(message.fd, message.brs) if message else _format(self.has_switch, self.has_switch)
+        planned_bytes = stream.data_bytes
+        if planned != _CLASSICAL:
+            planned_bytes = next(length for length in FD_LENGTHS if length >= planned_bytes)
+        if message and most_bytes > planned_bytes:
+            self.edits[f"{key}.payload_bytes"] = most_bytes
+        bytes_key = key and f"{key}.payload_bytes"
+        yield RecordedFigure(f"{label}: data", "bytes", planned_bytes, most_bytes, None, "at most", count, bytes_key)
+        formats = [(_format(sent.is_fd, sent.switches), len(sent.times_us)) for sent in recorded]
+        others = [(name, frames) for name, frames in formats if name != planned]
+        if others:
+            note = f"{others[0][0]} recorded, {planned} planned"
+            frames = sum(frames for _, frames in others)
+            yield _limited(f"{label}: frames of another format", 0, frames, count, key, note=note)
 
     def _sync(self, stream: Stream, sent: SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
         """Period of SYNC, equal to that of the plan, and its jitter."""
         periods, planned_us, count = grid(sent.times_us), plain(stream.period_us), len(sent.times_us)
+        period = RecordedFigure("SYNC: period", "us", planned_us, None, None, "equal", count, "cycle.period_us")
         if periods is None:
-            mean_us = sent.mean.value if count > 1 else None
-            yield RecordedFigure(
-                "SYNC: period", "us", planned_us, mean_us, None, "equal", count, "cycle.period_us", hidden=_TOO_FEW
-            )
+            yield period._replace(recorded=sent.mean.value if count > 1 else None, hidden=_TOO_FEW)
             return
-        clocks_us = CLOCK_TOLERANCE * planned_us / 3**0.5
         mean = mean_period(sent.times_us, periods)
-        doubt = expanded(mean.uncertainty, float(clocks_us), self.stamp_error_us / count)
-        yield RecordedFigure(
-            "SYNC: period", "us", planned_us, mean.value, doubt, "equal", count, "cycle.period_us", is_mean=True
-        )
-        late = lateness(periods, self.share)
-        doubt = expanded(late.uncertainty or 0.0)
+        doubt_us = expanded(mean.uncertainty, _clocks_us(planned_us), self.stamp_error_us / count)
+        yield period._replace(recorded=mean.value, uncertainty=doubt_us, is_mean=True)
         if spread_us is not None:
-            yield RecordedFigure(
-                "SYNC: jitter of the arrival",
-                "us",
-                spread_us,
-                late.value,
-                None if doubt is None else doubt + self.stamp_error_us,
-                "at most",
-                count,
-            )
+            late = lateness(periods, self.share)
+            doubt_us = self._with_stamps(late.uncertainty or 0.0)
+            quantity = "SYNC: jitter of the arrival"
+            yield RecordedFigure(quantity, "us", spread_us, late.value, doubt_us, "at most", count)
 
     def _message(
-        self, stream: Stream, label: str, each: list[SentFrames], spread_us: float | None
+        self, stream: Stream, label: str, recorded: Sequence[SentFrames], spread_us: float | None
     ) -> Iterator[RecordedFigure]:
         """Mean distance of a message, and how much sooner it comes than its period; of the identifier that is worst."""
-        key, planned_us, several = f"message.{stream.name}", plain(stream.period_us), len(each) > 1
-        repeated = [sent for sent in each if len(sent.times_us) > 1]
+        key, planned_us = f"message.{stream.name}", plain(stream.period_us)
+        repeated = [sent for sent in recorded if len(sent.times_us) > 1]
         if not repeated:
             return
+
+        def identifier(sent: SentFrames) -> str:
+            return f"{sent.identifier:#x}" if len(recorded) > 1 else ""
+
         often = min(repeated, key=lambda sent: sent.mean.value)
-        count = len(often.times_us)
-        scatter_us = planned_us if spread_us is None else spread_us
-        clocks_us = float(CLOCK_TOLERANCE * planned_us / 3**0.5)
-        # At worst the first frame was the latest that it may be, and the last one the earliest.
-        error_us = scatter_us / (count - 1) / 2 if often.mean.uncertainty is None else often.mean.uncertainty
-        is_known = count >= LEAST_EVENTS
-        notes = [_named(often) if several else "", "" if often.grid else "not periodic"]
+        count, mean = len(often.times_us), often.mean
+        is_enough = count >= LEAST_EVENTS
+        notes = [identifier(often), "" if often.grid else "not periodic"]
         if often.grid and often.grid.missing:
             notes.append(f"{often.grid.missing:,} of {often.grid.places[-1] + 1:,} periods without a frame")
+        # At worst the first frame was the latest that it may be, and the last one the earliest.
+        scatter_us = (planned_us if spread_us is None else spread_us) / (count - 1) / 2
+        error_us = scatter_us if mean.uncertainty is None else mean.uncertainty
+        doubt_us = expanded(error_us, _clocks_us(planned_us), self.stamp_error_us / (count - 1))
         period = RecordedFigure(
             f"{label}: period",
             "us",
             planned_us,
-            often.mean.value,
-            expanded(error_us, clocks_us, self.stamp_error_us / (count - 1)) if is_known else None,
-            "at least" if is_known else "shown",
+            mean.value,
+            doubt_us if is_enough else None,
+            "at least" if is_enough else "shown",
             count,
             f"{key}.period_us",
-            ", ".join(filter(None, (*notes, "" if is_known else _TOO_FEW))),
+            ", ".join(filter(None, (*notes, "" if is_enough else _TOO_FEW))),
             is_mean=True,
         )
-        if is_known and period.verdict == "outside":
-            self.edits[f"{key}.period_us"] = planned_us = round(often.mean.value, 1)
+        if is_enough and period.verdict == "outside":
+            self.edits[f"{key}.period_us"] = planned_us = round(mean.value, 1)
         yield period
-        own_period_us = planned_us * (1 - float(CLOCK_TOLERANCE))
-        found = [(quantile(ahead(sent.times_us, own_period_us), self.share), sent) for sent in repeated]
-        sooner, sent = max(found, key=lambda pair: pair[0].value)
-        figure = RecordedFigure(
+        least_us = planned_us * (1 - float(CLOCK_TOLERANCE))
+        ahead_us = [(quantile(ahead(sent.times_us, least_us), self.share), sent) for sent in repeated]
+        sooner, sent = max(ahead_us, key=lambda pair: pair[0].value)
+        jitter = RecordedFigure(
             f"{label}: sooner than its period",
             "us",
             spread_us,
@@ -500,10 +429,10 @@ class _Seen:
             "shown" if spread_us is None else "at most",
             len(sent.times_us),
             f"{key}.jitter_us",
-            _named(sent) if several else "",
+            identifier(sent),
         )
-        yield figure
-        if figure.verdict == "outside":
+        yield jitter
+        if jitter.verdict == "outside":
             model = event_model(
                 sent.times_us, planned_us, stamp_error_us=self.stamp_error_us, tolerance=float(CLOCK_TOLERANCE)
             )
@@ -511,25 +440,15 @@ class _Seen:
             if model.burst > 1:
                 self.edits[f"{key}.burst"] = model.burst
 
-    def _spread_us(self, stream: Stream, least_us: float, response: Mapping[str, Any] | None) -> float | None:
+    def _spread_us(self, stream: Stream, shortest_us: float, phases: Mapping[str, Any] | None) -> float | None:
         """How much the plan lets SYNC or a message arrive sooner than its period: R less the shortest frame [us].
 
         All of a burst may come with its first.
         """
-        if response is None or not (stream.is_message or stream.name == SYNC):
+        if phases is None or not (stream.is_message or stream.name == SYNC):
             return None
-        burst = self._said(stream).burst if stream.is_message else 1
-        together_us = (burst - 1) * plain(stream.period_us)
-        return _finite(max(plain(response["worst_response_us"]) - least_us, 0.0) + together_us)
-
-    def _said(self, stream: Stream) -> Any:
-        """The message in the profile."""
-        return next(message for message in self.network.profile.message if message.name == stream.name)
-
-    @property
-    def has_switch(self) -> bool:
-        """Whether the plan has a data bit rate of CAN FD."""
-        return bool(plain(self.cycle.traffic.data_bit_rate_kbit_s))
+        together_us = (stream.burst - 1) * stream.period_us
+        return _finite(max(plain(phases["worst_response_us"]) - shortest_us, 0.0) + together_us)
 
     def remarks(self) -> Iterator[str]:
         """What the log has beside the figures."""
@@ -537,45 +456,46 @@ class _Seen:
         yield from faults(frames, self.stretch)
         fd, switched = (int(np.count_nonzero(flags)) for flags in (frames.is_fd, frames.switched))
         if fd:
-            left = (
-                f", {switched:,} in no load, for the plan has no data bit rate"
-                if switched and not self.has_switch
-                else ""
-            )
+            left = f", {switched:,} in no load, for the plan has no data bit rate"
+            left = left if switched and not self.has_switch else ""
             yield f"{plural(fd, 'frame')} of CAN FD: in the load with half of the possible stuff bits{left}."
         if frames.remote:
             yield f"{plural(frames.remote, 'remote frame')}: the length code is shown as data."
         if self.stamp_error_us > self.step_us + _ROUNDING_US:
-            yield (
-                f"Frames come up to {self.stamp_error_us - self.step_us:.0f} us closer than the bus allows: stamps are "
-                "late, and U holds it."
-            )
+            late_us = self.stamp_error_us - self.step_us
+            yield f"Frames come up to {late_us:.0f} us closer than the bus allows: stamps are late, and U holds it."
         if self.step_us > 1:
             yield f"Stamps have steps of {self.step_us:g} us."
         yield _NOT_SHOWN
 
 
+def _limited(
+    quantity: str, most: int, number: int | None, events: int, key: str = "", *, note: str = "", hidden: str = ""
+) -> RecordedFigure:
+    """A number that must not exceed another one, without doubt."""
+    return RecordedFigure(quantity, "1", most, number, None, "at most", events, key, note, hidden=hidden)
+
+
+def _clocks_us(period_us: float) -> float:
+    """Standard uncertainty of a period by the clocks of the bus and of the recorder [us]."""
+    return float(CLOCK_TOLERANCE * period_us / 3**0.5)
+
+
+def _format(is_fd: bool, switches: bool) -> str:
+    if not is_fd:
+        return _CLASSICAL
+    return "CAN FD" if switches else "CAN FD without a switch of bit rate"
+
+
 def _labels(each: Sequence[Stream]) -> list[str]:
     """Name of each stream; those of a PDO with several frames are numbered."""
-    names = Counter(stream.label for stream in each)
-    seen: Counter[str] = Counter()
-    labels = []
-    for stream in each:
-        seen[stream.label] += 1
-        labels.append(f"{stream.label} {seen[stream.label]}" if names[stream.label] > 1 else stream.label)
-    return labels
-
-
-def _whole(number: Any) -> int:
-    """A plain number that is whole."""
-    return int(plain(number))
+    labels = [stream.label for stream in each]
+    return [
+        f"{label} {labels[: place + 1].count(label)}" if labels.count(label) > 1 else label
+        for place, label in enumerate(labels)
+    ]
 
 
 def _finite(us: float) -> float | None:
     """A planned time; None where a bus that is too full has none."""
     return us if isfinite(us) else None
-
-
-def _named(sent: SentFrames) -> str:
-    """Its identifier."""
-    return f"{sent.identifier:#x}"

@@ -33,7 +33,7 @@ BELOW = 1 - 1e-9
 Row = Sequence[float]
 Rows = Sequence[Row]
 """A row for each point."""
-Found = MutableSequence[float]
+Results = MutableSequence[float]
 
 
 def span_us(ahead_us: float, from_us: float, bit_us: float, sent_us: Row, period_us: Row, jitter_us: Row) -> float:
@@ -83,7 +83,7 @@ def bound_us(ahead_us: float, bit_us: float, sent_us: Row, period_us: Row, jitte
 
 
 def worst_instance(
-    group: int, own_us: float, ahead_us: float, bit_us: float, sent_us: Found, period_us: Row, jitter_us: Row
+    group: int, own_us: float, ahead_us: float, bit_us: float, sent_us: Results, period_us: Row, jitter_us: Row
 ) -> tuple[float, float, float]:
     """The worst instance of a frame, where the load of the bus is below `SATURATED`.
 
@@ -130,7 +130,7 @@ def worst_instance(
 
 
 def responses(
-    asked: Sequence[int],
+    answered: Sequence[int],
     group: Sequence[int],
     place: Row,
     last: Rows,
@@ -142,19 +142,19 @@ def responses(
     bit_us: Rows,
     once_us: Rows,
     jitter_us: Rows,
-    longest_us: Found,
-    before_us: Found,
-    blocked_us: Sequence[Found],
-    instance: Sequence[Found],
-    wait_us: Sequence[Found],
-    response_us: Sequence[Found],
+    longest_us: Results,
+    before_us: Results,
+    blocked_us: Sequence[Results],
+    instance: Sequence[Results],
+    wait_us: Sequence[Results],
+    response_us: Sequence[Results],
 ) -> None:
     """Find the worst-case response of some senders at each point, from one start of the busy period.
 
     Parameters
     ----------
-    asked
-        Rank of each sender that is asked for.
+    answered
+        Rank of each sender whose response is computed.
     group, place
         Of each sender by its rank: its group, and place of its first frame in the arbitration, ascending.
     last, frame_us, blocking_us, sent_us, enough_us
@@ -181,13 +181,13 @@ def responses(
         for rank in range(senders - 1, -1, -1):
             longest_us[rank] = max(longest_us[rank + 1], blocking[rank])
         rank, load, first_us = 0, 0.0, 0.0
-        for number in range(len(asked)):
-            own = asked[number]
-            if number == 0 or place[rank - 1] > ends[own]:
+        for number in range(len(answered)):
+            sender = answered[number]
+            if number == 0 or place[rank - 1] > ends[sender]:
                 rank, load, first_us = 0, 0.0, 0.0
-                for other in range(len(before_us)):
-                    before_us[other] = 0.0
-            while rank < senders and place[rank] <= ends[own]:
+                for index in range(len(before_us)):
+                    before_us[index] = 0.0
+            while rank < senders and place[rank] <= ends[sender]:
                 before_us[group[rank]] += sent[rank]
                 load += sent[rank] / periods[group[rank]]
                 first_us += once[rank]
@@ -196,10 +196,10 @@ def responses(
             worst, wait, response = 0.0, 0.0, math.inf
             if load < SATURATED:
                 # The busy period holds all of it.
-                response = jitters[group[own]] + bound_us(ahead_us, 0.0, before_us, periods, jitters)
-                if response > enough_us[point][own]:
+                response = jitters[group[sender]] + bound_us(ahead_us, 0.0, before_us, periods, jitters)
+                if response > enough_us[point][sender]:
                     worst, wait, response = worst_instance(
-                        group[own], frames[own], ahead_us, bit_us[point][0], before_us, periods, jitters
+                        group[sender], frames[sender], ahead_us, bit_us[point][0], before_us, periods, jitters
                     )
             if response > response_us[point][number]:
                 blocked_us[point][number], instance[point][number] = longest_us[rank], worst
@@ -217,8 +217,8 @@ def cycle_waits(
     period_us: Rows,
     jitter_us: Rows,
     deadline_us: Rows,
-    lasts_us: Sequence[Found],
-    blocked_us: Sequence[Found],
+    lasts_us: Sequence[Results],
+    blocked_us: Sequence[Results],
 ) -> None:
     """Find how long a cycle lasts with the frames of other messages, at each point.
 

@@ -242,30 +242,21 @@ class CanLimits(Limits):
 
 _OF_NODES: Final = (*OF_ALIKE_NODES, "group")
 _OF_CYCLE: Final = {
-    "bus": (
-        "sync_identifier",
-        "sync_counter",
-        "pipeline_cycles",
-        "host_us",
-        "host_grade",
-        "host_uncertainty_us",
-    ),
+    "bus": ("sync_identifier", "sync_counter", "pipeline_cycles", "host_us", "host_grade", "host_uncertainty_us"),
     "limits": ("reserve", "max_utilisation", "min_spare_nodes", "min_spare_axes"),
 }
 """Keys of sections that only a network with a cycle has."""
-
-
-def _no_cycle() -> CycleSection:
-    """The cycle of a network of messages alone: it is so long that nothing of it comes twice."""
-    return CycleSection(period_us=MAX_TIME_US)
+_PDO_NAMES: Final = tuple(NAMES.values())
 
 
 class CanProfile(Profile):
     """A whole profile: one motion network and its cycle, or a network of messages alone."""
 
     bus: CanBus = Field(description="The bus")
+    # Without a cycle nothing of it comes twice.
     cycle: CycleSection = Field(
-        default_factory=_no_cycle, description="The communication cycle; a network of messages alone has none"
+        default_factory=lambda: CycleSection(period_us=MAX_TIME_US),
+        description="The communication cycle; a network of messages alone has none",
     )
     payload: CanPayload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
     node: NodeSection | None = Field(default=None, description="One distributed node, where nodes are alike")
@@ -295,9 +286,19 @@ class CanProfile(Profile):
             yield Problem(MISSING, key="cycle", kind="missing-key")
 
     @model_validator(mode="after")
-    def _says_nothing_of_a_cycle(self) -> Self:
-        if self.has_cycle:
-            return self
+    def _agrees_with_itself(self) -> Self:
+        problems = (
+            *(() if self.has_cycle else self._problems_of_no_cycle()),
+            *self._names_problems(),
+            *self._identifiers_problems(),
+            *(() if self.bus.data_bit_rate_kbit_s is not None else self._problems_of_no_data_bit_rate()),
+        )
+        if problems:
+            raise refused(*problems)
+        return self
+
+    def _problems_of_no_cycle(self) -> Iterator[Problem]:
+        """Keys of a cycle, of a network without nodes."""
         keys: list[str] = [name for name in CIRCLE_SECTIONS if name in self.model_fields_set]
         keys += (
             f"{section}.{name}"
@@ -306,93 +307,37 @@ class CanProfile(Profile):
             if name in getattr(self, section).model_fields_set
         )
         keys += (f"message.{place}.per_node" for place, message in enumerate(self.message) if message.per_node)
-        if keys:
-            why = "asks for nodes, and a network of messages alone has none; remove it"
-            raise refused(*(Problem(why, key=key, kind="inconsistent") for key in keys))
-        return self
+        why = "asks for nodes, and a network of messages alone has none; remove it"
+        yield from (Problem(why, key=key, kind="inconsistent") for key in keys)
 
-    @model_validator(mode="after")
-    def _messages_have_names(self) -> Self:
-        names = [message.name for message in self.message]
-        seen: set[str] = set()
-        problems = [
-            Problem("there is a message of this name", key=f"message.{place}.name", kind="inconsistent")
-            for place, name in enumerate(names)
-            if name in seen or seen.add(name)  # type: ignore[func-returns-value] # add returns None
-        ]
-        problems += (
-            Problem("is what the frames of the cycle are called", key=f"message.{place}.name", kind="inconsistent")
-            for place, name in enumerate(names)
-            if name in (SYNC, LOOP, *NAMES.values())
-        )
-        if problems:
-            raise refused(*problems)
-        return self
+    def _names_problems(self) -> Iterator[Problem]:
+        """Names of messages that another message has, or the cycle."""
+        names: set[str] = set()
+        for place, message in enumerate(self.message):
+            key = f"message.{place}.name"
+            if message.name in names:
+                yield Problem("there is a message of this name", key=key, kind="inconsistent")
+            elif message.name in (SYNC, LOOP, *_PDO_NAMES):
+                yield Problem("is what the frames of the cycle are called", key=key, kind="inconsistent")
+            names.add(message.name)
 
-    @model_validator(mode="after")
-    def _groups_have_identifiers_of_their_own(self) -> Self:
-        problems = []
-        for name in (f"{direction}_identifier" for direction in NAMES.values()):
-            said = [getattr(group, name) for group in self.group]
-            problems += [
-                Problem("an earlier group has it", key=f"group.{place}.{name}", kind="inconsistent")
-                for place, identifier in enumerate(said)
-                if identifier is not None and identifier in said[:place]
-            ]
-        if problems:
-            raise refused(*problems)
-        return self
-
-    @model_validator(mode="after")
-    def _identifiers_are_in_range(self) -> Self:
-        problems = [
-            Problem(f"is over {MAX_IDENTIFIER[bits]}, the largest of {bits} bits", key, "inconsistent")
-            for key, identifier, bits in self._identifiers()
-            if identifier is not None and identifier > MAX_IDENTIFIER[bits]
-        ]
-        problems += (
-            Problem(
-                f"leaves no room for {MOST_NODES:g} nodes below {MAX_IDENTIFIER[bits]}", f"message.{place}.identifier"
-            )
-            for place, message in enumerate(self.message)
-            if message.per_node
-            and (bits := message.identifier_bits or self.bus.identifier_bits)
-            and MAX_IDENTIFIER[bits] - MOST_NODES < message.identifier <= MAX_IDENTIFIER[bits]
-        )
-        if problems:
-            raise refused(*problems)
-        return self
-
-    @model_validator(mode="after")
-    def _frames_are_of_the_bus(self) -> Self:
-        if self.bus.data_bit_rate_kbit_s is not None:
-            return self
-        problems = [
-            Problem(
-                "asks for bus.data_bit_rate_kbit_s; brs = false says a frame without a switch of bit rate",
-                f"message.{place}.fd",
-            )
-            for place, message in enumerate(self.message)
-            if message.fd and message.brs
-        ]
-        problems += (
-            Problem(f"has a PDO over the {FRAME_BYTES:g} bytes of a classical frame", f"{section}.{name}")
-            for section, payload in self._payloads()
-            for name in (f"{direction}_pdos" for direction in NAMES.values())
-            if max(getattr(payload, name) or (0,)) > FRAME_BYTES
-        )
-        if problems:
-            raise refused(*problems)
-        return self
-
-    def _payloads(self) -> Iterator[tuple[str, CanPayload]]:
-        """Section [payload] or all groups, each with its key."""
-        if self.payload is not None:
-            yield "payload", self.payload
-        yield from ((f"group.{place}", group) for place, group in enumerate(self.group))
+    def _identifiers_problems(self) -> Iterator[Problem]:
+        """Identifiers that are too large for their length, and those of an earlier group."""
+        for key, identifier, bits in self._identifiers():
+            if identifier is not None and identifier > MAX_IDENTIFIER[bits]:
+                yield Problem(f"is over {MAX_IDENTIFIER[bits]}, the largest of {bits} bits", key, "inconsistent")
+        for place, message in enumerate(self.message):
+            most = MAX_IDENTIFIER[message.identifier_bits or self.bus.identifier_bits]
+            if message.per_node and most - MOST_NODES < message.identifier <= most:
+                yield Problem(f"leaves no room for {MOST_NODES:g} nodes below {most}", f"message.{place}.identifier")
+        for name in (f"{direction}_identifier" for direction in _PDO_NAMES):
+            identifiers = [getattr(group, name) for group in self.group]
+            for place, identifier in enumerate(identifiers):
+                if identifier is not None and identifier in identifiers[:place]:
+                    yield Problem("an earlier group has it", key=f"group.{place}.{name}", kind="inconsistent")
 
     def _identifiers(self) -> Iterator[tuple[str, int | None, int]]:
-        """Keys of identifiers, each with what it says and the length."""
+        """Keys of identifiers, each with its value and the length."""
         bits = self.bus.identifier_bits
         if self.has_cycle:
             yield "bus.sync_identifier", self.bus.sync_identifier, bits
@@ -401,6 +346,24 @@ class CanProfile(Profile):
             yield f"{section}.command_identifier", payload.command_identifier, bits
         for place, message in enumerate(self.message):
             yield f"message.{place}.identifier", message.identifier, message.identifier_bits or bits
+
+    def _problems_of_no_data_bit_rate(self) -> Iterator[Problem]:
+        """Frames that only a bus with a data bit rate has."""
+        for place, message in enumerate(self.message):
+            if message.fd and message.brs:
+                why = "asks for bus.data_bit_rate_kbit_s; brs = false says a frame without a switch of bit rate"
+                yield Problem(why, f"message.{place}.fd")
+        for section, payload in self._payloads():
+            for name in (f"{direction}_pdos" for direction in _PDO_NAMES):
+                if max(getattr(payload, name) or (0,)) > FRAME_BYTES:
+                    why = f"has a PDO over the {FRAME_BYTES:g} bytes of a classical frame"
+                    yield Problem(why, f"{section}.{name}")
+
+    def _payloads(self) -> Iterator[tuple[str, CanPayload]]:
+        """Section [payload] or all groups, each with its key."""
+        if self.payload is not None:
+            yield "payload", self.payload
+        yield from ((f"group.{place}", group) for place, group in enumerate(self.group))
 
 
 PROFILE: Final = CanProfile

@@ -4,16 +4,18 @@ from array import array
 from collections.abc import Container, Iterator, Sequence
 from functools import cache, lru_cache
 from importlib import import_module
-from itertools import chain, islice, repeat
 from math import ceil, inf, isclose
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from busplan.buses.can import response
 from busplan.buses.can.equations import MOST_BLOCKS, bit_us
 from busplan.buses.can.frames import NAMES, SYNC, Points, Stream, Traffic, last_place, streams
-from busplan.elementwise import choose, from_rows, plain, rounded_up, rows, shape_of, smaller, total
+from busplan.elementwise import choose, plain, smaller, total
 from busplan.english import first_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 
@@ -30,17 +32,14 @@ class Waits(NamedTuple):
     most: int
     """Frames of a lower priority that it waits for, at most [1]."""
 
-    def blocks(self) -> Iterator[Stream]:
-        """One of them for each frame that goes, of plain numbers; the longest first."""
-        longest = sorted(self.lower, key=lambda stream: -plain(stream.frame_us))
-        each = (repeat(stream, int(plain(_frames_within(stream, self.lasts_us)))) for stream in longest)
-        return islice(chain.from_iterable(each), self.most)
-
-
-def _frames_within(stream: Stream, span_us: Points) -> Points:
-    """Frames of a message that keeps its deadline that are there in a span of time [1]."""
-    each = rounded_up((span_us + stream.deadline_us) / stream.period_us) + stream.burst - 1
-    return smaller(stream.identifiers * each, int(MOST_BLOCKS))
+    def blocks(self) -> list[Stream]:
+        """The message of each frame that blocks, of plain numbers; the longest first."""
+        frames: list[Stream] = []
+        for message in sorted(self.lower, key=lambda message: -message.frame_us):
+            # As many as are there within the cycle, of a message that keeps its deadline.
+            count = ceil((self.lasts_us + message.deadline_us) / message.period_us) + message.burst - 1
+            frames += [message] * int(min(message.identifiers * count, self.most))
+        return frames[: self.most]
 
 
 def sent_in(cyclic: Sequence[Stream], due: Container[str]) -> list[Stream]:
@@ -75,47 +74,45 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     PDOs that are not in every cycle are all due in the fullest, and no other cycle lasts longer: it has fewer PDOs, and
     no more of the messages before the last PDO of the fullest. These may block its own PDOs, but each goes once.
     """
-    each = streams(traffic, is_stuffed=is_stuffed)
-    cyclic = [stream for stream in each if not stream.is_message]
-    messages = [stream for stream in each if stream.is_message]
+    sent = streams(traffic, is_stuffed=is_stuffed)
+    cyclic = [stream for stream in sent if not stream.is_message]
+    messages = [stream for stream in sent if stream.is_message]
     bit, fullest = bit_us(traffic.bit_rate_kbit_s), last_place(cyclic)
-    last = fullest if due is None else last_place(sent_in(cyclic, due))
-    # Without PDOs a cycle ends with SYNC, which waits for a single frame.
-    most = int(MOST_BLOCKS) if due is None or due else 1
+    last, most = fullest, int(MOST_BLOCKS)
     if due is not None:
+        last = last_place(sent_in(cyclic, due))
+        # Without PDOs a cycle ends with SYNC, which waits for a single frame.
+        most = most if due else 1
         # Of messages before the last PDO of the fullest cycle nothing is pending at SYNC.
         messages = [
-            stream._replace(
+            message._replace(
                 deadline_us=choose(
-                    stream.last_place <= fullest,
-                    smaller(stream.deadline_us, stream.jitter_us + bit),
-                    stream.deadline_us,
+                    message.last_place <= fullest,
+                    smaller(message.deadline_us, message.jitter_us + bit),
+                    message.deadline_us,
                 )
             )
-            for stream in messages
+            for message in messages
         ]
     if not messages:
         return Waits(others_us, 0.0, (), most)
-    is_before = [stream.first_place <= last for stream in messages]
-    is_lower = [stream.last_place > last for stream in messages]
-    pairs = [*zip(messages, is_before, strict=True)]
-    at_once_us = total(choose(goes, stream.burst_us, 0.0) for stream, goes in pairs)
+    before = [(message, message.first_place <= last) for message in messages]
+    lower = [(message, message.last_place > last) for message in messages]
     columns = (
-        [others_us + at_once_us],
+        [others_us + total(choose(goes, message.burst_us, 0.0) for message, goes in before)],
         [bit],
-        [choose(goes, stream.frames_us, 0.0) for stream, goes in pairs],
-        [choose(lower, stream.frame_us, 0.0) for stream, lower in zip(messages, is_lower, strict=True)],
-        [stream.identifiers for stream in messages],
-        [stream.burst for stream in messages],
-        [stream.period_us for stream in messages],
-        [stream.jitter_us for stream in messages],
-        [stream.deadline_us for stream in messages],
+        [choose(goes, message.frames_us, 0.0) for message, goes in before],
+        [choose(blocks, message.frame_us, 0.0) for message, blocks in lower],
+        *([getattr(message, key) for message in messages] for key in _OF_MESSAGES),
     )
-    shape = shape_of(chain.from_iterable(columns))
-    found = rows([0.0], shape), rows([0.0], shape)
-    _compute("cycle_waits", most, *(rows(column, shape) for column in columns), found=found)
-    lower = tuple(stream for stream, is_one in zip(messages, is_lower, strict=True) if is_one is not False)
-    return Waits(from_rows(found[0], 0, shape), from_rows(found[1], 0, shape), lower, most)
+    shape, arrays = _arrays(*columns, [0.0], [0.0])
+    _computing().cycle_waits(most, *arrays)
+    lasts_us, blocking_us = (_points(array, 0, shape) for array in arrays[-2:])
+    return Waits(lasts_us, blocking_us, tuple(message for message, blocks in lower if blocks is not False), most)
+
+
+_OF_MESSAGES: Final = ("identifiers", "burst", "period_us", "jitter_us", "deadline_us")
+"""What `response.cycle_waits` takes of each message beside its frames."""
 
 
 class Response(NamedTuple):
@@ -145,13 +142,12 @@ def message_responses(
         Whether the stuff bits of the worst case are counted.
     is_verdict
         Whether a bound, without parts, is enough where it shows that a deadline is kept.
-
     """
-    each, starts = streams(traffic, is_stuffed=is_stuffed), _starts(traffic, is_stuffed=is_stuffed)
-    asked = [number for number, stream in enumerate(each) if stream.is_message]
-    enough_us = [stream.deadline_us for stream in each] if is_verdict else None
-    found = _worst(each, asked, starts, bit=bit_us(traffic.bit_rate_kbit_s), enough_us=enough_us)
-    return tuple((each[number], response) for number, response in found.items())
+    sent = streams(traffic, is_stuffed=is_stuffed)
+    messages = [number for number, stream in enumerate(sent) if stream.is_message]
+    enough_us = [stream.deadline_us for stream in sent] if is_verdict else None
+    starts, bit = _starts(traffic, is_stuffed=is_stuffed), bit_us(traffic.bit_rate_kbit_s)
+    return tuple((sent[number], worst) for number, worst in _worst(sent, messages, starts, bit, enough_us=enough_us))
 
 
 def sync_response(traffic: Traffic, *, is_stuffed: bool) -> Response:
@@ -159,9 +155,9 @@ def sync_response(traffic: Traffic, *, is_stuffed: bool) -> Response:
 
     SYNC is blocked by messages alone: where the cycle fits, its PDOs have gone before the next SYNC.
     """
-    each = streams(traffic, is_stuffed=is_stuffed)
-    blocks = [stream.is_message for stream in each]
-    return _worst(each, [0], [_Start()], bit=bit_us(traffic.bit_rate_kbit_s), blocks=blocks)[0]
+    sent, bit = streams(traffic, is_stuffed=is_stuffed), bit_us(traffic.bit_rate_kbit_s)
+    ((_, worst),) = _worst(sent, [0], [_Start()], bit, blocks=[stream.is_message for stream in sent])
+    return worst
 
 
 @lru_cache(maxsize=4)
@@ -170,15 +166,16 @@ def responses(traffic: Traffic, *, is_stuffed: bool) -> tuple[tuple[Stream, Resp
 
     Arguments are as `message_responses` has them, in plain numbers.
     """
-    each = streams(traffic, is_stuffed=is_stuffed)
-    pdos = [number for number, stream in enumerate(each) if number and stream.is_end and not stream.is_message]
-    own = [stream._replace(block=stream.first_place) for stream in each]
-    found = {0: sync_response(traffic, is_stuffed=is_stuffed)} if traffic.has_cycle else {}
-    found |= _worst(own, pdos, [_Start()], bit=bit_us(traffic.bit_rate_kbit_s))
-    return (
-        *((each[number], response) for number, response in found.items()),
-        *message_responses(traffic, is_stuffed=is_stuffed),
-    )
+    sent, bit = streams(traffic, is_stuffed=is_stuffed), bit_us(traffic.bit_rate_kbit_s)
+    sync = [(sent[0], sync_response(traffic, is_stuffed=is_stuffed))] if traffic.has_cycle else []
+    # The last frame of each PDO.
+    ends = {
+        (stream.name, stream.group): number for number, stream in enumerate(sent) if number and not stream.is_message
+    }
+    # Each PDO is behind those of smaller identifiers; a message, behind the whole block before it.
+    by_place = [stream._replace(block=stream.first_place) for stream in sent]
+    pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [_Start()], bit)]
+    return (*sync, *pdos, *message_responses(traffic, is_stuffed=is_stuffed))
 
 
 def counted(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[str, str]:
@@ -193,29 +190,36 @@ def counted(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[str, str
     is_stuffed
         Whether the stuff bits of the worst case are counted.
     """
-    own, worst = responses(traffic, is_stuffed=is_stuffed)[place]
-    higher, blocking = [], [""]
-    for one in streams(traffic, is_stuffed=is_stuffed):
-        if (one.block if own.is_message else one.first_place) <= own.last_place:
-            higher.append(one)
-        elif one.frame_us == worst.blocking_us and (one.is_message or own.name != SYNC):
-            blocking.append(one.label)
-    waited_us = worst.blocking_us + worst.interference_us + worst.instance * own.frame_us
-    window_us = waited_us + plain(bit_us(traffic.bit_rate_kbit_s))
-    for start in _starts(traffic, is_stuffed=is_stuffed) if own.is_message else [_Start()]:
+    answered, worst = responses(traffic, is_stuffed=is_stuffed)[place]
+    higher, blocking = [], ""
+    for stream in streams(traffic, is_stuffed=is_stuffed):
+        if (stream.block if answered.is_message else stream.first_place) <= answered.last_place:
+            higher.append(stream)
+        elif not blocking and stream.frame_us == worst.blocking_us and (stream.is_message or answered.name != SYNC):
+            blocking = stream.label
+    waited_us = worst.blocking_us + worst.interference_us + worst.instance * answered.frame_us
+    window_us = waited_us + bit_us(traffic.bit_rate_kbit_s)
+    for start in _starts(traffic, is_stuffed=is_stuffed) if answered.is_message else [_Start()]:
         numbers = [
-            (one.identifiers - (one == own))
-            * (ceil((window_us + start.jitter_us(one)) / one.period_us) + one.burst - 1 + (one.name in start.late))
-            for one in higher
+            (stream.identifiers - (stream == answered))
+            * (
+                ceil((window_us + start.jitter_us(stream)) / stream.period_us)
+                + stream.burst
+                - 1
+                + (stream.name in start.late)
+            )
+            for stream in higher
         ]
-        us = sum(n * one.frame_us for n, one in zip(numbers, higher, strict=True))
+        before = [(number, stream) for number, stream in zip(numbers, higher, strict=True) if number]
+        us = sum(number * stream.frame_us for number, stream in before)
         if isclose(us, worst.interference_us, abs_tol=1e-6):
-            each = [f"{n} {one.label} of {one.frame_us:g} us" for n, one in zip(numbers, higher, strict=True) if n]
-            return blocking[:2][-1], first_of(each, _LISTED)
+            return blocking, first_of(
+                [f"{number} {stream.label} of {stream.frame_us:g} us" for number, stream in before], _LISTED
+            )
     return "", ""
 
 
-_LISTED = 20
+_LISTED: Final = 20
 """Senders whose frames are listed, at most."""
 
 
@@ -261,71 +265,71 @@ def _starts(traffic: Traffic, *, is_stuffed: bool) -> list[_Start]:
 
 
 def _worst(
-    each: Sequence[Stream],
-    asked: Sequence[int],
+    sent: Sequence[Stream],
+    answered: Sequence[int],
     starts: Sequence[_Start],
-    *,
     bit: Points,
+    *,
     blocks: Sequence[bool] | None = None,
     enough_us: Sequence[Points] | None = None,
-) -> dict[int, Response]:
-    """Worst-case response of the last frame of some streams, which is the longest of the stream's, by their numbers.
+) -> Iterator[tuple[int, Response]]:
+    """Worst-case response of the last frame of some streams, which is the longest of the stream's, with their numbers.
 
     Parameters
     ----------
-    each
+    sent
         Every stream; all identifiers from `block` on go first.
-    asked
-        Numbers of those that are asked for.
+    answered
+        Numbers of those whose response is computed.
     starts
         Where a busy period may begin.
     bit
         Time of a bit [us].
     blocks
-        Whether each may hold up one that goes before it; without it all may.
+        Whether each stream may hold up one that goes before it; without it all may.
     enough_us
-        Of each, a response that a bound may show it to have [us].
+        Of each stream, a response that a bound may show it to have [us].
     """
-    if not asked:
-        return {}
-    order = sorted(range(len(each)), key=lambda number: each[number].block)
-    ranked, rank_of = [each[number] for number in order], sorted(range(len(each)), key=order.__getitem__)
+    if not answered:
+        return
+    order = sorted(range(len(sent)), key=lambda number: sent[number].block)
+    ranked, rank_of = [sent[number] for number in order], {number: rank for rank, number in enumerate(order)}
     # Senders of equal period and jitters are a group: there are fewer groups than senders.
-    times_us = [(own.period_us, *(start.jitter_us(own) for start in starts)) for own in ranked]
+    times_us = [(stream.period_us, *(start.jitter_us(stream) for start in starts)) for stream in ranked]
     groups: dict[Any, int] = {}
     group = [groups.setdefault(tuple(map(_token, us)), len(groups)) for us in times_us]
     period_us, *jitters_us = zip(*dict(zip(group, times_us, strict=True)).values(), strict=True)
     columns = (
-        [own.last_place for own in ranked],
-        [own.frame_us for own in ranked],
-        [own.frame_us if blocks is None or blocks[number] else 0.0 for number, own in zip(order, ranked, strict=True)],
-        [own.frames_us for own in ranked],
+        [stream.last_place for stream in ranked],
+        [stream.frame_us for stream in ranked],
+        [sent[number].frame_us if blocks is None or blocks[number] else 0.0 for number in order],
+        [stream.frames_us for stream in ranked],
         [0.0 if enough_us is None else enough_us[number] for number in order],
         period_us,
         [bit],
     )
-    once_us = [[own.burst_us + (own.name in start.late) * own.frames_us for own in ranked] for start in starts]
-    shape = shape_of(chain.from_iterable((*columns, *jitters_us, *once_us)))
-    integers = array("q", [rank_of[number] for number in asked]), array("q", group)
-    places = array("d", [own.block for own in ranked])
-    found = [rows([-inf] * len(asked), shape) for _ in range(4)]
-    for own_once_us, own_jitter_us in zip(once_us, jitters_us, strict=True):
-        _compute(
-            "responses",
-            *integers,
-            places,
-            *(rows(column, shape) for column in (*columns, own_once_us, own_jitter_us)),
+    onces_us = [
+        [stream.burst_us + (stream.name in start.late) * stream.frames_us for stream in ranked] for start in starts
+    ]
+    shape, arrays = _arrays(*columns, *onces_us, *jitters_us, *[[-inf] * len(answered)] * 4)
+    shared, results = arrays[: len(columns)], arrays[-4:]
+    for number in range(len(columns), len(columns) + len(starts)):
+        _computing().responses(
+            array("q", [rank_of[number] for number in answered]),
+            array("q", group),
+            array("d", [stream.block for stream in ranked]),
+            *shared,
+            arrays[number],
+            arrays[number + len(starts)],
             array("d", [0.0] * (len(ranked) + 1)),
             array("d", [0.0] * len(groups)),
-            found=found,
+            *results,
         )
-    worst = {}
-    for place, number in enumerate(asked):
-        blocked_us, late, wait_us, us = (from_rows(each_found, place, shape) for each_found in found)
-        instance = (late if shape else int(plain(late))) + each[number].burst - 1
-        interference_us = wait_us - blocked_us - instance * each[number].frame_us
-        worst[number] = Response(blocked_us, instance, interference_us, us)
-    return worst
+    for place, number in enumerate(answered):
+        blocked_us, late, wait_us, us = (_points(result, place, shape) for result in results)
+        instance = (late if shape else int(plain(late))) + sent[number].burst - 1
+        interference_us = wait_us - blocked_us - instance * sent[number].frame_us
+        yield number, Response(blocked_us, instance, interference_us, us)
 
 
 def _token(number: Points) -> float:
@@ -333,17 +337,27 @@ def _token(number: Points) -> float:
     return number if isinstance(number, int | float) else id(number)
 
 
-def _compute(name: str, *numbers: Any, found: Sequence[Any]) -> None:
-    """Write the results of a function of `response` into rows that are there."""
-    if (compiled := _compiled()) is not None:
-        getattr(compiled, name)(*numbers, *found)
-        return
-    lists = [each.tolist() for each in found]
-    getattr(response, name)(*(each if isinstance(each, int) else each.tolist() for each in numbers), *lists)
-    for rows_of, new in zip(found, lists, strict=True):
-        for point, row in enumerate(new):
-            for place, number in enumerate(row):
-                rows_of[point, place] = number
+def _arrays(*columns: Sequence[Points]) -> tuple[tuple[int, ...], list["NDArray[Any]"]]:
+    """Shape of the points of all columns together, and each column as an array with a row for each point."""
+    import numpy as np  # noqa: PLC0415 - only what waits for messages loads it
+
+    shape = np.broadcast_shapes(*{getattr(number, "shape", ()) for column in columns for number in column})
+    if not shape:
+        return shape, [np.array([column], dtype=float) for column in columns]
+    return shape, [
+        np.stack([np.broadcast_to(number, shape).ravel() for number in column], axis=1).astype(float)
+        for column in columns
+    ]
+
+
+def _points(results: "NDArray[Any]", place: int, shape: tuple[int, ...]) -> Points:
+    """The number at a place of the row of each point."""
+    return results[:, place].reshape(shape) if shape else results[0, place].item()
+
+
+def _computing() -> Any:
+    """`response`, compiled where it can be."""
+    return _compiled() or response
 
 
 @cache

@@ -12,7 +12,7 @@ from busplan.buses.ethercat.equations import (
     LATENCY_TABLE,
     MEAN,
     TERMS,
-    device_us,
+    cable_us,
     frame_bytes,
     overhead_bytes,
     sending_us,
@@ -20,19 +20,16 @@ from busplan.buses.ethercat.equations import (
 from busplan.buses.ethercat.frames import (
     Devices,
     Packing,
-    UnitCycle,
-    arrival_us,
     cables_us,
     cycles_of,
+    delay_us,
     devices,
     devices_at,
     devices_doubts,
     devices_us,
     frames,
     has_rates,
-    hop,
     mailbox_frame_us,
-    mailbox_us,
     mean_wire_bytes,
     packing,
     process_us,
@@ -44,153 +41,9 @@ from busplan.buses.network import Group, Network, Rate
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, choose, larger, named, plain, rounded_up, square_root, total
 
-_SUM = LATENCY_TABLE[-1].key
-
-
-def sync0_us(network: Network) -> Number:
-    """The first SYNC0 after the master's task; 0 without distributed clocks [us]."""
-    return sync0_share(network) * network.period_us if network.profile.bus.distributed_clocks else 0.0
-
-
-def sync0_share(network: Network) -> Number:
-    """The first SYNC0 as a share of the period: at the task itself it is the next SYNC0 that its frames meet [1]."""
-    shift = network.profile.bus.sync_shift
-    return choose(shift > 0, shift, 1)
-
-
-def latencies(network: Network) -> tuple[BusLatency, ...]:
-    """The worst case of a command, of feedback, and of a loop over both, for each group.
-
-    Parameters
-    ----------
-    network
-        The network; its numbers may be of any sort.
-    """
-    sent_us, way_us = process_us(network), _way_us(network)
-    each = []
-    for group in network.groups:
-        there, back = _command(group, network, sent_us, way_us), _feedback(group, network, sent_us, way_us)
-        # The master's pipeline begins with the cycle that brings the feedback.
-        both = {**there, "drive_us": back["drive_us"] + there["drive_us"], "frame_wait_us": back["frame_wait_us"]}
-        for name, phases in (("command", there), ("feedback", back), ("loop", both)):
-            each.append(BusLatency(name, None, phases | {_SUM: total(phases.values())}, group.name))
-    return tuple(each)
-
-
-def last_command_us(network: Network) -> Number:
-    """When the last device has taken its command at the latest, from the master's task [us]."""
-    sent_us, way_us = process_us(network), _way_us(network)
-    return reduce(larger, (_taken_us(group, network, sent_us, way_us) for group in network.groups))
-
-
-def command_doubt_us(network: Network) -> Number:
-    """Standard uncertainty of the last command: master, devices one way, bytes and slowest execution [us]."""
-    execution_us = reduce(larger, (group.write_uncertainty_us for group in network.groups))
-    process_bytes = total(own.number * own.data_bytes for own in devices(network))
-    parts = (
-        network.profile.bus.master_doubt_us,
-        *(doubt.one_way_us for doubt in devices_doubts(network)),
-        process_bytes * BYTE_BIAS_UNCERTAINTY_US,
-        execution_us,
-    )
-    return square_root(total(part * part for part in parts))
-
-
-def _period_us(group: Group, network: Network) -> Number:
-    """From a cycle with the group's data to the next [us]."""
-    return group.every * network.period_us if group.is_slower else network.period_us
-
-
-def _way_us(network: Network) -> Number:
-    """Delay of devices and cables to the last device and back [us]."""
-    return named(devices_us(network) + cables_us(network), "way_us", "way")
-
-
-def _taken_us(group: Group, network: Network, sent_us: Number, way_us: Number) -> Number:
-    """When the last device of a group may have taken its command, from the start of the cycle [us]."""
-    bus = network.profile.bus
-    on_wire_us = bus.master_us + bus.master_jitter_us + sent_us + way_us / 2
-    taken_us = on_wire_us + group.write_execution_us + group.worst_extra_us
-    return named(taken_us, "command_us", "t_cmd")
-
-
-def _command(group: Group, network: Network, sent_us: Number, way_us: Number) -> dict[str, Number]:
-    """From the cycle whose feedback it rests on to its effect."""
-    bus = network.profile.bus
-    taken_us = _taken_us(group, network, sent_us, way_us)
-    wait_us: Number = 0.0
-    if bus.distributed_clocks:
-        late = larger(rounded_up((taken_us - sync0_us(network)) / network.period_us), 0)
-        wait_us = sync0_us(network) + late * network.period_us - taken_us
-    return {
-        "drive_us": group.write_execution_us + group.worst_extra_us,
-        "frame_wait_us": 0.0,
-        "pipeline_us": named(bus.pipeline_cycles * _period_us(group, network), "pipeline_us", "n T_s"),
-        "master_us": bus.master_us,
-        "jitter_us": bus.master_jitter_us,
-        "sending_us": sent_us,
-        "path_us": way_us / 2,
-        "sync_wait_us": wait_us,
-    }
-
-
-def _feedback(group: Group, network: Network, sent_us: Number, way_us: Number) -> dict[str, Number]:
-    """From the sample to the start of the cycle whose frame takes it, and until the master has all frames."""
-    ready_us = group.read_execution_us + group.worst_extra_us
-    behind_us = sync0_us(network) + ready_us
-    period_us = _period_us(group, network)
-    wait_us = _cycles(behind_us / period_us) * period_us - behind_us
-    return {
-        "drive_us": ready_us,
-        "frame_wait_us": wait_us,
-        "pipeline_us": 0.0,
-        "master_us": network.profile.bus.master_us,
-        "jitter_us": network.profile.bus.master_jitter_us,
-        "sending_us": sent_us + mailbox_us(network),
-        "path_us": way_us,
-        "sync_wait_us": 0.0,
-    }
-
-
-def _cycles(share: Number) -> Number:
-    """Periods until the frame that takes a sample: none takes one that it triggers, however fast the drive."""
-    return larger(rounded_up(share), 1)
-
-
-def loop_periods(network: Network, *, at_sync: bool) -> int:
-    """Whole periods between a sample and the start of the cycle, or the SYNC0, that its command takes effect in.
-
-    Parameters
-    ----------
-    network
-        The network, of plain numbers.
-    at_sync
-        Whether commands take effect at SYNC0; otherwise when they arrive.
-
-    Returns
-    -------
-    int
-        Of the slowest group, those at slower rates left out [1].
-    """
-    bus, period_us = network.profile.bus, plain(network.period_us)
-    shift_us = plain(sync0_us(network)) if at_sync else 0.0
-    last_us = arrival_us(network, int(plain(network.nodes)))
-
-    def of(group: Group) -> float:
-        extra_us = plain(group.worst_extra_us)
-        sampled = _cycles((shift_us + plain(group.read_execution_us) + extra_us) / period_us)
-        late_us = last_us + plain(group.write_execution_us) + extra_us - shift_us
-        return plain(sampled) + (max(plain(rounded_up(late_us / period_us)), 0) if at_sync else 0)
-
-    groups = [group for group in network.groups if not group.is_slower] or network.groups
-    return int(max(map(of, groups)) + plain(bus.pipeline_cycles))
-
-
 TimingModelName = Literal["last-byte", "vendors"]
 LAST_BYTE: Final[TimingModelName] = "last-byte"
 VENDORS: Final[TimingModelName] = "vendors"
-
-
 EVENTS: Final = (
     EventKind("master", "master", "profile", "M", "contention"),
     EventKind("jitter", "master's jitter", "profile", "j", "contention"),
@@ -208,14 +61,23 @@ STRETCHES: Final = (
     EventKind("way", "way through the devices", "", "W", "work"),
 )
 """Stretches that several events make together."""
-
-
 _LEFT_OUT: Final = {
     "bus.master_us": "the master's own time",
     "bus.master_jitter_us": "the master's jitter",
     "bus.mailbox_polls": "mailbox polls",
 }
 """Keys of [bus] that a cycle lacks where they are 0."""
+
+
+def sync0_us(network: Network) -> Number:
+    """The first SYNC0 after the master's task; 0 without distributed clocks [us]."""
+    return sync0_share(network) * network.period_us if network.profile.bus.distributed_clocks else 0.0
+
+
+def sync0_share(network: Network) -> Number:
+    """The first SYNC0 as a share of the period: at the task itself it is the next SYNC0 that its frames meet [1]."""
+    shift = network.profile.bus.sync_shift
+    return choose(shift > 0, shift, 1)
 
 
 class EthercatCycle(BusCycle):
@@ -255,7 +117,7 @@ class EthercatCycle(BusCycle):
     @cached_property
     def process_bytes(self) -> Number:
         """Process data of all devices [bytes]."""
-        return named(total(alike.number * alike.data_bytes for alike in self._devices), "process_bytes", "D")
+        return named(total(devices.number * devices.data_bytes for devices in self._devices), "process_bytes", "D")
 
     @cached_property
     def _overhead_bytes(self) -> Number:
@@ -309,9 +171,8 @@ class EthercatCycle(BusCycle):
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The delays of devices, the master's own time, and what bytes take beyond the wire."""
-        devices = (Doubt(doubt.key, doubt.label, device_us(doubt.one_way_us)) for doubt in devices_doubts(self.network))
         return (
-            *devices,
+            *devices_doubts(self.network),
             Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
             Doubt("bytes", "what a byte takes beyond the wire", self.process_bytes * BYTE_BIAS_UNCERTAINTY_US),
         )
@@ -319,18 +180,18 @@ class EthercatCycle(BusCycle):
     def left_out(self) -> tuple[LeftOut, ...]:
         """The master's own time and jitter, mailbox polls, and cables without a length."""
         bus = self.network.profile.bus
-        keys = {key: getattr(bus, key.removeprefix("bus.")) for key in _LEFT_OUT}
-        keys |= {
+        values = {key: getattr(bus, key.removeprefix("bus.")) for key in _LEFT_OUT}
+        values |= {
             group.key("cable_m"): group.node.cable_m for group in self.network.groups if group.node.port != "E-bus"
         }
-        return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in keys.items() if not value)
+        return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in values.items() if not value)
 
     def _frames(self) -> Iterator[BusEvent]:
         """Each frame: everything but its data, then the data of each device that it carries."""
-        sizes = [plain(alike.data_bytes) for alike in self._devices for _ in range(int(plain(alike.number)))]
+        sizes = [plain(group.data_bytes) for group in self._devices for _ in range(int(plain(group.number)))]
         number = 0
         for run in frames(self.network, self._devices):
-            for carried in run.each():
+            for carried in run.by_frame():
                 number += 1
                 overhead = plain(frame_bytes(run.datagrams_bytes)) - sum(sizes[device - 1] for device in carried)
                 us, label = plain(sending_us(overhead)), f"headers of frame {number}"
@@ -342,36 +203,40 @@ class EthercatCycle(BusCycle):
     def _way(self) -> Iterator[BusEvent]:
         """The last byte to each device and through it, and back."""
         way, device = [], 0
-        for one_hop in map(hop, self.network.groups):
-            for _ in range(int(plain(one_hop.nodes))):
+        for group in self.network.groups:
+            to_us, through_us = plain(cable_us(group.node.cable_m)) / 2, plain(delay_us(group)) / 2
+            for _ in range(int(plain(group.nodes))):
                 device += 1
-                cable_us, device_us = plain(one_hop.cable_us) / 2, plain(one_hop.device_us) / 2
                 way += [
-                    BusEvent("cable", "cycle_cable_us", cable_us, f"cable to device {device}", device, "way"),
-                    BusEvent("device", "cycle_devices_us", device_us, f"way to device {device}", device, "way"),
+                    BusEvent("cable", "cycle_cable_us", to_us, f"cable to device {device}", device, "way"),
+                    BusEvent("device", "cycle_devices_us", through_us, f"way to device {device}", device, "way"),
                 ]
         yield from way
         yield from (part._replace(label=part.label.replace("to", "back from", 1)) for part in reversed(way))
 
-    def arrival_us(self, node: int) -> float:
-        """When the last byte of its frame has reached a device [us]."""
-        return arrival_us(self.network, node)
-
     def figures(self) -> Mapping[str, Number | None]:
-        """Frames, process data, when the last command is taken, and when SYNC0 comes."""
+        """Frames, process data, when the last command is taken, when SYNC0 comes, and the mean load."""
         has_clocks = self.network.profile.bus.distributed_clocks
         return {
             "frames": self.packing.frames,
             "process_bytes": self.process_bytes,
-            "command_us": last_command_us(self.network),
+            "command_us": self.last_command_us,
             "sync0_us": sync0_us(self.network) if has_clocks else None,
             MEAN.key: self._mean_us / self._given_us,
         }
 
-    def _names(self, cycle: UnitCycle) -> str:
-        """Names of the groups of a cycle."""
-        names = (group.name for group, due in zip(self.network.groups, cycle.due, strict=True) if due)
-        return ", ".join(names) or "no group"
+    def card_lines(self) -> tuple[tuple[str, str], ...]:
+        """Where groups have rates of their own: the cycle of the verdict, and the mean of all."""
+        if not has_rates(self.network):
+            return ()
+        cycles = cycles_of(self.network)
+        names = (group.name for group, is_due in zip(self.network.groups, cycles[0].due, strict=True) if is_due)
+        shown, number = ", ".join(names) or "no group", sum(len(cycle.numbers) for cycle in cycles)
+        mean_us, given_us = plain(self._mean_us), plain(self._given_us)
+        return (
+            ("fullest cycle", f"has {shown}; {len(cycles[0].numbers)} of {number} cycles are so"),
+            ("mean cycle", f"{mean_us:.1f} us, {mean_us / given_us:.0%}".replace("%", " %")),
+        )
 
     @property
     def _given_us(self) -> Number:
@@ -384,39 +249,146 @@ class EthercatCycle(BusCycle):
         network = self.network
         if not has_rates(network):
             return self.required_us
-        mean_bytes = mean_wire_bytes(network, with_last=self._is_last_again)
-        return self._beside_us + sending_us(mean_bytes)
+        polls: Number = network.profile.bus.mailbox_polls
+        is_last_again: Number = polls <= 0 if self.counts_reception else False
+        last_us = choose(is_last_again, self._receive_us, 0.0)
+        beside_us = self.required_us - process_us(network, self._devices) - last_us
+        return beside_us + sending_us(mean_wire_bytes(network, with_last=is_last_again))
 
-    @property
-    def _is_last_again(self) -> Number:
-        """Whether the last frame of process data is counted once more."""
-        polls: Number = self.network.profile.bus.mailbox_polls
-        return polls <= 0 if self.counts_reception else False
+    def arrival_us(self, node: int) -> float:
+        """When a device has its command, from the start of a cycle of plain numbers [us].
 
-    @property
-    def _beside_us(self) -> Number:
-        """What every cycle needs beside its frames of process data [us]."""
-        return (
-            self.required_us
-            - process_us(self.network, self._devices)
-            - choose(self._is_last_again, self._receive_us, 0.0)
-        )
+        It acts when the last byte of its frame has come: a check after the data says whether the frame is whole. The
+        frames are those of the fullest cycle, and start as late as the master's jitter lets them; a device that does
+        not go in it has its command with the last of them.
 
-    def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """Where groups have rates of their own: the cycle of the verdict, and the mean of all."""
-        if not has_rates(self.network):
-            return ()
-        cycles = cycles_of(self.network)
-        number, given_us = sum(len(cycle.numbers) for cycle in cycles), plain(self._given_us)
-        return (
-            ("fullest cycle", f"has {self._names(cycles[0])}; {len(cycles[0].numbers)} of {number} cycles are so"),
-            ("mean cycle", f"{plain(self._mean_us):.1f} us, {plain(self._mean_us) / given_us:.0%}".replace("%", " %")),
-        )
+        Parameters
+        ----------
+        node
+            Number of the device, from 1.
+        """
+        network = self.network
+        sent_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
+        for run in frames(network, devices(network)):
+            frame_us, before = plain(sending_us(frame_bytes(run.datagrams_bytes))), node - run.first
+            if before < run.devices * run.frames:
+                sent_us += (before // run.devices + 1) * frame_us
+                break
+            sent_us += run.frames * frame_us
+        way_us, left = 0.0, node
+        for group in network.groups:
+            passed = min(left, int(plain(group.nodes)))
+            way_us += passed * plain(delay_us(group) + cable_us(group.node.cable_m)) / 2
+            left -= passed
+        return sent_us + way_us
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """The master's pipeline, and the cycles that feedback and command wait for a frame and for SYNC0."""
-        return loop_periods(self.network, at_sync=at_sync)
+        """The master's pipeline, and the periods that feedback and command wait for a frame and for SYNC0 [1].
+
+        The slowest group counts, groups at slower rates left out.
+        """
+        network, period_us = self.network, plain(self.network.period_us)
+        shift_us = plain(sync0_us(network)) if at_sync else 0.0
+        last_us = self.arrival_us(int(plain(network.nodes)))
+
+        def waits(group: Group) -> float:
+            extra_us = plain(group.worst_extra_us)
+            sampled = plain(_until_taken((shift_us + plain(group.read_execution_us) + extra_us) / period_us))
+            late_us = last_us + plain(group.write_execution_us) + extra_us - shift_us
+            return sampled + (max(plain(rounded_up(late_us / period_us)), 0) if at_sync else 0)
+
+        groups = [group for group in network.groups if not group.is_slower] or network.groups
+        return int(max(map(waits, groups)) + plain(network.profile.bus.pipeline_cycles))
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """The worst case of a command, of feedback, and of both, for each group."""
-        return latencies(self.network)
+        """The worst case of a command, of feedback, and of a loop over both, for each group."""
+        latencies = []
+        for group in self.network.groups:
+            command, feedback = self._command(group), self._feedback(group)
+            # The master's pipeline begins with the cycle that brings the feedback.
+            drive_us = feedback["drive_us"] + command["drive_us"]
+            loop = {**command, "drive_us": drive_us, "frame_wait_us": feedback["frame_wait_us"]}
+            for name, phases in (("command", command), ("feedback", feedback), ("loop", loop)):
+                whole_us = {LATENCY_TABLE[-1].key: total(phases.values())}
+                latencies.append(BusLatency(name, None, phases | whole_us, group.name))
+        return tuple(latencies)
+
+    @property
+    def last_command_us(self) -> Number:
+        """When the last device has taken its command at the latest, from the master's task [us]."""
+        return reduce(larger, map(self._taken_us, self.network.groups))
+
+    @property
+    def command_doubt_us(self) -> Number:
+        """Standard uncertainty of the last command: master, devices one way, bytes and slowest execution [us]."""
+        execution_us = reduce(larger, (group.write_uncertainty_us for group in self.network.groups))
+        parts = (
+            self.network.profile.bus.master_doubt_us,
+            *(doubt.us / 2 for doubt in devices_doubts(self.network)),
+            self.process_bytes * BYTE_BIAS_UNCERTAINTY_US,
+            execution_us,
+        )
+        return square_root(total(part * part for part in parts))
+
+    @cached_property
+    def _sent_us(self) -> Number:
+        """All frames of process data of the fullest cycle [us]."""
+        return process_us(self.network, devices(self.network))
+
+    @cached_property
+    def _way_us(self) -> Number:
+        """Delay of devices and cables to the last device and back [us]."""
+        return named(devices_us(self.network) + cables_us(self.network), "way_us", "way")
+
+    def _taken_us(self, group: Group) -> Number:
+        """When the last device of a group may have taken its command, from the start of the cycle [us]."""
+        bus = self.network.profile.bus
+        on_wire_us = bus.master_us + bus.master_jitter_us + self._sent_us + self._way_us / 2
+        taken_us = on_wire_us + group.write_execution_us + group.worst_extra_us
+        return named(taken_us, "command_us", "t_cmd")
+
+    def _command(self, group: Group) -> dict[str, Number]:
+        """From the cycle whose feedback it rests on to its effect."""
+        network, bus = self.network, self.network.profile.bus
+        taken_us = self._taken_us(group)
+        wait_us: Number = 0.0
+        if bus.distributed_clocks:
+            late = larger(rounded_up((taken_us - sync0_us(network)) / network.period_us), 0)
+            wait_us = sync0_us(network) + late * network.period_us - taken_us
+        return {
+            "drive_us": group.write_execution_us + group.worst_extra_us,
+            "frame_wait_us": 0.0,
+            "pipeline_us": named(bus.pipeline_cycles * _period_us(group, network), "pipeline_us", "n T_s"),
+            "master_us": bus.master_us,
+            "jitter_us": bus.master_jitter_us,
+            "sending_us": self._sent_us,
+            "path_us": self._way_us / 2,
+            "sync_wait_us": wait_us,
+        }
+
+    def _feedback(self, group: Group) -> dict[str, Number]:
+        """From the sample to the start of the cycle whose frame takes it, and until the master has all frames."""
+        network, bus = self.network, self.network.profile.bus
+        ready_us = group.read_execution_us + group.worst_extra_us
+        behind_us = sync0_us(network) + ready_us
+        period_us = _period_us(group, network)
+        return {
+            "drive_us": ready_us,
+            "frame_wait_us": _until_taken(behind_us / period_us) * period_us - behind_us,
+            "pipeline_us": 0.0,
+            "master_us": bus.master_us,
+            "jitter_us": bus.master_jitter_us,
+            "sending_us": self._sent_us + bus.mailbox_polls * mailbox_frame_us(network),
+            "path_us": self._way_us,
+            "sync_wait_us": 0.0,
+        }
+
+
+def _period_us(group: Group, network: Network) -> Number:
+    """From a cycle with the group's data to the next [us]."""
+    return group.every * network.period_us if group.is_slower else network.period_us
+
+
+def _until_taken(ready: Number) -> Number:
+    """Periods from a sample to the frame that takes it, ready after a share of them: no frame takes its own sample."""
+    return larger(rounded_up(ready), 1)

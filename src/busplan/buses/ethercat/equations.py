@@ -6,7 +6,7 @@ from typing import Final, Literal
 
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
 from busplan.buses.published import Spread, published, rows_of
-from busplan.elementwise import Number, alike, choose, larger, plain
+from busplan.elementwise import Number, choose, larger, plain, traced_with
 from busplan.sourced import Grade, Sourced, constants
 
 Port = Literal["100BASE-TX", "E-bus"]
@@ -29,31 +29,22 @@ def _bytes(value: int, meaning: str, source: str) -> Sourced:
 
 
 def _delay(spread: Spread, port: str, source: str) -> tuple[Sourced, Sourced]:
-    """The mean delay of the devices of a port, and the standard uncertainty of one more kind of device."""
-    of_mean, of_doubt = f"{source}, their mean", f"{source}, their sd sqrt(1 + 1/n)"
-    return (
-        Sourced(
-            spread.mean,
-            unit="us",
-            grade="measured",
-            source=of_mean,
-            meaning=f"one-way delay of a device with {port} ports",
-        ),
-        Sourced(
-            spread.uncertainty,
-            unit="us",
-            grade="derived",
-            source=of_doubt,
-            meaning=f"standard uncertainty of the delay of all {port} devices of a machine, one way",
-        ),
+    """The mean delay of the devices of a port, and the standard uncertainty of a further kind of device."""
+    mean = Sourced(
+        spread.mean,
+        unit="us",
+        grade="measured",
+        source=f"{source}, their mean",
+        meaning=f"one-way delay of a device with {port} ports",
     )
-
-
-def _datagrams(*sizes: int, of: str, source: str, grade: Grade) -> Sourced:
-    """Datagrams of some data sizes, headers and working counters included [bytes]."""
-    meaning = f"datagrams of the master: {of}, data {' + '.join(map(str, sizes)) or '0'}"
-    value = sum(sizes) + len(sizes) * DATAGRAM_BYTES
-    return Sourced(value, unit="bytes", grade=grade, source=source, meaning=meaning)
+    doubt = Sourced(
+        spread.uncertainty,
+        unit="us",
+        grade="derived",
+        source=f"{source}, their sd sqrt(1 + 1/n)",
+        meaning=f"standard uncertainty of the delay of all {port} devices of a machine, one way",
+    )
+    return mean, doubt
 
 
 BYTE_US: Final = Sourced(
@@ -112,45 +103,30 @@ UNMEASURED_MASTER_SHARE: Final = Sourced(
     source="chosen: published times of like hosts differ by as much",
     meaning="standard uncertainty of a master's time that nobody has measured, as a share of it",
 )
-_ENI: Final = "ENI files that it wrote"
+
+
+def _by_master(datagrams: str) -> Mapping[str, Sourced]:
+    """Datagrams that each master adds to a frame, headers and working counters included [bytes]."""
+    return MappingProxyType({name: _datagrams(**of[datagrams]) for name, of in _MASTERS.items() if datagrams in of})
+
+
+def _datagrams(commands: str, sizes: list[int], source: str, grade: Grade = "published") -> Sourced:
+    meaning = f"datagrams of the master: {commands}, data {' + '.join(map(str, sizes)) or '0'}"
+    value = sum(sizes) + len(sizes) * DATAGRAM_BYTES
+    return Sourced(value, unit="bytes", grade=grade, source=source, meaning=meaning)
+
+
+_MASTERS: Final = published("ethercat")["masters"]
 LAYOUTS: Final[Mapping[str, ProcessData]] = MappingProxyType(
-    {"SOEM": SEPARATE, "IgH": SEPARATE, "ethercrab": SEPARATE, "TwinCAT": SHARED, "acontis": SHARED, UNNAMED: SEPARATE}
+    {name: master["process_data"] for name, master in _MASTERS.items()}
 )
 """Layout of the process data by master."""
-HOUSEKEEPING_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
-    {
-        "SOEM": _datagrams(of="none", source="SOEM, ec_main.c", grade="published"),
-        "IgH": _datagrams(2, of="BRD", source="EtherLab master, its state machine", grade="published"),
-        "ethercrab": _datagrams(of="none", source="ethercrab", grade="published"),
-        "TwinCAT": _datagrams(4, 2, 1, of="NOP, BRD, LRD", source=_ENI, grade="published"),
-        "acontis": _datagrams(4, 4, 2, of="NOP, APWR, BRD", source=_ENI, grade="published"),
-        UNNAMED: _datagrams(
-            4, 4, 2, of="as acontis", source="chosen: the most of those known but ethercrab", grade="assumed"
-        ),
-    }
-)
-"""Datagrams that each master adds to the first frame of every cycle, without those of distributed clocks."""
-CLOCK_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
-    {
-        "SOEM": _datagrams(8, of="FRMW", source="SOEM, ec_main.c", grade="published"),
-        "IgH": _datagrams(4, of="FRMW", source="EtherLab master", grade="published"),
-        "ethercrab": _datagrams(8, of="FRMW", source="ethercrab", grade="published"),
-        "TwinCAT": _datagrams(4, of="ARMW", source=_ENI, grade="published"),
-        "acontis": _datagrams(4, of="ARMW", source=_ENI, grade="published"),
-        UNNAMED: _datagrams(
-            4, of="as acontis", source="chosen: the most of those known but ethercrab", grade="assumed"
-        ),
-    }
-)
-"""Datagrams of distributed clocks, which each master adds to them."""
-STATE_CHECK_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
-    {
-        "ethercrab": _datagrams(
-            2, of="FPRD of a device's state", source="ethercrab 0.6, push_state_checks", grade="published"
-        )
-    }
-)
-"""Datagram that a master adds for each device, by master: it reads the state of all of them in every cycle."""
+HOUSEKEEPING_BYTES: Final = _by_master("every_cycle")
+"""Datagrams that each master adds to the first frame of every cycle, without that of distributed clocks."""
+CLOCK_BYTES: Final = _by_master("clocks")
+"""Datagram of distributed clocks, which each master adds to them."""
+STATE_CHECK_BYTES: Final = _by_master("every_device")
+"""Datagram for each device, by master: it reads the state of all devices in every cycle."""
 PIPELINE_CYCLES: Final = Sourced(
     1,
     unit="1",
@@ -194,14 +170,14 @@ def overhead_bytes(like: Number) -> Number:
     Parameters
     ----------
     like
-        A number that they are computed with, which says of what sort they are.
+        A number that they are computed with; they have its sort: float, array or traced.
 
     Examples
     --------
     >>> overhead_bytes(1)
     40.0
     """
-    return alike(PREAMBLE_BYTES, like) + ETHERNET_BYTES + HEADER_BYTES + CHECK_BYTES + GAP_BYTES
+    return traced_with(PREAMBLE_BYTES, like) + ETHERNET_BYTES + HEADER_BYTES + CHECK_BYTES + GAP_BYTES
 
 
 def padding_bytes(datagrams_bytes: Number) -> Number:
@@ -243,7 +219,7 @@ def room_bytes(datagrams: int) -> float:
     Parameters
     ----------
     datagrams
-        How many datagrams share them [1].
+        Number of datagrams that share them [1].
 
     Examples
     --------

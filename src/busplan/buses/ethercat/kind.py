@@ -12,12 +12,9 @@ from busplan.buses.ethercat.cycle import (
     STRETCHES,
     VENDORS,
     EthercatCycle,
-    command_doubt_us,
-    last_command_us,
     sync0_share,
 )
 from busplan.buses.ethercat.equations import (
-    BYTE_BIAS_US,
     CONSTANTS,
     FIGURES,
     MAILBOX_BYTES,
@@ -29,11 +26,10 @@ from busplan.buses.ethercat.equations import (
     SYNC_SHIFT,
     room_bytes,
 )
-from busplan.buses.ethercat.frames import data_bytes, datagrams, devices, layout
+from busplan.buses.ethercat.frames import data_bytes, datagrams, layout
 from busplan.buses.limits import (
     NODE_LIMIT,
     NOT_SHOWN_KEPT,
-    Bound,
     Cost,
     Key,
     Limit,
@@ -46,7 +42,7 @@ from busplan.buses.limits import (
 )
 from busplan.buses.network import Network
 from busplan.buses.rule import Recorded, Rule, RuleProblem, RuleSubject
-from busplan.elementwise import Number, larger, plain, total
+from busplan.elementwise import Number, larger, plain
 from busplan.english import plural
 from busplan.progress import Progress
 
@@ -54,44 +50,37 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def _largest_device(network: Network) -> Number:
-    return reduce(larger, (data_bytes(group, network) for group in network.groups))
-
-
-def _longest_cable(network: Network) -> Number:
-    lengths_m: list[Number] = [group.node.cable_m for group in network.groups]
-    return reduce(larger, lengths_m)
-
-
 def _late_command_us(network: Network) -> Number:
     """When the last device has taken its command, with what bytes take beyond the wire; 0 without clocks [us]."""
     if not network.profile.bus.distributed_clocks:
         return 0.0
-    process_bytes = total(device.number * device.data_bytes for device in devices(network))
-    return last_command_us(network) + process_bytes * BYTE_BIAS_US
+    cycle = EthercatCycle(network, LAST_BYTE)
+    return cycle.last_command_us + cycle.bias_us()
+
+
+def _late_command_doubt_us(network: Network) -> Number:
+    """Standard uncertainty of that [us]."""
+    return EthercatCycle(network, LAST_BYTE).command_doubt_us if network.profile.bus.distributed_clocks else 0.0
 
 
 def _words(network: Network) -> str:
     """Say when the last command comes, and whether it is late only if all of the master's time is before the wire."""
     value_us, doubt_us, most_us = (
-        plain(us) for us in (_late_command_us(network), SYNC0.bound.uncertainty(network), SYNC0.bound.most(network))
+        plain(us) for us in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
     )
-    is_split = SYNC0.bound.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
+    is_split = SYNC0.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
     where = ", all of bus.master_us before the wire" if is_split else ""
     return f"the last command comes at {value_us:.1f} +/- {doubt_us:.1f} us{where}, SYNC0 at {most_us:.1f} us"
 
 
-SYNC0: Final = Limit(
+SYNC0: Final = share_of_period(
     "sync0",
     _words,
-    *share_of_period(
-        _late_command_us,
-        share=sync0_share,
-        doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,
-        perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
-    ),
+    us=_late_command_us,
+    share=sync0_share,
+    doubt=_late_command_doubt_us,
+    perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
     way_out="a larger bus.sync_shift moves SYNC0 back",
-    has_rule=True,
 )
 """A command must be in every device before SYNC0."""
 LIMITS: Final = (
@@ -99,19 +88,22 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} devices are over the {most:.0f} addresses of a segment",
-        Bound(lambda network: network.nodes, lambda _network: MOST_DEVICES),
+        lambda network: network.nodes,
+        lambda _network: MOST_DEVICES,
         way_out=f"a second segment has {MOST_DEVICES:g} more",
     ),
     Limit(
         "payload",
         "a device of {value:.0f} bytes is over the {most:.0f} bytes of a frame, and no device is split",
-        Bound(_largest_device, lambda network: room_bytes(datagrams(network))),
+        lambda network: reduce(larger, (data_bytes(group, network) for group in network.groups)),
+        lambda network: room_bytes(datagrams(network)),
         way_out="a smaller payload would do",
     ),
     Limit(
         "cable",
         "a cable of {value:g} m is over the {most:g} m of 100BASE-TX",
-        Bound(_longest_cable, lambda _network: MOST_CABLE_M),
+        lambda network: reduce(larger, (group.node.cable_m for group in network.groups)),
+        lambda _network: MOST_CABLE_M,
         way_out="a device between would do",
     ),
     SYNC0,
@@ -288,10 +280,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         """Whole bytes up to those of a frame."""
         each = 1 if layout(network) == SHARED else 2
         return PayloadRange(1, int(room_bytes(datagrams(network)) / each), carrier="a frame")
-
-    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
-        """Say that the last byte passes all devices."""
-        return "the last byte through all devices and back"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The layout of process data, the frames, and the clocks."""

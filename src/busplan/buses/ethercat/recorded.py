@@ -15,7 +15,6 @@ from busplan.buses.ethercat.equations import (
     BYTE_US,
     DATAGRAM_BYTES,
     GAP_BYTES,
-    device_us,
     frame_bytes,
     sending_us,
 )
@@ -27,7 +26,8 @@ from busplan.buses.ethercat.frames import (
     has_rates,
     housekeeping_bytes,
 )
-from busplan.buses.ethercat.ports import Places, SeenCycles, line_delays, seen_cycles
+from busplan.buses.ethercat.port_times import line_delays
+from busplan.buses.ethercat.recorded_cycles import Places, SeenCycles, seen_cycles
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
 from busplan.elementwise import plain
@@ -47,17 +47,13 @@ _GAP_US: Final = plain(sending_us(GAP_BYTES))
 _TWO_STAMPS: Final = 0.5
 """Standard uncertainty of the largest distances of two stamps, in their step: none is off by more than a step."""
 _LEAST_SPAN_BYTES: Final = 200
-"""Least distance of the sizes of frames that says what a byte takes: the host takes them differently, too [bytes]."""
+"""Least range of frame sizes that shows the time of a byte: the host's time differs by size, too [bytes]."""
 _STRAY: Final = 0.01
 """Share of the frames whose stamps may be wrong, or that may be taken for others."""
-_NOT_SHOWN: Final = (
-    "Not shown by a capture of the master's port: its time from the task to the stamp of a frame, SYNC0, and the "
-    "devices' own time."
-)
 
 
 class _Trips(NamedTuple):
-    """Frames that were sent, each with the one that returned."""
+    """Frames that were sent, each with the frame that returned."""
 
     sent: Places
     returned: Places
@@ -120,35 +116,36 @@ class _Seen:
 
     def __init__(self, network: Network, frames: EthercatFrames, share: float) -> None:
         self.network, self.frames, self.share = network, frames, share
-        self.limit = network.profile.limits.missed_cycles
         steps_back = np.diff(frames.times_ns) < -_STEP_BACK_NS
         self.steps_back = int(np.count_nonzero(steps_back))
-        stretch = np.concatenate(([0], np.cumsum(steps_back)))
         self.stamp_us = step(frames.times_ns)
-        self.wire_us = np.array([_wire_us(layout) for layout in frames.layouts])[frames.layout]
         self.trips = _trips(frames)
         self.trips_us = (frames.times_ns[self.trips.returned] - frames.times_ns[self.trips.sent]) / 1000
         self.delays = line_delays(frames.latches, frames.unlatched)
         self.dropped = frames.notes.dropped + frames.cut
         """Packets that the recorder says it dropped, or that it cut."""
         process = [tuple(part for part in layout if part.is_process_data) for layout in frames.layouts]
+        datagrams = np.array([_datagrams_bytes(layout) for layout in frames.layouts])
+        wire_us = np.array([plain(sending_us(frame_bytes(size))) for size in datagrams.tolist()])
+        self.datagrams_bytes, self.wire_us = datagrams[frames.layout], wire_us[frames.layout]
         self.data_bytes = np.array([float(sum(part.data_bytes for part in parts)) for parts in process])[frames.layout]
-        kinds = {parts: kind for kind, parts in enumerate(dict.fromkeys(process))}
         self.is_data = np.array([bool(parts) for parts in process])[frames.layout]
-        sent = np.flatnonzero(self.is_data & ~frames.returned)
         self.cycles: SeenCycles | None = None
+        sent = np.flatnonzero(self.is_data & ~frames.returned)
         if len(sent):
             # Of several stretches of the clock the longest is taken.
-            sent = sent[stretch[sent] == np.bincount(stretch[sent]).argmax()]
+            stretch = np.concatenate(([0], np.cumsum(steps_back)))[sent]
+            sent = sent[stretch == np.bincount(stretch).argmax()]
             sent = sent[np.argsort(frames.times_ns[sent], kind="stable")]
             times_us = (frames.times_ns[sent] - frames.times_ns[sent[0]]) / 1000
-            kind = np.array([kinds[parts] for parts in process])[frames.layout[sent]]
-            self.cycles = seen_cycles(sent, times_us, kind, self.data_bytes[sent], network)
+            numbers = {parts: number for number, parts in enumerate(dict.fromkeys(process))}
+            kinds = np.array([numbers[parts] for parts in process])[frames.layout[sent]]
+            self.cycles = seen_cycles(sent, times_us, kinds, self.data_bytes[sent], network)
         self.bad_stamps = self._bad_stamps()
         """Why the stamps cannot say what takes how long; empty where they can."""
         self.jitter: Quantile | None = None
         self.master: Quantile | None = None
-        self.own_bytes: tuple[int, ...] | None = None
+        self.master_bytes: list[int] | None = None
         """Data of the master's own datagrams, where they are not as planned [bytes]."""
 
     def _bad_stamps(self) -> str:
@@ -205,67 +202,65 @@ class _Seen:
 
     def _period(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
         """Period and starts of the cycles."""
-        found, count = cycles.periods, len(cycles.first)
-        period_us = plain(self.network.period_us)
-        planned_us = plain(self.network.profile.bus.master_jitter_us)
-        if found is None:
-            hidden = self.too_few or self.bad_stamps
-            yield RecordedFigure("period", "us", period_us, None, None, "equal", count, _PERIOD, hidden=hidden)
-            yield RecordedFigure("latest start", "us", planned_us, None, None, "at most", count, _JITTER, hidden=hidden)
+        periods, count = cycles.periods, len(cycles.first)
+        period_us, jitter_us = plain(self.network.period_us), plain(self.network.profile.bus.master_jitter_us)
+        period = RecordedFigure("period", "us", period_us, None, None, "equal", count, _PERIOD)
+        start = RecordedFigure("latest start", "us", jitter_us, None, None, "at most", count, _JITTER)
+        if periods is None:
+            yield from (figure._replace(hidden=self.too_few or self.bad_stamps) for figure in (period, start))
             return
         clocks_us = CLOCK_TOLERANCE * period_us / 3**0.5
-        doubt = expanded(found.uncertainty_us, clocks_us, self.stamp_us / count)
-        yield RecordedFigure("period", "us", period_us, found.period_us, doubt, "equal", count, _PERIOD)
-        deviation_us = float(np.std(np.diff(found.late_us)))
+        doubt = expanded(periods.uncertainty_us, clocks_us, self.stamp_us / count)
+        yield period._replace(recorded=periods.period_us, uncertainty=doubt)
+        deviation_us = float(np.std(np.diff(periods.late_us)))
         yield RecordedFigure("standard deviation of the period", "us", None, deviation_us, None, "shown", count - 1)
-        latest = lateness(found, self.share)
-        doubt = expanded(latest.uncertainty, self.stamp_us * _TWO_STAMPS)
-        is_hidden = self.stamp_us > max(planned_us, latest.value)
-        hidden = f"stamps have steps of {self.stamp_us:g} us" if is_hidden else ""
-        if not (hidden or self.bad_stamps):
+        latest = lateness(periods, self.share)
+        is_hidden = self.stamp_us > max(jitter_us, latest.value)
+        if not (is_hidden or self.bad_stamps):
             self.jitter = latest
-        yield RecordedFigure(
-            "latest start", "us", planned_us, latest.value, doubt, "at most", count, _JITTER, hidden=hidden
+        yield start._replace(
+            recorded=latest.value,
+            uncertainty=expanded(latest.uncertainty, self.stamp_us * _TWO_STAMPS),
+            hidden=f"stamps have steps of {self.stamp_us:g} us" if is_hidden else "",
         )
 
     def _cycles(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
         """What is missing, and each sort of cycle beside that of the plan."""
-        each = self._each(cycles)
+        held = self._held(cycles)
         if cycles.periods is None:
-            yield from self._times(cycles.sorts[0], "", each.trips_us, (each.host_us,))
+            yield from self._times(cycles.sorts[0], "", held.trips_us, (held.host_us,))
             return
-        frames, data_bytes = (_usual(of, cycles.sort) for of in (each.frames, each.data_bytes))
-        has_less = (each.frames < frames) | (each.data_bytes < data_bytes)
+        frames, data_bytes = (_usual(values, cycles.sort) for values in (held.frames, held.data_bytes))
+        has_less = (held.frames < frames) | (held.data_bytes < data_bytes)
         yield self._without_frame(cycles, int(np.count_nonzero(has_less)))
-        whole = each.is_back & (each.frames == frames) & (each.data_bytes == data_bytes)
+        whole = held.is_back & (held.frames == frames) & (held.data_bytes == data_bytes)
         for place, sort in enumerate(cycles.sorts):
             names = [group.name for group, is_due in zip(self.network.groups, sort.due, strict=True) if is_due]
             with_names = f" with {' and '.join(names) or 'no group'}" if has_rates(self.network) else ""
-            own = np.flatnonzero(whole & (cycles.sort == place))
+            of_sort = np.flatnonzero(whole & (cycles.sort == place))
             if sort.data_bytes:
-                host_us = () if place else (each.host_us[own], each.host_us[whole])
-                yield from self._times(sort, with_names, each.trips_us[own], host_us)
-            yield from self._layout(sort, with_names, cycles, own, each)
+                host_us = () if place else (held.host_us[of_sort], held.host_us[whole])
+                yield from self._times(sort, with_names, held.trips_us[of_sort], host_us)
+            yield from self._layout(sort, with_names, cycles, of_sort, held)
 
-    def _each(self, cycles: SeenCycles) -> _Cycles:
+    def _held(self, cycles: SeenCycles) -> _Cycles:
         """What each cycle has."""
-        frames, sent, number, count = self.frames, cycles.frames, cycles.number, len(cycles.first)
-        back = np.full(len(frames.times_ns), -1)
+        times_ns, number, count = self.frames.times_ns, cycles.number, len(cycles.first)
+        back = np.full(len(times_ns), -1)
         back[self.trips.sent] = self.trips.returned
-        back = back[sent]
-        in_each = np.bincount(number, minlength=count)
-        returned = np.bincount(number, weights=back >= 0, minlength=count)
+        back = back[cycles.frames]
+        frames = np.bincount(number, minlength=count)
+        is_back = np.bincount(number, weights=back >= 0, minlength=count) == frames
         end_ns = np.full(count, np.iinfo(np.int64).min)
-        np.maximum.at(end_ns, number[back >= 0], frames.times_ns[back[back >= 0]])
-        is_back = returned == in_each
-        trips_us = np.where(is_back, (end_ns - frames.times_ns[cycles.first]) / 1000, 0.0)
-        way_us = plain(devices_us(self.network)) + plain(cables_us(self.network)) + self.delays.more_us(self.network)
-        datagrams = np.array([_datagrams_bytes(layout) for layout in frames.layouts])[frames.layout]
+        np.maximum.at(end_ns, number[back >= 0], times_ns[back[back >= 0]])
+        trips_us = np.where(is_back, (end_ns - times_ns[cycles.first]) / 1000, 0.0)
         wire_us, data_bytes, datagrams_bytes = (
-            np.bincount(number, weights=of[sent]) for of in (self.wire_us, self.data_bytes, datagrams)
+            np.bincount(number, weights=values[cycles.frames])
+            for values in (self.wire_us, self.data_bytes, self.datagrams_bytes)
         )
+        way_us = plain(devices_us(self.network)) + plain(cables_us(self.network)) + self.delays.more_us(self.network)
         host_us = trips_us - wire_us - data_bytes * BYTE_BIAS_US - way_us
-        return _Cycles(in_each, is_back, trips_us, host_us, data_bytes, datagrams_bytes)
+        return _Cycles(frames, is_back, trips_us, host_us, data_bytes, datagrams_bytes)
 
     def _without_frame(self, cycles: SeenCycles, with_less: int) -> RecordedFigure:
         """Cycles that have no frame, or less in their frames than most of their sort."""
@@ -283,8 +278,9 @@ class _Seen:
 
     def _missed(self, quantity: str, number: int, events: int, note: str, hides: str = "") -> RecordedFigure:
         """What counts against the limit; hidden where dropped packets may be all that is beyond it."""
-        hidden = hides if number - self.dropped <= self.limit else ""
-        return RecordedFigure(quantity, "1", self.limit, number, None, "at most", events, _MISSED, note, hidden=hidden)
+        limit = self.network.profile.limits.missed_cycles
+        hidden = hides if number - self.dropped <= limit else ""
+        return RecordedFigure(quantity, "1", limit, number, None, "at most", events, _MISSED, note, hidden=hidden)
 
     def _times(
         self, sort: UnitCycle, with_names: str, trips_us: Floats, host_us: tuple[Floats, ...]
@@ -292,85 +288,85 @@ class _Seen:
         """Round trip of a sort of cycle, and the master's time: the largest that some sets of cycles say, if any."""
         bus, count = self.network.profile.bus, len(trips_us)
         planned = EthercatCycle(self.network, LAST_BYTE, sort.numbers[0])
-        known = ("cycle_master_us", "cycle_frames_us", "cycle_data_us", "cycle_devices_us", "cycle_cable_us")
-        planned_us = sum(plain(planned.by_term[key]) for key in known) + plain(planned.bias_us())
+        in_trip = ("cycle_master_us", "cycle_frames_us", "cycle_data_us", "cycle_devices_us", "cycle_cable_us")
+        planned_us = sum(plain(planned.by_term[key]) for key in in_trip) + plain(planned.bias_us())
         few = f"{plural(count, 'whole cycle')}, and a figure takes {LEAST_EVENTS}" if count < LEAST_EVENTS else ""
-        trip_name, hidden = f"round trip{with_names}", self.bad_stamps or few
-        of_trip = RecordedFigure(trip_name, "us", planned_us, None, None, "at most", count, hidden=hidden)
-        of_master = RecordedFigure(
+        hidden = self.bad_stamps or few
+        trip = RecordedFigure(f"round trip{with_names}", "us", planned_us, None, None, "at most", count, hidden=hidden)
+        master = RecordedFigure(
             "master's time", "us", plain(bus.master_us), None, None, "at most", count, _MASTER, hidden=hidden
         )
         if hidden:
-            yield from (of_trip, of_master) if host_us else (of_trip,)
+            yield from (trip, master) if host_us else (trip,)
             return
         doubts = [
-            *(plain(device_us(doubt.one_way_us)) for doubt in devices_doubts(self.network)),
+            *(plain(doubt.us) for doubt in devices_doubts(self.network)),
             plain(planned.process_bytes) * BYTE_BIAS_UNCERTAINTY_US,
             plain(bus.master_doubt_us),
             self.stamp_us * _TWO_STAMPS,
         ]
-        trip = quantile(trips_us, self.share)
         if host_us:
             typical_us = quantile(trips_us, 0.5).value
             yield RecordedFigure("round trip, median", "us", None, typical_us, None, "shown", count)
-        yield of_trip._replace(recorded=trip.value, uncertainty=expanded(*doubts, trip.uncertainty or 0.0))
+        longest = quantile(trips_us, self.share)
+        yield trip._replace(recorded=longest.value, uncertainty=expanded(*doubts, longest.uncertainty or 0.0))
         if host_us:
             longest_us = max(host_us, key=lambda us: quantile(us, self.share).value)
             self.master = quantile(longest_us, self.share)
-            typical_us = quantile(longest_us, 0.5).value
-            yield of_master._replace(
+            yield master._replace(
                 recorded=self.master.value,
                 uncertainty=expanded(*doubts, self.master.uncertainty or 0.0),
                 events=len(longest_us),
-                note=f"median {typical_us:.1f}: round trip less wire, devices and cables",
+                note=f"median {quantile(longest_us, 0.5).value:.1f}: round trip less wire, devices and cables",
             )
 
     def _layout(
-        self, sort: UnitCycle, with_names: str, cycles: SeenCycles, own: Places, each: _Cycles
+        self, sort: UnitCycle, with_names: str, cycles: SeenCycles, of_sort: Places, held: _Cycles
     ) -> Iterator[RecordedFigure]:
         """Frames of a sort of cycle, and their datagrams."""
-        count, planned = len(own), EthercatCycle(self.network, LAST_BYTE, sort.numbers[0]).packing
-        name, planned_frames = f"frames in a cycle{with_names}", plain(planned.frames)
+        count, planned = len(of_sort), EthercatCycle(self.network, LAST_BYTE, sort.numbers[0]).packing
         if sort.data_bytes:
+            name, frames = f"frames in a cycle{with_names}", int(held.frames[of_sort[0]]) if count else None
             hidden = "" if count else "no such cycle is in the recording"
-            frames = int(each.frames[own[0]]) if count else None
-            yield RecordedFigure(name, "1", planned_frames, frames, None, "equal", count, hidden=hidden)
+            yield RecordedFigure(name, "1", plain(planned.frames), frames, None, "equal", count, hidden=hidden)
         if not count:
             return
-        # Of those that are as most are, one in the middle: now and then a master adds a datagram.
-        sizes, often = np.unique(each.datagrams_bytes[own], return_counts=True)
-        usual = own[each.datagrams_bytes[own] == sizes[often.argmax()]]
+        # Of the cycles as most are, the middle: now and then a master adds a datagram.
+        sizes, often = np.unique(held.datagrams_bytes[of_sort], return_counts=True)
+        usual_bytes = sizes[often.argmax()]
+        usual = of_sort[held.datagrams_bytes[of_sort] == usual_bytes]
         places = cycles.frames[cycles.number == usual[len(usual) // 2]]
         layouts = [self.frames.layouts[layout] for layout in self.frames.layout[places]]
         yield RecordedFigure(
             f"datagrams of a cycle{with_names}",
             "bytes",
             plain(planned.datagrams_bytes),
-            float(sizes[often.argmax()]),
+            float(usual_bytes),
             None,
             "at most",
             count,
-            note=" | ".join(" ".join(map(_words, layout)) for layout in layouts),
+            note=" | ".join(
+                " ".join(f"{COMMANDS.get(part.command, part.command)} {part.data_bytes}" for part in layout)
+                for layout in layouts
+            ),
         )
-        own_parts = [part for layout in layouts for part in layout if not part.is_process_data]
-        if sort is cycles.sorts[0] and _datagrams_bytes(own_parts) != plain(housekeeping_bytes(self.network)):
-            self.own_bytes = tuple(part.data_bytes for part in own_parts)
+        added = [part for layout in layouts for part in layout if not part.is_process_data]
+        if sort is cycles.sorts[0] and _datagrams_bytes(added) != plain(housekeeping_bytes(self.network)):
+            self.master_bytes = [part.data_bytes for part in added]
 
     def _lost(self) -> Iterator[RecordedFigure]:
+        """Frames that did not return, or with a wrong working counter."""
         frames, trips = self.frames, self.trips
         sent = int(np.count_nonzero(~frames.returned))
         yield self._missed("lost frames", len(trips.lost), sent, "", self._dropped)
-        wrong = total = 0
         back = trips.returned[self.is_data[trips.returned]]
-        for layout in np.unique(frames.layout[back]):
-            counts = np.bincount(frames.counters[back[frames.layout[back] == layout]])
-            total += int(counts.sum())
-            wrong += int(counts.sum() - counts.max())
-        if total:
-            yield self._missed("wrong working counters", wrong, total, "the most frequent ones are taken for right")
+        if len(back):
+            right = _usual(frames.counters[back], frames.layout[back])
+            wrong = int(np.count_nonzero(frames.counters[back] != right))
+            yield self._missed("wrong working counters", wrong, len(back), "the most frequent ones are taken for right")
 
     def _byte(self) -> Iterator[RecordedFigure]:
-        """The time of a byte, of frames that no other one is on the way with: others wait for those before them."""
+        """The time of a byte, of frames that are alone on the way: others wait for those before them."""
         if self.bad_stamps:
             return
         sent_ns, back_ns = self.frames.times_ns[self.trips.sent], self.frames.times_ns[self.trips.returned]
@@ -385,11 +381,18 @@ class _Seen:
             return
         slope, error = fitted
         doubt = expanded(error, BYTE_BIAS_UNCERTAINTY_US) or 0.0
-        planned = BYTE_US + BYTE_BIAS_US
-        note = f"round trips of {int(sizes.min())} to {int(sizes.max())} bytes on the wire"
-        hidden = "less than on the wire: the host waits for more than the frame" if slope + doubt < BYTE_US else ""
+        is_hidden = slope + doubt < BYTE_US
         yield RecordedFigure(
-            "time of a byte", "us", planned, slope, doubt, "at most", len(sizes), "", note, is_mean=True, hidden=hidden
+            "time of a byte",
+            "us",
+            BYTE_US + BYTE_BIAS_US,
+            slope,
+            doubt,
+            "at most",
+            len(sizes),
+            note=f"round trips of {int(sizes.min())} to {int(sizes.max())} bytes on the wire",
+            is_mean=True,
+            hidden="less than on the wire: the host waits for more than the frame" if is_hidden else "",
         )
 
     def remarks(self) -> Iterator[str]:
@@ -408,8 +411,7 @@ class _Seen:
             yield f"{plural(self.trips.unsent, 'frame')} returned without having been seen to be sent."
         if frames.cut:
             yield f"Left out: {plural(frames.cut, 'EtherCAT frame')} that the recorder cut; record whole packets."
-        left_out = frames.others + notes.other_links + notes.without_time
-        if left_out:
+        if left_out := frames.others + notes.left_out:
             yield f"Left out: {plural(left_out, 'packet')} of other protocols or interfaces, or without a time."
         if not self.bad_stamps and self.short:
             yield (
@@ -420,11 +422,14 @@ class _Seen:
             yield "The machine is faster than wire and devices of the profile, which has more of them than it."
         yield from self.delays.remarks
         yield f"Stamps have steps of {self.stamp_us:g} us."
-        yield _NOT_SHOWN
+        yield (
+            "Not shown by a capture of the master's port: its time from the task to the stamp of a frame, SYNC0, and "
+            "the devices' own time."
+        )
 
     def edits(self) -> dict[str, object]:
         """New value of each key that was measured; None removes one."""
-        edits: dict[str, Any] = {**self.delays.edits(self.network)}
+        edits: dict[str, object] = {**self.delays.edits(self.network)}
         if self.master is not None and self.master.value > 0:
             edits[_MASTER] = _up(self.master.value)
             edits["bus.master_grade"] = "measured"
@@ -433,32 +438,23 @@ class _Seen:
             edits["bus.master_uncertainty_us"] = None if doubt is None else round(doubt / 2, 4)
         if self.jitter is not None:
             edits[_JITTER] = _up(self.jitter.value)
-        if self.own_bytes is not None:
-            edits["bus.housekeeping_bytes"] = list(self.own_bytes)
+        if self.master_bytes is not None:
+            edits["bus.housekeeping_bytes"] = self.master_bytes
         return edits
 
 
 def _usual(values: npt.NDArray[Any], sort: Places) -> npt.NDArray[Any]:
     """For each of n things the value that most of its sort have."""
     usual = np.zeros_like(values)
-    for own in np.unique(sort):
-        each, often = np.unique(values[sort == own], return_counts=True)
-        usual[sort == own] = each[often.argmax()]
+    for number in np.unique(sort):
+        distinct, often = np.unique(values[sort == number], return_counts=True)
+        usual[sort == number] = distinct[often.argmax()]
     return usual
 
 
 def _up(us: float) -> float:
     """A time that is to hold what was measured, to a nanosecond [us]."""
     return ceil(us * 1000) / 1000
-
-
-def _words(part: Datagram) -> str:
-    return f"{COMMANDS.get(part.command, part.command)} {part.data_bytes}"
-
-
-def _wire_us(layout: tuple[Datagram, ...]) -> float:
-    """A frame on the wire [us]."""
-    return plain(sending_us(frame_bytes(_datagrams_bytes(layout))))
 
 
 def _datagrams_bytes(parts: Sequence[Datagram]) -> float:

@@ -1,7 +1,6 @@
 """The keys that only profiles of an EtherCAT bus have, in [bus], [node] and [[group]]."""
 
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -40,11 +39,6 @@ _MOST_CYCLES = 1000
 class EthercatBus(BusSection):
     """Section [bus]: an EtherCAT segment at 100 Mbit/s."""
 
-    removed: ClassVar[Mapping[str, str]] = {
-        "command": 'LRW took it that outputs and inputs share bytes; write process_data = "LRW-shared" where the '
-        'master is TwinCAT or acontis, "LRW-separate" for SOEM, IgH or ethercrab, "LRD-LWR" as before; or name it: '
-        'master = "SOEM"'
-    }
     kind: Literal["ethercat"] = Field(description="Kind of bus", examples=["ethercat"])
     nodes: Count | None = Field(default=None, description="Devices N, the master not counted", examples=[8])
     master: Master | None = Field(

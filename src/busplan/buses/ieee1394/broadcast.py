@@ -11,17 +11,14 @@ Z. Chen, P. Kazanzides, "Multi-Kilohertz Control of Multiple Robots via IEEE-139
 mechatronics-firmware and mechatronics-software.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cached_property, partial
 from typing import NamedTuple
 
 from busplan.buses.cycle import BUT_FIRST, FIRST, BusEvent, BusLatency, Doubt, Run
-from busplan.buses.ieee1394 import equations, figures
-from busplan.buses.ieee1394 import transactions as doubts
+from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
     BASE_RATE_MBIT_S,
-    BLOCK_READ_REQUEST_BYTES,
-    BLOCK_READ_RESPONSE_OVERHEAD_BYTES,
     BLOCK_WRITE_REQUEST_OVERHEAD_BYTES,
     BROADCAST_CLOCK_MHZ,
     BROADCAST_NODE_BYTES,
@@ -34,8 +31,10 @@ from busplan.buses.ieee1394.constants import (
     padded_bytes,
 )
 from busplan.buses.ieee1394.cycle import CycleWithStarts
+from busplan.buses.ieee1394.timing import Phases, Responder, transaction
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, alike, is_off, larger, named, total
+from busplan.elementwise import Number, is_off, larger, named, total, traced_with
+from busplan.sections.base import TransactionKind
 
 
 def hub_block_bytes(network: Network) -> Number:
@@ -64,15 +63,6 @@ def _with_quadlet(payload_bytes: Number) -> Number:
     return padded_bytes(payload_bytes) + BROADCAST_NODE_BYTES
 
 
-class Packets(NamedTuple):
-    """Data phases of the packets that are not the nodes' own [us]."""
-
-    query_us: Number
-    hub_request_us: Number
-    hub_block_us: Number
-    write_us: Number
-
-
 class Idle(NamedTuple):
     """Idle bus before a request of the host, or after the last request [us]."""
 
@@ -96,23 +86,11 @@ class BroadcastCycle(CycleWithStarts):
     """
 
     @cached_property
-    def packets(self) -> Packets:
-        """Data phases of query, hub and write [us]."""
-        sizes = (
-            QUADLET_WRITE_REQUEST_BYTES,
-            BLOCK_READ_REQUEST_BYTES,
-            BLOCK_READ_RESPONSE_OVERHEAD_BYTES + hub_block_bytes(self.network),
-            BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + write_block_bytes(self.network),
-        )
-        return Packets(*map(self._data_us, sizes))
-
-    def _data_us(self, packet_bytes: Number) -> Number:
-        return equations.data_phase_us(
-            self.link.hops,
-            hop_us=self.delays.hop_us,
-            packet_bytes=packet_bytes,
-            data_rate_mbit_s=self.link.data_rate_mbit_s,
-        )
+    def query_us(self) -> Number:
+        """The query with its acknowledge [us]."""
+        data_us = self.delays.data_us(QUADLET_WRITE_REQUEST_BYTES)
+        query_us = self.delays.arbitration_us + data_us + self.delays.acknowledge_us
+        return named(query_us, "query_us", "T_query")
 
     @property
     def _is_isochronous(self) -> bool:
@@ -133,7 +111,7 @@ class BroadcastCycle(CycleWithStarts):
         return larger(self._clocks_us(FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
 
     def _clocks_us(self, clocks: Number) -> Number:
-        return alike(clocks, self.link.hops) / BROADCAST_CLOCK_MHZ
+        return traced_with(clocks, self.link.hops) / BROADCAST_CLOCK_MHZ
 
     def slot_wait_us(self, group: Group) -> Number:
         """Wait of the next node after the broadcast of a node, where each has its own time [us].
@@ -173,13 +151,7 @@ class BroadcastCycle(CycleWithStarts):
         group
             The node's group.
         """
-        return self._data_us(BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + _with_quadlet(group.read_bytes))
-
-    @cached_property
-    def query_us(self) -> Number:
-        """The query with its acknowledge [us]."""
-        found_us = self.delays.arbitration_us + self.packets.query_us + self.delays.acknowledge_us
-        return named(found_us, "query_us", "T_query")
+        return self.delays.data_us(BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + _with_quadlet(group.read_bytes))
 
     @property
     def node_waits_us(self) -> Number:
@@ -194,21 +166,19 @@ class BroadcastCycle(CycleWithStarts):
         return named(self.first_wait_us + sent_us + self.slot_waits_us, "boards_us", "T_boards")
 
     @cached_property
-    def hub_us(self) -> Number:
-        """The read of the hub: request, acknowledge, concatenated block and its acknowledge [us]."""
-        delays, sent = self.delays, self.packets
-        return (
-            delays.arbitration_us
-            + sent.hub_request_us
-            + delays.acknowledge_us
-            + sent.hub_block_us
-            + delays.acknowledge_us
-        )
+    def hub(self) -> Phases:
+        """The read of the hub's block, whose answer is concatenated."""
+        responder = Responder(0.0, "concatenated", host_us=self.host_us)
+        return self._transaction("read", hub_block_bytes(self.network), responder)
 
     @cached_property
-    def write_us(self) -> Number:
-        """The write with its acknowledge [us]."""
-        return self.delays.arbitration_us + self.packets.write_us + self.delays.acknowledge_us
+    def write(self) -> Phases:
+        """The write of all commands to the hub, which its acknowledge answers."""
+        responder = Responder(0.0, "unified", host_us=self.host_us)
+        return self._transaction("write", write_block_bytes(self.network), responder)
+
+    def _transaction(self, kind: TransactionKind, payload_bytes: Number, responder: Responder) -> Phases:
+        return transaction(kind, model=self.model, delays=self.delays, payload_bytes=payload_bytes, responder=responder)
 
     @cached_property
     def hub_wait(self) -> Idle:
@@ -222,7 +192,7 @@ class BroadcastCycle(CycleWithStarts):
     @cached_property
     def late_us(self) -> Number:
         """Rest of the host's wait when the last broadcast ends [us]."""
-        wait_us = alike(HUB_WAIT_US, self.network.nodes) + HUB_WAIT_PER_NODE_US * self.network.nodes
+        wait_us = traced_with(HUB_WAIT_US, self.network.nodes) + HUB_WAIT_PER_NODE_US * self.network.nodes
         return named(larger(wait_us - self.boards_us, 0.0), "late_us", "late")
 
     @cached_property
@@ -243,113 +213,62 @@ class BroadcastCycle(CycleWithStarts):
             return Idle(gap_us, 0.0)
         return Idle(gap_us, larger(late_us + host_us - gap_us, 0.0))
 
-    @property
-    def longest_request_us(self) -> Number:
-        """Data phase of the write [us]."""
-        return self.packets.write_us
-
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The query, at which the nodes sample, each broadcast, the read of the hub, and the write."""
-        delays, sent, waits_us = self.delays, self.packets, self.first_wait_us
+        delays, hub, waits_us = self.delays, self.hub, self.first_wait_us
+        request, response, write = (
+            partial(_part, *packet) for packet in (("read", "request"), ("read", "response"), ("write", "request"))
+        )
         yield BusEvent("sync", "sync_us", self.query_us, "query to all nodes")
         for place, group in enumerate(self.network.groups):
-            part = partial(_part, "read", "response")
-            wait, next_us = part("node_wait", "idle", waits_us, "wait of the node"), self.slot_wait_us(group)
+            wait, next_us = response("node_wait", "idle", waits_us, "wait of the node"), self.slot_wait_us(group)
             events = (
-                part("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast"),
+                response("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast"),
                 wait._replace(rounds=FIRST),
                 wait._replace(us=next_us, rounds=BUT_FIRST),
-                part("arbitration", "arbitration", self.arbitration_us, "node arbitration"),
-                part("response_data", "data", self.broadcast_us(group), "node broadcast"),
+                response("arbitration", "arbitration", self.arbitration_us, "node arbitration"),
+                response("response_data", "data", self.broadcast_us(group), "node broadcast"),
             )
             yield Run(events, group.nodes, place)
             waits_us = next_us
-        request, response, write = (
-            partial(_part, *of) for of in (("read", "request"), ("read", "response"), ("write", "request"))
-        )
         read_hub = (
             request("arbitration", "arbitration", delays.arbitration_us, "host arbitration"),
-            request("request_data", "data", sent.hub_request_us, "host request to the hub"),
+            request("request_data", "data", hub.request_data_us, "host request to the hub"),
             request("acknowledge", "acknowledge", delays.acknowledge_us, "hub acknowledge"),
-            response("response_data", "data", sent.hub_block_us, "hub's block of all data"),
+            response("response_data", "data", hub.response_data_us, "hub's block of all data"),
             response("acknowledge", "acknowledge", delays.acknowledge_us, "host acknowledge"),
         )
         write_hub = (
             write("arbitration", "arbitration", delays.arbitration_us, "host arbitration"),
-            write("request_data", "data", sent.write_us, "commands to all nodes"),
+            write("request_data", "data", self.write.request_data_us, "commands to all nodes"),
             write("acknowledge", "acknowledge", delays.acknowledge_us, "hub acknowledge"),
         )
         yield Run((*_waits(self.hub_wait, "before the hub is read"), *read_hub))
         yield Run((*_waits(self.idle, "after the hub's block"), *write_hub))
         yield Run(_waits(self.idle, "after the write"))
 
-    def _phases(self) -> tuple[dict[str, Number], dict[str, Number]]:
-        """The phases of the read of all data, from the query to the host, and of the write of all commands."""
-        delays, sent, gaps = self.delays, self.packets, self.delays.gaps
-        common: dict[str, Number] = {
-            **dict.fromkeys(("query_us", "boards_us", "hub_wait_us"), 0.0),
-            "hops": self.link.hops,
-            "gap_count": self.link.gap_count,
-            "arbitration_us": delays.arbitration_us,
-            "acknowledge_us": delays.acknowledge_us,
-            "hold_us": 0.0,
-            "execution_us": 0.0,
-            "worst_extra_us": 0.0,
-            "subaction_gap_us": gaps.subaction_us,
-            "arbitration_reset_gap_us": gaps.arbitration_reset_us,
-            "gaps_us": gaps.both_us,
-        }
-        read_us = self.query_us + self.boards_us + self.hub_wait.us + self.hub_us
-        write_us = self.write_us
-        read: dict[str, Number] = {
-            "query_us": self.query_us,
-            "boards_us": self.boards_us,
-            "hub_wait_us": self.hub_wait.us,
-            "request_bytes": BLOCK_READ_REQUEST_BYTES,
-            "response_bytes": BLOCK_READ_RESPONSE_OVERHEAD_BYTES + hub_block_bytes(self.network),
-            "request_data_us": sent.hub_request_us,
-            "response_data_us": sent.hub_block_us,
-            "request_us": delays.arbitration_us + sent.hub_request_us,
-            "response_us": sent.hub_block_us,
-            "request_and_acknowledge_us": delays.arbitration_us + sent.hub_request_us + delays.acknowledge_us,
-            "response_and_acknowledge_us": sent.hub_block_us + delays.acknowledge_us,
-            "latency_us": read_us,
-            "latency_with_gaps_us": read_us + gaps.both_us,
-            "idle_us": self.node_waits_us + self.hub_wait.gap_us + self.idle.gap_us,
-            "host_us": self.hub_wait.host_us + self.idle.host_us,
-            "transaction_us": read_us + self.idle.us,
-        }
-        write: dict[str, Number] = {
-            "request_bytes": BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + write_block_bytes(self.network),
-            "response_bytes": 0,
-            "request_data_us": sent.write_us,
-            "response_data_us": 0.0,
-            "request_us": delays.arbitration_us + sent.write_us,
-            "response_us": 0.0,
-            "request_and_acknowledge_us": write_us,
-            "response_and_acknowledge_us": 0.0,
-            "latency_us": write_us,
-            "latency_with_gaps_us": write_us + gaps.both_us,
-            "idle_us": self.idle.gap_us,
-            "host_us": self.idle.host_us,
-            "transaction_us": write_us + self.idle.us,
-        }
-        return _in_order({**common, **read}), _in_order({**common, **write})
+    @cached_property
+    def read(self) -> Phases:
+        """The read of all data, from the query to the host."""
+        latency_us = self.query_us + self.boards_us + self.hub_wait.us + self.hub.latency_us
+        return self.hub._replace(
+            latency_us=latency_us,
+            latency_with_gaps_us=latency_us + self.hub.gaps_us,
+            idle_us=self.node_waits_us + self.hub_wait.gap_us + self.hub.idle_us,
+            host_us=self.hub_wait.host_us + self.hub.host_us,
+            transaction_us=latency_us + self.idle.us,
+        )
 
-    def figures(self) -> Mapping[str, Number | None]:
-        """Settings of the bus, and the latencies; the paper has no number of nodes for this schedule."""
-        read, write = self._phases()
-        shown = ("latency_us", "latency_with_gaps_us", "transaction_us")
-        return {
-            **self.setup(),
-            **{f"{kind}_{key}": phases[key] for kind, phases in (("read", read), ("write", write)) for key in shown},
-            **{key: read[key] for key in ("gaps_us", "subaction_gap_us", "arbitration_reset_gap_us")},
-            "nodes_eq11": None,
-        }
+    def longest(self, kind: TransactionKind) -> Phases:
+        """The read of all data, or the write of all commands [us]."""
+        return self.read if kind == "read" else self.write
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The data of a node to the host, and a command to it; they are those of all nodes."""
-        read, write = self._phases()
+        link = {"hops": self.link.hops, "gap_count": self.link.gap_count}
+        before_hub = {"query_us": self.query_us, "boards_us": self.boards_us, "hub_wait_us": self.hub_wait.us}
+        read = {**link, **before_hub, **self.read._asdict()}
+        write = {**link, **dict.fromkeys(before_hub, 0.0), **self.write._asdict()}
         return tuple(
             latency
             for group in self.network.groups
@@ -361,18 +280,20 @@ class BroadcastCycle(CycleWithStarts):
 
     def bias_us(self) -> Number | None:
         """Time of the packets beyond the model, on the mean [us]."""
-        return doubts.broadcast_bias_us(self.halves, with_gap=self.with_gap, gap_count=self.link.gap_count)
+        with_gap_us = self.with_gap * doubts.gap_term_us(self.link.gap_count)
+        return self.halves * doubts.residual().mean_us + with_gap_us
 
     def doubts(self) -> tuple[Doubt, ...]:
         """Inputs that are not known exactly."""
         retries, nodes = self.network.profile.cycle.retries, self.network.nodes
-        return doubts.of_broadcast(
-            self.halves,
-            with_gap=self.with_gap,
+        # Of the query, of arbitration and data of each broadcast, of the hub's packets, and of the write.
+        hop_delays = 3 + 2 * nodes + 5 + 3 + 3 * retries + 2 * self.number_of_starts
+        return doubts.of_inputs(
+            residual_us=self.halves * doubts.residual().uncertainty_us,
+            gap_term_us=self.with_gap * doubts.gap_term_us(self.link.gap_count),
+            phy_delays=hop_delays * self.link.hops,
             link=self.link,
-            # Of the query, of arbitration and data of each broadcast, of the hub's packets, and of the write.
-            hop_delays=3 + 2 * nodes + 5 + 3 + 3 * retries + 2 * self.number_of_starts,
-            host_swing_us=self._host_swing_us(),
+            host_us=self._host_swing_us(),
         )
 
     @property
@@ -386,16 +307,16 @@ class BroadcastCycle(CycleWithStarts):
         return 4 + self.network.profile.cycle.retries if self._is_isochronous else self.halves
 
     def _host_swing_us(self) -> Number:
-        """Change by a standard uncertainty of the host: half the larger of two steps, two up and two down [us]."""
+        """Change by a standard uncertainty of the host [us]."""
         step_us: Number = self.network.profile.host.standard_uncertainty_us
         if is_off(step_us):
             return 0.0
 
-        def waits_us(host_us: Number) -> Number:
+        def waits_us(steps: int) -> Number:
+            host_us = self.host_us + steps * step_us
             return self._idle(host_us, late_us=self.late_us).us + 2 * self._idle(host_us).us
 
-        above_us, own_us, below_us = (waits_us(self.host_us + steps * step_us) for steps in (2, 0, -2))
-        return larger(above_us - own_us, own_us - below_us) / 2
+        return doubts.swing_us(waits_us)
 
 
 def _part(transaction: str, packet: str, kind: str, term: str, us: Number, label: str) -> BusEvent:
@@ -409,8 +330,3 @@ def _waits(idle: Idle, where: str) -> tuple[BusEvent, BusEvent]:
         BusEvent("arbitration_reset_gap", "cycle_idle_us", idle.gap_us, f"arbitration reset gap {where}"),
         BusEvent("host", "cycle_host_us", idle.host_us, host, rests_on="host.transaction_us"),
     )
-
-
-def _in_order(phases: Mapping[str, Number]) -> dict[str, Number]:
-    """Phases in the order of the document."""
-    return {figure.key: phases[figure.key] for figure in figures.LATENCY if figure.key in phases}

@@ -14,24 +14,28 @@ from busplan.sourced import Sourced, constants
 
 Speed = Literal["S100", "S200", "S400"]
 
+
+def _published(value: float, unit: str, meaning: str, source: str, *, symbol: str = "") -> Sourced:
+    """A figure that was read in a public source."""
+    return Sourced(value, unit=unit, grade="published", source=source, meaning=meaning, symbol=symbol)
+
+
 # --- rates -----------------------------------------------------------------------------------------------
 
-BASE_RATE_MBIT_S: Final = Sourced(
+BASE_RATE_MBIT_S: Final = _published(
     98.304,
-    unit="Mbit/s",
-    grade="published",
-    source="IEEE 1394-1995; the gap tables of Linux, Apple and JHU do not depend on the packet speed",
-    meaning="base rate: S100's data rate, and the clock that gaps and PHY delays are counted in",
+    "Mbit/s",
+    "base rate: S100's data rate, and the clock that gaps and PHY delays are counted in",
+    "IEEE 1394-1995; the gap tables of Linux, Apple and JHU do not depend on the packet speed",
     symbol="C",
 )
 DATA_RATE_MBIT_S: Final = MappingProxyType(
     {
-        speed: Sourced(
+        speed: _published(
             multiple * BASE_RATE_MBIT_S,
-            unit="Mbit/s",
-            grade="published",
-            source="IEEE 1394a" if speed != "S400" else "IEEE 1394a; paper, section IV-A",
-            meaning=f"data rate of {speed}",
+            "Mbit/s",
+            f"data rate of {speed}",
+            "IEEE 1394a" if speed != "S400" else "IEEE 1394a; paper, section IV-A",
             symbol="R",
         )
         for speed, multiple in {"S100": 1, "S200": 2, "S400": 4}.items()
@@ -41,31 +45,25 @@ DATA_RATE_MBIT_S: Final = MappingProxyType(
 
 # --- limits ----------------------------------------------------------------------------------------------
 
-MAX_NODES: Final = Sourced(
+MAX_NODES: Final = _published(
     62,
-    unit="nodes",
-    grade="published",
-    source="paper, section I: 63 nodes on one bus, the host is one of them",
-    meaning="largest number of distributed nodes on one bus",
+    "nodes",
+    "largest number of distributed nodes on one bus",
+    "paper, section I: 63 nodes on one bus, the host is one of them",
 )
-MAX_HOPS: Final = Sourced(
-    16,
-    unit="hops",
-    grade="published",
-    source="paper, section I; IEEE project page",
-    meaning="largest number of cable hops between two nodes",
+MAX_HOPS: Final = _published(
+    16, "hops", "largest number of cable hops between two nodes", "paper, section I; IEEE project page"
 )
 MAX_GAP_COUNT: Final = 63
 """The gap count is a six-bit field of the PHY; 63 is also its value after power-up."""
 
 MAX_PAYLOAD_BYTES: Final = MappingProxyType(
     {
-        speed: Sourced(
+        speed: _published(
             limit,
-            unit="bytes",
-            grade="published",
-            source="IEEE 1394a, as in the Sederta driver header",
-            meaning=f"largest payload of an asynchronous packet at {speed}",
+            "bytes",
+            f"largest payload of an asynchronous packet at {speed}",
+            "IEEE 1394a, as in the Sederta driver header",
         )
         for speed, limit in {"S100": 512, "S200": 1024, "S400": 2048}.items()
     }
@@ -74,11 +72,9 @@ MAX_PAYLOAD_BYTES: Final = MappingProxyType(
 
 # --- packets on the wire, CRCs included --------------------------------------------------------------------
 
-_PACKETS = "JHU mechatronics-firmware, FireWire.v; the header formats of IEEE 1394"
-
 
 def _packet(size: int, meaning: str) -> Sourced:
-    return Sourced(size, unit="bytes", grade="published", source=_PACKETS, meaning=meaning)
+    return _published(size, "bytes", meaning, "JHU mechatronics-firmware, FireWire.v; the header formats of IEEE 1394")
 
 
 QUADLET_BYTES: Final = 4
@@ -93,34 +89,19 @@ WRITE_RESPONSE_BYTES: Final = _packet(16, "write response")
 
 # --- constants of equations (4)-(6), (10) and (15) ---------------------------------------------------------
 
-REFERENCE_CABLE_M: Final = Sourced(
-    4.5,
-    unit="m",
-    grade="published",
-    source="paper, sections I and IV-A",
-    meaning="length of the standard cable that CABLE_DELAY_US holds for",
+_TICKS = "gap clock ticks"
+_GROWTH = "gap clock ticks per gap count"
+REFERENCE_CABLE_M: Final = _published(
+    4.5, "m", "length of the standard cable that CABLE_DELAY_US holds for", "paper, sections I and IV-A"
 )
-CABLE_DELAY_US: Final = Sourced(
-    0.023,
-    unit="us",
-    grade="published",
-    source="eqs (4)-(6); 4.5 m at 5.05 ns/m",
-    meaning="signal delay of one standard cable",
-)
-PHY_DELAY_TICKS: Final = Sourced(
+CABLE_DELAY_US: Final = _published(0.023, "us", "signal delay of one standard cable", "eqs (4)-(6); 4.5 m at 5.05 ns/m")
+PHY_DELAY_TICKS: Final = _published(
     14,
-    unit="gap clock ticks",
-    grade="published",
-    source="eqs (4)-(6); at the base rate 0.142 us: TI TSB12LV41, p. 3-43, has 144 ns in the worst case",
-    meaning="repeat delay of one PHY",
+    _TICKS,
+    "repeat delay of one PHY",
+    "eqs (4)-(6); at the base rate 0.142 us: TI TSB12LV41, p. 3-43, has 144 ns in the worst case",
 )
-ARBITRATION_GAP_TICKS: Final = Sourced(
-    4,
-    unit="gap clock ticks per gap count",
-    grade="published",
-    source="eq (4)",
-    meaning="arbitration delay for each unit of the gap count",
-)
+ARBITRATION_GAP_TICKS: Final = _published(4, _GROWTH, "arbitration delay for each unit of the gap count", "eq (4)")
 ARBITRATION_HOLD_US: Final = Sourced(
     1.63,
     unit="us",
@@ -135,73 +116,35 @@ DATA_END_US: Final = Sourced(
     source="published in eq (6); that it is DATA_END_TIME, 0.24-0.26 us, is the likeliest reading",
     meaning="constant part of the acknowledge phase",
 )
-SUBACTION_GAP_TICKS: Final = Sourced(
-    29,
-    unit="gap clock ticks",
-    grade="derived",
-    source="eq (10) taken apart: 82 + 48 g = (29 + 16 g) + (53 + 32 g); a threshold of idle bus, TI TSB12LV01B, p. 7-6",
-    meaning="constant part of the subaction gap",
-)
-SUBACTION_GAP_TICKS_PER_COUNT: Final = Sourced(
-    16,
-    unit="gap clock ticks per gap count",
-    grade="derived",
-    source="eq (10) taken apart",
-    meaning="growth of the subaction gap with the gap count",
-)
-RESET_GAP_TICKS: Final = Sourced(
-    53,
-    unit="gap clock ticks",
-    grade="derived",
-    source="eq (10) taken apart",
-    meaning="constant part of the arbitration reset gap",
-)
-RESET_GAP_TICKS_PER_COUNT: Final = Sourced(
-    32,
-    unit="gap clock ticks per gap count",
-    grade="derived",
-    source="eq (10) taken apart",
-    meaning="growth of the arbitration reset gap with the gap count",
-)
-GAPS_TICKS: Final = Sourced(
-    SUBACTION_GAP_TICKS + RESET_GAP_TICKS,
-    unit="gap clock ticks",
-    grade="published",
-    source="eq (10)",
-    meaning="constant part of both gaps together",
-)
-GAPS_TICKS_PER_COUNT: Final = Sourced(
-    SUBACTION_GAP_TICKS_PER_COUNT + RESET_GAP_TICKS_PER_COUNT,
-    unit="gap clock ticks per gap count",
-    grade="published",
-    source="eq (10)",
-    meaning="growth of both gaps together with the gap count",
-)
+
+
+def _gap_part(ticks: int, unit: str, meaning: str) -> Sourced:
+    apart = "eq (10) taken apart: 82 + 48 g = (29 + 16 g) + (53 + 32 g); a threshold of idle bus, TI TSB12LV01B, p. 7-6"
+    return Sourced(ticks, unit=unit, grade="derived", source=apart, meaning=meaning)
+
+
+SUBACTION_GAP_TICKS: Final = _gap_part(29, _TICKS, "constant part of the subaction gap")
+SUBACTION_GAP_TICKS_PER_COUNT: Final = _gap_part(16, _GROWTH, "growth of the subaction gap with the gap count")
+RESET_GAP_TICKS: Final = _gap_part(53, _TICKS, "constant part of the arbitration reset gap")
+RESET_GAP_TICKS_PER_COUNT: Final = _gap_part(32, _GROWTH, "growth of the arbitration reset gap with the gap count")
+GAPS_TICKS: Final = _published(82, _TICKS, "constant part of both gaps together", "eq (10)")
+GAPS_TICKS_PER_COUNT: Final = _published(48, _GROWTH, "growth of both gaps together with the gap count", "eq (10)")
 BITS_PER_BYTE: Final = 8
-EQ15_CONSTANT_US: Final = Sourced(
-    3.11,
-    unit="us",
-    grade="published",
-    source="eq (15)",
-    meaning="eqs (4)-(6) at one hop, gap count 63 and S400, each rounded to two decimals and added",
+EQ15_CONSTANT_US: Final = _published(
+    3.11, "us", "eqs (4)-(6) at one hop, gap count 63 and S400, each rounded to two decimals and added", "eq (15)"
 )
 
 # --- cycle starts ------------------------------------------------------------------------------------------
 
-CYCLE_US: Final = Sourced(
+CYCLE_US: Final = _published(
     125,
-    unit="us",
-    grade="published",
-    source="Linux, drivers/firewire/core.h: 8000 cycles a second",
-    meaning="time from one cycle start to the next",
+    "us",
+    "time from one cycle start to the next",
+    "Linux, drivers/firewire/core.h: 8000 cycles a second",
     symbol="T_iso",
 )
-CYCLE_START_BYTES: Final = Sourced(
-    20,
-    unit="bytes",
-    grade="published",
-    source="the header formats of IEEE 1394: 160 bits, sent at S100",
-    meaning="cycle start packet on the wire",
+CYCLE_START_BYTES: Final = _published(
+    20, "bytes", "cycle start packet on the wire", "the header formats of IEEE 1394: 160 bits, sent at S100"
 )
 LEAST_ASYNCHRONOUS_US: Final = Sourced(
     1,
@@ -220,64 +163,38 @@ SYNC_PACKET_BYTES: Final = Sourced(
 
 # --- the broadcast schedule --------------------------------------------------------------------------------
 
-_JHU_SOFTWARE = "JHU mechatronics-software, BasePort.cpp and FirewirePort.cpp"
-_JHU_FIRMWARE = "JHU mechatronics-firmware, FireWire.v up to Rev 7, HubReg.v from Rev 8"
+_SOFTWARE = "JHU mechatronics-software, BasePort.cpp and FirewirePort.cpp"
+_FIRMWARE = "JHU mechatronics-firmware, FireWire.v up to Rev 7"
 
-MAX_BROADCAST_NODES: Final = Sourced(
-    16,
-    unit="nodes",
-    grade="published",
-    source=f"{_JHU_SOFTWARE}: BoardIO::MAX_BOARDS",
-    meaning="largest number of nodes that the hub collects data from",
+MAX_BROADCAST_NODES: Final = _published(
+    16, "nodes", "largest number of nodes that the hub collects data from", f"{_SOFTWARE}: BoardIO::MAX_BOARDS"
 )
-BROADCAST_CLOCK_MHZ: Final = Sourced(
-    49.152,
-    unit="MHz",
-    grade="published",
-    source=f"{_JHU_SOFTWARE}: the system clock of the FPGA",
-    meaning="clock of the nodes",
+BROADCAST_CLOCK_MHZ: Final = _published(
+    49.152, "MHz", "clock of the nodes", f"{_SOFTWARE}: the system clock of the FPGA"
 )
-FIRST_BROADCAST_CLOCKS: Final = Sourced(
-    150,
-    unit="clocks",
-    grade="published",
-    source=_JHU_FIRMWARE,
-    meaning="how long the first node waits after the query",
+FIRST_BROADCAST_CLOCKS: Final = _published(
+    150, "clocks", "how long the first node waits after the query", f"{_FIRMWARE}, HubReg.v from Rev 8"
 )
-BROADCAST_SLOT_CLOCKS: Final = Sourced(
+BROADCAST_SLOT_CLOCKS: Final = _published(
     256,
-    unit="clocks",
-    grade="published",
-    source="JHU mechatronics-firmware, FireWire.v up to Rev 7: 256 clocks for each board before it",
-    meaning="from a node's time to broadcast to the next node's time, with timed requests",
+    "clocks",
+    "from a node's time to broadcast to the next node's time, with timed requests",
+    f"{_FIRMWARE}: 256 clocks for each board before it",
 )
-HUB_WAIT_US: Final = Sourced(
-    10,
-    unit="us",
-    grade="published",
-    source=f"{_JHU_SOFTWARE}: 10 + 5 N",
-    meaning="wait of the host after the query, whatever the number of nodes",
+HUB_WAIT_US: Final = _published(
+    10, "us", "wait of the host after the query, whatever the number of nodes", f"{_SOFTWARE}: 10 + 5 N"
 )
-HUB_WAIT_PER_NODE_US: Final = Sourced(
-    5,
-    unit="us",
-    grade="published",
-    source=f"{_JHU_SOFTWARE}: 10 + 5 N",
-    meaning="further wait of the host after the query for each node",
+HUB_WAIT_PER_NODE_US: Final = _published(
+    5, "us", "further wait of the host after the query for each node", f"{_SOFTWARE}: 10 + 5 N"
 )
-BROADCAST_NODE_BYTES: Final = Sourced(
+BROADCAST_NODE_BYTES: Final = _published(
     4,
-    unit="bytes",
-    grade="published",
-    source=f"{_JHU_SOFTWARE}: a quadlet of sequence before the data, a header quadlet before the command (Rev 8)",
-    meaning="what each node adds to a broadcast, to the hub's block and to the write, beside its payload",
+    "bytes",
+    "what each node adds to a broadcast, to the hub's block and to the write, beside its payload",
+    f"{_SOFTWARE}: a quadlet of sequence before the data, a header quadlet before the command (Rev 8)",
 )
-HUB_TIMING_BYTES: Final = Sourced(
-    4,
-    unit="bytes",
-    grade="published",
-    source=f"{_JHU_SOFTWARE}: the last quadlet of the hub's block",
-    meaning="timing at the end of the hub's block",
+HUB_TIMING_BYTES: Final = _published(
+    4, "bytes", "timing at the end of the hub's block", f"{_SOFTWARE}: the last quadlet of the hub's block"
 )
 
 # --- how well the model is known --------------------------------------------------------------------------
@@ -306,19 +223,11 @@ PING_PER_NODE_US: Final = Sourced(
     source="paper, section IV-A",
     meaning="what each further node adds to a ping",
 )
-SLICE_RATIO: Final = Sourced(
-    0.5,
-    unit="1",
-    grade="published",
-    source="paper, section III-E, eq (11)",
-    meaning="share of the period that is for communication",
+SLICE_RATIO: Final = _published(
+    0.5, "1", "share of the period that is for communication", "paper, section III-E, eq (11)"
 )
-PACKET_OVERHEAD_BYTES: Final = Sourced(
-    20,
-    unit="bytes",
-    grade="published",
-    source="paper, section IV-A",
-    meaning="overhead of each packet in the paper's model",
+PACKET_OVERHEAD_BYTES: Final = _published(
+    20, "bytes", "overhead of each packet in the paper's model", "paper, section IV-A"
 )
 
 # --- gap count ---------------------------------------------------------------------------------------------
@@ -327,16 +236,12 @@ GAP_COUNT_BY_HOPS: Final = (
     5, 7, 8, 10, 13, 16, 18, 21, 24, 26, 29, 32, 35, 37, 40, 43, 46, 48, 51, 54, 57, 59, 62,
 )  # fmt: skip
 """Smallest safe gap count for 1, 2, ... hops; see `GAP_COUNT_TABLE_HOPS`."""
-GAP_COUNT_TABLE_HOPS: Final = Sourced(
+GAP_COUNT_TABLE_HOPS: Final = _published(
     len(GAP_COUNT_BY_HOPS),
-    unit="hops",
-    grade="published",
-    source="P1394a table C-2, 1394a table E-1, as Apple, JHU and, to 15 hops, Linux carry it",
-    meaning="most hops in the table of smallest safe gap counts, for cables of 4.5 m",
+    "hops",
+    "most hops in the table of smallest safe gap counts, for cables of 4.5 m",
+    "P1394a table C-2, 1394a table E-1, as Apple, JHU and, to 15 hops, Linux carry it",
 )
-
-
-_WORDS: Final = f"the table of smallest safe gap counts at H hops; {MAX_GAP_COUNT} beyond it"
 
 
 def safe_gap_count(hops: Number) -> Number:
@@ -368,7 +273,8 @@ def safe_gap_count(hops: Number) -> Number:
     """
     if isinstance(hops, int) and hops < 1:
         raise ValueError(f"hops must be 1 or more, got {hops}")
-    return from_table((*GAP_COUNT_BY_HOPS, MAX_GAP_COUNT), hops - 1, words=_WORDS, sources=(GAP_COUNT_TABLE_HOPS,))
+    words = f"the table of smallest safe gap counts at H hops; {MAX_GAP_COUNT} beyond it"
+    return from_table((*GAP_COUNT_BY_HOPS, MAX_GAP_COUNT), hops - 1, words=words, sources=(GAP_COUNT_TABLE_HOPS,))
 
 
 def padded_bytes(payload_bytes: Number) -> Number:

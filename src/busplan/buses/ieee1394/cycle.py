@@ -1,16 +1,15 @@
-"""The individual schedule, a read and a write of each node, and the figures that go with it."""
+"""The individual schedule, a read and a write of each node, and what both schedules have in common."""
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, partial, reduce
-from itertools import repeat
+from itertools import product, repeat
 from math import ceil
 from typing import Final
 
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Run, summed
 from busplan.buses.figure import AVAILABLE, NONPERIODIC, Ink, by_key
-from busplan.buses.ieee1394 import equations
-from busplan.buses.ieee1394 import transactions as doubts
+from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
     CYCLE_START_BYTES,
     CYCLE_US,
@@ -20,17 +19,16 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.figures import LATENCY, SYNC, TERMS
-from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Link, TimingModelName, delays
+from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import (
-    LATENCY_SYMBOLS,
     Exchange,
-    Ways,
+    GroupHops,
     charges_own_hops,
     events,
     exchange,
+    group_hops,
     is_broadcast,
     link_of,
-    ways,
 )
 from busplan.buses.limits import EventKind
 from busplan.buses.network import Group, Network
@@ -92,43 +90,24 @@ class CycleWithStarts(BusCycle):
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The cycle in the order of its protocol, without retries and the window, which follow it."""
 
-    @property
     @abstractmethod
-    def longest_request_us(self) -> Number:
-        """Data phase of the longest packet that the host sends to a node [us]."""
+    def longest(self, kind: TransactionKind) -> Phases:
+        """The longest of each phase, over all reads or all writes [us]."""
 
     @cached_property
     def delays(self) -> Delays:
-        """Delays of any packet, over the hops of the farthest node."""
-        return self.delays_of(self.link, None)
-
-    def delays_of(self, link: Link, shared: Delays | None) -> Delays:
-        """Arbitration, acknowledge and gaps over some way, with their names for a derivation.
-
-        Parameters
-        ----------
-        link
-            The way.
-        shared
-            The delays over other hops of the bus, where they have been computed.
-        """
-        named_delays = delays(link, model=TIMING_MODELS[self.model], alone=self.network.nodes == 1, shared=shared)
-        for key, number in (
-            ("arbitration_us", named_delays.arbitration_us),
-            ("acknowledge_us", named_delays.acknowledge_us),
-            ("subaction_gap_us", named_delays.gaps.subaction_us),
-            ("arbitration_reset_gap_us", named_delays.gaps.arbitration_reset_us),
-            ("gaps_us", named_delays.gaps.both_us),
-        ):
-            named(number, key, LATENCY_SYMBOLS[key])
-        return named_delays
+        """Arbitration, acknowledge and gaps over the way to the farthest node [us]."""
+        return delays(self.link, model=self.model, alone=self.network.nodes == 1)
 
     @cached_property
     def cycle_start_us(self) -> Number:
         """Cost of a cycle start: it destroys idle time already run, and goes at S100 [us]."""
-        delays, link = self.delays, self.link
+        delays = self.delays
         data_us = equations.data_phase_us(
-            link.hops, hop_us=delays.hop_us, packet_bytes=CYCLE_START_BYTES, data_rate_mbit_s=DATA_RATE_MBIT_S["S100"]
+            self.link.hops,
+            hop_us=delays.hop_us,
+            packet_bytes=CYCLE_START_BYTES,
+            data_rate_mbit_s=DATA_RATE_MBIT_S["S100"],
         )
         isochronous_us: Number = self.network.profile.bus.isochronous_us
         return delays.gaps.arbitration_reset_us + delays.arbitration_us + data_us + isochronous_us
@@ -169,7 +148,8 @@ class CycleWithStarts(BusCycle):
         yield from self.schedule()
         retries: Number = self.network.profile.cycle.retries
         if self.model != "paper" and not is_off(retries):
-            delays, longest_us = self.delays, self.longest_request_us
+            delays = self.delays
+            longest_us = larger(self.longest("read").request_data_us, self.longest("write").request_data_us)
             retry_us = delays.arbitration_us + longest_us + delays.acknowledge_us + delays.gaps.arbitration_reset_us
             yield Run((BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request"),), retries)
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
@@ -206,15 +186,29 @@ class CycleWithStarts(BusCycle):
         needed_us = min(plain(self.required_us), period_us)
         return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
 
-    def setup(self) -> dict[str, Number]:
-        """Settings of the bus, by key of their figures."""
-        safe = safe_gap_count(self.link.hops)
+    def figures(self) -> Mapping[str, Number | None]:
+        """Settings of the bus, the latencies and gaps, and the number of nodes by equation (11)."""
+        read, write, safe = self.longest("read"), self.longest("write"), safe_gap_count(self.link.hops)
         return {
             "hops": self.link.hops,
             "gap_count": self.link.gap_count,
             "safe_gap_count": safe,
             "gap_count_safe": self.link.gap_count >= named(safe, "safe_gap_count", "g_safe"),
+            "read_latency_us": read.latency_us,
+            "write_latency_us": write.latency_us,
+            "read_latency_with_gaps_us": read.latency_with_gaps_us,
+            "write_latency_with_gaps_us": write.latency_with_gaps_us,
+            "read_transaction_us": read.transaction_us,
+            "write_transaction_us": write.transaction_us,
+            "gaps_us": self.delays.gaps.both_us,
+            "subaction_gap_us": self.delays.gaps.subaction_us,
+            "arbitration_reset_gap_us": self.delays.gaps.arbitration_reset_us,
+            "nodes_eq11": self.published_nodes(),
         }
+
+    def published_nodes(self) -> Number | None:
+        """Number of nodes by equation (11) [1]; None where the paper has none for this schedule or these nodes."""
+        return None
 
     @property
     def is_known(self) -> bool:
@@ -245,13 +239,6 @@ class CycleWithStarts(BusCycle):
         return plain(due) * plain(self.cycle_start_us)
 
 
-_SHOWN: Final = (
-    *("latency_us", "latency_with_gaps_us", "transaction_us"),
-    *("gaps_us", "subaction_gap_us", "arbitration_reset_gap_us"),
-)
-"""Phases of a transaction that are figures of a cycle."""
-
-
 class Ieee1394Cycle(CycleWithStarts):
     """The synchronous packet, a read and then a write of every node, and the window for non-periodic data.
 
@@ -266,29 +253,51 @@ class Ieee1394Cycle(CycleWithStarts):
 
     @cached_property
     def exchanges(self) -> tuple[Exchange, ...]:
-        """Every transaction of the cycle, group by group."""
-        return tuple(
-            self._exchange(place, kind, None, suffix=f",{kind}{group.name and f',{group.name}'}")
-            for kind in TRANSACTION_KINDS
-            for place, group in enumerate(self.network.groups)
-        )
+        """Every transaction of the cycle, with the nodes of each group on the mean."""
+        return self._exchanges([hops.mean for hops in self._hops])
 
     @cached_property
-    def _ways(self) -> tuple[Ways, ...]:
-        return ways(self.network)
+    def _farthest(self) -> tuple[Exchange, ...]:
+        """Every transaction with the farthest node of each group."""
+        is_mean = not charges_own_hops(self.network)
+        return self.exchanges if is_mean else self._exchanges([hops.last for hops in self._hops])
 
-    def _exchange(self, place: int, kind: TransactionKind, hops: Number | None, *, suffix: str = "") -> Exchange:
-        """The transaction of a group by its place, with a node at some hops or, without them, on the mean."""
-        network, has_way = self.network, charges_own_hops(self.network)
-        link = self.link._replace(hops=self._ways[place].mean if hops is None else hops) if has_way else self.link
-        common = self._own_delays(link) if has_way else self.delays
-        return exchange(network, network.groups[place], kind, model=self.model, link=link, common=common, suffix=suffix)
+    @cached_property
+    def _hops(self) -> tuple[GroupHops, ...]:
+        if charges_own_hops(self.network):
+            return group_hops(self.network)
+        return (GroupHops(*(self.link.hops,) * 3),) * len(self.network.groups)
 
-    def _own_delays(self, link: Link) -> Delays:
-        """Delays over a node's own hops; its arbitration goes to the root, which may be any node."""
-        node_delays = self.delays_of(link, self.delays)
-        is_at_host = self.network.profile.bus.root == "host"
-        return node_delays if is_at_host else node_delays._replace(arbitration_us=self.delays.arbitration_us)
+    def _exchanges(self, hops: Sequence[Number]) -> tuple[Exchange, ...]:
+        """Every transaction with nodes at some hops, by group; a derivation tells their phases apart."""
+        places = range(len(self.network.groups))
+        exchanges = tuple(self._exchange(place, kind, hops[place]) for kind in TRANSACTION_KINDS for place in places)
+        for sent in exchanges:
+            suffix = f",{sent.kind}{sent.group.name and f',{sent.group.name}'}"
+            for key, us in sent.phases._asdict().items():
+                named(us, key, _PHASES[key].symbol + suffix)
+        return exchanges
+
+    def _exchange(self, place: int, kind: TransactionKind, hops: Number) -> Exchange:
+        """The transaction of a group by its place, with a node at some hops."""
+        delays = self.delays_to(hops)
+        return exchange(self.network, self.network.groups[place], kind, model=self.model, delays=delays)
+
+    def delays_to(self, hops: Number) -> Delays:
+        """Delays to a node at some hops; its arbitration goes to the root, which may be any node [us]."""
+        farthest = self.delays
+        if not charges_own_hops(self.network):
+            return farthest
+        delays = farthest.over(hops)
+        if self.network.profile.bus.root == "host":
+            return delays
+        return delays._replace(arbitration_us=farthest.arbitration_us, arbitration_hops=farthest.arbitration_hops)
+
+    def delays_to_farthest(self, name: str) -> Delays:
+        """Delays to the farthest node of a group of the profile, by its name [us]."""
+        groups = enumerate(self.network.groups)
+        place = next(place for place, group in groups if name in [member.name for member in group.members])
+        return self.delays_to(self._hops[place].last)
 
     @cached_property
     def sync_us(self) -> Number:
@@ -301,16 +310,8 @@ class Ieee1394Cycle(CycleWithStarts):
             sync = self.network.profile.cycle.sync
             ping_us: Number = sync.ping_us + sync.ping_per_node_us * (self.network.nodes - 1)
             return ping_us
-        delays, link = self.delays, self.link
-        data_us = equations.data_phase_us(
-            link.hops, hop_us=delays.hop_us, packet_bytes=SYNC_PACKET_BYTES, data_rate_mbit_s=link.data_rate_mbit_s
-        )
-        return delays.arbitration_us + data_us + delays.gaps.arbitration_reset_us
-
-    @property
-    def longest_request_us(self) -> Number:
-        """Data phase of the longest request, to the farthest node of its group [us]."""
-        return reduce(larger, (transaction.phases.request_data_us for transaction in self._farthest))
+        delays = self.delays
+        return delays.arbitration_us + delays.data_us(SYNC_PACKET_BYTES) + delays.gaps.arbitration_reset_us
 
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The synchronous packet, and each transaction of every node."""
@@ -322,7 +323,7 @@ class Ieee1394Cycle(CycleWithStarts):
     def _laid_out(self, transaction: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
         """The transaction with a node of a group, by the node's number in it from 0."""
         if charges_own_hops(self.network):
-            transaction = self._exchange(place, transaction.kind, self._ways[place].of_node(number))
+            transaction = self._exchange(place, transaction.kind, self._hops[place].of_node(number))
         return events(transaction, model=self.model)
 
     def bias_us(self) -> Number | None:
@@ -337,70 +338,35 @@ class Ieee1394Cycle(CycleWithStarts):
             return ()
         # Hops of the synchronous packet, of retries and of cycle starts; `of_cycle` adds those of transactions.
         hop_delays = 2 + 3 * self.network.profile.cycle.retries + 2 * self.number_of_starts
-        return doubts.of_cycle(
-            self.exchanges, self.network, link=self.link, gaps=self.delays.gaps, hop_delays=hop_delays
-        )
+        return doubts.of_cycle(self.exchanges, self.network, delays=self.delays, hop_delays=hop_delays)
 
-    def figures(self) -> Mapping[str, Number | None]:
-        """Settings of the bus, the latencies and gaps, and the number of nodes by equation (11)."""
-        network, read, write = self.network, self._longest("read"), self._longest("write")
+    def longest(self, kind: TransactionKind) -> Phases:
+        """The longest of each phase, over the reads or writes with the farthest node of each group [us]."""
+        columns = zip(*(sent.phases for sent in self._farthest if sent.kind == kind), strict=True)
+        return Phases(*(reduce(larger, column) for column in columns))
+
+    def published_nodes(self) -> Number | None:
+        """Number of nodes by equation (11), where all nodes are alike [1]."""
+        network, read, write = self.network, self.longest("read"), self.longest("write")
+        if not network.is_uniform:
+            return None
         given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
-        return {
-            **self.setup(),
-            "read_latency_us": read["latency_us"],
-            "write_latency_us": write["latency_us"],
-            "read_latency_with_gaps_us": read["latency_with_gaps_us"],
-            "write_latency_with_gaps_us": write["latency_with_gaps_us"],
-            "read_transaction_us": read["transaction_us"],
-            "write_transaction_us": write["transaction_us"],
-            "gaps_us": read["gaps_us"],
-            "subaction_gap_us": read["subaction_gap_us"],
-            "arbitration_reset_gap_us": read["arbitration_reset_gap_us"],
-            "nodes_eq11": equations.published_nodes(
-                named(given_us, AVAILABLE.key, AVAILABLE.symbol),
-                sync_us=self.sync_us,
-                latency_us=(read["latency_us"] + write["latency_us"]) / 2,
-                gaps_us=read["gaps_us"],
-            )
-            if network.is_uniform
-            else None,
-        }
-
-    def _longest(self, kind: TransactionKind) -> dict[str, Number]:
-        """The longest of each phase, over the reads or writes with the farthest node of each group."""
-        all_phases = [transaction.phases for transaction in self._farthest if transaction.kind == kind]
-        return {key: reduce(larger, (getattr(phases, key) for phases in all_phases)) for key in _SHOWN}
-
-    @cached_property
-    def _farthest(self) -> tuple[Exchange, ...]:
-        """Transactions with the farthest node of each group."""
-        if not charges_own_hops(self.network):
-            return self.exchanges
-        return tuple(
-            self._exchange(place, kind, self._ways[place].last, suffix=f",{kind}{group.name and f',{group.name}'}")
-            for kind in TRANSACTION_KINDS
-            for place, group in enumerate(self.network.groups)
+        return equations.published_nodes(
+            named(given_us, AVAILABLE.key, AVAILABLE.symbol),
+            sync_us=self.sync_us,
+            latency_us=(read.latency_us + write.latency_us) / 2,
+            gaps_us=self.delays.gaps.both_us,
         )
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """A read and a write of the farthest node of each group."""
-        places = range(len(self.network.groups))
-        farthest = (
-            self._exchange(place, kind, self._ways[place].last) for place in places for kind in TRANSACTION_KINDS
-        )
-        return tuple(
-            BusLatency(
-                transaction.kind,
-                transaction.payload_bytes,
-                {
-                    "hops": transaction.link.hops,
-                    "gap_count": transaction.link.gap_count,
-                    **transaction.phases._asdict(),
-                },
-                transaction.group.name,
-            )
-            for transaction in farthest
-        )
+        latencies = []
+        for place, kind in product(range(len(self.network.groups)), TRANSACTION_KINDS):
+            sent = self._exchange(place, kind, self._hops[place].last)
+            link = sent.delays.link
+            phases = {"hops": link.hops, "gap_count": link.gap_count, **sent.phases._asdict()}
+            latencies.append(BusLatency(kind, sent.payload_bytes, phases, sent.group.name))
+        return tuple(latencies)
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """Parts of the cycle that the profile does not give."""

@@ -16,8 +16,7 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.timing import TIMING_MODELS
-from busplan.buses.ieee1394.transactions import residual
+from busplan.buses.ieee1394.doubts import residual
 from busplan.buses.published import published
 from busplan.elementwise import plain
 
@@ -69,7 +68,7 @@ FUNCTIONS: Final[Mapping[str, Callable[..., Any]]] = {
     "host_for_gain_us": host_for_gain_us,
     "board_us": lambda cycle: cycle.arbitration_us + cycle.broadcast_us(cycle.network.groups[0]),
     "hub_block_bytes": lambda cycle: hub_block_bytes(cycle.network),
-    "phy_delay_us": lambda cycle: equations.phy_delay_us(TIMING_MODELS[cycle.model].gap_clock_mbit_s(_S400)),
+    "phy_delay_us": lambda cycle: equations.phy_delay_us(cycle.delays.clock_mbit_s),
     "cable_delay_us": lambda _, length_m: equations.hop_delay_us(length_m, phy_delay_us=0.0),
     "gap_counts_met": gap_counts_met,
 }

@@ -19,9 +19,9 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import EVENTS, STRETCHES, CycleWithStarts, Ieee1394Cycle
 from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE
-from busplan.buses.ieee1394.rules import LIMITS, RULES
-from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
-from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
+from busplan.buses.ieee1394.rules import LIMITS, RULES, unsafe_words
+from busplan.buses.ieee1394.timing import Responder, transaction
+from busplan.buses.ieee1394.transactions import charges_own_hops, gap_count_of, hops_of, is_broadcast
 from busplan.buses.limits import (
     Cost,
     Key,
@@ -57,20 +57,21 @@ def packets_of(network: Network, group: str, model: str, kind: str, payload_byte
             'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
             'calibrate with cycle.schedule = "individual"'
         )
-    nodes = next(nodes for nodes in network.alike if nodes.name == group)
+    nodes = next(nodes for nodes in network.profile.node_groups if nodes.name == group)
     answer, key = getattr(nodes.node, f"{kind}_response"), nodes.node_key(f"{kind}_response")
     if answer != "split":
         raise BusplanError(
             f'{key} = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
             f'be found from its latency; leave its lines out, or calibrate with {key} = "split"'
         )
+    cycle = Ieee1394Cycle(network, model)  # type: ignore[arg-type]
     phases = transaction(
         kind,  # type: ignore[arg-type]
-        model=TIMING_MODELS[model],  # type: ignore[index]
-        link=farthest_link(network, group),
+        model=cycle.model,
+        delays=cycle.delays_to_farthest(group),
         payload_bytes=payload_bytes,
-        overhead_bytes=nodes.payload.overhead_bytes,
         responder=Responder(0.0),
+        overhead_bytes=nodes.payload.overhead_bytes,
     )
     return PacketTime(plain(phases.latency_us), plain(phases.subaction_gap_us))
 
@@ -178,7 +179,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             "cycle.retries": profile.cycle.retries,
             "host.transaction_us": profile.host.transaction_us,
         }
-        for nodes in network.alike:
+        for nodes in network.profile.node_groups:
             paper_has_not[nodes.node_key("read_response")] = nodes.node.read_response != "split"
             paper_has_not[nodes.node_key("write_response")] = nodes.node.write_response != "split"
             paper_has_not[nodes.node_key("execution.worst_extra_us")] = nodes.node.execution.worst_extra_us
@@ -227,7 +228,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         speed = network.profile.bus.speed
         return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), carrier=speed)
 
-    def way_charged(self, network: Network) -> str:
+    def path_words(self, network: Network) -> str:
         """Say whose hops each node is charged."""
         if is_broadcast(network):
             return "every packet at the hops of the farthest"
@@ -243,17 +244,9 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:
         """An unsafe gap count, and cables that the table does not hold for."""
-        bus, warnings = network.profile.bus, []
-        limit = "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
-        for sized in [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]:
-            if not self.is_safe(sized):
-                hops, given = hops_of(sized), gap_count_of(sized)
-                warnings.append(
-                    f"gap count {given} is unsafe for {plural(int(plain(hops)), 'hop')} "
-                    f"({plural(int(plain(sized.nodes)), 'node')}); "
-                    f"the smallest safe one is {safe_gap_count(hops)}{limit}"
-                )
-                break
+        bus = network.profile.bus
+        sizes = [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]
+        warnings = [unsafe_words(sized) for sized in sizes if not self.is_safe(sized)][:1]
         if not bus.cable_is_standard:
             warnings.append(
                 f"cables of {bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m that the "

@@ -3,10 +3,9 @@
 A gap count below the table fits, but is not safe.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
-from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
 from busplan.buses.ieee1394.broadcast import hub_block_bytes, write_block_bytes
@@ -25,10 +24,10 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
-from busplan.buses.limits import Bound, Limit
+from busplan.buses.limits import Limit
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, margin, told_apart
-from busplan.elementwise import Number
+from busplan.elementwise import Number, plain
 from busplan.english import plural
 from busplan.sections.base import TRANSACTION_KINDS
 
@@ -40,9 +39,24 @@ def _most_payload(network: Network) -> Number:
     return MAX_PAYLOAD_BYTES[network.profile.bus.speed]
 
 
+def _of_broadcast(value: Callable[[Network], Number]) -> Callable[[Network], Number]:
+    """A value that only the broadcast schedule has; 0 under the other."""
+    return lambda network: value(network) if is_broadcast(network) else 0
+
+
 def _cycle_start_us(network: Network) -> Number:
     is_sent = network.profile.bus.cycle_master
     return Ieee1394Cycle(network, "standard").cycle_start_us if is_sent else 0.0
+
+
+def unsafe_words(network: Network) -> str:
+    """Say which gap count is unsafe for which hops, and which is the smallest safe one; of plain numbers."""
+    hops, nodes = hops_of(network), plural(int(plain(network.nodes)), "node")
+    cables = "" if network.profile.bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
+    return (
+        f"gap count {gap_count_of(network)} is unsafe for {plural(int(plain(hops)), 'hop')} ({nodes}); "
+        f"the smallest safe one is {safe_gap_count(hops)}{cables}"
+    )
 
 
 _ONE_BY_ONE: Final = 'cycle.schedule = "individual" has no such limit'
@@ -51,55 +65,60 @@ LIMITS: Final = (
     Limit(
         "payload",
         "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        Bound(lambda network: network.largest_payload_bytes, _most_payload),
+        lambda network: network.largest_payload_bytes,
+        _most_payload,
         way_out="a faster bus or a smaller payload would do",
         has_rule=True,
     ),
     Limit(
         "nodes",
         "{value:.0f} nodes are over the {most:.0f} of one bus",
-        Bound(lambda network: network.nodes, lambda _network: MAX_NODES),
+        lambda network: network.nodes,
+        lambda _network: MAX_NODES,
         way_out=f"a second bus has {MAX_NODES:g} more",
         has_rule=True,
     ),
     Limit(
         "hops",
         "{value:.0f} hops are over the {most:.0f} of one bus",
-        Bound(hops_of, lambda _network: MAX_HOPS),
+        hops_of,
+        lambda _network: MAX_HOPS,
         way_out=f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes",
         has_rule=True,
     ),
     Limit(
         "broadcasting nodes",
         "{value:.0f} nodes are over the {most:.0f} that a hub collects data of",
-        Bound(
-            lambda network: network.nodes if is_broadcast(network) else 0,
-            lambda network: MAX_BROADCAST_NODES if is_broadcast(network) else inf,
-        ),
+        _of_broadcast(lambda network: network.nodes),
+        lambda _network: MAX_BROADCAST_NODES,
         way_out=_ONE_BY_ONE,
     ),
     Limit(
         "hub block",
         "the hub's block of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        Bound(lambda network: hub_block_bytes(network) if is_broadcast(network) else 0, _most_payload),
+        _of_broadcast(hub_block_bytes),
+        _most_payload,
         way_out=f"less read from each node, or {_ONE_BY_ONE}",
     ),
     Limit(
         "write block",
         "the write of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        Bound(lambda network: write_block_bytes(network) if is_broadcast(network) else 0, _most_payload),
+        _of_broadcast(write_block_bytes),
+        _most_payload,
         way_out=f"less written to each node, or {_ONE_BY_ONE}",
     ),
     Limit(
         "cycle starts",
         "a cycle start takes {value:.3f} us, over {most:.3f} us: no time is left for the nodes until the next one",
-        Bound(_cycle_start_us, lambda _network: CYCLE_US - LEAST_ASYNCHRONOUS_US),
+        _cycle_start_us,
+        lambda _network: CYCLE_US - LEAST_ASYNCHRONOUS_US,
         way_out="less bus.isochronous_us, or no cycle master, leaves time",
     ),
     Limit(
         "gap table",
-        "gap count {most:.0f} is unsafe for the hops; the smallest safe one is {value:.0f}",
-        Bound(lambda network: safe_gap_count(hops_of(network)), gap_count_of),
+        unsafe_words,
+        lambda network: safe_gap_count(hops_of(network)),
+        gap_count_of,
         way_out=f"for cables of more than {REFERENCE_CABLE_M:g} m none is known to be safe",
         role="safety",
     ),
@@ -137,25 +156,17 @@ def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
 def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More nodes than one bus has addresses for."""
     if "nodes" in subject.deciding.exceeded:
-        groups = subject.profile.alike_nodes
-        nodes = sum(group.nodes for group in groups)
-        yield RuleProblem(
-            groups[-1].nodes_key,
-            f"{nodes} nodes are over the {MAX_NODES:g} of one bus",
-            "put the others on a second bus",
-        )
+        key = subject.profile.node_groups[-1].nodes_key
+        yield RuleProblem(key, subject.limit_words("nodes"), "put the others on a second bus")
 
 
 def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More cable hops than the standard allows."""
     if "hops" in subject.deciding.exceeded:
-        chain = _bus(subject).max_hops is None
-        way_out = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if chain else "rewire the tree"
-        yield RuleProblem(
-            subject.profile.alike_nodes[-1].nodes_key if chain else "bus.max_hops",
-            f"{subject.deciding.own['hops']} hops are over the {MAX_HOPS:g} of one bus",
-            way_out,
-        )
+        is_chain = _bus(subject).max_hops is None
+        key = subject.profile.node_groups[-1].nodes_key if is_chain else "bus.max_hops"
+        way_out = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if is_chain else "rewire the tree"
+        yield RuleProblem(key, subject.limit_words("hops"), way_out)
 
 
 def payload_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -182,22 +193,14 @@ def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
-    for nodes, kind in product(subject.profile.alike_nodes, TRANSACTION_KINDS):
+    for nodes, kind in product(subject.profile.node_groups, TRANSACTION_KINDS):
         yield nodes.payload_key(kind), int(nodes.bytes_of(kind))
 
 
 def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A gap count below the table."""
-    figures = subject.deciding
-    if not figures.own["gap_count_safe"]:
-        is_standard = _bus(subject).cable_is_standard
-        yield RuleProblem(
-            "bus.gap_count",
-            f"gap count {figures.own['gap_count']} is unsafe for {figures.own['hops']} hops; "
-            f"the smallest safe one is {figures.own['safe_gap_count']}"
-            f"{'' if is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}",
-            *subject.cure(),
-        )
+    if not subject.deciding.own["gap_count_safe"]:
+        yield RuleProblem("bus.gap_count", subject.limit_words("gap table"), *subject.cure())
 
 
 def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:

@@ -15,7 +15,7 @@ from busplan.buses.ieee1394.constants import (
     SLICE_RATIO,
     Speed,
 )
-from busplan.buses.ieee1394.timing import BroadcastRequest, TimingModelName
+from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.elementwise import Number, choose
 from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
 from busplan.sections.cycle import (
@@ -168,7 +168,7 @@ class Ieee1394CycleSection(CycleSection):
         "after which each node broadcasts its data, one read of the hub that collected them, and one write",
         examples=["broadcast"],
     )
-    broadcast_request: BroadcastRequest = Field(
+    broadcast_request: Literal["isochronous", "priority", "timed"] = Field(
         default="priority",
         description="How the nodes ask for the bus to broadcast: priority, each after a subaction gap (JHU firmware "
         "Rev 9); isochronous, without one (Rev 8); timed, each at a time of its own (up to Rev 7). Used only "

@@ -5,12 +5,10 @@ from typing import ClassVar, Final
 
 from busplan.buses.limits import (
     NODE_LIMIT,
-    Bound,
     Key,
     Limit,
     PayloadRange,
     Perturbation,
-    Starter,
     TimingModel,
     period_limit,
     period_rule,
@@ -31,7 +29,7 @@ from busplan.buses.sercos.sercos2 import (
     WORST,
     Sercos2Cycle,
 )
-from busplan.buses.sercos.shared import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
+from busplan.buses.sercos.shared import KEYS, WORD_BYTES, SercosBus, starter
 from busplan.elementwise import plain
 
 _FASTEST: Final = 16
@@ -42,13 +40,15 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} drives are over the {most:.0f} of a ring",
-        Bound(lambda network: network.nodes, lambda _network: MOST_DRIVES),
+        lambda network: network.nodes,
+        lambda _network: MOST_DRIVES,
         way_out=f"a second ring has {MOST_DRIVES:g} more",
     ),
     Limit(
         "payload",
         "the MDT has {value:.0f} bytes of data, over {most:.0f}",
-        Bound(lambda network: Sercos2Cycle(network, NONE).mdt_bytes, lambda _network: MOST_MDT_BYTES),
+        lambda network: Sercos2Cycle(network, NONE).mdt_bytes,
+        lambda _network: MOST_MDT_BYTES,
         way_out="a smaller payload or a second ring would do",
     ),
 )
@@ -69,15 +69,12 @@ class Sercos2(SercosBus):
     limits = LIMITS
     rules = (period_rule("BP151", PERIODS, kind="sercos2", source=PERIODS_SOURCE),)
     periods = PERIODS
-    starter = Starter(
+    starter = starter(
         """\
 [bus]
 kind = "sercos2"
 data_rate_mbit_s = 16      # assumed: 2 or 4, and with SERCOS II 8 or 16
-at_gap_us = 5              # assumed: no public figure says it; the master's time slots do""",
-        slice_ratio=WHOLE_PERIOD,
-        measure=MEASURE,
-        base=BASE,
+at_gap_us = 5              # assumed: no public figure says it; the master's time slots do"""
     )
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
@@ -89,8 +86,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         "bus.at_start_us": Key("t_1"),
         "bus.turnaround_us": Key("t_ATMT", TURNAROUND_US),
         "bus.recovery_us": Key("t_MTSY"),
-        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
-        "node.execution.worst_extra_us": Key("T_extra"),
+        **KEYS,
     }
     evidence_data = ("sercos2",)
 
@@ -111,10 +107,6 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         """Payloads of whole words, as many as a drive can be told to send for each of its axes."""
         axes = min((int(plain(group.axes)) for group in network.groups), default=1)
         return PayloadRange(int(WORD_BYTES), int(MOST_DRIVE_BYTES) * max(axes, 1), carrier="a drive's telegram")
-
-    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
-        """Say what each drive is charged."""
-        return "every drive its telegram and its record"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The data rate and the gap."""

@@ -6,10 +6,10 @@ from typing import Final, Literal, NamedTuple
 
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
 from busplan.buses.limits import Periods
-from busplan.buses.network import Group, Network
+from busplan.buses.network import Network
 from busplan.buses.sercos import shared as sercos
 from busplan.buses.sercos.shared import DELAYS, word_bytes
-from busplan.elementwise import Number, alike, choose, larger, named, rounded_down, rounded_up, smaller
+from busplan.elementwise import Number, choose, larger, named, rounded_down, rounded_up, smaller, traced_with
 from busplan.sections.base import TransactionKind
 from busplan.sourced import Sourced, constants
 
@@ -311,7 +311,8 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
         "write" for MDT, "read" for AT.
     """
     is_in_all = network.profile.bus.hot_plug_field == "all"
-    first_bytes = alike(HOT_PLUG_BYTES, network.nodes)
+    sizes = (group.write_bytes if kind == "write" else group.read_bytes for group in network.groups)
+    first_bytes = traced_with(HOT_PLUG_BYTES, network.nodes)
     if kind == "write":
         first_bytes = first_bytes + EXTENDED_BYTES + (ALIGNED_BYTES if is_in_all else 0)
     return Telegrams(
@@ -320,23 +321,13 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
         (
             Items(network.nodes, CHANNEL_BYTES),
             Items(network.nodes, DEVICE_BYTES),
-            *(Items(group.nodes, data_bytes(network, size)) for group, size in sizes(network, kind)),
+            *(Items(group.nodes, data_bytes(network, size)) for group, size in zip(network.groups, sizes, strict=True)),
         ),
         SORTS[kind].upper(),
     )
 
 
-def sizes(network: Network, kind: TransactionKind) -> list[tuple[Group, Number]]:
-    """Each group of nodes with its payload [bytes]."""
-    return [(group, group.write_bytes if kind == "write" else group.read_bytes) for group in network.groups]
-
-
 def data_bytes(network: Network, payload_bytes: Number) -> Number:
-    """Cyclic data of a device in whole words, with the control of its connection [bytes]."""
+    """Cyclic data of a device in whole words, from V1.1 on with the control of its connection [bytes]."""
     words: Number = word_bytes(payload_bytes)
-    return words + CONNECTION_BYTES if has_connections(network) else words
-
-
-def has_connections(network: Network) -> bool:
-    """Tell whether the cyclic data of a device are a connection with a control of its own: from V1.1 on."""
-    return bool(network.profile.bus.version != "V1.0")
+    return words if network.profile.bus.version == "V1.0" else words + CONNECTION_BYTES

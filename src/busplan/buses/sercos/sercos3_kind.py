@@ -6,14 +6,12 @@ from typing import ClassVar, Final
 
 from busplan.buses.limits import (
     NODE_LIMIT,
-    Bound,
     Cost,
     Key,
     Limit,
     PayloadRange,
     Perturbation,
     Setting,
-    Starter,
     TimingModel,
     period_limit,
     period_rule,
@@ -39,7 +37,7 @@ from busplan.buses.sercos.sercos3 import (
     telegrams_of,
 )
 from busplan.buses.sercos.sercos3_cycle import EVENTS, STRETCHES, TELEGRAMS, WINDOW, Sercos3Cycle
-from busplan.buses.sercos.shared import BASE, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
+from busplan.buses.sercos.shared import KEYS, WORD_BYTES, SercosBus, starter
 from busplan.elementwise import Number, larger, plain
 
 _METHOD: Final = "bus.timing_method"
@@ -60,19 +58,22 @@ LIMITS: Final = (
     Limit(
         "nodes",
         "{value:.0f} devices are over the {most:.0f} of a network",
-        Bound(lambda network: network.nodes, lambda _network: MOST_DEVICES),
+        lambda network: network.nodes,
+        lambda _network: MOST_DEVICES,
         way_out=f"a second network has {MOST_DEVICES:g} more",
     ),
     Limit(
         "payload",
         "a device's data make a telegram of {value:.0f} bytes, over {most:.0f}",
-        Bound(_largest_telegram, lambda _network: MOST_BYTES),
+        _largest_telegram,
+        lambda _network: MOST_BYTES,
         way_out="a smaller payload would do",
     ),
     Limit(
         "telegrams",
         "{value:.0f} telegrams in one direction are over the {most:.0f} of a cycle",
-        Bound(_most_telegrams, lambda _network: MOST_TELEGRAMS),
+        _most_telegrams,
+        lambda _network: MOST_TELEGRAMS,
         way_out="a smaller payload or a second network would do",
     ),
 )
@@ -93,15 +94,12 @@ class Sercos3(SercosBus):
     limits = LIMITS
     rules = (period_rule("BP141", PERIODS, kind="sercos3", source=PERIODS_SOURCE),)
     periods = PERIODS
-    starter = Starter(
+    starter = starter(
         """\
 [bus]
 kind = "sercos3"
 version = "V1.1"           # assumed: from V1.1 on each device's data carry 2 bytes of connection control
-gap_bytes = 37             # what every device takes; S-0-1036 of the network says what it runs at""",
-        slice_ratio=WHOLE_PERIOD,
-        measure=MEASURE,
-        base=BASE,
+gap_bytes = 37             # what every device takes; S-0-1036 of the network says what it runs at"""
     )
     event_kinds = EVENTS
     stretch_kinds = STRETCHES
@@ -114,9 +112,8 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         "bus.master_delay_us": Key("t_master", MASTER_DELAY_US),
         "bus.component_delay_us": Key("t_comp", COMPONENT_DELAY_US),
         "bus.at_start_us": Key("t_1,min"),
-        "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
         _METHOD: Key(meaning="a setting of the master", short="method {}"),
-        "node.execution.worst_extra_us": Key("T_extra"),
+        **KEYS,
     }
     evidence_data = ("sercos3",)
 
@@ -145,10 +142,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         """Payloads of whole words: four telegrams carry those of all devices, one telegram that of a device."""
         share = int(MOST_TELEGRAMS * MOST_BYTES) // int(plain(network.nodes))
         return PayloadRange(int(WORD_BYTES), min(share, int(MOST_BYTES - CONNECTION_BYTES)), carrier="four telegrams")
-
-    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
-        """Say what each device is charged."""
-        return "every device its connection control and its data"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """Version, timing method and gap."""

@@ -1,4 +1,4 @@
-"""The keys that only profiles of SERCOS III have, in [bus] and [[group]]."""
+"""The keys that only profiles of SERCOS III have, in [bus]."""
 
 from typing import Annotated, Final, Literal
 
@@ -18,7 +18,7 @@ from busplan.buses.sercos.sercos3 import (
 from busplan.buses.sercos.sercos3_cycle import WINDOW, TimingModelName
 from busplan.buses.sercos.shared import MOST_PIPELINE, PIPELINE_CYCLES
 from busplan.sections.base import Count, TimeUs
-from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
+from busplan.sections.cycle import BusSection
 from busplan.sections.profile import Profile
 
 
@@ -91,21 +91,10 @@ class Sercos3Bus(BusSection):
     )
 
 
-class Sercos3Group(GroupSection):
-    """One of the sections [[group]]: devices that are alike, in the order of their addresses."""
-
-    axes: GroupAxes = Field(examples=[4])
-
-
 class Sercos3Profile(Profile):
     """A whole profile: one motion network and its cycle."""
 
     bus: Sercos3Bus = Field(description="The bus")
-    payload: PayloadSection | None = Field(default=None, description="What travels in a cycle, where devices are alike")
-    node: NodeSection | None = Field(default=None, description="One device, where devices are alike")
-    group: Annotated[tuple[Sercos3Group, ...], Field(strict=False)] = Field(
-        default=(), description="Groups of unlike devices, instead of bus.nodes, [node] and [payload]"
-    )
 
 
 PROFILE: Final = Sercos3Profile

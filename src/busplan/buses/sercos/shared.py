@@ -1,7 +1,7 @@
 """Parts that SERCOS I, II and III share: whole words, the master's pipeline, the age of feedback and commands."""
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Mapping
 from functools import reduce
 from math import ceil
 from typing import Final, TypeAlias
@@ -9,7 +9,8 @@ from typing import Final, TypeAlias
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusLatency
 from busplan.buses.figure import Figure
-from busplan.buses.network import Group, Network
+from busplan.buses.limits import Key, Starter
+from busplan.buses.network import Network
 from busplan.elementwise import Number, larger, plain, rounded_up, total
 from busplan.sourced import Sourced, constants
 
@@ -60,41 +61,46 @@ DELAYS: Final = (
 )
 """In the order in which they add up."""
 Sent: TypeAlias = tuple[Number, Number]
-WHOLE_PERIOD: Final = "1            # assumed: the master computes beside the telegrams, within bus.pipeline_cycles"
-MEASURE: Final = "it runs beside the telegrams; take it from the drives' data, S-0-0005 (SERCOS III: S-0-1005)"
-BASE: Final = "from a sample to the telegram that carries it, and from a command to its effect"
-"""Lines of a new profile on the slice and the execution times."""
+"""What the cycle sends before feedback or a command, and the telegrams that carry it [us]."""
+KEYS: Final[Mapping[str, Key]] = {
+    "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
+    "node.execution.worst_extra_us": Key("T_extra"),
+}
+
+
+def starter(bus: str) -> Starter:
+    """A new profile with a section [bus]."""
+    return Starter(
+        bus,
+        slice_ratio="1            # assumed: the master computes beside the telegrams, within bus.pipeline_cycles",
+        measure="it runs beside the telegrams; take it from the drives' data, S-0-0005 (SERCOS III: S-0-1005)",
+        base="from a sample to the telegram that carries it, and from a command to its effect",
+    )
 
 
 def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Number = 0.0) -> tuple[BusLatency, ...]:
     """Age of feedback when the host has it, and delay of a command up to its effect.
 
-    Parameters
-    ----------
-    network
-        The network; its nodes sample at once, and take their commands over at once.
-    feedback_us, command_us
-        What the cycle sends before them, and the telegrams that carry them [us].
-    ring_us
-        Delay of the ring [us].
-    """
-    return (
-        _delay("feedback", slowest_us(network, lambda group: group.read_execution_us), *feedback_us, ring_us),
-        _delay("command", slowest_us(network, lambda group: group.write_execution_us), *command_us, ring_us),
-    )
-
-
-def slowest_us(network: Network, execution_us: Callable[[Group], Number]) -> Number:
-    """The slowest execution of any node [us].
+    All nodes sample at once, and take their commands over at once.
 
     Parameters
     ----------
     network
         The network.
-    execution_us
-        From a group to the execution time of its nodes [us].
+    feedback_us, command_us
+        What is sent before and with them [us].
+    ring_us
+        Delay of the ring [us].
     """
-    return reduce(larger, (execution_us(group) + group.worst_extra_us for group in network.groups))
+    write_us = (group.write_execution_us + group.worst_extra_us for group in network.groups)
+    return (
+        _delay("feedback", _slowest_read_us(network), *feedback_us, ring_us),
+        _delay("command", reduce(larger, write_us), *command_us, ring_us),
+    )
+
+
+def _slowest_read_us(network: Network) -> Number:
+    return reduce(larger, (group.read_execution_us + group.worst_extra_us for group in network.groups))
 
 
 def _delay(name: str, *parts_us: Number) -> BusLatency:
@@ -118,7 +124,7 @@ class SercosCycle(BusCycle):
 
     def sampled_us(self) -> float:
         """All nodes sample at once, early enough for the slowest of them [us]."""
-        return plain(self.feedback_due_us) - plain(slowest_us(self.network, lambda group: group.read_execution_us))
+        return plain(self.feedback_due_us) - plain(_slowest_read_us(self.network))
 
     def loop_periods(self, *, at_sync: bool) -> int:
         """The master's pipeline; and where drives act at their next sample, the cycles until a command is executed."""

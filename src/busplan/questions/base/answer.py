@@ -54,7 +54,7 @@ def period_option(period_us: float) -> tuple[str, str]:
 
 def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
     """Options of the changes, quoted for a shell; --period with the profile's period [us]."""
-    for change in changes.each:
+    for change in changes.entries:
         yield from period_option(period_us) if change.option == "--period" else (change.option, shell_word(change.text))
 
 

@@ -26,9 +26,8 @@ from busplan.forms.blocks import (
 )
 from busplan.profile.changes import KeyChanges
 from busplan.profile.edit import value_text
-from busplan.questions.fit.certainty import TIME, limits_behind
-from busplan.questions.fit.figures import FitFigures
-from busplan.sections.profile import Profile
+from busplan.questions.fit.certainty import TIME
+from busplan.questions.fit.figures import FitFigures, limits_behind
 
 if TYPE_CHECKING:
     from busplan.buses.bus import Bus
@@ -50,30 +49,21 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes
     quotes
         If True, text values are quoted, as in a profile.
     """
-    return joined(
-        *(
-            Sentence((f"{key} = ", *_part(key, value, quotes), f" ({meanings[key]})" if key in meanings else ""))
-            for key, value in changes.items()
-        ),
-        by=", ",
-    )
+
+    def written(key: str, value: object) -> tuple[Part, ...]:
+        if isinstance(value, list):
+            return (value_text(value),)
+        shown = ShownValue(value, key)
+        return ('"', shown, '"') if quotes and isinstance(value, str) else (shown,)
+
+    notes = {key: f" ({meaning})" for key, meaning in meanings.items()}
+    settings = (Sentence((f"{key} = ", *written(key, value), notes.get(key, ""))) for key, value in changes.items())
+    return joined(*settings, by=", ")
 
 
 def change_meanings(bus: "Bus") -> dict[str, str]:
     """Meaning of a change on the machine, by key, for keys that do not say so."""
     return {name: key.meaning for name, key in bus.keys.items() if key.meaning}
-
-
-def key_value(key: str, value: object) -> ShownValue:
-    """The new value of one key, with its place in the JSON document."""
-    return ShownValue(value, key)
-
-
-def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
-    if isinstance(value, list):
-        return (value_text(value),)
-    shown = key_value(key, value)
-    return ('"', shown, '"') if quotes and isinstance(value, str) else (shown,)
 
 
 def warning_sentences(network: Network) -> Iterator[Sentence]:
@@ -85,6 +75,8 @@ def warning_sentences(network: Network) -> Iterator[Sentence]:
 def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterator[Sentence]:
     """Say how the execution time behind the figures is known; nothing without a grade, or where none is in them.
 
+    Where groups differ, each grade stands with the groups that have it.
+
     Parameters
     ----------
     network
@@ -92,28 +84,16 @@ def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterato
     of_latency
         Whether the figures are latencies, and not those of the cycle.
     """
-    grades = execution_grades(network.profile)
-    if grades is not None and network.bus.has_execution(network, of_latency=of_latency):
+    names: dict[str, list[str]] = {}
+    for group in network.profile.node_groups:
+        names.setdefault(group.node.execution.grade or "", []).append(group.name)
+    grades = ", ".join(
+        f"{grade or 'without a grade'} of {' and '.join(groups)}" if len(names) > 1 else grade
+        for grade, groups in names.items()
+    )
+    if grades and network.bus.has_execution(network, of_latency=of_latency):
         text = f"The execution time behind these figures is {grades}."
         yield sentence(text, state="warns" if "assumed" in grades else "neutral")
-
-
-def execution_grades(profile: Profile) -> str | None:
-    """Grade of the execution time; where groups differ, each with the groups that have it. None without any."""
-    names: dict[str, list[str]] = {}
-    for group in profile.alike_nodes:
-        names.setdefault(group.node.execution.grade or "without a grade", []).append(group.name)
-    if len(names) == 1:
-        return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
-    return ", ".join(f"{grade} of {' and '.join(groups)}" for grade, groups in names.items()) or None
-
-
-def broken_limits(figures: FitFigures, network: Network) -> list[str]:
-    """Say by how much each limit of the bus is broken, or why it is not shown to be kept."""
-    broken = map(network.bus.limit, limits_behind(figures))
-    if network.groups:
-        network = network._replace(period_us=figures.period_us)
-    return [limit.words(network) for limit in broken if limit is not None]
 
 
 def checked_against(bus: "Bus", *, has_cycle: bool = True) -> str:
@@ -122,15 +102,6 @@ def checked_against(bus: "Bus", *, has_cycle: bool = True) -> str:
     parts = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
     never = f"never measured: {', '.join(tested.untested)}" if tested.untested and has_cycle else ""
     return "; ".join(filter(None, (parts, never))) or "no published figures"
-
-
-def not_applicable(network: Network) -> Iterator[Sentence]:
-    """Say which timing models cannot express a profile, and why."""
-    bus = network.bus
-    for model in bus.timing_models:
-        keys = bus.cannot_express(network, model=model.name)
-        if keys:
-            yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
 
 
 def reset_sentence(after: FitFigures | None, network: Network) -> Iterator[Sentence]:
@@ -142,34 +113,20 @@ def reset_sentence(after: FitFigures | None, network: Network) -> Iterator[Sente
 
 
 def story(figures: FitFigures, network: Network) -> tuple[Part, ...]:
-    """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict.
-
-    Parameters
-    ----------
-    figures
-        The figures.
-    network
-        The network.
-    """
+    """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict."""
     available = attribute_value(AVAILABLE, figures)
     if figures.fits:
         used = attribute_value(UTILISATION, figures)._replace(decimals=1)
         return sentence("{} to spare, {} of {} used", attribute_value(MARGIN, figures), used, available).parts
     short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
-    reasons = [Sentence((words,)) for words in broken_limits(figures, network)]
+    reasons = [Sentence((limit.words(network),)) for limit in limits_behind(figures, network)]
     if TIME in figures.exceeded:
         reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
     return joined(*reasons, by=", and ").parts
 
 
 def margin_parts(figures: FitFigures) -> tuple[Part, ...]:
-    """A corrected margin with its uncertainty, as far as that is known.
-
-    Parameters
-    ----------
-    figures
-        Figures under the timing model that decides.
-    """
+    """The corrected margin under the model that decides, with its uncertainty as far as that is known."""
     margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
 

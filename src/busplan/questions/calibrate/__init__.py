@@ -22,7 +22,7 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, checked_models, load_network
 from busplan.sections.base import TransactionKind
 from busplan.sections.cycle import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import Profile
 
 FAR: Final = 3.5
@@ -264,7 +264,7 @@ class CalibrateAnswer(Answer):
 
     network: Network
     source: str
-    nodes: AlikeNodes
+    nodes: ProfileGroup
     timing_model: str
     execution: TableExecution
     measurements: int
@@ -428,7 +428,7 @@ def calibrate(
 
 
 def _section(
-    nodes: AlikeNodes,
+    nodes: ProfileGroup,
     execution: TableExecution,
     fit_keys: Mapping[str, object],
     doubt_us: float | None,
@@ -444,11 +444,11 @@ def _section(
     return {key: list(value) if isinstance(value, tuple) else value for key, value in keys.items()}
 
 
-def _nodes(profile: Profile, group: str | None) -> AlikeNodes:
+def _nodes(profile: Profile, group: str | None) -> ProfileGroup:
     """The nodes that were measured."""
-    by_name = {alike.name: alike for alike in profile.alike_nodes}
+    by_name = {alike.name: alike for alike in profile.node_groups}
     if group is None and len(by_name) == 1:
-        return profile.alike_nodes[0]
+        return profile.node_groups[0]
     if group in by_name:
         return by_name[group]
     known = f"the groups {', '.join(by_name)}" if profile.group else "no groups"

@@ -78,7 +78,7 @@ class CapacityAnswer(Answer):
     def report(self) -> Report:
         """The answer in blocks."""
         if self.sensitivities:
-            from busplan.questions.capacity.sensitivity import sensitivity_report
+            from busplan.questions.capacity.sensitivity_report import sensitivity_report
 
             return sensitivity_report(self)
         from busplan.questions.capacity.report import capacity_report

@@ -12,16 +12,16 @@ from busplan.elementwise import FIT_ROUNDING, plain
 from busplan.english import listed, nouns, plural
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Card, Code, Gauge, Record, Sentence, State, Words, joined
-from busplan.forms.numbers import period, sentence_text
+from busplan.forms.numbers import period
 from busplan.questions.base.sentences import change_meanings, checked_against, settings_sentence
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, limits_behind
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME
 from busplan.questions.fit.figures import (
     CapacityFigures,
     FitFigures,
     after_reset,
     capacity_figures,
     figures,
-    safe_nodes,
+    limits_behind,
 )
 from busplan.questions.fit.inputs import HeavyAssumption, heavy_assumptions
 from busplan.questions.fit.network import changed
@@ -39,9 +39,6 @@ class Change:
     """Nodes that the change is made for."""
     figures: FitFigures
     """Whether it fits after it, under the model that decides."""
-    safe_nodes: int | None
-    """Most nodes that are shown to fit after it; None where groups differ."""
-    safe_axes: int | None
 
 
 @dataclass(frozen=True)
@@ -86,11 +83,6 @@ class Verdict:
         return all(figures.fits == self.deciding.fits for figures in self.others) if self.others else None
 
     @property
-    def contradicting(self) -> tuple[CapacityFigures, ...]:
-        """Figures of the models that say otherwise, and do not decide."""
-        return tuple(figures for figures in self.others if contradicts(figures.fits, self.deciding))
-
-    @property
     def all_well(self) -> bool:
         """Whether the cycle is shown to fit, on a safe bus, within [limits]."""
         return self.deciding.verdict == FITS and self.deciding.safe and not self.missed_limits
@@ -125,9 +117,7 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
         period_us=period_us,
         deciding=deciding,
         others=tuple(result for result in results if result is not deciding),
-        broken_limits=tuple(
-            limit.words(network) for key in limits_behind(deciding) if (limit := bus.limit(key)) is not None
-        ),
+        broken_limits=tuple(limit.words(network) for limit in limits_behind(deciding, network)),
         missed_limits=tuple(missed.items()),
         fastest=smallest_period(network, is_safe=False, with_limits=False) if network.groups else None,
         after_reset=after_reset(network, deciding),
@@ -141,9 +131,6 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
     )
 
 
-_FULL: Final = f"{MAX_COUNT} nodes are the most of a profile"
-
-
 def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple[Change | None, str]:
     """The change that mends what is wrong or, where a bus is full, carries another node; and why there is none."""
     if now.verdict != FITS or not now.safe or is_missed:
@@ -151,7 +138,7 @@ def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple
     elif now.safe_nodes is None or now.safe_nodes > now.nodes:
         return None, ""  # there is room, or nobody said which of the groups is to grow
     elif now.safe_nodes == MAX_COUNT:
-        return None, _FULL
+        return None, f"{MAX_COUNT} nodes are the most of a profile"
     else:
         try:
             target = changed(network, {NODES: now.safe_nodes + 1})
@@ -160,11 +147,8 @@ def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple
     mending = cure(target)
     if mending.changes is None:
         return None, mending.why
-    after = changed(target, mending.changes)
-    model = network.bus.deciding_model
-    most = safe_nodes(after)[0] if after.is_uniform else None
-    axes = None if most is None else most * int(after.profile.node.axes)
-    return Change(mending.changes, int(plain(target.nodes)), figures(after, model=model), most, axes), ""
+    after = figures(changed(target, mending.changes), model=now.timing_model)
+    return Change(mending.changes, int(plain(target.nodes)), after), ""
 
 
 _FIGURES: Final = 3
@@ -201,12 +185,6 @@ def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
     return Card(subject, _word(verdict), _gauge(verdict), tuple(lines))
 
 
-def card_text(card: Card) -> str:
-    """The verdict in one line: what the card says, label by label."""
-    lines = "; ".join(f"{label}: {sentence_text(words)}" for label, words in card.lines)
-    return f"{sentence_text(card.subject)}: {card.verdict.text}. {lines}."
-
-
 def _word(verdict: Verdict) -> Words:
     word = verdict.deciding.verdict
     but = "" if verdict.all_well or word != FITS else ", BUT"
@@ -229,7 +207,7 @@ def _gauge(verdict: Verdict) -> Gauge | None:
     limit = network.bus.limit("load")
     if limit is None:
         return None
-    load, most = plain(limit.bound.value(network)), plain(limit.bound.most(network))
+    load, most = plain(limit.value(network)), plain(limit.most(network))
     whole = max(1.0, load)
     return Gauge(load / whole, 0.0, most / whole, 1 / whole, state)
 
@@ -251,14 +229,13 @@ def _reasons(verdict: Verdict) -> Iterator[_Line]:
 
 def _times(verdict: Verdict) -> Iterator[_Line]:
     figures, network = verdict.deciding, verdict.network
-    doubt_us, margin_us = figures.uncertainty_us, (figures.margin_corrected_us or 0.0)
-    of_us = _us(figures.available_us, None)
-    share = f"{_used_us(figures) / figures.available_us:.0%}".replace("%", " %")
-    of = of_us if network.slice_ratio == 1 else f"the {of_us} that the bus may use"
+    doubt_us, margin_us, given_us = figures.uncertainty_us, figures.margin_corrected_us or 0.0, figures.available_us
+    used_us, of = _used_us(figures), _us(given_us, None)
+    of = of if network.slice_ratio == 1 else f"the {of} that the bus may use"
     bias = f", {_us(figures.bias_us, None)} of it bias of the model" if figures.bias_us else ""
-    yield "used", Sentence((f"{_us(_used_us(figures), doubt_us)} us of {of}, {share}{bias}",))
+    yield "used", Sentence((f"{_us(used_us, doubt_us)} us of {of}, {_percent(used_us / given_us)}{bias}",))
     doubt = "" if doubt_us is None else f", +/- {_us(doubt_us, doubt_us)}"
-    kept_us = figures.available_us * network.profile.limits.reserve
+    kept_us = given_us * network.profile.limits.reserve
     kept = f"; {_us(kept_us, doubt_us)} must stay free" if kept_us else ""
     yield ("short by" if margin_us < 0 else "free"), Sentence((f"{_us(abs(margin_us), doubt_us)} us{doubt}{kept}",))
     yield "fastest period", _fastest(verdict)
@@ -310,7 +287,13 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
         largest = max(figures.terms, key=lambda term: plain(term.us))
         us = _us(plain(largest.us), figures.uncertainty_us)
         yield "largest part", Sentence((f"{bus.figures.term_label(largest.name)}, {us} us",))
-    yield from _doubts(verdict)
+    parts = uncertainty_parts(figures)
+    if parts and parts[0]["share"]:
+        yield "largest doubt", Sentence((f"{parts[0]['label']}, {_percent(parts[0]['share'])} of the variance",))
+    if network.groups and figures.bias_us is None:
+        (error,) = (model.error for model in bus.timing_models if model.name == figures.timing_model)
+        uncertainty = ", no uncertainty given" if figures.uncertainty_us is None else ""
+        yield "bias", Sentence((f"none corrected{uncertainty}: {error}",))
     for assumption in verdict.assumptions:
         them = "it" if len(assumption.keys) == 1 else "them"
         yield "assumed", Sentence((f"{listed(assumption.keys, 'and')}: measure {them} first",), "warns")
@@ -318,8 +301,7 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
         yield "not included", Sentence((", ".join(dict.fromkeys(part.label for part in verdict.left_out)),))
     if verdict.premises:
         yield "rests on", Sentence(("; ".join(verdict.premises),))
-    has_cycle = bool(verdict.network.groups)
-    yield "checked against", Sentence((checked_against(verdict.network.bus, has_cycle=has_cycle),))
+    yield "checked against", Sentence((checked_against(bus, has_cycle=bool(network.groups)),))
     for model in bus.timing_models:
         if missing := bus.cannot_express(network, model=model.name):
             yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
@@ -327,28 +309,16 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
 
 def _but(verdict: Verdict) -> Iterator[_Line]:
     """What speaks against the verdict at its period: another model, a bus reset, a warning."""
-    for opposed in verdict.contradicting:
-        needed_us = _us(opposed.required_us, verdict.deciding.uncertainty_us)
-        needed = f"{needed_us} us needed of {_us(opposed.available_us, None)}"
-        yield f"{opposed.timing_model} model", Sentence((f"says otherwise, {needed}, but does not decide",), "warns")
+    deciding = verdict.deciding
+    for opposed in verdict.others:
+        if contradicts(opposed.fits, deciding):
+            needed_us = _us(opposed.required_us, deciding.uncertainty_us)
+            words = f"says otherwise, {needed_us} us needed of {_us(opposed.available_us, None)}, but does not decide"
+            yield f"{opposed.timing_model} model", Sentence((words,), "warns")
     if verdict.after_reset is not None:
-        after_reset = verdict.network.bus.safety.after_reset
-        keys = ", ".join(f"{key} = {value}" for key, value in after_reset.items())
+        keys = ", ".join(f"{key} = {value}" for key, value in verdict.network.bus.safety.after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
     yield from (("beware", Sentence((warning,), "warns")) for warning in verdict.warnings)
-
-
-def _doubts(verdict: Verdict) -> Iterator[_Line]:
-    """The largest part of the uncertainty, and that no bias is known."""
-    figures, network = verdict.deciding, verdict.network
-    parts = uncertainty_parts(figures)
-    if parts and parts[0]["share"]:
-        share = f"{parts[0]['share']:.0%}".replace("%", " %")
-        yield "largest doubt", Sentence((f"{parts[0]['label']}, {share} of the variance",))
-    if network.groups and figures.bias_us is None:
-        (error,) = (model.error for model in network.bus.timing_models if model.name == figures.timing_model)
-        uncertainty = ", no uncertainty given" if figures.uncertainty_us is None else ""
-        yield "bias", Sentence((f"none corrected{uncertainty}: {error}",))
 
 
 def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
@@ -363,6 +333,10 @@ def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
         }
         for doubt in sorted(figures.doubts, key=lambda doubt: -float(doubt.us))
     ]
+
+
+def _percent(share: float) -> str:
+    return f"{share:.0%}".replace("%", " %")
 
 
 def _us(us: float, doubt_us: float | None) -> str:

@@ -1,6 +1,7 @@
 """`busplan.circle_test`."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, VERDICT, Figure, by, by_key
@@ -11,13 +12,12 @@ from busplan.forms.charts import Drawing
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Periods, ProfileLike, load_network, one_or_several, whole
+from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
     from busplan.questions.circle.failures import Failure
-    from busplan.questions.circle.roundness import Contribution
     from busplan.servo.circle import CircleRun
-
 
 NEGLIGIBLE_MM: Final = 1e-4
 """Contour error below which nothing of the profile makes a circle what it is: chosen, far below any machine [mm]."""
@@ -177,6 +177,25 @@ CIRCLE_BY_KEY: Final = by_key(CIRCLE_FIGURES)
 """Figures of the circle test by key."""
 
 
+class Contribution(NamedTuple):
+    """One error source, and the circle without it."""
+
+    source: str
+    max_contour_error_mm: float
+    """Largest contour error when this source is removed [mm]."""
+    removed_mm: float
+    """Decrease of the largest contour error by its removal [mm]; negative if it hides another source."""
+    mean_contour_error_mm: float
+    """Mean contour error when this source is removed [mm]."""
+    circular_deviation_mm: float | None
+    """Circular deviation G when this source is removed [mm]; None on a trapezoid."""
+
+    @property
+    def words(self) -> str:
+        """Name of the source in words."""
+        return self.source.replace("_", " ")
+
+
 class CircleFigures(NamedTuple):
     """Circle test at one period. Figures of a simulation that did not run are None."""
 
@@ -235,7 +254,7 @@ class CircleFigures(NamedTuple):
     passed: bool | None
     """None if nothing fails, and the profile has no contour tolerance or no error source matters: it is not judged."""
     failures: "tuple[Failure, ...]"
-    contributions: "tuple[Contribution, ...] | None"
+    contributions: tuple[Contribution, ...] | None
     """Largest first; None if they were not requested and no contour measure failed."""
 
     @property
@@ -247,33 +266,55 @@ class CircleFigures(NamedTuple):
             return "PASSED" if self.passed else "FAILED"
         return "NO SOURCE MATTERS" if self.sources_matter is False else "NOT JUDGED"
 
+    @property
+    def failed_measure(self) -> str | None:
+        """Key of the first contour measure that misses its tolerance; None if there is none."""
+        failed = (failure for failure in self.failures if failure.name in CONTOUR_MEASURES)
+        return next((failure.name for failure in failed if failure.value is not None), None)
 
-class CircleTest(NamedTuple):
-    """Answer of `circle_test`: the profile, and the figures and simulation of each period."""
+    @property
+    def to_attack(self) -> tuple[Contribution, float] | None:
+        """The source without which the failed measure is smallest, and how much less it is [mm].
+
+        None if no contour measure fails, contributions were not requested, or no removal reduces the measure.
+        """
+        measure = self.failed_measure
+        if measure is None or not self.contributions:
+            return None
+        first = min(self.contributions, key=lambda source: float(getattr(source, measure)))
+        removed_mm = float(getattr(self, measure)) - float(getattr(first, measure))
+        return (first, removed_mm) if removed_mm > 0 else None
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class CircleTestAnswer(Answer):
+    """Answer of `circle_test`: `results` and `runs`, one for each period.
+
+    Figures of a simulation that did not run are None, as is the run of a cycle that does not fit the bus. Answers are
+    equal to themselves alone: traces are arrays, which have no single truth.
+
+    Parameters
+    ----------
+    profile
+        The profile.
+    results
+        Figures of each period.
+    runs
+        Simulation of each period.
+    with_contributions
+        If True, document and report rank the error sources.
+    """
 
     profile: Profile
     results: tuple[CircleFigures, ...]
     runs: "tuple[CircleRun | None, ...]"
     with_contributions: bool = False
-    """If True, document and report rank the error sources."""
 
     @property
     def passed(self) -> bool | None:
         """Whether every period holds every tolerance; None if no period fails and some period is not judged."""
         verdicts = [result.passed for result in self.results]
         return False if False in verdicts else None if None in verdicts else True
-
-
-class CircleTestAnswer(Answer, CircleTest):
-    """Answer of `circle_test`: `results` and `runs`, one for each period.
-
-    Figures of a simulation that did not run are None, as is the run of a cycle that does not fit the bus.
-    """
-
-    __slots__ = ()
-    # Traces are arrays, which have no single truth.
-    __eq__ = object.__eq__
-    __hash__ = object.__hash__
 
     def report(self) -> Report:
         """The answer in blocks."""
@@ -300,7 +341,7 @@ class CircleTestAnswer(Answer, CircleTest):
             `every` is no whole number from 1 on.
         """
         from busplan.forms.csv_rows import csv_blocks
-        from busplan.questions.circle.failures import TRACE_COLUMNS, trace_records
+        from busplan.questions.circle.report import TRACE_COLUMNS, trace_records
 
         return csv_blocks(trace_records(self, every=whole(every, name="every")), columns=TRACE_COLUMNS)
 
@@ -312,11 +353,11 @@ class CircleTestAnswer(Answer, CircleTest):
         BusplanError
             No period fits the bus, so nothing was simulated.
         """
-        from busplan.questions.circle.drawing import test_drawing
+        from busplan.questions.circle.drawing import circle_drawing
 
         if not any(self.runs):
             raise BusplanError("there is nothing to draw: no period fits the bus")
-        return test_drawing(self)
+        return circle_drawing(self)
 
 
 def circle_test(
@@ -363,12 +404,11 @@ def circle_test(
     >>> answer.runs[0].trace(every=10).contour_error_mm.shape
     (48656,)
     """
-    from busplan.questions.circle import roundness
+    from busplan.questions.circle.roundness import run_circles
 
-    test = roundness.circle_test(
+    return run_circles(
         load_network(profile),
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         with_contributions=contributions,
         progress=progress,
     )
-    return CircleTestAnswer(*test)

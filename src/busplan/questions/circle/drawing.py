@@ -25,11 +25,10 @@ from busplan.forms.charts import (
 from busplan.forms.lines import Tone
 from busplan.forms.numbers import ROUNDING_UM, decimals_of, period
 from busplan.forms.scale import ring_step
-from busplan.questions.circle import CircleFigures, CircleTest
-from busplan.questions.circle.failures import ContourProfile, contour_profile
+from busplan.questions.circle import CircleFigures, CircleTestAnswer
 from busplan.sections.machine import ToleranceSection
 from busplan.servo.circle import CircleRun
-from busplan.servo.contour import contour_error
+from busplan.servo.contour import blocks, contour_error
 from busplan.servo.path import Direction
 
 _ERROR_SHARE: Final = 0.25
@@ -40,6 +39,51 @@ _FLAT: Final = 0.1
 """Errors whose spread is a smaller share of the largest would look like one line above zero."""
 _NANOMETRES_BELOW_UM: Final = 0.1
 TOLERANCE: Final = Entry("tolerance", "tolerance of the largest error", shape="line")
+
+
+CONTOUR_SECTORS: Final = 720
+"""Sectors of the drawn circle: half a degree each, narrower than a printed line."""
+
+
+class ContourProfile(NamedTuple):
+    """Smallest and largest contour error in equal sectors from the x axis on [mm]; None in a sector without points."""
+
+    low_mm: tuple[float | None, ...]
+    high_mm: tuple[float | None, ...]
+
+    @property
+    def largest_mm(self) -> float:
+        """Largest contour error, without its sign [mm]."""
+        return max((abs(error) for error in (*self.low_mm, *self.high_mm) if error is not None), default=0.0)
+
+
+def contour_profile(run: CircleRun) -> ContourProfile:
+    """Condense the measured part of a circle test.
+
+    Parameters
+    ----------
+    run
+        The simulation.
+
+    Returns
+    -------
+    ContourProfile
+        Sector 0 begins on the positive x axis; sectors follow counter-clockwise.
+    """
+    low, high = np.full(CONTOUR_SECTORS, np.inf), np.full(CONTOUR_SECTORS, -np.inf)
+    for block in blocks(run.measured):
+        x_mm, y_mm = run.x_mm[block], run.y_mm[block]
+        error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
+        turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
+        sector = np.minimum((turn * CONTOUR_SECTORS).astype(np.int64), CONTOUR_SECTORS - 1)
+        # Neighbouring points are mostly in the same sector: only the extremes of each stay are looked at one by one.
+        entered = np.flatnonzero(np.diff(sector, prepend=-1))
+        np.minimum.at(low, sector[entered], np.minimum.reduceat(error_mm, entered))
+        np.maximum.at(high, sector[entered], np.maximum.reduceat(error_mm, entered))
+    return ContourProfile(
+        tuple(float(value) if np.isfinite(value) else None for value in low),
+        tuple(float(value) if np.isfinite(value) else None for value in high),
+    )
 
 
 class LengthUnit(NamedTuple):
@@ -122,11 +166,6 @@ def magnified(largest_mm: float, *, tolerance_mm: float | None) -> Magnified | N
     return Magnified(edge_mm, ring_step(edge_mm * 1e3), drawn)
 
 
-def largest_mm(contour: ContourProfile) -> float:
-    """Largest contour error around the circle, without its sign [mm]."""
-    return max((abs(error) for error in (*contour.low_mm, *contour.high_mm) if error is not None), default=0.0)
-
-
 class ErrorRange(NamedTuple):
     """Range of a scale of errors."""
 
@@ -190,13 +229,7 @@ def dial(contour: ContourProfile, scale: Magnified, direction: Direction) -> Dia
     return Dial(Entry("first"), low, high, tuple(rings), (scale.ring_text, "a ring"), direction == "cw")
 
 
-def circle_drawing(contour: ContourProfile, scale: Magnified, direction: Direction) -> Drawing:
-    """Draw the circle alone; parameters as `dial` has them."""
-    return Drawing("Circle with its contour error magnified", (Panel(dial(contour, scale, direction)),))
-
-
 Floats = NDArray[np.float64]
-
 _MAX_POINTS: Final = 2000
 """Most points of one curve: more would not be visible."""
 
@@ -232,28 +265,14 @@ class Scales(NamedTuple):
     tolerance: ToleranceSection
 
 
-def circle_rows(test: CircleTest) -> list[CircleRow]:
-    """Rows of the periods that were simulated.
-
-    Parameters
-    ----------
-    test
-        The circle test.
-    """
+def _circle_rows(test: CircleTestAnswer) -> list[CircleRow]:
+    """Rows of the periods that were simulated."""
     pairs = zip(test.results, test.runs, strict=True)
     return [CircleRow(result, run, _curves(run)) for result, run in pairs if run is not None]
 
 
-def common_scales(rows: Sequence[CircleRow], tolerance: ToleranceSection) -> Scales:
-    """Scales of all rows. A row whose table left the circle counts only if there is no other.
-
-    Parameters
-    ----------
-    rows
-        The rows, one or more.
-    tolerance
-        Limits of the circle.
-    """
+def _common_scales(rows: Sequence[CircleRow], tolerance: ToleranceSection) -> Scales:
+    """Scales of all rows. A row whose table left the circle counts only if there is no other."""
     shown = [row for row in rows if not row.run.diverged] or rows
     measured = [curve.error_um for row in shown for curve in row.curves if curve.measured]
     judged = [curve.error_um for row in shown for curve in row.judged]
@@ -322,7 +341,7 @@ _TONES: Final[dict[bool | None, Tone]] = {True: "passes", False: "fails", None: 
 _DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
 
 
-def test_drawing(test: CircleTest) -> Drawing:
+def circle_drawing(test: CircleTestAnswer) -> Drawing:
     """Draw each simulated period on the same scales, one below the other.
 
     Parameters
@@ -330,8 +349,8 @@ def test_drawing(test: CircleTest) -> Drawing:
     test
         The circle test, with at least one simulated period.
     """
-    rows = circle_rows(test)
-    scales = common_scales(rows, test.profile.tolerance)
+    rows = _circle_rows(test)
+    scales = _common_scales(rows, test.profile.tolerance)
     servo = "ideal drive" if test.results[0].ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(result.period_us) for result, run in zip(test.results, test.runs, strict=True) if run is None]
     words = [f"circle test, {servo}"]
@@ -348,7 +367,7 @@ def _circle(row: CircleRow, scales: Scales) -> Panel:
     """The setup, the verdict, and the circle on the scale of all periods."""
     result, scale = row.result, scales.circle
     setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
-    deviation = measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
+    deviation = _measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
     whole = "no G on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}"
     words = f"{_shown(row, scales)}; {whole}; {_DIRECTIONS[row.run.path.direction]}"
     plot = None
@@ -367,8 +386,8 @@ def _shown(row: CircleRow, scales: Scales) -> str:
     return f"{scales.circle.ring_text} a ring, {times} times magnified"
 
 
-def measure_text(value_mm: float | None, limit_mm: float | None, scales: Scales) -> str:
-    """Write a measure with its unit, and its tolerance where there is one."""
+def _measure_text(value_mm: float | None, limit_mm: float | None, scales: Scales) -> str:
+    """A measure with its unit, and its tolerance where there is one."""
     unit = scales.unit
     value = "-" if value_mm is None else f"{decimals_of(value_mm * 1e3 * unit.per_um, 3)} {unit.name}"
     return value if limit_mm is None else f"{value} (limit {unit.text(limit_mm * 1e3)})"
@@ -378,8 +397,8 @@ def _errors(row: CircleRow, scales: Scales) -> Panel:
     """The contour error over time, with its mean and maximum above: the measured part strong and shaded."""
     errors, per_um, tolerance = scales.errors, scales.unit.per_um, scales.tolerance
     result, limit_mm = row.result, tolerance.max_contour_error_mm
-    mean = measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
-    largest = measure_text(result.max_contour_error_mm, limit_mm, scales)
+    mean = _measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
+    largest = _measure_text(result.max_contour_error_mm, limit_mm, scales)
     label = ", ".join(filter(None, (f"contour error [{scales.unit.name}]", errors.zero_outside)))
     up = numbers(label, errors.bottom_um * per_um, errors.top_um * per_um, room=_ROOM)
     guides = [] if errors.zero_outside else [Guide(Entry("zero"), y=0.0)]

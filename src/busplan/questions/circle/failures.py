@@ -5,113 +5,14 @@ from math import inf
 from string import Formatter
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-
 from busplan.buses.network import Network
 from busplan.elementwise import existing
-from busplan.forms.blocks import Record
-from busplan.questions.circle import CircleTest
-from busplan.questions.fit.certainty import FITS, TIME, limits_behind
-from busplan.questions.fit.figures import FitFigures
+from busplan.questions.fit.certainty import FITS, TIME
+from busplan.questions.fit.figures import FitFigures, limits_behind
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
-from busplan.servo.contour import blocks, contour_error
 from busplan.servo.runnable import LONGEST_SETTLING_US
-
-CONTOUR_SECTORS: Final = 720
-"""Sectors of the drawn circle: half a degree each, narrower than a printed line."""
-
-
-class ContourProfile(NamedTuple):
-    """Smallest and largest contour error in equal sectors from the x axis on [mm]; None in a sector without points."""
-
-    low_mm: tuple[float | None, ...]
-    high_mm: tuple[float | None, ...]
-
-
-def contour_profile(run: CircleRun) -> ContourProfile:
-    """Condense the measured part of a circle test.
-
-    Parameters
-    ----------
-    run
-        The simulation.
-
-    Returns
-    -------
-    ContourProfile
-        Sector 0 begins on the positive x axis; sectors follow counter-clockwise.
-    """
-    low, high = np.full(CONTOUR_SECTORS, np.inf), np.full(CONTOUR_SECTORS, -np.inf)
-    for block in blocks(run.measured):
-        x_mm, y_mm = run.x_mm[block], run.y_mm[block]
-        error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
-        turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
-        sector = np.minimum((turn * CONTOUR_SECTORS).astype(np.int64), CONTOUR_SECTORS - 1)
-        # Neighbouring points are mostly in the same sector: only the extremes of each stay are looked at one by one.
-        entered = np.flatnonzero(np.diff(sector, prepend=-1))
-        np.minimum.at(low, sector[entered], np.minimum.reduceat(error_mm, entered))
-        np.maximum.at(high, sector[entered], np.maximum.reduceat(error_mm, entered))
-    return ContourProfile(
-        tuple(float(value) if np.isfinite(value) else None for value in low),
-        tuple(float(value) if np.isfinite(value) else None for value in high),
-    )
-
-
-def drawn_profile(run: CircleRun | None) -> ContourProfile | None:
-    """Condense a circle test for drawing; None if the table did not follow the circle or was not simulated.
-
-    Parameters
-    ----------
-    run
-        The simulation.
-    """
-    return None if run is None or run.diverged else contour_profile(run)
-
-
-TRACE_COLUMNS: Final = (
-    "period_us",
-    "time_us",
-    "command_x_mm",
-    "command_y_mm",
-    "x_mm",
-    "y_mm",
-    "contour_error_mm",
-)
-
-_BLOCK: Final = 4096
-"""Rows converted to Python numbers at a time."""
-
-
-def trace_records(test: CircleTest, *, every: int) -> Iterator[Record]:
-    """One row for every n-th step of each simulated period.
-
-    Parameters
-    ----------
-    test
-        The circle test.
-    every
-        n, 1 or more [1].
-    """
-    for result, run in zip(test.results, test.runs, strict=True):
-        if run is None:
-            continue
-        trace = run.trace(every=every)
-        columns = (
-            trace.time_us,
-            trace.command_x_mm,
-            trace.command_y_mm,
-            trace.x_mm,
-            trace.y_mm,
-            trace.contour_error_mm,
-        )
-        for start in range(0, len(trace.time_us), _BLOCK):
-            # Python floats take four times the memory of numpy floats.
-            block = [column[start : start + _BLOCK].tolist() for column in columns]
-            for values in zip(*block, strict=True):
-                yield dict(zip(TRACE_COLUMNS, (result.period_us, *values), strict=True))
-
 
 MARGINS: Final = {"min_phase_margin_deg": "deg", "min_gain_margin_db": "dB"}
 """Least margins of the loop by key, with their unit; they have defaults, so that they are always asked for."""
@@ -141,7 +42,7 @@ class Stated(NamedTuple):
         return f"{number:g} {self.unit}" if self.decimals is None else f"{number:.{self.decimals}f} {self.unit}"
 
 
-class _Saying(NamedTuple):
+class _Message(NamedTuple):
     """Message template of a failure; {beyond} is the distance between {value} and {limit}."""
 
     words: str
@@ -156,18 +57,18 @@ class _Saying(NamedTuple):
     """Unit of the limit, if it is not that of the figure."""
 
 
-_FAILURES: Final[dict[str, _Saying]] = {
-    "required_us": _Saying(
+_FAILURES: Final[dict[str, _Message]] = {
+    "required_us": _Message(
         "the cycle does not fit the bus: {value} needed of {limit}", "us", limit_key="available_us", limit_decimals=3
     ),
-    "safe_required_us": _Saying(
+    "safe_required_us": _Message(
         "the cycle is not shown to fit the bus: with bias, uncertainty and reserve {value} needed of {limit}",
         "us",
         limit_key="available_us",
         limit_decimals=3,
     ),
-    "stability": _Saying("the position loop is unstable"),
-    "circle_not_followed": _Saying(
+    "stability": _Message("the position loop is unstable"),
+    "circle_not_followed": _Message(
         "the table did not follow the circle (not the whole turn, or an error above the radius): "
         "it went {value} of {limit} round the centre",
         "deg",
@@ -175,21 +76,21 @@ _FAILURES: Final[dict[str, _Saying]] = {
         key="covered_deg",
         limit_decimals=0,
     ),
-    "min_phase_margin_deg": _Saying("the phase margin of {value} is {beyond} under its {limit}", "deg", 2),
-    "min_gain_margin_db": _Saying("the gain margin of {value} is {beyond} under its {limit}", "dB", 2),
-    "mean_contour_error_mm": _Saying("the mean contour error of {value} is {beyond} over its {limit}"),
-    "max_contour_error_mm": _Saying("the largest contour error of {value} is {beyond} over its {limit}"),
-    "not_settled": _Saying(
+    "min_phase_margin_deg": _Message("the phase margin of {value} is {beyond} under its {limit}", "deg", 2),
+    "min_gain_margin_db": _Message("the gain margin of {value} is {beyond} under its {limit}", "dB", 2),
+    "mean_contour_error_mm": _Message("the mean contour error of {value} is {beyond} over its {limit}"),
+    "max_contour_error_mm": _Message("the largest contour error of {value} is {beyond} over its {limit}"),
+    "not_settled": _Message(
         "the loops and their friction take more than {limit} to settle, so that the turn is not measured",
         "s",
         limit_decimals=0,
     ),
-    _WITHOUT_TURN: _Saying(
+    _WITHOUT_TURN: _Message(
         "the circular deviation G is measured on a whole turn, and the path is a trapezoid: "
         'set circle.path = "iso230-4", or take out tolerance.circular_deviation_mm = {limit}',
         limit_unit="mm",
     ),
-    "circular_deviation_mm": _Saying("the circular deviation G of {value} is {beyond} over its {limit}"),
+    "circular_deviation_mm": _Message("the circular deviation G of {value} is {beyond} over its {limit}"),
 }
 _OF_TIME: Final = ("required_us", "safe_required_us")
 
@@ -200,7 +101,7 @@ class Failure(NamedTuple):
     name: str
     value: float | None
     limit: float | None
-    said: str = ""
+    limit_words: str = ""
     """Message of a broken limit of the bus; empty for other failures."""
     is_default: bool = False
     """Whether the limit is the default of its key, not set in the profile."""
@@ -210,7 +111,7 @@ class Failure(NamedTuple):
     @property
     def is_of_bus(self) -> bool:
         """Whether a limit of the bus fails, not the circle."""
-        return bool(self.said) or self.name in _OF_TIME
+        return bool(self.limit_words) or self.name in _OF_TIME
 
     def document(self) -> dict[str, Any]:
         """Return it as in the JSON document; a value that does not exist is null, and the text says why."""
@@ -224,18 +125,18 @@ class Failure(NamedTuple):
 
     def parts(self) -> Iterator[str | Stated]:
         """Words and numbers of the message."""
-        if self.said:
-            yield self.said
+        if self.limit_words:
+            yield self.limit_words
             return
         key = _WITHOUT_TURN if self.name == CONTOUR_MEASURES[-1] and self.value is None else self.name
-        saying, value, limit = _FAILURES[key], self.value or 0.0, self.limit or 0.0
-        limit_key = saying.limit_key or self.name
+        message, value, limit = _FAILURES[key], self.value or 0.0, self.limit or 0.0
+        limit_key = message.limit_key or self.name
         numbers = {
-            "value": Stated(value, saying.key or self.name.removeprefix("min_"), saying.unit, saying.decimals),
-            "limit": Stated(limit, limit_key, saying.limit_unit or saying.unit, saying.limit_decimals),
-            "beyond": Stated(abs(value - limit), limit_key, saying.unit, saying.decimals),
+            "value": Stated(value, message.key or self.name.removeprefix("min_"), message.unit, message.decimals),
+            "limit": Stated(limit, limit_key, message.limit_unit or message.unit, message.limit_decimals),
+            "beyond": Stated(abs(value - limit), limit_key, message.unit, message.decimals),
         }
-        for words, field, _, _ in Formatter().parse(saying.words):
+        for words, field, _, _ in Formatter().parse(message.words):
             yield words
             if field is not None:
                 yield numbers[field]
@@ -258,17 +159,8 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
 
 
 def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
-    """Tell which limits of the bus a cycle breaks, or that it is not shown to fit.
-
-    Parameters
-    ----------
-    network
-        The network.
-    capacity
-        Its figures under the timing model that decides.
-    """
-    behind = limits_behind(capacity)
-    broken = [limit for limit in network.bus.limits if limit.key in behind]
+    """Limits of the bus that a cycle breaks, or that it is not shown to fit."""
+    broken = limits_behind(capacity, network)
     late: tuple[Failure, ...] = ()
     if TIME in capacity.exceeded:
         late = (Failure("required_us", capacity.required_us, capacity.available_us),)
@@ -278,8 +170,8 @@ def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
         *(
             Failure(
                 limit.key,
-                existing(limit.bound.value(network)),
-                existing(limit.bound.most(network)),
+                existing(limit.value(network)),
+                existing(limit.most(network)),
                 limit.words(network),
             )
             for limit in broken
@@ -289,17 +181,7 @@ def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
 
 
 def circle_failures(profile: Profile, run: CircleRun, *, settled: bool) -> tuple[Failure, ...]:
-    """List the failures of a simulated circle: stability first, then settling, the turn, the margins and the contour.
-
-    Parameters
-    ----------
-    profile
-        The network and its tolerances.
-    run
-        The simulation.
-    settled
-        Whether the loops had settled when the measured turn began.
-    """
+    """Failures of a simulated circle: stability first, then settling, the turn, the margins and the contour."""
     tolerance = profile.tolerance
     late = _NEXT_SYNC if profile.servo.loop == "host" and profile.servo.update == "next_sync" else ""
     if not (run.margins_x.stable and run.margins_y.stable):

@@ -24,43 +24,24 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
+from busplan.forms.charts import Drawing, Panel
 from busplan.forms.numbers import period, period_value
 from busplan.questions.base.sentences import Owner, document, figure_table, with_profile
-from busplan.questions.circle import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTest
-from busplan.questions.circle.drawing import circle_drawing, largest_mm, magnified
-from busplan.questions.circle.failures import MARGINS, ContourProfile, drawn_profile
-from busplan.questions.circle.roundness import failed_measure, to_attack
+from busplan.questions.circle import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer
+from busplan.questions.circle.drawing import contour_profile, dial, magnified
+from busplan.questions.circle.failures import MARGINS
 from busplan.sections.profile import Profile
+from busplan.servo.circle import CircleRun
 
 
-def verdict_words(result: CircleFigures) -> Words:
-    """The verdict in a word or two.
-
-    Parameters
-    ----------
-    result
-        The circle test at one period.
-    """
-    if result.passed is None and result.stable is not None:
-        return Words(result.verdict_word, "warns")
-    return Words(result.verdict_word, "passes" if result.passed else "fails")
-
-
-def circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
-    """Say which limits the circle holds, which it breaks, and which error source to attack first.
-
-    Parameters
-    ----------
-    profile
-        The network and its tolerances.
-    result
-        The circle test at one period.
-    """
-    period, feed = setup_values(result)
+def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
+    """The limits that the circle holds or breaks, and the error source to attack first."""
+    period, feed = _setup_values(result)
     subject = (Code(profile.name), " at ", period, " and ", feed)
-    verdict = verdict_words(result)
+    is_open = result.passed is None and result.stable is not None
+    verdict = Words(result.verdict_word, "warns" if is_open else "passes" if result.passed else "fails")
     if result.failures:
-        yield Sentence((*subject, ": ", verdict, ", ", *failure_words(result).parts, "."), verdict.state)
+        yield Sentence((*subject, ": ", verdict, ", ", *_failure_words(result).parts, "."), verdict.state)
         yield from _attack(result)
         return
     if result.passed:
@@ -97,14 +78,14 @@ def _unjudged(result: CircleFigures) -> tuple[Part, ...]:
 
 def _attack(result: CircleFigures) -> Iterator[Sentence]:
     """Say which error source to attack first for the first contour measure that fails."""
-    measure, attack = failed_measure(result), to_attack(result)
+    measure, attack = result.failed_measure, result.to_attack
     if measure is None:
         return
     label = CIRCLE_BY_KEY[measure].label
     if attack is not None:
         source, removed_mm = attack
         yield sentence(
-            f"Attack {source_words(source.source)} first: without it the {label} is {{}}, {{}} less.",
+            f"Attack {source.words} first: without it the {label} is {{}}, {{}} less.",
             attribute_value(CIRCLE_BY_KEY[measure], source),
             ShownValue(removed_mm, "removed_mm", "um", 3),
         )
@@ -112,25 +93,13 @@ def _attack(result: CircleFigures) -> Iterator[Sentence]:
         yield Sentence((f"No single error source of the profile explains the {label}.",))
 
 
-def setup_values(result: CircleFigures) -> tuple[ShownValue, ShownValue]:
-    """The period and the feed of a test.
-
-    Parameters
-    ----------
-    result
-        The circle test at one period.
-    """
+def _setup_values(result: CircleFigures) -> tuple[ShownValue, ShownValue]:
+    """The period and the feed of a test."""
     return period_value(result.period_us), attribute_value(CIRCLE_BY_KEY["feed_mm_per_min"], result)
 
 
-def failure_words(result: CircleFigures) -> Sentence:
-    """Limits that the circle breaks, in words, without a full stop.
-
-    Parameters
-    ----------
-    result
-        The circle test at one period, which fails.
-    """
+def _failure_words(result: CircleFigures) -> Sentence:
+    """Limits that the circle breaks, in words, without a full stop."""
     phrases = (
         Sentence(tuple(part if isinstance(part, str) else ShownValue(*part) for part in failure.parts()))
         for failure in result.failures
@@ -138,16 +107,8 @@ def failure_words(result: CircleFigures) -> Sentence:
     return joined(*phrases, by=", and ")
 
 
-def servo_sentence(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
-    """Say how the servo values behind the figures are known; nothing without a simulation.
-
-    Parameters
-    ----------
-    profile
-        The profile.
-    result
-        The circle test at one period.
-    """
+def _servo_sentence(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
+    """How the servo values behind the figures are known; nothing without a simulation."""
     if result.stable is None:
         return
     if result.ideal_drive:
@@ -155,11 +116,6 @@ def servo_sentence(profile: Profile, result: CircleFigures) -> Iterator[Sentence
         return
     state: State = "warns" if result.servo_grade == "assumed" else "neutral"
     yield Sentence((f"The servo values that the profile gives are {profile.servo.grades_text}.",), state)
-
-
-def source_words(source: str) -> str:
-    """Name of an error source in words."""
-    return source.replace("_", " ")
 
 
 _SHOWN: Final = (
@@ -178,7 +134,7 @@ ACT_TOGETHER: Final = Sentence(
 NO_SOURCES: Final = Sentence(("The profile has no error source that could be removed.",))
 
 
-def circle_report(test: CircleTest) -> Report:
+def circle_report(test: CircleTestAnswer) -> Report:
     """Report of `circle-test`."""
     return Report(
         Sentence(("Circle test of ", Code(test.profile.name))),
@@ -188,43 +144,25 @@ def circle_report(test: CircleTest) -> Report:
     )
 
 
-def _blocks(test: CircleTest) -> Iterator[Block]:
+def _blocks(test: CircleTestAnswer) -> Iterator[Block]:
     """Verdict of each period, the periods side by side, and the error sources of each circle."""
     for result in test.results:
-        yield from circle_sentences(test.profile, result)
+        yield from _circle_sentences(test.profile, result)
     simulated = (result for result in test.results if result.stable is not None)
-    yield from servo_sentence(test.profile, next(simulated, test.results[0]))
-    yield circle_table(test.results)
+    yield from _servo_sentence(test.profile, next(simulated, test.results[0]))
+    yield _circle_table(test.results)
     if test.with_contributions:
         ranked = [result for result in test.results if result.contributions is not None]
-        yield from (contributions_table(source) for source in ranked if source.contributions)
+        yield from (_contributions_table(source) for source in ranked if source.contributions)
         if ranked:
             yield ACT_TOGETHER if any(source.contributions for source in ranked) else NO_SOURCES
     for result, run in zip(test.results, test.runs, strict=True):
         # A cycle that does not fit has no circle; the verdict says why.
-        if result.stable is not None:
-            yield circle_or_reason(drawn_profile(run), result, test.profile)
+        if run is not None:
+            yield _circle_chart(run, result, test.profile)
 
 
-def circle_or_reason(contour: ContourProfile | None, result: CircleFigures, profile: Profile) -> Chart | Sentence:
-    """The circle with its error magnified, or the reason why it is not drawn.
-
-    Parameters
-    ----------
-    contour
-        Contour error around the circle; None if there is no circle.
-    result
-        The circle test at one period.
-    profile
-        The network and its tolerances.
-    """
-    if contour is None:
-        return Sentence(("Not drawn: ", *failure_words(result).parts, "."))
-    chart = circle_chart(contour, result, profile)
-    return chart or sentence("At {} and {} there is no contour error to draw.", *setup_values(result))
-
-
-def circle_table(results: Sequence[CircleFigures]) -> Table:
+def _circle_table(results: Sequence[CircleFigures]) -> Table:
     """Figures of the circle test, the periods side by side."""
     owners = [Owner(TableColumn(period(result.period_us)), result) for result in results]
     of_host = () if any(result.loop == "host" for result in results) else _OF_HOST
@@ -233,14 +171,8 @@ def circle_table(results: Sequence[CircleFigures]) -> Table:
     return figure_table(rows, owners, caption=Sentence(("Figures of the circle test",)))
 
 
-def contributions_table(result: CircleFigures) -> Table:
-    """The error sources, ranked, each with a bar on a common scale.
-
-    Parameters
-    ----------
-    result
-        The circle test at one period, with contributions.
-    """
+def _contributions_table(result: CircleFigures) -> Table:
+    """The error sources, ranked, each with a bar on a common scale."""
     ranked = result.contributions or ()
     removed = [source.removed_mm for source in ranked]
     least, most = min((0.0, *removed)), max((0.0, *removed))
@@ -250,9 +182,7 @@ def contributions_table(result: CircleFigures) -> Table:
         left = (
             attribute_value(CIRCLE_BY_KEY[key], source) for key in ("max_contour_error_mm", "circular_deviation_mm")
         )
-        rows.append(
-            TableRow((source_words(source.source), Bar(takes, least, most) if most > least else "", takes, *left))
-        )
+        rows.append(TableRow((source.words, Bar(takes, least, most) if most > least else "", takes, *left)))
     columns = (
         TableColumn("source", kind="words"),
         TableColumn("", kind="drawing"),
@@ -262,29 +192,21 @@ def contributions_table(result: CircleFigures) -> Table:
     )
     caption = sentence(
         "Each error source removed in turn at {} and {}; what it takes from the largest contour error",
-        *setup_values(result),
+        *_setup_values(result),
     )
     return Table(columns, tuple(rows), caption)
 
 
-def circle_chart(contour: ContourProfile, result: CircleFigures, profile: Profile) -> Chart | None:
-    """The circle with its error magnified; None if there is no error to show.
-
-    Parameters
-    ----------
-    contour
-        Contour error around the circle.
-    result
-        The circle test at one period.
-    profile
-        The network and its tolerances.
-    """
+def _circle_chart(run: CircleRun, result: CircleFigures, profile: Profile) -> Chart | Sentence:
+    """The circle with its error magnified, or the reason why it is not drawn."""
+    if run.diverged:
+        return Sentence(("Not drawn: ", *_failure_words(result).parts, "."))
+    contour, setup = contour_profile(run), _setup_values(result)
     tolerance_mm = profile.tolerance.max_contour_error_mm
-    scale = magnified(largest_mm(contour), tolerance_mm=tolerance_mm)
+    scale = magnified(contour.largest_mm, tolerance_mm=tolerance_mm)
     if scale is None:
-        return None
+        return sentence("At {} and {} there is no contour error to draw.", *setup)
     part = "at constant speed" if result.path == "trapezoid" else "on the turn"
-    setup = setup_values(result)
     caption = sentence(f"Contour error {part}, at {{}} and {{}}", *setup)
     if result.max_contour_error_mm is not None:
         largest = attribute_value(CIRCLE_BY_KEY["max_contour_error_mm"], result)
@@ -303,11 +225,13 @@ def circle_chart(contour: ContourProfile, result: CircleFigures, profile: Profil
         ShownValue(scale.times(result.radius_mm), decimals=0),
         ShownValue(scale.ring_um * scale.unit.per_um, unit=scale.unit.name),
     )
-    drawing = circle_drawing(contour, scale, profile.circle.direction)
+    drawing = Drawing(
+        "Circle with its contour error magnified", (Panel(dial(contour, scale, profile.circle.direction)),)
+    )
     return Chart(drawing, caption, joined(times, limit, by=""))
 
 
-def circle_records(test: CircleTest) -> list[Record]:
+def circle_records(test: CircleTestAnswer) -> list[Record]:
     """One flat row for each period: the centre in two columns, failures by name, a column for each error source."""
     sources = sorted({part.source for result in test.results for part in result.contributions or ()})
     records = []
@@ -323,7 +247,7 @@ def circle_records(test: CircleTest) -> list[Record]:
     return records
 
 
-def circle_document(test: CircleTest) -> JsonDocument:
+def circle_document(test: CircleTestAnswer) -> JsonDocument:
     """Document of `busplan circle-test --format json`."""
     results = []
     for result in test.results:
@@ -335,3 +259,46 @@ def circle_document(test: CircleTest) -> JsonDocument:
             record["contributions"] = None if ranked is None else [source._asdict() for source in ranked]
         results.append(record)
     return document("circle-test", profile=test.profile.name, results=results)
+
+
+TRACE_COLUMNS: Final = (
+    "period_us",
+    "time_us",
+    "command_x_mm",
+    "command_y_mm",
+    "x_mm",
+    "y_mm",
+    "contour_error_mm",
+)
+
+_BLOCK: Final = 4096
+"""Rows converted to Python numbers at a time."""
+
+
+def trace_records(test: CircleTestAnswer, *, every: int) -> Iterator[Record]:
+    """One row for every n-th step of each simulated period.
+
+    Parameters
+    ----------
+    test
+        The circle test.
+    every
+        n, 1 or more [1].
+    """
+    for result, run in zip(test.results, test.runs, strict=True):
+        if run is None:
+            continue
+        trace = run.trace(every=every)
+        columns = (
+            trace.time_us,
+            trace.command_x_mm,
+            trace.command_y_mm,
+            trace.x_mm,
+            trace.y_mm,
+            trace.contour_error_mm,
+        )
+        for start in range(0, len(trace.time_us), _BLOCK):
+            # Python floats take four times the memory of numpy floats.
+            block = [column[start : start + _BLOCK].tolist() for column in columns]
+            for values in zip(*block, strict=True):
+                yield dict(zip(TRACE_COLUMNS, (result.period_us, *values), strict=True))

@@ -5,14 +5,15 @@ delay of a host loop can make the circle rounder while it reduces the margins, s
 """
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from math import inf
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.network import Network
 from busplan.progress import Progress
-from busplan.questions.circle import NEGLIGIBLE_MM, CircleFigures, CircleTest
+from busplan.questions.circle import NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer, Contribution
 from busplan.questions.circle.failures import bus_failures, circle_failures, tightest_margins
 from busplan.questions.fit.circle_refusal import (
     delivery_of,
@@ -57,23 +58,6 @@ class Setup(NamedTuple):
         return self._replace(x=replace(self.x, **changes), y=replace(self.y, **changes))
 
 
-class Contribution(NamedTuple):
-    """One error source, and the circle without it."""
-
-    source: str
-    max_contour_error_mm: float
-    """Largest contour error when this source is removed [mm]."""
-    removed_mm: float
-    """Decrease of the largest contour error by its removal [mm]; negative if it hides another source."""
-    mean_contour_error_mm: float
-    """Mean contour error when this source is removed [mm]."""
-    circular_deviation_mm: float | None
-    """Circular deviation G when this source is removed [mm]; None on a trapezoid."""
-
-
-Removal = Callable[[Setup], Setup]
-
-
 def _with_setpoints_every_step(setup: Setup) -> Setup:
     """Return the setup with a set-point at every step; unchanged if the period has other effects than chords."""
     path, timing, delivery = setup.path, setup.timing, setup.delivery
@@ -94,7 +78,7 @@ def _with_setpoints_every_step(setup: Setup) -> Setup:
     )
 
 
-_REMOVALS: Mapping[str, Removal] = {
+_REMOVALS: Mapping[str, Callable[[Setup], Setup]] = {
     "velocity_feedforward": lambda setup: setup.with_axes(velocity_feedforward=1.0),
     "acceleration_feedforward": lambda setup: setup.with_axes(acceleration_feedforward_s=0.0),
     "drive_lag": lambda setup: setup.with_axes(drive_lag_us=0.0),
@@ -162,20 +146,8 @@ def contributions(
     return tuple(sorted(ranked, key=lambda contribution: -contribution.removed_mm))
 
 
-def bus(network: Network) -> FitFigures:
-    """Capacity under the timing model that decides."""
-    return figures(network, model=network.bus.deciding_model)
-
-
 def setup(network: Network) -> Setup:
-    """Input of the circle simulation of a network.
-
-    Raises
-    ------
-    BusplanError
-        As `circle_test`.
-    """
-    require_circle(network)
+    """Input of the circle simulation of a network, whose circle can be run."""
     profile, settling_us = network.profile, path_settling_us(network)
     circle = profile.circle
     x, y = loop_axes(network)
@@ -215,17 +187,6 @@ class Estimate(NamedTuple):
     time_s: float
     memory_bytes: float
 
-    def then(self, following: "Estimate") -> "Estimate":
-        """Cost of this and, with its memory free again, of what follows.
-
-        Parameters
-        ----------
-        following
-            Cost of the runs that follow.
-        """
-        memory_bytes = max(self.memory_bytes, following.memory_bytes)
-        return Estimate(self.steps + following.steps, self.time_s + following.time_s, memory_bytes)
-
     @property
     def is_long(self) -> bool:
         """Whether it takes long enough to be announced."""
@@ -239,11 +200,7 @@ class Estimate(NamedTuple):
         return f"circle test: {self.steps:,} steps, about {self.time_s:.0f} s and {memory}{engine}"
 
 
-NOTHING: Final = Estimate(0, 0.0, 0.0)
-"""Cost of no simulation."""
-
-
-def estimate(kept: Sequence[Setup], passing: Sequence[Setup] = ()) -> Estimate:
+def estimate(kept: Sequence[Setup], passing: Iterable[Setup] = ()) -> Estimate:
     """Estimate what simulations cost.
 
     Parameters
@@ -254,12 +211,13 @@ def estimate(kept: Sequence[Setup], passing: Sequence[Setup] = ()) -> Estimate:
         Simulations that are only measured.
     """
     rate_us = _STEP_US[compiled_kernel("auto") is not None]
-    setups = [*kept, *passing]
-    sizes = [_STEP_BYTES * setup.steps + _SETPOINT_BYTES * setup.path.setpoints for setup in setups]
+    # Setups that pass may be made one by one: each takes memory.
+    sizes = [(setup.steps, setup.path.setpoints) for setup in chain(kept, passing)]
+    memory_bytes = [_STEP_BYTES * steps + _SETPOINT_BYTES * setpoints for steps, setpoints in sizes]
     return Estimate(
-        steps=_AXES * sum(setup.steps for setup in setups),
-        time_s=sum(_AXES * rate_us * setup.steps + _SETPOINT_US * setup.path.setpoints for setup in setups) / 1e6,
-        memory_bytes=sum(sizes[: len(kept)]) + max(sizes[len(kept) :], default=0),
+        steps=_AXES * sum(steps for steps, _ in sizes),
+        time_s=sum(_AXES * rate_us * steps + _SETPOINT_US * setpoints for steps, setpoints in sizes) / 1e6,
+        memory_bytes=sum(memory_bytes[: len(kept)]) + max(memory_bytes[len(kept) :], default=0),
     )
 
 
@@ -277,49 +235,17 @@ def announce(cost: Estimate) -> None:
 
 _LEAST_ARC_DEG: Final = 270.0
 """Shortest arc of a trapezoid for a least-squares centre and radius."""
+_CONTOUR_FIGURES: Final = (*CONTOUR_MEASURES, "radial_deviation_min_mm", "radial_deviation_max_mm")
 
 
-def failed_measure(result: CircleFigures) -> str | None:
-    """Name of the first contour measure that misses its tolerance; None if there is none.
-
-    Parameters
-    ----------
-    result
-        The circle test at one period.
-    """
-    failed = (failure for failure in result.failures if failure.name in CONTOUR_MEASURES)
-    return next((failure.name for failure in failed if failure.value is not None), None)
-
-
-def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
-    """Find the source whose removal reduces the first failed contour measure most, and the reduction [mm].
-
-    Parameters
-    ----------
-    result
-        The circle test at one period, with contributions.
-
-    Returns
-    -------
-    tuple or None
-        None if no contour measure fails, or no removal reduces it.
-    """
-    measure = failed_measure(result)
-    if measure is None or not result.contributions:
-        return None
-    first = min(result.contributions, key=lambda source: float(getattr(source, measure)))
-    removed_mm = float(getattr(result, measure)) - float(getattr(first, measure))
-    return (first, removed_mm) if removed_mm > 0 else None
-
-
-def circle_test(
+def run_circles(
     network: Network,
     *,
     periods_us: Sequence[float] | None = None,
     with_contributions: bool = False,
     explain: bool = True,
     progress: Progress | None = None,
-) -> CircleTest:
+) -> CircleTestAnswer:
     """Run the circle test of a network.
 
     Parameters
@@ -335,11 +261,6 @@ def circle_test(
     progress
         Called now and then with the steps simulated so far and those known to be needed.
 
-    Returns
-    -------
-    CircleTest
-        One result for each period.
-
     Raises
     ------
     BusplanError
@@ -353,13 +274,12 @@ def circle_test(
     counter = _Counter(progress)
     # Set up every period before the first simulation, so that errors come at once. A period that does not fit the bus
     # needs no path.
-    capacities = [bus(variant) for variant in variants]
-    setups = [
-        setup(variant) if capacity.fits else _timing(variant)
-        for variant, capacity in zip(variants, capacities, strict=True)
-    ]
-    simulated = [prepared for prepared in setups if isinstance(prepared, Setup)]
-    ranked = [sources(prepared) if with_contributions and isinstance(prepared, Setup) else {} for prepared in setups]
+    for variant in variants:
+        require_circle(variant)
+    capacities = [figures(variant, model=variant.bus.deciding_model) for variant in variants]
+    setups = [setup(variant) if capacity.fits else None for variant, capacity in zip(variants, capacities, strict=True)]
+    simulated = [prepared for prepared in setups if prepared]
+    ranked = [sources(prepared) if with_contributions and prepared else {} for prepared in setups]
     passing = [source for without in ranked for source in without.values()]
     counter.expect(*simulated, *passing)
     announce(estimate(simulated, passing))
@@ -367,15 +287,9 @@ def circle_test(
         _test(variant, capacity, prepared, without if with_contributions else None, explain=explain, counter=counter)
         for variant, capacity, prepared, without in zip(variants, capacities, setups, ranked, strict=True)
     ]
-    return CircleTest(
+    return CircleTestAnswer(
         network.profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs), with_contributions
     )
-
-
-def _timing(network: Network) -> LoopTiming:
-    """Timing of a circle that could be run, on a bus that does not carry it."""
-    require_circle(network)
-    return loop_timing(network.profile)
 
 
 class _Counter:
@@ -413,18 +327,18 @@ class _Counter:
 def _test(
     network: Network,
     capacity: FitFigures,
-    prepared: Setup | LoopTiming,
+    prepared: Setup | None,
     without: Mapping[str, Setup] | None,
     *,
     explain: bool,
     counter: _Counter,
 ) -> tuple[CircleFigures, CircleRun | None]:
     """Test one period; `without` has the setup without each error source, if they are to be ranked."""
-    if isinstance(prepared, LoopTiming):
-        return _figures(network, prepared, capacity, None, settled=True), None
+    if prepared is None:
+        return _figures(network, capacity, None, settled=True), None
     run = counter.run(prepared)
-    result = _figures(network, prepared.timing, capacity, run, settled=prepared.settled)
-    if without is None and explain and failed_measure(result):
+    result = _figures(network, capacity, run, settled=prepared.settled)
+    if without is None and explain and result.failed_measure:
         without = sources(prepared)
         counter.expect(*without.values())
         announce(estimate((), tuple(without.values())))
@@ -434,10 +348,8 @@ def _test(
     return result, run
 
 
-def _figures(
-    network: Network, timing: LoopTiming, capacity: FitFigures, run: CircleRun | None, *, settled: bool
-) -> CircleFigures:
-    profile = network.profile
+def _figures(network: Network, capacity: FitFigures, run: CircleRun | None, *, settled: bool) -> CircleFigures:
+    profile, timing = network.profile, loop_timing(network.profile)
     phase_deg, gain_db, crossover_hz = tightest_margins(run) if run else (None, None, None)
     contour = run.contour if run and settled else None
     is_turn = profile.circle.path != "trapezoid"
@@ -478,11 +390,7 @@ def _figures(
         gain_margin_db=gain_db,
         crossover_hz=crossover_hz,
         settled=settled if run and is_turn else None,
-        mean_contour_error_mm=contour.mean_contour_error_mm if contour else None,
-        max_contour_error_mm=contour.max_contour_error_mm if contour else None,
-        radial_deviation_min_mm=contour.radial_deviation_min_mm if contour else None,
-        radial_deviation_max_mm=contour.radial_deviation_max_mm if contour else None,
-        circular_deviation_mm=contour.circular_deviation_mm if contour else None,
+        **{key: getattr(contour, key, None) for key in _CONTOUR_FIGURES},
         radius_deviation_mm=round_.radius_deviation_mm if round_ else None,
         centre_offset_mm=round_.centre_offset_mm if round_ else None,
         constant_speed_deg=run.constant_speed_deg if run else None,

@@ -195,7 +195,7 @@ def most_safe_axes(network: Network) -> SafeAxes:
     nodes, limit = safe_nodes(network, group=varied.name)
     node_axes = int(varied.node.axes)
     axes_beside = sum(
-        int(group.nodes) * int(group.node.axes) for group in profile.alike_nodes if group.name != varied.name
+        int(group.nodes) * int(group.node.axes) for group in profile.node_groups if group.name != varied.name
     )
     axes = None if not node_axes else axes_beside + nodes * node_axes if nodes else 0
     return SafeAxes(profile.cycle.period_us, axes, nodes, limit)

@@ -43,7 +43,8 @@ from busplan.questions.base.sentences import (
     with_profile,
 )
 from busplan.questions.compare import KindComparison, MachineOnKind, NotOnKind, SafeAxes, fitting
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, limits_behind
+from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS
+from busplan.questions.fit.figures import limits_behind
 
 _INKS: Final[tuple[Ink, ...]] = ("request", "contention", "work", "sync", "acknowledge", "response", "reserve")
 """Colours of the curves; each has a letter, too."""
@@ -199,8 +200,7 @@ def _left_out(comparison: KindComparison) -> Iterator[Sentence]:
 
 def _obstacles(machine: MachineOnKind) -> Iterator[Sentence]:
     """The limits that are broken, and why no period is shown to fit."""
-    bus, network = machine.network.bus, machine.network
-    broken = [limit.words(network) for limit in map(bus.limit, limits_behind(machine.figures)) if limit]
+    broken = [limit.words(machine.network) for limit in limits_behind(machine.figures, machine.network)]
     if broken:
         yield Sentence((f"At {period(machine.figures.period_us)} {'; '.join(broken)}.",))
     if machine.smallest.us is None:

@@ -12,8 +12,8 @@ from busplan.buses.figure import Figure, by_key
 from busplan.buses.network import Network
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.profile.edit import load_revision
 from busplan.profile.kinds import KeyValue, dotted_keys
+from busplan.profile.sources import load_revision
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, argument, checked_models, finite, load_network
 from busplan.questions.fit.certainty import VERDICTS, VerdictWord

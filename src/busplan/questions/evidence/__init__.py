@@ -4,9 +4,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from inspect import signature
 from math import hypot
-from typing import Any, Literal, NamedTuple, Self, TypeVar
+from typing import Any, Literal, NamedTuple, Self
 
 from pydantic import ConfigDict, Field, ValidationError, model_validator
 
@@ -24,14 +23,13 @@ from busplan.profile.sources import load
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.circle import CircleFigures
-from busplan.questions.circle.roundness import circle_test
+from busplan.questions.circle.roundness import run_circles
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.sections.base import Section
 from busplan.sourced import Grade
 
 Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
-_Model = TypeVar("_Model", bound=Section)
 
 
 class Comparison(NamedTuple):
@@ -76,27 +74,29 @@ class Row(Section):
 
     quantity: str
     unit: Unit
-    published: int | float | None = Field(
-        default=None, gt=0, description="The figure as printed; None for a computed one alone"
-    )
-    grade: Grade | None = Field(default=None, description="How well the published figure is known")
-    share_of: int | float = Field(default=1, gt=0, description="A printed figure that both are shown as a share of")
-    profile: str = Field(description="Shipped profile that is computed")
-    set: dict[str, Any] = Field(default={}, description="New values of the profile, by dotted key")
-    model: str | None = Field(default=None, description="Timing model; None for the one that decides")
-    method: str | None = Field(default=None, description="Name of the way to compute it; None for the timing model")
-    figures: tuple[str | int | float, ...] = Field(
-        strict=False,
-        min_length=1,
-        description="What is computed, added up: figures of capacity (required_us), of a transaction "
-        "(latency.write.latency_us) or of the circle test (circle.duration_s), constants and functions of the kind of "
-        "bus, and numbers of the source",
-    )
-    given: dict[str, Any] = Field(default={}, description="Arguments of the function")
-    divided_by: dict[str, Any] | None = Field(
-        default=None, description="Divisor of the computed figure: the same row with these keys changed"
-    )
-    doubt: str | None = Field(default=None, description="Key of the doubts that U of the computed figure comes from")
+    published: int | float | None = Field(default=None, gt=0)
+    """The figure as printed; None for a computed one alone."""
+    grade: Grade | None = None
+    """How well the published figure is known."""
+    share_of: int | float = Field(default=1, gt=0)
+    """A printed figure that both are shown as a share of."""
+    profile: str
+    """Shipped profile that is computed."""
+    set: dict[str, Any] = Field(default={})
+    """New values of the profile, by dotted key."""
+    model: str | None = None
+    """Timing model; None for the one that decides."""
+    method: str | None = None
+    """Name of the way to compute it; None for the timing model."""
+    figures: tuple[str | int | float, ...] = Field(strict=False, min_length=1)
+    """What is computed, added up: figures of capacity (required_us), of a transaction (latency.write.latency_us) or of
+    the circle test (circle.duration_s), constants and functions of the kind of bus, and numbers of the source."""
+    given: dict[str, Any] = Field(default={})
+    """Arguments of the function."""
+    divided_by: dict[str, Any] | None = None
+    """Divisor of the computed figure: the same row with these keys changed."""
+    doubt: str | None = None
+    """Key of the doubts that U of the computed figure comes from."""
 
     @model_validator(mode="after")
     def _is_graded(self) -> Self:
@@ -145,7 +145,7 @@ def sections_of(bus: Bus, data: str, *, progress: Progress | None = None) -> Ite
 
     for content in published(data).get("evidence", ()):
         with _placed(f"{data}.toml: [[evidence]] {content.get('title')!r}"):
-            table = _checked(_Table, content)
+            table = _Table.model_validate(content)
             rows = list(_rows(table))
             if bus_of(load(rows[0].profile).profile) is bus:
                 note = " ".join(filter(None, (table.source and f"{table.source}.", table.note)))
@@ -159,7 +159,7 @@ def _rows(table: _Table) -> Iterator[Row]:
         shared = {key: value for key, value in content.items() if key != "methods"}
         for method in content.get("methods", table.methods):
             with _placed(f"row {content.get('quantity')!r}"):
-                yield _checked(Row, _joined(table.model_extra or {}, shared, method))
+                yield Row.model_validate(_joined(table.model_extra or {}, shared, method))
 
 
 def _joined(*parts: Mapping[str, Any]) -> dict[str, Any]:
@@ -171,22 +171,16 @@ def _joined(*parts: Mapping[str, Any]) -> dict[str, Any]:
     return joined
 
 
-def _checked(model: type[_Model], content: Mapping[str, Any]) -> _Model:
-    try:
-        return model.model_validate(content)
-    except ValidationError as error:
-        raise BusplanError(
-            *(f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors())
-        ) from None
-
-
 @contextmanager
 def _placed(place: str) -> Iterator[None]:
     """Put a place before each message of an error."""
     try:
         yield
-    except BusplanError as error:
-        raise BusplanError(*(f"{place}: {problem}" for problem in str(error).split("\n"))) from None
+    except ValidationError as error:
+        problems = [f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}" for problem in error.errors()]
+        raise BusplanError(*(f"{place}: {problem}" for problem in problems)) from None
+    except (BusplanError, TypeError) as error:
+        raise BusplanError(*(f"{place}: {problem}" for problem in str(error).split("\n"))) from error
 
 
 class _Case:
@@ -211,7 +205,7 @@ class _Case:
 
     @cached_property
     def _circle(self) -> CircleFigures:
-        return circle_test(self.network, progress=self._progress).results[0]
+        return run_circles(self.network, progress=self._progress).results[0]
 
     def sum_of(self, row: Row) -> float:
         """The figures of a row with this profile and this model, added up."""
@@ -223,10 +217,6 @@ class _Case:
         if name in self.bus.constants:
             value = float(self.bus.constants[name])
         elif function := self.bus.evidence_functions().get(name):
-            try:
-                signature(function).bind(self._cycle, **given)
-            except TypeError as error:
-                raise BusplanError(f"given: {name}: {error}") from None
             value = function(self._cycle, **given)
         elif source == "circle":
             value = getattr(self._circle, key, None)
@@ -251,7 +241,7 @@ def _comparison(title: str, row: Row, case: Callable[[Row], _Case]) -> Compariso
     with _placed(f"row {row.quantity!r}"):
         computed, divisor = case(row), row.share_of
         if row.divided_by is not None:
-            below = _checked(Row, _joined(row.model_dump(exclude={"divided_by"}), row.divided_by))
+            below = Row.model_validate(_joined(row.model_dump(exclude={"divided_by"}), row.divided_by))
             divisor = divisor * case(below).sum_of(below)
         return Comparison(
             title,

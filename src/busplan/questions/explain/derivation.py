@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from inspect import signature
 from itertools import product
 from math import isinf
 from types import MappingProxyType
@@ -14,206 +13,22 @@ from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure, by_key, term_name
 from busplan.buses.network import Network
-from busplan.elementwise import CHOSEN, COMPARISON, FUNCTION, OPERATIONS, Number, Traced, value_of
+from busplan.elementwise import Number, Traced, value_of
 from busplan.english import listed
 from busplan.errors import BusplanError
+from busplan.questions.explain.formula import formula_text, inputs, lines
 from busplan.questions.fit.certainty import certainty
 from busplan.questions.fit.figures import certainty_numbers, numeric_figures
-from busplan.questions.fit.inputs import choosing_keys, traced_profile
-from busplan.questions.fit.network import leading_model, model_names, network_of
-from busplan.sourced import DIGITS, SYMBOLS, Equation, Input, Sourced, input_of, short
-
-_ATOM: Final = 4
-_MOST_TERMS: Final = 24
-"""Operands of a sum that is written out."""
-_SHOWN_TERMS: Final = 3
-"""Operands of a longer sum that are written, from its first."""
-_MOST_DIGITS: Final = 17
-"""Digits that distinguish any two floats."""
-_SUPPORTS: Final = 1e-4
-"""Largest relative error of a written difference, caused by the digits that it does not show."""
-_MOST_HINTS: Final = 3
-
-
-def against(left: float, sign: str, right: float) -> str:
-    """Write a comparison with enough digits to see that it holds.
-
-    Examples
-    --------
-    >>> against(205.917, "<=", 2000.0), against(205.91746955, ">", 205.91746954)
-    ('205.917 <= 2000', '205.91746955 > 205.91746954')
-    """
-    digits = DIGITS
-    while left != right and f"{left:.{digits}g}" == f"{right:.{digits}g}" and digits < _MOST_DIGITS:
-        digits += 1
-    return f"{left:.{digits}g} {sign} {right:.{digits}g}"
-
-
-def less(left: float, right: float) -> str:
-    """Write a difference with enough digits to reproduce its result.
-
-    Examples
-    --------
-    >>> less(2000.0, 205.91747), less(320.00001432686, 320.0)
-    ('2000 - 205.9175', '320.000014327 - 320')
-    """
-    digits = DIGITS
-    while digits < _MOST_DIGITS:
-        seen = float(f"{left:.{digits}g}") - float(f"{right:.{digits}g}")
-        if abs(seen - (left - right)) <= _SUPPORTS * abs(left - right):
-            break
-        digits += 1
-    return f"{left:.{digits}g} - {right:.{digits}g}"
-
-
-def formula_text(operand: Number, *, in_numbers: bool) -> str:
-    """Write the expression of a number in terms of named numbers.
-
-    Parameters
-    ----------
-    operand
-        A computed number.
-    in_numbers
-        If True, write values instead of symbols.
-
-    Examples
-    --------
-    >>> nodes = Traced(2, given=Input("N", "bus.nodes", 2, "", "given", "profile", "nodes"))
-    >>> delay = 0.25 * (nodes + 1)
-    >>> formula_text(delay, in_numbers=False), formula_text(delay, in_numbers=True), delay.value
-    ('0.25 (N + 1)', '0.25 * (2 + 1)', 0.75)
-    """
-    # An expression without a name that was chosen stands for the choice.
-    while isinstance(operand, Traced) and operand.operation == CHOSEN:
-        chosen = operand.parts[0]
-        if not isinstance(chosen, Traced) or chosen.symbol:
-            break
-        operand = chosen
-    if isinstance(operand, Traced) and not operand.operation:
-        return operand.numbers if in_numbers else operand.formula
-    if in_numbers and isinstance(operand, Traced) and all(_is_atom(part) for part in operand.parts):
-        values = [value_of(part) for part in operand.parts]
-        if operand.operation == "sub":
-            return less(*map(float, values))
-        if operand.operation in OPERATIONS and OPERATIONS[operand.operation].rank == COMPARISON:
-            return against(values[0], OPERATIONS[operand.operation].sign, values[1])
-    return _written(operand, in_numbers=in_numbers, top=True)[0]
-
-
-def _written(operand: Number, *, in_numbers: bool, top: bool = False) -> tuple[str, int]:
-    """Text of an operand, and its operator precedence."""
-    if not isinstance(operand, Traced):
-        symbol = operand.symbol if isinstance(operand, Sourced) and not in_numbers else ""
-        return _atom(symbol or short(value_of(operand)))
-    if not top and (operand.symbol or not operand.operation):
-        return _atom(short(operand.value) if in_numbers or not operand.symbol else operand.symbol)
-    if operand.operation == CHOSEN:
-        chosen = operand.parts[0]
-        if isinstance(chosen, Sourced) and not in_numbers:
-            return _atom(chosen.symbol or chosen.meaning)
-        return _written(chosen, in_numbers=in_numbers)
-    terms = _chained(operand)
-    if len(terms) > _MOST_TERMS:
-        return _shortened(operand.operation, terms, in_numbers=in_numbers)
-    return _joined(operand, [_written(part, in_numbers=in_numbers) for part in operand.parts], in_numbers=in_numbers)
-
-
-def _chained(operand: Traced) -> list[Number]:
-    """The operands of a sum, or of the largest or smallest of several; of other operations none."""
-    if operand.operation not in ("add", "larger", "smaller"):
-        return []
-    operands: list[Number] = []
-    left: Number = operand
-    while isinstance(left, Traced) and left.operation == operand.operation and (left is operand or not left.symbol):
-        left, right = left.parts
-        operands.append(right)
-    return [left, *reversed(operands)]
-
-
-def _shortened(name: str, terms: Sequence[Number], *, in_numbers: bool) -> tuple[str, int]:
-    """The first operands and the last: nobody reads a sum of hundreds."""
-    operation = OPERATIONS[name]
-    written = [_written(term, in_numbers=in_numbers)[0] for term in (*terms[:_SHOWN_TERMS], terms[-1])]
-    written.insert(-1, f"... {len(terms) - len(written)} more ...")
-    if operation.rank == FUNCTION:
-        return f"{operation.sign}({', '.join(written)})", FUNCTION
-    return f" {operation.sign} ".join(written), operation.rank
-
-
-def _joined(operand: Traced, parts: list[tuple[str, int]], *, in_numbers: bool) -> tuple[str, int]:
-    """Text and precedence of an operation, from those of its operands."""
-    operation = OPERATIONS[operand.operation]
-    if operation.rank == FUNCTION:
-        return f"{operation.sign}({', '.join(text for text, _ in parts)})", FUNCTION
-    (left, left_rank), (right, right_rank) = parts
-    left = f"({left})" if left_rank < operation.rank else left
-    # The right operand of -, / and ^ needs brackets at the same precedence, too.
-    tighter = operation.rank + (operation.sign in "-/^")
-    right = f"({right})" if right_rank < tighter else right
-    if operation.sign == "*" and not in_numbers and not right[0].isdigit():
-        return f"{left} {right}", operation.rank
-    return f"{left} {operation.sign} {right}", operation.rank
-
-
-def _is_atom(operand: Number) -> bool:
-    return not isinstance(operand, Traced) or bool(operand.symbol) or not operand.operation
-
-
-def _atom(text: str) -> tuple[str, int]:
-    rank = 1 if " + " in text or text.startswith("-") else 2 if " " in text else _ATOM
-    return text, rank
-
-
-def formula_of(equation: Equation) -> str:
-    """Write an equation in symbols by computing it with traced numbers.
-
-    Examples
-    --------
-    >>> from busplan.sourced import EQUATIONS
-    >>> formula_of(EQUATIONS["acknowledge_phase_us"])
-    'hop H + 0.25'
-    """
-    names = list(signature(equation.function).parameters)
-    # Any number but 0 and 1, which truth values equal.
-    first, *rest = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
-    result = equation.function(first, **dict(zip(names[1:], rest, strict=True)))
-    return result.symbol or formula_text(result, in_numbers=False)
-
-
-def lines(figure: Traced) -> Iterator[Traced]:
-    """Every named number behind a figure, in the order of computation; the figure is last."""
-    yield from (number for number in _visit(figure) if not number.given and (number.symbol or number is figure))
-
-
-def inputs(figure: Traced) -> Iterator[Input]:
-    """Inputs of a figure: keys of the profile and constants, each once."""
-    leaves: dict[tuple[str, str], Input] = {}
-    for number in _visit(figure):
-        for leaf in (number.given, *(input_of(part) for part in number.parts if isinstance(part, Sourced))):
-            if leaf is not None:
-                leaves.setdefault((leaf.name, leaf.symbol), leaf)
-    yield from leaves.values()
-
-
-def _visit(figure: Traced) -> Iterator[Traced]:
-    """Every number behind a figure once, its parts before it; a sum of thousands is deeper than Python recurses."""
-    seen: set[int] = set()
-    waiting = [(figure, False)]
-    while waiting:
-        number, has_parts_behind = waiting.pop()
-        if has_parts_behind:
-            yield number
-        elif id(number) not in seen:
-            seen.add(id(number))
-            waiting.append((number, True))
-            waiting.extend((part, False) for part in reversed(number.parts) if isinstance(part, Traced))
-
+from busplan.questions.fit.inputs import choosing_keys, traced_network
+from busplan.questions.fit.network import leading_model, model_names
+from busplan.sourced import Input, Sourced, short
 
 CommandName = Literal["capacity", "latency"]
 _Numbers = Mapping[str, Traced]
 
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 """Grades from the weakest to the strongest; "given" values are choices, not knowledge."""
+_MOST_HINTS: Final = 3
 _BESIDE: Final = MappingProxyType({MARGIN_CORRECTED.key: (UNCERTAINTY,)})
 """Figures that are derived beside another: a margin says nothing without its uncertainty."""
 
@@ -291,37 +106,30 @@ def derive(
         There is no such figure, no equation leads to it, or an option does not apply to it.
     """
     network = networks[0]
-    command, figures, wanted_transactions = wanted(name, network)
-    if transactions is not None and command != "latency":
-        keys = (f"latency.{figure.key}" for figure in figures if figure.key in figures_of(network.bus)["latency"])
-        instead = next((f"; {key} has" for key in keys), "")
-        raise BusplanError(f"{name}: a figure of {command}, which has no transactions{instead}")
-    transactions = transactions or wanted_transactions
-    derivations = tuple(
-        derivation for at in networks for derivation in _at_period(at, command, figures, timing_models, transactions)
-    )
+    meant = wanted(name, network)
+    if transactions is not None and meant.command != "latency":
+        timed = figures_of(network.bus)["latency"]
+        instead = next((f"; latency.{figure.key} has" for figure in meant.figures if figure.key in timed), "")
+        raise BusplanError(f"{name}: a figure of {meant.command}, which has no transactions{instead}")
+    if transactions:
+        meant = meant._replace(transactions=tuple(transactions))
+    derivations = tuple(derivation for at in networks for derivation in _at_period(at, meant, timing_models))
     if not derivations:
-        raise BusplanError(_why_none(network, command, figures[0], timing_models))
+        raise BusplanError(_why_none(network, meant, timing_models))
     return derivations
 
 
-def _at_period(
-    network: Network,
-    command: CommandName,
-    figures: Sequence[Figure],
-    timing_models: Sequence[str] | None,
-    transactions: Sequence[str] | None,
-) -> Iterator[Derivation]:
+def _at_period(network: Network, meant: Wanted, timing_models: Sequence[str] | None) -> Iterator[Derivation]:
     """The derivations of some figures, nested by transaction, figure and timing model."""
     deciding, leading = network.bus.deciding_model, leading_model(network)
     models = timing_models or (leading, deciding)
-    numbers = {model: numbers_of(network, command, model=model) for model in models}
-    for transaction, figure in product(transactions or numbers[models[0]], figures):
+    numbers = {model: numbers_of(network, meant.command, model=model) for model in models}
+    for transaction, figure in product(meant.transactions or numbers[models[0]], meant.figures):
         for model in timing_models or [deciding if figure in CERTAINTY else leading]:
             traced = numbers[model][transaction]
             for shown in (figure, *_BESIDE.get(figure.key, ())):
                 if shown.key in traced:
-                    yield _derivation(network, traced[shown.key], command, shown, model, transaction or None)
+                    yield _derivation(network, traced[shown.key], meant.command, shown, model, transaction or None)
 
 
 def _derivation(
@@ -348,11 +156,11 @@ def _existing(value: object) -> object:
     return None if isinstance(value, float) and isinf(value) else value
 
 
-def _why_none(network: Network, command: CommandName, figure: Figure, timing_models: Sequence[str] | None) -> str:
-    deciding = network.bus.deciding_model
+def _why_none(network: Network, meant: Wanted, timing_models: Sequence[str] | None) -> str:
+    figure, deciding = meant.figures[0], network.bus.deciding_model
     if timing_models is not None and figure in CERTAINTY and deciding not in timing_models:
         return f"{figure.key}: belongs to the timing model that decides and to no other, {deciding}"
-    if (command, figure) in explained_figures(network):
+    if (meant.command, figure) in explained_figures(network):
         return f"{figure.key}: does not exist under this timing model, or for this transaction"
     return (
         f"{figure.key}: no equation leads to it in {network.profile.name} ({figure.meaning}); busplan explain "
@@ -383,15 +191,14 @@ def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[st
         Numbers; an infinite one does not exist.
     """
     # Traced for each command: a number keeps the name that it is given first.
-    network = network_of(traced_profile(network.profile))
+    network = traced_network(network)
     cycle = network.bus.cycle(network, model=model)
     figures = figures_of(network.bus)[command]
     if command == "capacity":
         return {"": _traced(_of_capacity(cycle, is_decided=model == network.bus.deciding_model), figures)}
+    nodes = network.nodes
     return {
-        latency.label: _traced(
-            {"payload_bytes": latency.payload_bytes, "nodes": network.nodes, **latency.phases}, figures
-        )
+        latency.label: _traced({"payload_bytes": latency.payload_bytes, "nodes": nodes, **latency.phases}, figures)
         for latency in cycle.latencies()
     }
 
@@ -399,11 +206,8 @@ def numbers_of(network: Network, command: CommandName, *, model: str) -> dict[st
 def _of_capacity(cycle: BusCycle, *, is_decided: bool) -> dict[str, Number | None]:
     if not cycle.network.groups:
         return {**cycle.figures()}
-    numbers: dict[str, Number | None] = {
-        **{term.key: term.us for term in cycle.terms},
-        **cycle.figures(),
-        **numeric_figures(cycle),
-    }
+    terms = {term.key: term.us for term in cycle.terms}
+    numbers: dict[str, Number | None] = {**terms, **cycle.figures(), **numeric_figures(cycle)}
     if is_decided:
         weighed = certainty(cycle)
         for doubt in weighed.doubts:
@@ -487,11 +291,8 @@ def wanted(name: str, network: Network) -> Wanted:
     transactions = tuple(label for label in labels if _letters(name) in map(_letters, (label, *label.split())))
     if transactions or (name and name in network.names):
         # All other figures of `latency` lead to this one.
-        main = (
-            network.bus.figures.deadlines[0]
-            if network.bus.figures.deadlines
-            else network.bus.figures.latency_table[-1].key
-        )
+        timed = network.bus.figures
+        main = timed.deadlines[0] if timed.deadlines else timed.latency_table[-1].key
         return Wanted("latency", (register["latency"][main],), transactions or None)
     raise BusplanError(f"{name or repr(name)}: no such figure{_hint(name, network)} one, explain lists them")
 
@@ -530,18 +331,18 @@ def assumptions(network: Network) -> tuple[Input, ...]:
         execution time without a grade comes first: it is a fact, not a choice.
     """
     profile, bus = network.profile, network.bus
-    limited = network_of(traced_profile(profile))
+    limited = traced_network(network)
     numbers: list[Number] = []
     for model in model_names(network):
         traced = numbers_of(network, "capacity", model=model)[""]
         numbers += [traced[key] for key in ("required_us", "available_us", "safe_required_us") if key in traced]
     for limit in bus.limits:
         if limit.role != "safety":
-            numbers += (limit.bound.value(limited), limit.bound.most(limited), limit.bound.uncertainty(limited))
+            numbers += (limit.value(limited), limit.most(limited), limit.uncertainty(limited))
     by_name: dict[str, Input] = {}
     for given in inputs(Traced(None, parts=tuple(numbers))):
         by_name.setdefault(given.name, given)
-    executions = tuple(group.node_key("execution.") for group in profile.alike_nodes)
+    executions = tuple(group.node_key("execution.") for group in profile.node_groups)
 
     def rank(given: Input) -> int:
         """Place of the grade of an input; a choice comes after all of them."""

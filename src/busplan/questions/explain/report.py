@@ -23,7 +23,8 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import figure_text, period_value
 from busplan.questions.base.sentences import document, fields, with_profile
-from busplan.questions.explain.derivation import CommandName, Derivation, Step, formula_of
+from busplan.questions.explain.derivation import CommandName, Derivation, Step
+from busplan.questions.explain.formula import formula_of
 from busplan.questions.fit.network import bus_of
 from busplan.sections.profile import Profile
 from busplan.sourced import DIGITS, EQUATIONS, Input, short

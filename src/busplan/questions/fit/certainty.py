@@ -2,16 +2,20 @@
 
 from collections.abc import Callable, Mapping
 from functools import reduce
-from math import inf
-from typing import Final, Literal, NamedTuple, Protocol
+from typing import Final, Literal, NamedTuple
 
 from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
-from busplan.buses.limits import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Bound, Limit
+from busplan.buses.limits import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total, within
 
+VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
+FITS: Final[VerdictWord] = "fits"
+NOT_SHOWN: Final[VerdictWord] = "not shown to fit"
+DOES_NOT_FIT: Final[VerdictWord] = "does not fit"
+VERDICTS: Final = (FITS, NOT_SHOWN, DOES_NOT_FIT)
 TIME: Final = "time"
 """Key of the limit of time, which is no limit of the bus: the cycle must fit its slice."""
 
@@ -37,29 +41,6 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
     return within(required_us, available_us)
 
 
-def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
-    """The limits of a network's kind of bus, without those of safety and without doubts; time is the last."""
-    bus = network.bus
-    time = time_limit(lambda tried: bus.cycle(tried, model=model).most_required_us)
-    return (*(limit.nominal for limit in bus.limits if limit.role != "safety"), time)
-
-
-def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
-    """The limit of time: what a network needs [us] against its share of the period."""
-    return Limit(
-        TIME,
-        "{value:.3f} us needed of {most:.3f} us",
-        Bound(needed_us, available_us),
-    )
-
-
-VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
-FITS: Final[VerdictWord] = "fits"
-NOT_SHOWN: Final[VerdictWord] = "not shown to fit"
-DOES_NOT_FIT: Final[VerdictWord] = "does not fit"
-VERDICTS: Final = (FITS, NOT_SHOWN, DOES_NOT_FIT)
-
-
 class Certainty(NamedTuple):
     """A cycle with its bias and its uncertainty [us]. The numbers may be of any sort."""
 
@@ -72,13 +53,6 @@ class Certainty(NamedTuple):
     safe_required_us: Number
     """Length of slice in which the cycle is shown to fit, reserve included."""
     doubts: tuple[Doubt, ...]
-
-    @property
-    def known_uncertainty_us(self) -> Number:
-        """U; infinite where it is unknown, without a bias and without any doubt."""
-        return (
-            choose(self.uncertainty_us > 0, self.uncertainty_us, inf) if self.bias_us is None else self.uncertainty_us
-        )
 
 
 def certainty(cycle: BusCycle) -> Certainty:
@@ -112,19 +86,11 @@ def certainty(cycle: BusCycle) -> Certainty:
 
 def limit_codes(network: Network) -> dict[str, Number]:
     """The place among `VERDICTS` of each limit of the bus by key, those of safety left out."""
-    return {limit.key: limit.bound.verdict_code(network) for limit in network.bus.limits if limit.role != "safety"}
+    return {limit.key: limit.verdict_code(network) for limit in network.bus.limits if limit.role != "safety"}
 
 
 def time_code(weighed: Certainty, network: Network) -> Number:
-    """The place among `VERDICTS` of the limit of time.
-
-    Parameters
-    ----------
-    weighed
-        The certainty of the network's cycle.
-    network
-        The network.
-    """
+    """The place among `VERDICTS` of the limit of time, from the certainty of a network's cycle."""
     given_us = available_us(network)
     is_shown = fits_in(weighed.safe_required_us, available_us=given_us)
     best_us: Number = weighed.margin_corrected_us + weighed.uncertainty_us
@@ -137,26 +103,11 @@ def verdict_code(codes: Mapping[str, Number]) -> Number:
     return reduce(larger, codes.values())
 
 
-class Judged(Protocol):
-    """A verdict with the limits behind it."""
-
-    @property
-    def verdict(self) -> str | None:
-        """The verdict; None under a timing model that does not decide."""
-
-    @property
-    def exceeded(self) -> tuple[str, ...]:
-        """Keys of the limits that are broken."""
-
-    @property
-    def not_shown(self) -> tuple[str, ...] | None:
-        """Keys of the limits that are neither broken nor shown to be kept; None where the verdict is."""
-
-
-def limits_behind(judged: Judged) -> tuple[str, ...]:
-    """Keys of the limits of the bus that a verdict rests on, time left out: broken, or not shown to be kept."""
-    keys = (judged.not_shown or ()) if judged.verdict == NOT_SHOWN else judged.exceeded
-    return tuple(key for key in keys if key != TIME)
+def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
+    """The limits of a network's kind of bus, without those of safety and without doubts; time is the last."""
+    bus = network.bus
+    time = time_limit(lambda tried: bus.cycle(tried, model=model).most_required_us)
+    return (*(limit.nominal for limit in bus.limits if limit.role != "safety"), time)
 
 
 def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
@@ -164,3 +115,8 @@ def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
     bus = network.bus
     time = time_limit(lambda tried: certainty(bus.cycle(tried, model=bus.deciding_model)).safe_required_us)
     return (*(limit.shown for limit in bus.limits), time)
+
+
+def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
+    """The limit of time: what a network needs [us] against its share of the period."""
+    return Limit(TIME, "{value:.3f} us needed of {most:.3f} us", needed_us, available_us)

@@ -1,14 +1,13 @@
 """The circle that a profile asks for, without simulating it: why it cannot be run, its loops and its length."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import accumulate
 from math import inf
 from typing import Any, Final, Literal
 
 from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network
-from busplan.elementwise import Number, plain
+from busplan.elementwise import plain
 from busplan.questions.fit.certainty import available_us, deciding_cycle, fits_in
 from busplan.sections.base import Section, value_at
 from busplan.sections.machine import CONTOUR_MEASURES
@@ -55,27 +54,16 @@ def skew_us(network: Network) -> float:
 
     A loop on the host has it in its delays.
     """
-    if network.profile.servo.loop == "host" or acts_at_once(network):
+    clock = network.bus.key_of("clock")
+    if network.profile.servo.loop == "host" or not clock or value_at(network.profile, clock):
         return 0.0
     first_us, last_us = _first_and_last_us(deciding_cycle(network))
     return last_us - first_us
 
 
-def acts_at_once(network: Network) -> bool:
-    """Whether the nodes take their set-points at one time; otherwise each does when it has its own."""
-    clock = network.bus.key_of("clock")
-    return not clock or bool(value_at(network.profile, clock))
-
-
 def jitter_us(network: Network) -> float:
     """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds [us]."""
-    return float(plain(any_jitter_us(network)))
-
-
-def any_jitter_us(network: Network) -> Number:
-    """As `jitter_us`, of a profile whose numbers may be arrays [us]."""
-    us: Number = network.profile.delivery.jitter_us + deciding_cycle(network).sync_jitter_us()
-    return us
+    return plain(network.profile.delivery.jitter_us + deciding_cycle(network).sync_jitter_us())
 
 
 def _first_and_last_us(cycle: BusCycle) -> tuple[float, float]:
@@ -101,11 +89,6 @@ def refusals(network: Network) -> tuple[Refused, ...]:
     """Why the circle of a network cannot be run, each cause by its dotted key; empty if it can.
 
     A cycle that does not fit its bus has no circle: then nothing is asked of drives, delivery and move.
-
-    Parameters
-    ----------
-    network
-        The network, whatever it asks for.
     """
     if not network.groups:
         return (Refused("bus.nodes", "none", "messages alone have no axes that could move"),)
@@ -118,11 +101,6 @@ def refusals(network: Network) -> tuple[Refused, ...]:
 
 def require_circle(network: Network) -> None:
     """Refuse a circle that cannot be run.
-
-    Parameters
-    ----------
-    network
-        The network, whatever it asks for.
 
     Raises
     ------
@@ -141,7 +119,7 @@ def _of_run(network: Network, *, is_loop_refused: bool) -> tuple[Refused, ...]:
     axes: list[Axis] = []
     for name in AXIS_NAMES:
         try:
-            axes.append(axis_of(profile, name))
+            axes.append(Axis(**profile.servo.axis_keys(name)))
             refused = [*out_of_reach(axes[-1], name=name, feed_mm_per_min=profile.circle.feed_mm_per_min)]
         except ParameterError as error:
             refused = [*error.refused]
@@ -227,17 +205,6 @@ def _at_key(cause: Refused, profile: Profile, axis: AxisName | None = None) -> R
 # --- parts of the simulation that need no numpy -----------------------------------------------------------------
 
 
-def axis_of(profile: Profile, name: AxisName) -> Axis:
-    """One axis of a profile, without the delay of the bus.
-
-    Raises
-    ------
-    ParameterError
-        Its encoder is too fine.
-    """
-    return Axis(**profile.servo.axis_keys(name))
-
-
 def delivery_of(network: Network) -> Delivery:
     """How set-points arrive, with the skew and the jitter that the bus adds."""
     delivery = network.profile.delivery
@@ -294,11 +261,8 @@ def loop_timing(profile: Profile) -> LoopTiming:
 
 def loop_axes(network: Network) -> tuple[Axis, Axis]:
     """Both axes of a profile with the delays of their loops, in a circle that can be run."""
-    x, y = (
-        replace(axis_of(network.profile, name), delay_us=delay_us)
-        for name, delay_us in zip(AXIS_NAMES, loop_delays_us(network), strict=True)
-    )
-    return x, y
+    keys, (x_us, y_us) = network.profile.servo.axis_keys, loop_delays_us(network)
+    return Axis(**keys("x"), delay_us=x_us), Axis(**keys("y"), delay_us=y_us)
 
 
 def path_steps(network: Network) -> int:

@@ -15,6 +15,7 @@ from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, existing, larger, plain, rounded_up, smaller, total
 from busplan.questions.fit.certainty import (
     FITS,
+    NOT_SHOWN,
     TIME,
     VERDICTS,
     Certainty,
@@ -28,7 +29,7 @@ from busplan.questions.fit.certainty import (
     time_code,
     verdict_code,
 )
-from busplan.questions.fit.network import changed
+from busplan.questions.fit.network import trial
 from busplan.sections.base import MAX_COUNT
 
 
@@ -37,31 +38,6 @@ class MostNodes(NamedTuple):
 
     nodes: Number
     limit: Number
-
-
-def largest_nodes(network: Network, *, model: str, group: str = "") -> tuple[int, str]:
-    """Find the largest number of nodes that fits its period, and the limit that sets it.
-
-    Parameters
-    ----------
-    network
-        The network; its own number of nodes plays no part.
-    model
-        Timing model.
-    group
-        Name of the group whose nodes are counted, the others as they are; empty where all nodes are alike.
-
-    Returns
-    -------
-    tuple
-        Number of nodes [1], and the key of the limit.
-
-    References
-    ----------
-    Paper, equations (1)-(11), with (11) solved for N.
-    """
-    network = network.asking(group)
-    return _with_key(network, limits_with_time(network, model=model))
 
 
 def safe_nodes(network: Network, *, group: str = "", without: str | None = None) -> tuple[int, str]:
@@ -74,7 +50,7 @@ def safe_nodes(network: Network, *, group: str = "", without: str | None = None)
     network
         The network; its own number of nodes plays no part.
     group
-        As for `largest_nodes`.
+        Name of the group whose nodes are counted, the others as they are; empty where all nodes are alike.
     without
         Key of a limit that is left out, to find what binds next.
 
@@ -83,11 +59,12 @@ def safe_nodes(network: Network, *, group: str = "", without: str | None = None)
     tuple
         Number of nodes [1], and the key of the limit.
     """
-    network = network.asking(group)
-    return _with_key(network, [limit for limit in limits_to_be_safe(network) if limit.key != without])
+    limits = [limit for limit in limits_to_be_safe(network) if limit.key != without]
+    return _nodes_within(network.varying(group), limits)
 
 
-def _with_key(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:
+def _nodes_within(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:
+    """As `most_nodes`, of plain numbers: the number of nodes, and the key of the limit."""
     most = most_nodes(network, limits)
     return int(plain(most.nodes)), limits[int(plain(most.limit))].key
 
@@ -136,7 +113,7 @@ def _most_within(limit: Limit, network: Network, cached_network: Callable[[int],
     if not (over.any() if hasattr(over, "any") else over):
         return ceiling
     if elements > 1:
-        varying = _size(limit.bound.least_value(network.with_nodes(1)))
+        varying = _size(limit.least_value(network.with_nodes(1)))
         counted = ceiling * (varying * _VALUE_COST + elements)
         if counted <= ceiling.bit_length() * elements * _VALUE_COST:
             broken = (limit.is_broken(network.with_nodes(nodes)) for nodes in range(1, ceiling + 1))
@@ -202,7 +179,7 @@ class FitFigures:
     """The parts of `required_us`, in the order of the wire."""
     utilisation: float
     margin_us: float
-    binding_term: str
+    binding_term: str | None
     """Name of the largest term."""
     min_period_us: float | None
     """This and `safe_min_period_us` are None where no period that the bus allows is long enough."""
@@ -271,8 +248,8 @@ def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
     """How many nodes of each group fit a network's period, and are shown to fit; of all where they are alike."""
     decides = model == network.bus.deciding_model
     counts = []
-    for group in network.profile.alike_nodes:
-        most, limit = largest_nodes(network, model=model, group=group.name)
+    for group in network.profile.node_groups:
+        most, limit = _nodes_within(network.varying(group.name), limits_with_time(network, model=model))
         safe, safe_limit = safe_nodes(network, group=group.name) if decides else (None, None)
         nodes, axes = int(group.nodes), group.node.axes
         safe_axes = None if safe is None else axes * safe
@@ -311,7 +288,7 @@ def figures(network: Network, *, model: str) -> FitFigures:
         timing_model=model,
         **numbers,
         terms=terms,
-        binding_term=max(terms, key=lambda term: plain(term.us)).name if terms else _NO_TERM,
+        binding_term=max(terms, key=lambda term: plain(term.us)).name if terms else None,
         exceeded=exceeded,
         fits=not exceeded,
         **(_certainty_figures(cycle, codes) if decides else _UNDECIDED),
@@ -320,7 +297,6 @@ def figures(network: Network, *, model: str) -> FitFigures:
     )
 
 
-_NO_TERM: Final[Any] = None
 _UNDECIDED: Final[dict[str, Any]] = {
     **{figure.key: None for figure in CERTAINTY if figure.key not in COUNTS},
     "doubts": (),
@@ -354,10 +330,13 @@ def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number |
     """
     if not cycle.network.groups:
         return {figure.key: None for figure in (BIAS, MARGIN_CORRECTED, UNCERTAINTY, SAFE_REQUIRED, SAFE_MIN_PERIOD)}
+    uncertainty_us = weighed.uncertainty_us
+    if weighed.bias_us is None:  # nothing is known where there is no doubt either
+        uncertainty_us = choose(uncertainty_us > 0, uncertainty_us, inf)
     return {
         "bias_us": weighed.bias_us,
         "margin_corrected_us": weighed.margin_corrected_us,
-        "uncertainty_us": weighed.known_uncertainty_us,
+        "uncertainty_us": uncertainty_us,
         "safe_required_us": weighed.safe_required_us,
         "safe_min_period_us": shortest_period_us(cycle.network, weighed.safe_required_us, is_shown=True),
     }
@@ -434,9 +413,15 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     period_us = bus.periods.from_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
         if limit.period is not None and not limit.is_slow:
-            bound = limit.bound.shown if is_shown else limit.bound.nominal
-            period_us = larger(period_us, bus.periods.from_us(limit.period(bound, network)))
+            kept = limit.shown if is_shown else limit.nominal
+            period_us = larger(period_us, bus.periods.from_us(kept.shortest_period_us(network)))
     return period_us
+
+
+def limits_behind(figures: FitFigures, network: Network) -> tuple[Limit, ...]:
+    """The limits of the bus that a verdict rests on, time left out: broken, or not shown to be kept."""
+    keys = (figures.not_shown or ()) if figures.verdict == NOT_SHOWN else figures.exceeded
+    return tuple(limit for limit in network.bus.limits if limit.key in keys)
 
 
 def after_reset(network: Network, deciding: FitFigures) -> FitFigures | None:
@@ -452,7 +437,7 @@ def after_reset(network: Network, deciding: FitFigures) -> FitFigures | None:
     changes = network.bus.safety.after_reset
     if deciding.verdict != FITS or not changes:
         return None
-    reset = changed(network, changes)
+    reset = trial(network, changes)
     if reset.profile == network.profile:
         return None
     after = figures(reset, model=deciding.timing_model)

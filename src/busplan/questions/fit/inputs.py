@@ -6,13 +6,13 @@ from typing import Any, Final, NamedTuple
 
 from busplan.buses.bus import Bus
 from busplan.buses.limits import Key
-from busplan.buses.network import Group, Network
+from busplan.buses.network import Network
 from busplan.buses.rule import RuleFigures
 from busplan.elementwise import GivenTable, Traced, plain
 from busplan.profile.document import comment_grade
 from busplan.profile.kinds import cycle_keys, models_of
-from busplan.questions.fit.network import bus_of, network_of
-from busplan.sections.base import value_at, with_all_unchecked, with_unchecked
+from busplan.questions.fit.network import at_once, bus_of, trial
+from busplan.sections.base import value_at
 from busplan.sections.cycle import TableExecution
 from busplan.sections.profile import Profile
 from busplan.sourced import SYMBOLS, Input, Sourced
@@ -82,37 +82,32 @@ def given(profile: Profile, key: str) -> Input:
     return Input(symbol, key, value, unit, grade, source, description)
 
 
-def traced(profile: Profile, key: str) -> Traced:
-    """Make a traced number from a key of a profile."""
-    input_ = given(profile, key)
-    return Traced(input_.value, given=input_)
-
-
-def traced_profile(profile: Profile) -> Profile:
-    """Return an unvalidated copy with traced values in all keys that the cycle may depend on.
+def traced_network(network: Network) -> Network:
+    """The network with traced values of all keys that its cycle may depend on.
 
     These are numbers, and words that choose a formula.
     """
+    profile = network.profile
     values: dict[str, object] = {}
     for key in cycle_keys(profile):
         value = value_at(profile, key)
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if is_number or (isinstance(value, str) and _chooses(profile, key)):
-            values[key] = traced(profile, key)
-    for group in profile.alike_nodes:
+            values[key] = Traced(value, given=given(profile, key))
+    for group in profile.node_groups:
         execution, key = group.node.execution, group.node_key(_TABLE)
         if isinstance(execution, TableExecution):
             table = GivenTable(execution.time_us)
             symbol = f"table,{group.name}" if group.name else "table"
             table.given = given(profile, key)._replace(symbol=symbol, value=f"{len(execution.time_us)} points")
             values[key] = table
-    return with_all_unchecked(profile, values)
+    return trial(network, values)
 
 
 def _chooses(profile: Profile, key: str) -> bool:
     """Whether a key is text-valued and selects a formula."""
     names = choosing_keys(bus_of(profile))
-    return any(key == group.node_key(name) for group in profile.alike_nodes for name in names)
+    return any(key == group.node_key(name) for group in profile.node_groups for name in names)
 
 
 def choosing_keys(bus: Bus) -> tuple[str, ...]:
@@ -211,7 +206,7 @@ def _of_execution(figures: RuleFigures, network: Network, variance: float) -> li
     ]
     if not assumed:
         return []
-    without = network._replace(groups=tuple(_at_once(group) if group in assumed else group for group in network.groups))
+    without = network._replace(groups=tuple(at_once(group) if group in assumed else group for group in network.groups))
     cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(group.key(_EXECUTION) for group in assumed)
     whole_us, rest_us = (_doubt_us(doubts) for doubts in (figures.doubts, cycle.doubts()))
     rest = {term.key: plain(term.us) for term in cycle.terms}
@@ -230,19 +225,12 @@ def _of_rates(figures: RuleFigures, network: Network) -> Iterator[_Share]:
     """Shares of the assumed bit rates: the required time, or without a cycle the load, that an endless rate saves."""
     bus = network.bus
     for key in assumed_rates(network):
-        endless = network_of(with_unchecked(network.profile, key, _ENDLESS))
+        endless = trial(network, {key: _ENDLESS})
         if network.groups:
             cycle = bus.cycle(endless._replace(period_us=figures.period_us), model=figures.timing_model)
             yield (key,), 1 - plain(cycle.required_us) / figures.required_us, "the required time"
         elif (load := bus.limit("load")) is not None:
-            yield (key,), 1 - plain(load.bound.value(endless)) / plain(load.bound.value(network)), "the load"
-
-
-def _at_once(group: Group) -> Group:
-    """The same nodes, known to execute in no time."""
-    return group._replace(
-        read_execution_us=0.0, write_execution_us=0.0, read_uncertainty_us=0.0, write_uncertainty_us=0.0
-    )
+            yield (key,), 1 - plain(load.value(endless)) / plain(load.value(network)), "the load"
 
 
 def _doubt_us(doubts: Sequence[Any]) -> float:

@@ -1,6 +1,6 @@
 """A profile as a network: its kind of bus, and its nodes with their payloads and execution times."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 from busplan.buses import kind_named
@@ -8,8 +8,8 @@ from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, Traced, is_everywhere, total
 from busplan.profile.document import override
-from busplan.sections.base import TRANSACTION_KINDS, Section, with_unchecked
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.base import TRANSACTION_KINDS, Section, with_all_unchecked, with_unchecked
+from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import Profile
 
 PERIOD: Final = "cycle.period_us"
@@ -20,9 +20,9 @@ def bus_of(profile: Profile) -> Bus:
     return kind_named(profile.bus.kind)
 
 
-def varied_nodes(profile: Profile) -> AlikeNodes:
+def varied_nodes(profile: Profile) -> ProfileGroup:
     """The nodes whose number varies when axes are counted: all that are alike, or the group of the most axes."""
-    return max(profile.alike_nodes, key=lambda group: int(group.nodes * group.node.axes))
+    return max(profile.node_groups, key=lambda group: int(group.nodes * group.node.axes))
 
 
 def network_of(profile: Profile) -> Network:
@@ -34,34 +34,18 @@ def network_of(profile: Profile) -> Network:
         The profile. Its values may be numbers, arrays or traced numbers.
     """
     cycle = profile.cycle
-    groups = tuple(_group(members) for members in _side_by_side(profile.alike_nodes))
+    groups = tuple(_group(members) for members in _side_by_side(profile.node_groups))
     varied = None if profile.group else ""
     return Network(profile, bus_of(profile), groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us, varied)
 
 
-def at_period(network: Network, period_us: Number) -> Network:
-    """The same network at another communication period that its profile may have [us]."""
-    return network._replace(profile=with_unchecked(network.profile, PERIOD, period_us), period_us=period_us)
-
-
-def changed(network: Network, changes: Mapping[str, object]) -> Network:
-    """The network with other values by dotted key.
-
-    Raises
-    ------
-    BusplanError
-        The profile's schema refuses them.
-    """
-    return network_of(override(network.profile, dict(changes)))
-
-
-def _group(members: Sequence[AlikeNodes]) -> Group:
+def _group(members: Sequence[ProfileGroup]) -> Group:
     first = members[0]
     execution = first.node.execution
     read_bytes, write_bytes = (first.bytes_of(kind) for kind in TRANSACTION_KINDS)
     read_us, write_us = execution.execution_us(read_bytes), execution.execution_us(write_bytes)
     return Group(
-        said=first,
+        members=tuple(members),
         nodes=first.nodes if len(members) == 1 else total(member.nodes for member in members),
         axes=first.node.axes,
         read_bytes=read_bytes,
@@ -71,13 +55,12 @@ def _group(members: Sequence[AlikeNodes]) -> Group:
         worst_extra_us=execution.worst_extra_us,
         read_uncertainty_us=execution.standard_uncertainty_us(read_us),
         write_uncertainty_us=execution.standard_uncertainty_us(write_us),
-        members=tuple(members),
     )
 
 
-def _side_by_side(groups: Sequence[AlikeNodes]) -> list[list[AlikeNodes]]:
+def _side_by_side(groups: Sequence[ProfileGroup]) -> list[list[ProfileGroup]]:
     """Join neighbours that differ only in name and number, so that their cycle is that of a uniform bus."""
-    runs: list[list[AlikeNodes]] = []
+    runs: list[list[ProfileGroup]] = []
     for group in groups:
         # Groups at slower rates go in cycles of their own.
         is_in_every = is_everywhere(getattr(group.payload, "every", 1) <= 1)
@@ -102,28 +85,54 @@ def _is_alike(left: object, right: object) -> bool:
 _COMPARED: Final = (int, float, str, tuple, Traced)
 
 
-def with_payloads(group: Group, *, read_bytes: Number, write_bytes: Number) -> Group:
-    """The same nodes with other payloads [bytes], whose execution times follow.
+def trial(network: Network, values: Mapping[str, object]) -> Network:
+    """The network with other values by dotted key, which its profile may have: nothing is checked.
 
     Raises
     ------
     ValueError
         The execution time of a payload is not known.
     """
-    execution_us = group.node.execution.execution_us
-    sized = group._replace(read_bytes=read_bytes, write_bytes=write_bytes)
-    return with_execution(sized, read_us=execution_us(read_bytes), write_us=execution_us(write_bytes))
+    return network_of(with_all_unchecked(network.profile, values))
 
 
-def with_execution(group: Group, *, read_us: Number, write_us: Number) -> Group:
-    """The same nodes with other execution times [us], as well known as the profile says."""
-    execution = group.node.execution
+def at_period(network: Network, period_us: Number) -> Network:
+    """The same network at another communication period that its profile may have [us]."""
+    return network._replace(profile=with_unchecked(network.profile, PERIOD, period_us), period_us=period_us)
+
+
+def with_payloads(network: Network, sizes_bytes: Iterable[tuple[Number, Number]]) -> Network:
+    """The network with another payload of the read and of the write of each group of the profile [bytes].
+
+    Raises
+    ------
+    ValueError
+        The execution time of a payload is not known.
+    """
+    values: dict[str, object] = {}
+    for group, sizes in zip(network.profile.node_groups, sizes_bytes, strict=True):
+        section = f"group.{group.name}" if group.name else "payload"
+        for kind, size_bytes in zip(TRANSACTION_KINDS, sizes, strict=True):
+            values |= {f"{section}.{kind}_bytes": size_bytes, f"{section}.{kind}_bytes_per_axis": None}
+    return trial(network, values)
+
+
+def at_once(group: Group) -> Group:
+    """The same nodes, known to execute in no time."""
     return group._replace(
-        read_execution_us=read_us,
-        write_execution_us=write_us,
-        read_uncertainty_us=execution.standard_uncertainty_us(read_us),
-        write_uncertainty_us=execution.standard_uncertainty_us(write_us),
+        read_execution_us=0.0, write_execution_us=0.0, read_uncertainty_us=0.0, write_uncertainty_us=0.0
     )
+
+
+def changed(network: Network, changes: Mapping[str, object]) -> Network:
+    """The network with other values by dotted key, where a profile can have them.
+
+    Raises
+    ------
+    BusplanError
+        The profile's schema refuses them.
+    """
+    return network_of(override(network.profile, dict(changes)))
 
 
 def at_periods(network: Network, periods_us: Sequence[float] | None) -> list[Network]:
@@ -136,10 +145,9 @@ def at_periods(network: Network, periods_us: Sequence[float] | None) -> list[Net
     """
     if periods_us is None:
         return [network]
-    origins = ({PERIOD: f"period {period_us}"} for period_us in periods_us)
     return [
-        network_of(override(network.profile, {PERIOD: period_us}, origin=origin))
-        for period_us, origin in zip(periods_us, origins, strict=True)
+        network_of(override(network.profile, {PERIOD: period_us}, origin={PERIOD: f"period {period_us}"}))
+        for period_us in periods_us
     ]
 
 
@@ -153,8 +161,3 @@ def leading_model(network: Network) -> str:
     """Name of the timing model whose figures lead: the profile's own, or the one that decides where that cannot."""
     model: str = network.profile.bus.timing_model
     return model if model in model_names(network) else network.bus.deciding_model
-
-
-def without_execution(network: Network) -> Network:
-    """The same network, whose nodes execute in no time."""
-    return network._replace(groups=tuple(with_execution(group, read_us=0.0, write_us=0.0) for group in network.groups))

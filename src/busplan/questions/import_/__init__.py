@@ -1,27 +1,36 @@
 """`busplan.import_profile`: a machine from the files that its engineers already have."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 from typing import Final
 
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.forms.blocks import Report
+from busplan.forms.blocks import Code, Report, Sentence, ShownValue, Table, TableColumn, TableRow, sentence
 from busplan.profile.document import decode, validate
+from busplan.profile.edit import short_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, one_or_several
+from busplan.questions.base.sentences import document
 from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import PERIOD, network_of
 from busplan.questions.import_ import can, ethercat
-from busplan.questions.import_.reading import Fact, ProfileLine, Reading, machines, merged, profile_text, stem_of
-from busplan.sections.base import with_unchecked
+from busplan.questions.import_.formats import read_machine
+from busplan.questions.import_.reading import Fact, ProfileLine, Reading, merged, profile_text
 from busplan.sections.profile import Profile
 
 _FRAMES: Final = ("cycle_frames_us", "cycle_data_us")
 _NONPERIODIC: Final = "cycle.nonperiodic_us"
 _ROUNDING_US: Final = 1e-6
+_ROWS: Final = {"ethercat": ethercat.rows, "can": can.rows}
+"""Lines of the profile, by kind of bus."""
+_COLUMNS: Final = (
+    *(TableColumn(heading, kind="words") for heading in ("key", "value", "grade", "file and line")),
+    TableColumn("note", kind="words", rank=1, wraps=True),
+)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -46,16 +55,48 @@ class ImportAnswer(Answer):
     remarks: tuple[str, ...]
 
     def sentences(self) -> tuple[str, ...]:
-        """What files say otherwise or leave open, the verdict, and what stays unknown."""
-        from busplan.questions.import_.report import sentences
-
-        return tuple(sentences(self))
+        """What files say otherwise or leave open, the card of `capacity`, and what stays unknown."""
+        return (*self.remarks, *self._card(), *self._unknown())
 
     def report(self) -> Report:
         """The answer in blocks: the verdict, what stays unknown, and every value with its place."""
-        from busplan.questions.import_.report import import_report
+        facts = ((row, row.fact) for row in self.rows)
+        records = [
+            {"key": row.dotted, "value": row.plain, "grade": fact.grade, "place": fact.place, "note": fact.note}
+            for row, fact in facts
+        ]
+        rows = (
+            TableRow((Code(row.dotted), _shown(row.plain), row.fact.grade, row.fact.place, row.fact.note))
+            for row in self.rows
+        )
+        verdict = " ".join(self._card()[0].split())
+        words = (Sentence((text,)) for text in (verdict, *self.remarks, *self._unknown()))
+        return Report(
+            sentence("{}, from files of the machine", Code(self.profile.name)),
+            (*words, Table(_COLUMNS, tuple(rows))),
+            document("import", name=self.profile.name, values=records, remarks=list(self.remarks)),
+            records,
+        )
 
-        return import_report(self)
+    def _card(self) -> list[str]:
+        from busplan.questions.capacity import capacity
+
+        return str(capacity(self.profile)).partition("\n\n")[0].splitlines()
+
+    def _unknown(self) -> tuple[str, ...]:
+        """Values that nobody has measured or configured, those of groups and of messages together."""
+        unknown: dict[str, dict[str, None]] = {}
+        for row in self.rows:
+            if row.fact.grade == "assumed" and row.key not in ("grade", "kind", "master_grade"):
+                first, *rest = row.section.split(".")
+                section = ".".join((first, *(["*", *rest[1:]] if rest else [])))
+                unknown.setdefault(f"{section}.{row.key}", {})[short_text(row.fact.value)] = None
+        listed = ", ".join(f"{key} = {' or '.join(values)}" for key, values in unknown.items())
+        return (f"Not known, so assumed: {listed}.",) if listed else ()
+
+
+def _shown(value: object) -> ShownValue | str:
+    return ShownValue(value) if isinstance(value, int | float) else short_text(value)
 
 
 def import_profile(
@@ -101,23 +142,23 @@ def import_profile(
     names = [os.fspath(path) for path in one_or_several(paths, name="paths")]
     if not names or len(set(names)) < len(names):
         raise BusplanError(f"paths {names!r}: expected files of one machine, each once")
-    readings = machines(names, progress=progress or (lambda _done, _total: None))
+    readings = [read_machine(each, progress=progress or (lambda _done, _total: None)) for each in names]
     logs = [reading.file for reading in readings if reading.is_log]
     if len(logs) > 1:
         raise BusplanError(f"{logs[0]} and {logs[1]} are both logs; give the longer one")
-    can.settled(readings)
+    can.settle(readings)
     machine = merged(readings)
-    files = [(reading.file, reading.title) for reading in readings]
+    title = name or ("machine" if names[0] == "-" else FilePath(names[0]).stem)
     rows = list(_ROWS[machine.kind](machine))
-    profile = _validated(profile_text(rows, name=name or stem_of(names), files=files), machine)
-    if "frames" in machine.bus:
-        rows, profile = _with_time_of_frames(rows, profile, machine)
-    text = profile_text(rows, name=name or stem_of(names), files=files)
+    text = profile_text(rows, name=title, readings=readings)
+    profile = _validated(text, machine)
+    if "frames" in machine.bus and (more := _time_beyond(profile, machine)):
+        rows = [row for row in rows if row.dotted != _NONPERIODIC]
+        at = next(number for number, row in enumerate(rows) if row.dotted == PERIOD) + 1
+        rows.insert(at, more)
+        text = profile_text(rows, name=title, readings=readings)
+        profile = _validated(text, machine)
     return ImportAnswer(profile, text, tuple(rows), tuple(machine.remarks))
-
-
-_ROWS: Mapping[str, Callable[[Reading], Iterator[ProfileLine]]] = {"ethercat": ethercat.rows, "can": can.rows}
-"""Writer of the profile, by kind of bus."""
 
 
 def _validated(text: str, machine: Reading) -> Profile:
@@ -128,27 +169,21 @@ def _validated(text: str, machine: Reading) -> Profile:
         raise BusplanError(*(f"{machine.file}: as a profile: {problem}" for problem in problems)) from None
 
 
-def _with_time_of_frames(
-    rows: list[ProfileLine], profile: Profile, machine: Reading
-) -> tuple[list[ProfileLine], Profile]:
-    """Count the time that the frames of a file take beyond those of the profile."""
-    fact = machine.bus["frames"]
-    file_us = sum(map(ethercat.frame_us, fact.value))
-    run = deciding_cycle(network_of(profile))
-    planned_us = sum(float(plain(term.us)) for term in run.terms if term.key in _FRAMES)
-    frames = "its frame takes" if len(fact.value) == 1 else f"its {len(fact.value)} frames take"
-    said = f"{machine.file}: {frames} {file_us:.2f} us on the wire"
+def _time_beyond(profile: Profile, machine: Reading) -> ProfileLine | None:
+    """Time that the frames of a file take beyond those of the profile; None where they take none."""
+    frames = machine.bus["frames"]
+    file_us = sum(map(ethercat.frame_us, frames.value))
+    terms = deciding_cycle(network_of(profile)).terms
+    planned_us = sum(float(plain(term.us)) for term in terms if term.key in _FRAMES)
+    subject = "its frame takes" if len(frames.value) == 1 else f"its {len(frames.value)} frames take"
+    words = f"{machine.file}: {subject} {file_us:.2f} us on the wire"
     if file_us < planned_us - _ROUNDING_US:
-        machine.remarks.append(f"{said}, those of the profile {planned_us:.2f} us")
-        return rows, profile
-    machine.remarks.append(f"{said}, as those of the profile")
+        machine.remarks.append(f"{words}, those of the profile {planned_us:.2f} us")
+        return None
+    machine.remarks.append(f"{words}, as those of the profile")
     if file_us < planned_us + _ROUNDING_US:
-        return rows, profile
-    before_us = profile.cycle.nonperiodic_us
-    more_us = round(before_us + file_us - planned_us, 6)
-    old = next((row.fact.note for row in rows if row.dotted == _NONPERIODIC), "")
-    note = "; ".join(filter(None, (old, f"{len(fact.value)} frames take so much more than those of the model")))
-    rows = [row for row in rows if row.dotted != _NONPERIODIC]
-    at = next(number for number, row in enumerate(rows) if row.dotted == PERIOD) + 1
-    rows.insert(at, ProfileLine("cycle", "nonperiodic_us", Fact(more_us, fact.place, note=note)))
-    return rows, with_unchecked(profile, _NONPERIODIC, more_us)
+        return None
+    notes = [ethercat.SLOWER] if "slower" in machine.bus else []
+    notes.append(f"{len(frames.value)} frames take so much more than those of the model")
+    us = round(profile.cycle.nonperiodic_us + file_us - planned_us, 6)
+    return ProfileLine("cycle", "nonperiodic_us", Fact(us, frames.place, note="; ".join(notes)))

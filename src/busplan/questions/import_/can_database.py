@@ -6,7 +6,8 @@ from typing import Any, Final
 
 from busplan.errors import BusplanError
 from busplan.extras import require_extra
-from busplan.questions.import_.reading import Fact, Reading, parsed
+from busplan.questions.import_.reading import Reading
+from busplan.questions.import_.xml import parsed
 
 EXTENDED: Final = 1 << 31
 """Added to the number of a message with an identifier of 29 bits, as DBC has it."""
@@ -53,11 +54,9 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
     machine = Reading("can", title, name, rank=1, lists_all=False)
     if len(given) > _MOST_BYTES:
         raise BusplanError(f"{name}: is larger than {_MOST_BYTES:,} bytes; no {title} of one machine is")
+    text = given if isinstance(given, str) else given.decode("utf-8", "replace")
     if isinstance(given, bytes):
         parsed(given, name=name, skipped=("NetworkDefinition", "AUTOSAR"))
-        text = given.decode("utf-8", "replace")
-    else:
-        text = given
     require_extra("cantools", extra="import", option=f"{name}: {title}", module="cantools.database")
     database = _loaded(text, name, title, dialect)
     lines: dict[str, int] = {}
@@ -68,19 +67,18 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
         raise machine.refusal(1, f"a {title} without messages")
     _bit_rates(database, machine)
     for message in database.messages:
-        line = lines.get(message.name, 1)
-        place, number = machine.place(line), message.frame_id + EXTENDED * bool(message.is_extended_frame)
+        line, number = lines.get(message.name, 1), message.frame_id + EXTENDED * bool(message.is_extended_frame)
         if number in machine.messages:
             owner = machine.messages[number]["name"].value
             raise machine.refusal(line, f"message {message.name} has the identifier of {owner}: a bus has each once")
         facts = machine.messages[number] = {
-            "name": Fact(message.name, place),
-            "payload_bytes": Fact(message.length, place),
+            "name": machine.fact(message.name, line),
+            "payload_bytes": machine.fact(message.length, line),
         }
         if message.is_fd:
-            facts["is_fd"] = Fact(True, place)
+            facts["is_fd"] = machine.fact(True, line)
         if message.cycle_time:
-            facts["period_us"] = Fact(message.cycle_time * _KILO, place)
+            facts["period_us"] = machine.fact(message.cycle_time * _KILO, line)
     return machine
 
 
@@ -118,4 +116,4 @@ def _bit_rates(database: Any, machine: Reading) -> None:
         rates += [attributes[name].value for name in attribute_names if name in attributes]
         if rates and isinstance(rates[0], int | float) and 0 < rates[0] <= _MOST_BIT_RATE:
             rate = rates[0] / _KILO if rates[0] > _LARGEST_IN_KILO[key] else rates[0]
-            machine.bus[key] = Fact(rate, machine.place(1))
+            machine.bus[key] = machine.fact(rate, 1)

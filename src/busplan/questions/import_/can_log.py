@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from math import floor, log10
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -13,10 +13,10 @@ from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.questions.import_.can import BIT_RATE, LEAST, SHOWN
 from busplan.questions.import_.can_database import EXTENDED
-from busplan.questions.import_.reading import Fact, Reading
-from busplan.recordings.can import (
+from busplan.questions.import_.reading import Fact, Reading, assumed
+from busplan.recordings.can import CanFrames, read_can
+from busplan.recordings.can_timing import (
     LISTED,
-    CanFrames,
     ClockStretch,
     EventModel,
     SentFrames,
@@ -24,7 +24,6 @@ from busplan.recordings.can import (
     faults,
     least_bit_rate,
     longest_stretch,
-    read_can,
     sent_messages,
     stamps_of_no_bus,
     step_us,
@@ -88,7 +87,7 @@ def read(path: Path, name: str, *, progress: Progress) -> Reading:
     timings = [_timing(sent, length_us, error_us) for sent in messages]
     for timing in timings:
         number = timing.sent.identifier + EXTENDED * timing.sent.extended
-        machine.messages[number] = dict(_facts(timing, Path(name).name))
+        machine.messages[number] = dict(_facts(timing, PurePath(name).name))
     machine.remarks += _remarks(frames, stretch, timings, length_us)
     _bit_rate(machine, frames, stretch, least)
     return machine
@@ -199,10 +198,9 @@ def _bit_rate(machine: Reading, frames: CanFrames, stretch: ClockStretch, least_
     why = f"no less than {least_kbit_s:.3g} kbit/s by the log, for frames do not overlap"
     if shown:
         why = f"{shown[0]:g} kbit/s by frames of the log directly after each other"
-        machine.bus[BIT_RATE] = Fact(shown[0], "", "assumed", "by frames of the log directly after each other")
-        machine.bus[SHOWN] = machine.bus[BIT_RATE]
+        machine.bus[BIT_RATE] = machine.bus[SHOWN] = assumed(shown[0], "by frames of the log directly after each other")
     else:
-        machine.bus[BIT_RATE] = Fact(allowed[0], "", "assumed", f"the least usual one that is {why}")
+        machine.bus[BIT_RATE] = assumed(allowed[0], f"the least usual one that is {why}")
     machine.remarks.append(f"The bit rate is {why}")
 
 

@@ -1,18 +1,17 @@
 """ENI, the configuration of an EtherCAT master (ETG.2100): frames to the byte, devices, clocks and mailboxes."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from math import ceil, lcm
-from typing import Final
+from typing import Final, NamedTuple
 
-from busplan.questions.import_.reading import Element, Fact, Line, Reading, parsed
+from busplan.questions.import_.reading import ControlWords, Fact, Facts, Line, Reading, whole_number
+from busplan.questions.import_.xml import Element, parsed
 
-TITLE: Final = "ENI"
 _LRD, _LWR, _LRW = 10, 11, 12
+_LOGICAL: Final = (_LRD, _LWR, _LRW)
 _SEPARATE, _SHARED, _SPLIT = "LRW-separate", "LRW-shared", "LRD-LWR"
 _PORTS: Final = {"Y": "100BASE-TX", "K": "E-bus"}
-CONTROL_WORDS: Final = range(0x6040, 0x8000, 0x800)
-"""Index of the control word of each axis of a drive (CiA 402); one more for each further axis."""
 _CONTROL_WORD: Final = re.compile(r"control[ _-]?word", re.IGNORECASE)
 _TYPE: Final = re.compile(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
 _MOST_BYTES: Final = 1486
@@ -21,8 +20,40 @@ _MOST_TIME_NS: Final = 10**12
 _MOST_DEVICES: Final = 65_535
 _MOST_CYCLES: Final = 1000
 """Longest common multiple of rates that a profile takes."""
-_OFFSETS: Final = (("Recv", "InputOffs"), ("Send", "OutputOffs"))
-"""Data of a device, and the key of a datagram that says where they begin in the process image."""
+_SIZES: Final = {"Recv": "read_bytes", "Send": "write_bytes"}
+"""Data of a device in each direction."""
+_OFFSETS: Final = {"Recv": "InputOffs", "Send": "OutputOffs"}
+"""Key of a datagram that says where the data of a direction begin in the process image."""
+
+
+class _Datagram(NamedTuple):
+    """A datagram that is sent in operation."""
+
+    code: int
+    length: int
+    """Bytes of its data."""
+    address: int
+    """Logical address; -1 where there is none."""
+    image: dict[str, range]
+    """Bytes of the process image that it has, by direction."""
+
+
+class _Task(NamedTuple):
+    """A task of the master."""
+
+    period: Fact | None
+    line: Line
+    frames: list[list[_Datagram]]
+
+    @property
+    def period_us(self) -> int:
+        """Its period; 0 where it is not known [us]."""
+        return int(self.period.value) if self.period else 0
+
+    @property
+    def sizes(self) -> list[list[int]]:
+        """Bytes of each datagram of each frame."""
+        return [[datagram.length for datagram in frame] for frame in self.frames]
 
 
 def read(content: bytes, name: str) -> Reading:
@@ -34,7 +65,7 @@ def read(content: bytes, name: str) -> Reading:
         It is not valid, or says no machine; with its line.
     """
     root = parsed(content, name=name, skipped=("InitCmds", "StringTable"))
-    machine = Reading("ethercat", TITLE, name, rank=0)
+    machine = Reading("ethercat", "ENI", name, rank=0)
     config = root.first("Config")
     slaves = list(config.all("Slave")) if config else []
     if config is None or not slaves:
@@ -42,153 +73,157 @@ def read(content: bytes, name: str) -> Reading:
         raise machine.refusal(root.line, f"<{root.tag}> has no Config/Slave that can be read{encrypted}")
     if len(slaves) > _MOST_DEVICES:
         raise machine.refusal(slaves[-1].line, f"more than {_MOST_DEVICES} devices")
-    images: dict[str, set[int]] = {"Send": set(), "Recv": set()}
+    images: dict[str, set[int]] = {direction: set() for direction in _SIZES}
     outputs = list(config.all("ProcessImage/Outputs/Variable"))
-    for number, slave in enumerate(slaves):
-        machine.nodes[number] = dict(_device(slave, images, outputs, machine))
-    _cycle(config, machine)
+    for place, slave in enumerate(slaves):
+        machine.nodes[place] = _device(slave, images, outputs, machine)
+    _cycle(config, slaves, machine)
     _branches(slaves, machine)
     return machine
 
 
-def number(element: Element, path: str, machine: Reading, *, most: int) -> tuple[int, Line] | None:
-    """Whole number in an element below this one, and its line; None where there is none.
-
-    Raises
-    ------
-    BusplanError
-        Not a whole number from 0 to the largest.
-    """
+def _number(element: Element, path: str, machine: Reading, *, most: int) -> Fact | None:
+    """Whole number in an element below this one; None where there is none."""
     child = element.first(path)
     if child is None or not child.text.strip():
         return None
-    value = whole_number(child.text)
-    if value is None or not 0 <= value <= most:
-        shown = child.text.strip()[:40]
-        raise machine.refusal(child.line, f"{child.tag} {shown!r}: expected a whole number from 0 to {most}")
-    return value, child.line
+    return machine.number(child.tag, child.text, child.line, most=most)
 
 
-def whole_number(text: str) -> int | None:
-    """A whole number, decimal or as #x1a00 or 0x1a00; None for any other text."""
-    text = text.strip().lower()
-    match = re.fullmatch(r"(?:(?:#x|0x)([0-9a-f]{1,16})|(-?[0-9]{1,18}))", text)
-    return None if match is None else int(match[1], 16) if match[1] else int(match[2])
+def _parts(slave: Element, direction: str, machine: Reading) -> Iterator[tuple[range, Fact]]:
+    """Bits of the process image that each part of a device's data has, and its length."""
+    for part in slave.all(f"ProcessData/{direction}"):
+        start = _number(part, "BitStart", machine, most=_MOST_BITS)
+        length = _number(part, "BitLength", machine, most=8 * _MOST_BYTES)
+        if start and length and length.value:
+            yield range(start.value, start.value + length.value), length
 
 
-def _device(
-    slave: Element, images: dict[str, set[int]], outputs: list[Element], machine: Reading
-) -> Iterator[tuple[str, Fact]]:
-    """Facts of a device."""
-    info = slave.first("Info") or slave
-    title = info.first("Name")
-    text = title.text.strip() if title else ""
-    kind = _TYPE.search(text)
-    yield "name", Fact(kind[1] if kind else text or "device", machine.place(title.line if title else slave.line))
-    physics = info.first("Physics")
-    letter = physics.text.strip()[:1].upper() if physics else ""
-    if physics and letter in _PORTS:
-        yield "port", Fact(_PORTS[letter], machine.place(physics.line), note=f"Physics {physics.text.strip()[:8]}")
-    spans = {}
-    for tag, key in (("Recv", "read_bytes"), ("Send", "write_bytes")):
-        line: Line = slave.line
-        size = bits = 0
-        for part in slave.all(f"ProcessData/{tag}"):
-            start = number(part, "BitStart", machine, most=_MOST_BITS)
-            length = number(part, "BitLength", machine, most=8 * _MOST_BYTES)
-            if start and length and length[0]:
-                spans[tag] = range(start[0], start[0] + length[0])
-                own = set(range(start[0] // 8, ceil((start[0] + length[0]) / 8))) - images[tag]
-                images[tag] |= own
-                line, size, bits = length[1], size + len(own), bits + length[0]
-        shares = f"{bits} bits in bytes of its neighbours" if bits > 8 * size else ""
-        yield key, Fact(size, machine.place(line), note=shares)
-    yield "axes", _axes(slave, spans.get("Send"), outputs, machine)
-    clock = slave.first("DC")
-    cycle = clock and number(clock, "CycleTime0", machine, most=_MOST_TIME_NS)
-    if clock and cycle and cycle[0]:
-        yield "clock_us", Fact(cycle[0] / 1000, machine.place(cycle[1]))
-        shift = clock.first("ShiftTime")
-        shift_ns = whole_number(shift.text) if shift else None
-        if shift and shift_ns is not None:
-            yield "shift_us", Fact(shift_ns / 1000, machine.place(shift.line))
-    mailbox = slave.first("Mailbox/Recv")
-    longest = number(mailbox, "Length", machine, most=_MOST_BITS) if mailbox else None
-    if longest and longest[0]:
-        yield "mailbox_bytes", Fact(longest[0], machine.place(longest[1]))
+def _bytes_of(bits: range) -> range:
+    return range(bits.start // 8, ceil(bits.stop / 8))
 
 
-def _axes(slave: Element, span: range | None, outputs: list[Element], machine: Reading) -> Fact:
-    """Axes of a device: the control words of CiA 402 in its PDOs, or among the names of its outputs."""
-    words: dict[int, Line] = {}
-    pdos = list(slave.all("ProcessData/RxPdo"))
-    for pdo in [pdo for pdo in pdos if "Sm" in pdo.attributes] or pdos:
-        for entry in pdo.all("Entry/Index"):
-            index = whole_number(entry.text)
-            if index is not None and index in CONTROL_WORDS:
-                words.setdefault(index, entry.line)
-    if not words and span:
-        for variable in outputs:
-            title, offset = variable.first("Name"), number(variable, "BitOffs", machine, most=_MOST_BITS)
-            if title and offset and offset[0] in span and _CONTROL_WORD.search(title.text):
-                words[offset[0]] = title.line
-    listed = next((pdo.line for pdo in slave.all("ProcessData/RxPdo")), None)
-    # A device without outputs is no drive.
-    line = next(iter(words.values())) if words else listed or (slave.line if span is None else None)
-    return axes_fact(words, machine, line=line)
-
-
-def axes_fact(words: Mapping[int, Line], machine: Reading, *, line: Line | None) -> Fact:
-    """Axes of a device by the lines of its control words.
+def _device(slave: Element, images: dict[str, set[int]], outputs: list[Element], machine: Reading) -> Facts:
+    """Facts of a device.
 
     Parameters
     ----------
-    words
-        Line of each control word.
+    slave
+        Its element.
+    images
+        Bytes of the process image that devices before it have, by direction; its own are added.
+    outputs
+        Variables of the process image.
     machine
         The record of the file.
-    line
-        Line of its PDOs; None where the file does not list them.
     """
-    if line is None:
-        return Fact(0, grade="assumed", note="which PDOs it has no file says")
-    if not words:
-        return Fact(0, machine.place(line), "derived", "no control word of CiA 402 in its PDOs")
-    return Fact(len(words), machine.place(next(iter(words.values()))), "derived", "control words of CiA 402")
+    info = slave.first("Info") or slave
+    title, physics = info.first("Name"), info.first("Physics")
+    text = title.text.strip() if title else ""
+    kind = _TYPE.search(text)
+    facts = {"name": machine.fact(kind[1] if kind else text or "device", title.line if title else slave.line)}
+    letter = physics.text.strip()[:1].upper() if physics else ""
+    if physics and letter in _PORTS:
+        facts["port"] = machine.fact(_PORTS[letter], physics.line, note=f"Physics {physics.text.strip()[:8]}")
+    sent: range | None = None
+    for direction, key in _SIZES.items():
+        first, size, bits = machine.fact(0, slave.line), 0, 0
+        for span, length in _parts(slave, direction, machine):
+            new = set(_bytes_of(span)) - images[direction]
+            images[direction] |= new
+            first, size, bits = length, size + len(new), bits + len(span)
+            sent = span if direction == "Send" else sent
+        shares = f"{bits} bits in bytes of its neighbours" if bits > 8 * size else ""
+        facts[key] = first._replace(value=size, note=shares)
+    facts["axes"] = _axes(slave, sent, outputs, machine)
+    clock = slave.first("DC")
+    cycle = clock and _number(clock, "CycleTime0", machine, most=_MOST_TIME_NS)
+    if clock and cycle and cycle.value:
+        facts["clock_us"] = cycle._replace(value=cycle.value / 1000)
+        shift = clock.first("ShiftTime")
+        shift_ns = whole_number(shift.text) if shift else None
+        if shift and shift_ns is not None:
+            facts["shift_us"] = machine.fact(shift_ns / 1000, shift.line)
+    mailbox = slave.first("Mailbox/Recv")
+    longest = mailbox and _number(mailbox, "Length", machine, most=_MOST_BITS)
+    if longest and longest.value:
+        facts["mailbox_bytes"] = longest
+    return facts
 
 
-def _cycle(config: Element, machine: Reading) -> None:
+def _axes(slave: Element, sent: range | None, outputs: list[Element], machine: Reading) -> Fact:
+    """Axes of a device: the control words of CiA 402 in its PDOs, or among the names of its outputs."""
+    words, pdos = ControlWords(), list(slave.all("ProcessData/RxPdo"))
+    for pdo in [pdo for pdo in pdos if "Sm" in pdo.attributes] or pdos:
+        for entry in pdo.all("Entry/Index"):
+            index = whole_number(entry.text)
+            if index is not None:
+                words.add(index, entry.line)
+    if not words.lines and sent:
+        for variable in outputs:
+            title, offset = variable.first("Name"), _number(variable, "BitOffs", machine, most=_MOST_BITS)
+            if title and offset and offset.value in sent and _CONTROL_WORD.search(title.text):
+                words.lines[offset.value] = title.line
+    # A device without outputs is no drive.
+    is_listed = bool(words.lines or pdos or sent is None)
+    return words.axes(machine, line=(pdos[0].line if pdos else slave.line) if is_listed else None)
+
+
+def _cycle(config: Element, slaves: Sequence[Element], machine: Reading) -> None:
     """The period, and what goes in the frames of a cycle."""
-    tasks = []
-    for task in config.all("Cyclic"):
-        period = number(task, "CycleTime", machine, most=_MOST_TIME_NS)
-        frames = [list(_commands(frame, machine)) for frame in task.all("Frame")]
-        tasks.append((period, task, [frame for frame in frames if frame]))
-    tasks.sort(key=lambda task: task[0][0] if task[0] else 0)
-    if tasks and tasks[0][0] and tasks[0][0][0]:
-        machine.bus["period_us"] = Fact(tasks[0][0][0], machine.place(tasks[0][0][1]))
+    tasks = sorted((_task(task, machine) for task in config.all("Cyclic")), key=lambda task: task.period_us)
+    if tasks and tasks[0].period and tasks[0].period_us:
+        machine.bus["period_us"] = tasks[0].period
     else:
         clocks = [facts["clock_us"] for facts in machine.nodes.values() if "clock_us" in facts]
         if clocks:
             machine.bus["period_us"] = min(clocks)._replace(note="of the clocks; no Cyclic/CycleTime")
-    if not tasks or not tasks[0][2]:
+    if not tasks or not tasks[0].frames:
         machine.remarks.append(f"{machine.file}: no Cyclic/Frame: which datagrams the master sends is not known")
         return
-    has_rates = _rates(config, [(period[0] if period else 0, task) for period, task, _ in tasks], machine)
-    _frames(config, tasks[0][2], tasks[0][1].line, machine)
-    for period, task, frames in tasks[1:]:
+    has_rates = _rates(slaves, tasks, machine)
+    _frames(config, tasks[0], machine)
+    for task in tasks[1:]:
         if has_rates:
             # All of them are in the cycle in which the tasks meet.
-            machine.bus["frames"].value.extend(map(_sizes, frames))
+            machine.bus["frames"].value.extend(task.sizes)
             continue
-        machine.bus.setdefault("slower", Fact([], machine.place(task.line))).value.extend(map(_sizes, frames))
+        machine.bus.setdefault("slower", machine.fact([], task.line)).value.extend(task.sizes)
         machine.remarks.append(
-            f"{machine.file}:{task.line}: a further task of {period[0] if period else 'unknown'} us: its frames are "
-            "counted in every cycle, in cycle.nonperiodic_us"
+            f"{machine.file}:{task.line}: a further task of {task.period_us if task.period else 'unknown'} us: its "
+            "frames are counted in every cycle, in cycle.nonperiodic_us"
         )
 
 
-def _rates(config: Element, tasks: list[tuple[int, Element]], machine: Reading) -> bool:
+def _task(task: Element, machine: Reading) -> _Task:
+    period = _number(task, "CycleTime", machine, most=_MOST_TIME_NS)
+    frames = [list(_datagrams(frame, machine)) for frame in task.all("Frame")]
+    return _Task(period, task.line, [frame for frame in frames if frame])
+
+
+def _datagrams(frame: Element, machine: Reading) -> Iterator[_Datagram]:
+    for command in frame.all("Cmd"):
+        states = [state.text.strip() for state in command.all("State")]
+        if states and "OP" not in states:
+            continue
+        code = _number(command, "Cmd", machine, most=255)
+        length = _number(command, "DataLength", machine, most=_MOST_BYTES)
+        data = command.first("Data")
+        if length is None and data is not None:
+            length = machine.fact(len(data.text.strip()) // 2, data.line)
+        if code is None or length is None:
+            raise machine.refusal(command.line, "a cyclic Cmd without Cmd or DataLength")
+        address = _number(command, "Addr", machine, most=2**32 - 1)
+        starts = {
+            direction: whole_number(offset.text)
+            for direction, key in _OFFSETS.items()
+            if code.value in _LOGICAL and (offset := command.first(key))
+        }
+        image = {key: range(start, start + length.value) for key, start in starts.items() if start is not None}
+        yield _Datagram(code.value, length.value, address.value if address else -1, image)
+
+
+def _rates(slaves: Sequence[Element], tasks: Sequence[_Task], machine: Reading) -> bool:
     """Give devices of slower tasks their rate, where the file says which devices each task serves.
 
     Returns
@@ -196,93 +231,49 @@ def _rates(config: Element, tasks: list[tuple[int, Element]], machine: Reading) 
     bool
         Whether each device belongs to a single task, and all periods are multiples of the shortest.
     """
-    shortest = tasks[0][0]
-    rates = [period // shortest if shortest else 0 for period, _ in tasks]
-    is_whole = all(rate and rate * shortest == period for rate, (period, _) in zip(rates, tasks, strict=True))
-    if len(tasks) == 1 or not is_whole or lcm(*rates) > _MOST_CYCLES:
+    shortest_us = tasks[0].period_us
+    rates = [task.period_us // shortest_us if shortest_us else 0 for task in tasks]
+    are_multiples = all(rate and rate * shortest_us == task.period_us for rate, task in zip(rates, tasks, strict=True))
+    if len(tasks) == 1 or not are_multiples or lcm(*rates) > _MOST_CYCLES:
         return False
-    served = [{tag: list(_image_spans(task, key, machine)) for tag, key in _OFFSETS} for _, task in tasks]
-    found: dict[int, int] = {}
-    for place, slave in enumerate(config.all("Slave")):
-        parts = [(tag, part) for tag, _ in _OFFSETS for part in _parts(slave, tag, machine)]
-        own = {
-            next(
-                (
-                    task
-                    for task, spans in enumerate(served)
-                    if any(part[0] in span and part[-1] in span for span in spans[tag])
-                ),
-                -1,
-            )
-            for tag, part in parts
-        }
-        if -1 in own or len(own) > 1:
-            return False
-        found[place] = own.pop() if own else 0
-    for place, number in found.items():
+    task_of: list[int | None] = []
+    for slave in slaves:
+        parts = [(direction, _bytes_of(bits)) for direction in _SIZES for bits, _ in _parts(slave, direction, machine)]
+        serving = {_serving(tasks, direction, part) for direction, part in parts} or {0}
+        task_of.append(serving.pop() if len(serving) == 1 else None)
+    if None in task_of:
+        return False
+    for place, number in enumerate(task_of):
         if number:
             note = f"its task has {rates[number]} times the shortest period"
-            machine.nodes[place]["every"] = Fact(rates[number], machine.place(tasks[number][1].line), note=note)
+            machine.nodes[place]["every"] = machine.fact(rates[number], tasks[number].line, note=note)
     return True
 
 
-def _image_spans(task: Element, key: str, machine: Reading) -> Iterator[range]:
-    """Bytes of the process image that each datagram of a task has."""
-    for command in task.all("Frame/Cmd"):
-        start = number(command, key, machine, most=_MOST_BITS)
-        length = number(command, "DataLength", machine, most=_MOST_BYTES)
-        code = number(command, "Cmd", machine, most=255)
-        if start and length and code and code[0] in (_LRD, _LWR, _LRW):
-            yield range(start[0], start[0] + length[0])
+def _serving(tasks: Sequence[_Task], direction: str, part: range) -> int | None:
+    """Number of the first task with a datagram that has a part of the process image; None where there is none."""
+    for number, task in enumerate(tasks):
+        spans = (datagram.image.get(direction, range(0)) for frame in task.frames for datagram in frame)
+        if any(part[0] in span and part[-1] in span for span in spans):
+            return number
+    return None
 
 
-def _parts(slave: Element, tag: str, machine: Reading) -> Iterator[range]:
-    """Bytes of the process image of each part of a device's data."""
-    for part in slave.all(f"ProcessData/{tag}"):
-        start = number(part, "BitStart", machine, most=_MOST_BITS)
-        length = number(part, "BitLength", machine, most=8 * _MOST_BYTES)
-        if start and length and length[0]:
-            yield range(start[0] // 8, ceil((start[0] + length[0]) / 8))
-
-
-def _sizes(frame: list[tuple[int, int, int]]) -> list[int]:
-    return [length for _, length, _ in frame]
-
-
-def _commands(frame: Element, machine: Reading) -> Iterator[tuple[int, int, int]]:
-    """Command, bytes of data and logical address of each datagram that is sent in operation."""
-    for command in frame.all("Cmd"):
-        states = [state.text.strip() for state in command.all("State")]
-        if states and "OP" not in states:
-            continue
-        code = number(command, "Cmd", machine, most=255)
-        length = number(command, "DataLength", machine, most=_MOST_BYTES)
-        data = command.first("Data")
-        if length is None and data is not None:
-            length = (len(data.text.strip()) // 2, data.line)
-        if code is None or length is None:
-            raise machine.refusal(command.line, "a cyclic Cmd without Cmd or DataLength")
-        address = number(command, "Addr", machine, most=2**32 - 1)
-        yield code[0], length[0], address[0] if address else -1
-
-
-def _frames(config: Element, frames: list[list[tuple[int, int, int]]], line: Line, machine: Reading) -> None:
-    """Layout and housekeeping, so that the frames come out to the byte."""
+def _frames(config: Element, task: _Task, machine: Reading) -> None:
+    """Layout and housekeeping, so that the frames of the fastest task come out to the byte."""
     states = _mailbox_states(config, machine)
-    process: list[tuple[int, int]] = []
-    others: list[int] = []
-    for code, length, address in (command for frame in frames for command in frame):
-        if code in (_LRD, _LWR, _LRW) and address not in states:
-            process.append((code, length))
+    process: list[_Datagram] = []
+    housekeeping: list[int] = []
+    for datagram in (datagram for frame in task.frames for datagram in frame):
+        if datagram.code in _LOGICAL and datagram.address not in states:
+            process.append(datagram)
         else:
-            others.append(length)
-    place = machine.place(line)
-    own = [facts for facts in machine.nodes.values() if "every" not in facts]
-    pairs = [(facts["read_bytes"].value, facts["write_bytes"].value) for facts in own]
+            housekeeping.append(datagram.length)
+    served = [facts for facts in machine.nodes.values() if "every" not in facts]
+    pairs = [(facts["read_bytes"].value, facts["write_bytes"].value) for facts in served]
     separate, shared = sum(map(sum, pairs)), sum(map(max, pairs))
-    total = sum(length for _, length in process)
-    codes = {code for code, _ in process}
-    if _LRW in codes or len(process) < len((_LRD, _LWR)):
+    total = sum(datagram.length for datagram in process)
+    if any(datagram.code == _LRW for datagram in process) or len(process) < len((_LRD, _LWR)):
         # A total below the sum of both directions can only be of bytes that both share.
         layout = _SHARED if total < separate else _SEPARATE
     else:
@@ -290,34 +281,32 @@ def _frames(config: Element, frames: list[list[tuple[int, int, int]]], line: Lin
     needed = shared if layout == _SHARED else separate
     # Where a frame is full, the profile's next datagram begins a new frame, too.
     headers = 2 if layout == _SPLIT else 1
-    further = [0] * max(len(process) - headers * len(frames), 0)
-    gaps = total - needed
-    notes = [f"{len(process)} datagrams of process data" if further else ""]
-    if gaps > 0 and (further or others):
-        (further or others)[-1] += gaps
+    further = [0] * max(len(process) - headers * len(task.frames), 0)
+    gaps, notes = total - needed, [f"{len(process)} datagrams of process data"] if further else []
+    if gaps > 0 and (further or housekeeping):
+        (further or housekeeping)[-1] += gaps
         notes.append(f"{gaps} bytes are gaps in the image")
     elif gaps:
         machine.remarks.append(
-            f"{machine.file}:{line}: process data are {total} bytes, its devices have {needed}: those are taken"
+            f"{machine.file}:{task.line}: process data are {total} bytes, its devices have {needed}: those are taken"
         )
-    machine.bus["process_data"] = Fact(layout, place)
-    machine.bus["housekeeping_bytes"] = Fact([*others, *further], place, note=", ".join(filter(None, notes)))
-    machine.bus["frames"] = Fact([_sizes(frame) for frame in frames], place)
+    machine.bus["process_data"] = machine.fact(layout, task.line)
+    machine.bus["housekeeping_bytes"] = machine.fact([*housekeeping, *further], task.line, note=", ".join(notes))
+    machine.bus["frames"] = machine.fact(task.sizes, task.line)
 
 
 def _mailbox_states(config: Element, machine: Reading) -> range:
     """Logical addresses of the states of mailboxes, which no device's process data are."""
-    start = number(config, "Master/MailboxStates/StartAddr", machine, most=2**32 - 1)
-    count = number(config, "Master/MailboxStates/Count", machine, most=_MOST_DEVICES)
-    return range(start[0], start[0] + max(count[0] if count else 1, 1)) if start else range(0)
+    start = _number(config, "Master/MailboxStates/StartAddr", machine, most=2**32 - 1)
+    count = _number(config, "Master/MailboxStates/Count", machine, most=_MOST_DEVICES)
+    return range(start.value, start.value + max(count.value if count else 1, 1)) if start else range(0)
 
 
 def _branches(slaves: list[Element], machine: Reading) -> None:
     """Mark devices that are not connected to the device before them."""
-    addresses = [number(slave, "Info/PhysAddr", machine, most=65_535) for slave in slaves]
+    addresses = [_number(slave, "Info/PhysAddr", machine, most=65_535) for slave in slaves]
     for place, slave in enumerate(slaves[1:], start=1):
-        port = slave.first("PreviousPort")
-        before = port and number(port, "PhysAddr", machine, most=65_535)
-        own = addresses[place - 1]
-        if before and own and before[0] != own[0]:
-            machine.nodes[place]["branch"] = Fact(before[0], machine.place(before[1]))
+        port, before = slave.first("PreviousPort"), addresses[place - 1]
+        parent = port and _number(port, "PhysAddr", machine, most=65_535)
+        if parent and before and parent.value != before.value:
+            machine.nodes[place]["branch"] = parent

@@ -2,11 +2,9 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from math import ceil
 from typing import Final, NamedTuple
 
-from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact
-from busplan.questions.import_.reading import Fact, Facts, Reading
+from busplan.questions.import_.reading import ControlWords, Facts, Reading
 
 SLAVES: Final = "ethercat slaves -v"
 PDOS: Final = "ethercat pdos"
@@ -53,25 +51,22 @@ def read(text: str, name: str) -> Reading:
         if any(_SYNC_MANAGER.match(line) for _, line in lines) or (is_of_pdos and not is_of_slaves):
             facts |= _sizes(lines, machine)
     _delays(ports, machine)
-    machine.bus["master"] = Fact("IgH", machine.place(1), "derived", f"{title} is of its tool")
+    machine.bus["master"] = machine.fact("IgH", 1, "derived", f"{title} is of its tool")
     return machine
 
 
 def _devices(text: str, machine: Reading) -> dict[int, list[tuple[int, str]]]:
     """The numbered lines of each device."""
     devices: dict[int, list[tuple[int, str]]] = {}
-    masters = set()
-    own: list[tuple[int, str]] | None = None
+    masters, device = set(), None
     for line, content in enumerate(text.split("\n"), start=1):
-        header = _HEADER.match(content)
-        if header:
+        if header := _HEADER.match(content):
             masters.add(header[1])
             if len(masters) > 1:
                 raise machine.refusal(line, "a second master: a profile is one bus; give the text of one master")
-            own = devices.setdefault(int(header[2]), [])
-            own.append((line, content))
-        elif own is not None:
-            own.append((line, content))
+            device = devices.setdefault(int(header[2]), [])
+        if device is not None:
+            device.append((line, content))
         elif _SYNC_MANAGER.match(content):
             raise machine.refusal(line, f"no line === Master 0, Slave 0 === before it: give `{PDOS}` of the whole bus")
     if not devices:
@@ -87,21 +82,19 @@ def _described(lines: list[tuple[int, str]], facts: Facts, machine: Reading) -> 
                 delay = None if match["delay"] == "-" else int(match["delay"])
                 yield _Port(match["type"], int(match["next"]), delay, line)
             if match["port"] == "0" and match["type"] in _PORT_TYPES:
-                facts["port"] = Fact(_PORT_TYPES[match["type"]], machine.place(line), "measured")
+                facts["port"] = machine.fact(_PORT_TYPES[match["type"]], line, "measured")
         elif match := _NAME.match(content):
             # The order number, where there is one, is the shorter name.
-            facts.setdefault("name", Fact(match[2], machine.place(line)))
+            facts.setdefault("name", machine.fact(match[2], line))
         elif _CLOCKS.match(content):
-            facts["has_clock"] = Fact(True, machine.place(line), "measured")
+            facts["has_clock"] = machine.fact(True, line, "measured")
         elif (match := _MAILBOX.match(content)) and int(match[1]):
-            facts["mailbox_bytes"] = Fact(int(match[1]), machine.place(line))
+            facts["mailbox_bytes"] = machine.fact(int(match[1]), line)
 
 
 def _sizes(lines: list[tuple[int, str]], machine: Reading) -> Facts:
     """Bytes and axes of a device by the entries of its PDOs: each direction in whole bytes."""
-    bits = {"Rx": 0, "Tx": 0}
-    places = dict.fromkeys(bits, lines[0][0])
-    words: dict[int, int] = {}
+    bits, places, words = {"Rx": 0, "Tx": 0}, dict.fromkeys(_DIRECTIONS, lines[0][0]), ControlWords()
     direction = ""
     for line, content in lines:
         if match := _PDO.match(content):
@@ -110,13 +103,10 @@ def _sizes(lines: list[tuple[int, str]], machine: Reading) -> Facts:
                 places[direction] = line
         elif (match := _ENTRY.match(content)) and direction:
             bits[direction] += int(match[2])
-            if direction == "Rx" and int(match[1], 16) in CONTROL_WORDS:
-                words.setdefault(int(match[1], 16), line)
-    sizes = {
-        key: Fact(ceil(bits[direction] / 8), machine.place(places[direction]), note=f"{bits[direction]} bits")
-        for direction, key in _DIRECTIONS.items()
-    }
-    return {**sizes, "axes": axes_fact(words, machine, line=lines[0][0])}
+            if direction == "Rx":
+                words.add(int(match[1], 16), line)
+    sizes = {key: machine.bytes_of(bits[direction], places[direction]) for direction, key in _DIRECTIONS.items()}
+    return {**sizes, "axes": words.axes(machine, line=lines[0][0])}
 
 
 def _delays(ports: Mapping[int, list[_Port]], machine: Reading) -> None:
@@ -125,8 +115,8 @@ def _delays(ports: Mapping[int, list[_Port]], machine: Reading) -> None:
     A hop over devices without a clock is shared out evenly among them.
     """
     waiting: list[int] = []
-    for number, own in ports.items():
-        before = next((port for port in own if port.next < number), None)
+    for number, device_ports in ports.items():
+        before = next((port for port in device_ports if port.next < number), None)
         if before is None:
             continue
         if not before.delay_ns or "has_clock" not in machine.nodes[number]:
@@ -136,5 +126,5 @@ def _delays(ports: Mapping[int, list[_Port]], machine: Reading) -> None:
         us = before.delay_ns / 1000 / (len(shared) + 1)
         note = f"cable included{f', shared with {len(shared)} without a clock' if shared else ''}"
         for device in (*shared, number):
-            machine.nodes[device]["delay_us"] = Fact(us, machine.place(before.line), "measured", note)
+            machine.nodes[device]["delay_us"] = machine.fact(us, before.line, "measured", note)
         waiting = [device for device in waiting if device not in shared]

@@ -1,13 +1,11 @@
 """LinuxCNC's ethercat-conf.xml: period, devices, bits of their PDOs, SYNC0's shift, and sync units."""
 
 import re
-from math import ceil
 from typing import Final
 
-from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact, whole_number
-from busplan.questions.import_.reading import Element, Fact, Line, Reading, parsed
+from busplan.questions.import_.reading import ControlWords, Fact, Line, Reading, whole_number
+from busplan.questions.import_.xml import Element, parsed
 
-TITLE: Final = "ethercat-conf.xml"
 _DIRECTIONS: Final = {"out": "write_bytes", "in": "read_bytes"}
 _MOST_TIME_NS: Final = 10**12
 _MOST_BITS: Final = 8 * 1486
@@ -22,22 +20,23 @@ def read(content: bytes, name: str) -> Reading:
         It is not valid, or has several masters; with its line.
     """
     root = parsed(content, name=name)
-    machine = Reading("ethercat", TITLE, name, rank=1, lists_all=False)
+    machine = Reading("ethercat", "ethercat-conf.xml", name, rank=1, lists_all=False)
     masters = list(root.all("master"))
     if len(masters) != 1:
         line = masters[1].line if masters else root.line
         raise machine.refusal(line, f"{len(masters)} masters: a profile is one bus; give a file of one <master>")
     master = masters[0]
-    period_ns = _number(master, "appTimePeriod", machine, most=_MOST_TIME_NS)
-    if period_ns:
-        machine.bus["period_us"] = Fact(period_ns / 1000, machine.place(master.line))
-    machine.bus["master"] = Fact("IgH", machine.place(master.line), "derived", "the master of linuxcnc-ethercat")
+    period = _number(master, "appTimePeriod", machine, most=_MOST_TIME_NS)
+    if period and period.value:
+        machine.bus["period_us"] = period._replace(value=period.value / 1000)
+    machine.bus["master"] = machine.fact("IgH", master.line, "derived", "the master of linuxcnc-ethercat")
     units: dict[str, Line] = {}
     for slave in master.all("slave"):
         number = _number(slave, "idx", machine, most=65_535)
-        if number is None or number in machine.nodes:
-            raise machine.refusal(slave.line, f"slave idx {number}: expected a number that no other slave has")
-        _device(slave, number, machine)
+        if number is None or number.value in machine.nodes:
+            idx = number and number.value
+            raise machine.refusal(slave.line, f"slave idx {idx}: expected a number that no other slave has")
+        _device(slave, number.value, machine)
         units.setdefault(slave.attributes.get("syncUnit", ""), slave.line)
         rate = slave.attributes.get("syncUnitCycle", "*1")
         if rate not in ("*1", "1"):
@@ -49,46 +48,40 @@ def read(content: bytes, name: str) -> Reading:
         raise machine.refusal(master.line, "<master> has no <slave>")
     if len(units) > 1:
         line = list(units.values())[-1]
-        machine.bus["further_datagrams"] = Fact(len(units) - 1, machine.place(line), note=f"{len(units)} sync units")
+        machine.bus["further_datagrams"] = machine.fact(len(units) - 1, line, note=f"{len(units)} sync units")
     return machine
 
 
 def _device(slave: Element, number: int, machine: Reading) -> None:
     facts = machine.nodes[number] = {}
     kind = slave.attributes.get("type", "device")
-    facts["name"] = Fact(slave.attributes.get("name", kind) if kind == "generic" else kind, machine.place(slave.line))
+    name = slave.attributes.get("name", kind) if kind == "generic" else kind
+    facts["name"] = machine.fact(name, slave.line)
     managers = list(slave.all("syncManager"))
-    words: dict[int, Line] = {}
     if any(True for manager in managers for _ in manager.all("pdo")):
-        bits = dict.fromkeys(_DIRECTIONS, 0)
+        bits, words, line = dict.fromkeys(_DIRECTIONS, 0), ControlWords(), managers[0].line
         for manager in managers:
             direction = manager.attributes.get("dir", "")
             for entry in manager.all("pdo/pdoEntry"):
                 if direction not in bits:
                     raise machine.refusal(manager.line, f"syncManager dir {direction[:20]!r}: expected in or out")
-                bits[direction] += _number(entry, "bitLen", machine, most=_MOST_BITS) or 0
+                length = _number(entry, "bitLen", machine, most=_MOST_BITS)
+                bits[direction] += length.value if length else 0
                 index = whole_number(f"0x{entry.attributes.get('idx', '')}")
-                if direction == "out" and index is not None and index in CONTROL_WORDS:
-                    words.setdefault(index, entry.line)
-        place = machine.place(managers[0].line)
-        for direction, key in _DIRECTIONS.items():
-            facts[key] = Fact(ceil(bits[direction] / 8), place, note=f"{bits[direction]} bits")
-        facts["axes"] = axes_fact(words, machine, line=managers[0].line)
+                if direction == "out" and index is not None:
+                    words.add(index, entry.line)
+        facts |= {key: machine.bytes_of(bits[direction], line) for direction, key in _DIRECTIONS.items()}
+        facts["axes"] = words.axes(machine, line=line)
     clock = slave.first("dcConf")
     if clock:
-        facts["clock_us"] = Fact(0.0, machine.place(clock.line))
+        facts["clock_us"] = machine.fact(0.0, clock.line)
         shift = clock.attributes.get("sync0Shift", "0")
         if not re.fullmatch(r"-?\d{1,12}", shift):
             raise machine.refusal(clock.line, f"sync0Shift {shift[:40]!r}: expected whole nanoseconds")
-        facts["shift_us"] = Fact(int(shift) / 1000, machine.place(clock.line), "derived", "from the master's task on")
+        facts["shift_us"] = machine.fact(int(shift) / 1000, clock.line, "derived", "from the master's task on")
 
 
-def _number(element: Element, key: str, machine: Reading, *, most: int) -> int | None:
+def _number(element: Element, key: str, machine: Reading, *, most: int) -> Fact | None:
     """A whole number of an attribute; None where it is missing."""
     text = element.attributes.get(key)
-    if text is None:
-        return None
-    value = whole_number(text)
-    if value is None or not 0 <= value <= most:
-        raise machine.refusal(element.line, f"{key} {text[:40]!r}: expected a whole number from 0 to {most}")
-    return value
+    return None if text is None else machine.number(key, text, element.line, most=most)

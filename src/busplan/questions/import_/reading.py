@@ -1,158 +1,24 @@
-"""Reading files of machines: text, XML, and the record that every reader fills."""
+"""What files say of a machine: facts with their places, those of several files together, and lines of a profile."""
 
-import os
 import re
-from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
-from importlib import import_module
 from itertools import groupby
-from pathlib import Path, PurePath
+from math import ceil
+from pathlib import PurePath
 from typing import Any, Final, NamedTuple, TypeAlias
-from xml.parsers import expat
 
+from busplan.buses import kind_named
 from busplan.english import printable
 from busplan.errors import BusplanError
-from busplan.profile.document import MAX_FILE_BYTES, read_bytes
+from busplan.profile.document import MAX_FILE_BYTES
 from busplan.profile.edit import short_text, value_text, whole
-from busplan.progress import Progress
 from busplan.sourced import Grade
-
-_MOST_DEPTH: Final = 64
-_MOST_ELEMENTS: Final = 1_000_000
-_CHUNK_BYTES: Final = 4096
-_FAR: Final = 300
-"""Columns that a person counts; some tools write all in one line."""
-
-
-@dataclass(slots=True)
-class Element:
-    """An element of an XML file."""
-
-    tag: str
-    """Without its namespace."""
-    line: int | str
-    """Its line, with the column if the line is long."""
-    attributes: dict[str, str]
-    children: list["Element"] = field(default_factory=list)
-    text: str = ""
-    """Behind its last child."""
-
-    def all(self, path: str) -> Iterator["Element"]:
-        """Elements of a path of tags below this one, as "Config/Slave"."""
-        tag, _, rest = path.partition("/")
-        for child in self.children:
-            if child.tag == tag:
-                yield from child.all(rest) if rest else (child,)
-
-    def first(self, path: str) -> "Element | None":
-        """The first element of a path; None if there is none."""
-        return next(self.all(path), None)
-
-
-def parsed(content: bytes, *, name: str, skipped: Collection[str] = ()) -> Element:
-    """Read an XML file.
-
-    Parameters
-    ----------
-    content
-        The file.
-    name
-        Its name in messages.
-    skipped
-        Tags whose elements are left out, with all below them.
-
-    Raises
-    ------
-    BusplanError
-        It is no XML, or has a document type (which is where entities are declared), too many elements, or too many
-        inside each other; with its line.
-    """
-    reader = _Reader(name, frozenset(skipped))
-    reader.read(content)
-    return next(iter(reader.root.children), reader.root)
-
-
-def root_tag(content: bytes, *, name: str) -> str:
-    """Tag of the root element of an XML file, without reading the rest.
-
-    Raises
-    ------
-    BusplanError
-        As `parsed`.
-    """
-    reader = _Reader(name, frozenset())
-    for start in range(0, len(content), _CHUNK_BYTES):
-        reader.read(content[start : start + _CHUNK_BYTES], is_last=start + _CHUNK_BYTES >= len(content))
-        if reader.root.children:
-            break
-    return reader.root.children[0].tag
-
-
-class _Reader:
-    def __init__(self, name: str, skipped: frozenset[str]) -> None:
-        self.name, self.skipped = name, skipped
-        self.root = Element("", 0, {})
-        self.open = [self.root]
-        self.texts: list[str] = []
-        self.depth = self.elements = self.skips = 0
-        self.parser = expat.ParserCreate()
-        self.parser.buffer_text = True
-        self.parser.StartDoctypeDeclHandler = self._doctype
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self.parser.CharacterDataHandler = self._text
-
-    def read(self, content: bytes, *, is_last: bool = True) -> None:
-        """Read the file, or the next part of it."""
-        try:
-            self.parser.Parse(content, is_last)
-        except expat.ExpatError as error:
-            what = expat.ErrorString(error.code)
-            raise BusplanError(f"{self.name}:{error.lineno}:{error.offset + 1}: not valid XML: {what}") from None
-        except (ValueError, LookupError) as error:  # an encoding that Python does not know
-            raise BusplanError(f"{self.name}:1: not valid XML: {error}") from None
-
-    def _refuse(self, message: str) -> BusplanError:
-        return BusplanError(f"{self.name}:{self.parser.CurrentLineNumber}: {message}")
-
-    def _doctype(self, *_: Any) -> None:
-        raise self._refuse("a document type (<!DOCTYPE>) is not read: it can declare entities; remove it")
-
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        self.depth += 1
-        self.elements += 1
-        if self.depth > _MOST_DEPTH:
-            raise self._refuse(f"elements inside each other more than {_MOST_DEPTH} deep; no such file is a machine's")
-        if self.elements > _MOST_ELEMENTS:
-            raise self._refuse(f"more than {_MOST_ELEMENTS:,} elements; no such file is a machine's")
-        tag = tag.rpartition(":")[2]
-        if self.skips or tag in self.skipped:
-            self.skips += 1
-            return
-        line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber
-        element = Element(tag, f"{line}:{column + 1}" if column > _FAR else line, attributes)
-        self.open[-1].children.append(element)
-        self.texts.clear()
-        self.open.append(element)
-
-    def _end(self, _tag: str) -> None:
-        self.depth -= 1
-        if self.skips:
-            self.skips -= 1
-        else:
-            self.open.pop().text = "".join(self.texts)
-            self.texts.clear()
-
-    def _text(self, text: str) -> None:
-        if not self.skips:
-            self.texts.append(text)
-
 
 _MAY_DIFFER: Final = ("name", "master", "clock_us")
 """Facts that may differ from file to file."""
-
+_CONTROL_WORDS: Final = range(0x6040, 0x8000, 0x800)
+"""Index of the control word of each axis of a drive (CiA 402); one more for each further axis."""
 
 Line: TypeAlias = int | str
 """Number of a line, with ":" and the column where the file has long lines."""
@@ -175,6 +41,11 @@ class Fact(NamedTuple):
 
 
 Facts = dict[str, Fact]
+
+
+def assumed(value: object, note: str = "") -> Fact:
+    """A value that no file says."""
+    return Fact(value, "", "assumed", note)
 
 
 @dataclass
@@ -214,12 +85,69 @@ class Reading:
         """File and line, for comments."""
         return f"{PurePath(self.file).name}:{line}"
 
+    def fact(self, value: object, line: Line, grade: Grade = "published", note: str = "") -> Fact:
+        """A value that stands in a line of the file."""
+        return Fact(value, self.place(line), grade, note)
+
+    def bytes_of(self, bits: int, line: Line) -> Fact:
+        """The whole bytes that data of a device take."""
+        return self.fact(ceil(bits / 8), line, note=f"{bits} bits")
+
+    def number(self, key: str, text: str, line: Line, *, most: int) -> Fact:
+        """A whole number, decimal or as #x1a00 or 0x1a00.
+
+        Raises
+        ------
+        BusplanError
+            Not a whole number from 0 to the largest.
+        """
+        value = whole_number(text)
+        if value is None or not 0 <= value <= most:
+            shown = repr(text.strip()[:40])
+            raise self.refusal(line, f"{key} {shown}: expected a whole number from 0 to {most}")
+        return self.fact(value, line)
+
     def refusal(self, line: Line, message: str) -> BusplanError:
         """Make the error for something wrong in the file."""
         return BusplanError(f"{self.file}:{line}: {message}")
 
 
-def merged(machines: Iterable[Reading]) -> Reading:
+def whole_number(text: str) -> int | None:
+    """A whole number, decimal or as #x1a00 or 0x1a00; None for any other text."""
+    match = re.fullmatch(r"(?:(?:#x|0x)([0-9a-f]{1,16})|(-?[0-9]{1,18}))", text.strip().lower())
+    return None if match is None else int(match[1], 16) if match[1] else int(match[2])
+
+
+class ControlWords:
+    """Control words of CiA 402 among the outputs of a device: each is an axis."""
+
+    def __init__(self) -> None:
+        self.lines: dict[int, Line] = {}
+        """Line of each, by the index of its object."""
+
+    def add(self, index: int, line: Line) -> None:
+        """Take an object that is mapped as an output, if it is a control word."""
+        if index in _CONTROL_WORDS:
+            self.lines.setdefault(index, line)
+
+    def axes(self, machine: Reading, *, line: Line | None) -> Fact:
+        """Axes of the device.
+
+        Parameters
+        ----------
+        machine
+            The record of the file.
+        line
+            Line of its PDOs; None where the file does not list them.
+        """
+        if line is None:
+            return assumed(0, "which PDOs it has no file says")
+        if not self.lines:
+            return machine.fact(0, line, "derived", "no control word of CiA 402 in its PDOs")
+        return machine.fact(len(self.lines), next(iter(self.lines.values())), "derived", "control words of CiA 402")
+
+
+def merged(readings: Iterable[Reading]) -> Reading:
     """One record of several files of one machine; where they differ, it says so.
 
     Raises
@@ -227,43 +155,52 @@ def merged(machines: Iterable[Reading]) -> Reading:
     BusplanError
         They are of two kinds of bus, or have not the same devices.
     """
-    first, *others = sorted(machines, key=lambda machine: machine.rank)
-    whole = Reading(first.kind, first.title, first.file, first.rank)
+    ranked = sorted(readings, key=lambda reading: reading.rank)
+    first = ranked[0]
+    machine = Reading(first.kind, first.title, first.file, first.rank)
     differences: dict[str, list[str]] = {}
-    for machine in (first, *others):
-        if machine.kind != whole.kind:
+    for reading in ranked:
+        if reading.kind != machine.kind:
             raise BusplanError(
-                f"{first.file} is of {whole.kind} and {machine.file} of {machine.kind}: a profile is one bus; give the "
-                "files of one"
+                f"{first.file} is of {machine.kind} and {reading.file} of {reading.kind}: a profile is one bus; give "
+                "the files of one"
             )
-        _add(whole.bus, machine.bus, "", differences)
-        if whole.kind == "can" and (same := whole.nodes.keys() & machine.nodes.keys()):
+        if machine.kind == "can" and (both := machine.nodes.keys() & reading.nodes.keys()):
             raise BusplanError(
-                f"{first.file} and {machine.file} are both node {min(same)}; an EDS has no node-ID, give the DCF of "
+                f"{first.file} and {reading.file} are both node {min(both)}; an EDS has no node-ID, give the DCF of "
                 "each"
             )
-        for whose, of_whole, new in (
-            ("node", whole.nodes, machine.nodes),
-            ("message", whole.messages, machine.messages),
-        ):
-            for number, facts in new.items():
-                _add(of_whole.setdefault(number, {}), facts, f"{whose} {number}: ", differences)
-        whole.remarks += machine.remarks
-    if whole.kind == "ethercat":
-        _require_one_machine([first, *others])
-    for said, *more in differences.values():
-        whole.remarks.append(f"{said}; the first is taken{f', in {len(more)} more places, too' if more else ''}")
-    return whole
+        _add(machine.bus, reading.bus, "", differences)
+        for number, facts in reading.nodes.items():
+            _add(machine.nodes.setdefault(number, {}), facts, f"node {number}: ", differences)
+        for number, facts in reading.messages.items():
+            _add(machine.messages.setdefault(number, {}), facts, f"message {number}: ", differences)
+        machine.remarks += reading.remarks
+    if machine.kind == "ethercat":
+        _require_one_machine(ranked)
+    for words, *more in differences.values():
+        machine.remarks.append(f"{words}; the first is taken{f', in {len(more)} more places, too' if more else ''}")
+    return machine
 
 
-def _require_one_machine(machines: Sequence[Reading]) -> None:
+def _add(facts: Facts, new: Mapping[str, Fact], owner: str, differences: dict[str, list[str]]) -> None:
+    for key, fact in new.items():
+        before = facts.setdefault(key, fact)
+        if before.grade == "assumed" != fact.grade:
+            facts[key] = fact
+        elif before.value != fact.value and fact.grade != "assumed" and key not in _MAY_DIFFER:
+            values = (f"{short_text(stated.value)} at {stated.place}" for stated in (before, fact))
+            differences.setdefault(key, []).append(f"{owner}{key} is {' and '.join(values)}")
+
+
+def _require_one_machine(readings: Sequence[Reading]) -> None:
     """Refuse files of different devices; one that needs not list all may have fewer."""
-    complete = max(machines, key=lambda machine: (machine.lists_all, len(machine.nodes)))
-    for machine in machines:
-        unlisted = machine.nodes.keys() - complete.nodes.keys()
-        if unlisted or (machine.lists_all and machine.nodes.keys() != complete.nodes.keys()):
+    complete = max(readings, key=lambda reading: (reading.lists_all, len(reading.nodes)))
+    for reading in readings:
+        unlisted = reading.nodes.keys() - complete.nodes.keys()
+        if unlisted or (reading.lists_all and reading.nodes.keys() != complete.nodes.keys()):
             raise BusplanError(
-                f"{complete.file} has {len(complete.nodes)} devices and {machine.file} {len(machine.nodes)}: these are "
+                f"{complete.file} has {len(complete.nodes)} devices and {reading.file} {len(reading.nodes)}: these are "
                 "two machines, or one was changed; export both anew"
             )
     missing = [number for number in range(max(complete.nodes, default=0)) if number not in complete.nodes]
@@ -272,16 +209,6 @@ def _require_one_machine(machines: Sequence[Reading]) -> None:
             f"{complete.file}: no device {missing[0]}, though there is device {max(complete.nodes)}; those that it "
             "leaves out delay frames, too: give the text of `ethercat slaves -v` beside it"
         )
-
-
-def _add(own: Facts, new: Mapping[str, Fact], whose: str, differences: dict[str, list[str]]) -> None:
-    for key, fact in new.items():
-        known = own.setdefault(key, fact)
-        if known.grade == "assumed" != fact.grade:
-            own[key] = fact
-        elif known.value != fact.value and fact.grade != "assumed" and key not in _MAY_DIFFER:
-            values = (f"{short_text(stated.value)} at {stated.place}" for stated in (known, fact))
-            differences.setdefault(key, []).append(f"{whose}{key} is {' and '.join(values)}")
 
 
 _COMMENTS_AT: Final = 27
@@ -309,7 +236,43 @@ class ProfileLine(NamedTuple):
         return whole(self.fact.value)
 
 
-def profile_text(rows: Sequence[ProfileLine], *, name: str, files: Sequence[tuple[str, str]]) -> str:
+def lines(section: str, facts: Mapping[str, Fact | None]) -> Iterator[ProfileLine]:
+    """A line for each fact of a section that is known."""
+    return (ProfileLine(section, key, fact) for key, fact in facts.items() if fact is not None)
+
+
+def execution_lines(group: str, base: Fact, per_byte: Fact) -> Iterator[ProfileLine]:
+    """The section of the execution time of a group, which no file says."""
+    facts = {"kind": assumed("linear"), "grade": assumed("assumed"), "base_us": base, "per_byte_us": per_byte}
+    return lines(f"{group}.execution", facts)
+
+
+def usual_period(kind: str) -> Fact:
+    """The period that a kind of bus usually has [us]."""
+    text = kind_named(kind).starter.period
+    return assumed(float(text[:-2]) * _UNITS[text[-2:]], "no file says it; usual on this bus")
+
+
+def group_name(text: str, taken: set[str]) -> str:
+    """A name that a profile takes, not used before: letters, digits, - and _.
+
+    Examples
+    --------
+    >>> taken = set()
+    >>> group_name("L7EC-1000S/C(COE)", taken), group_name("L7EC-1000S/C(COE)", taken), group_name("2 drives", taken)
+    ('L7EC-1000S-C-COE', 'L7EC-1000S-C-COE-2', 'n2-drives')
+    """
+    name = re.sub(r"[^A-Za-z0-9_-]+", "-", text).strip("-")[:_LONGEST_NAME] or "node"
+    name = name if name[0].isalpha() else f"n{name}"
+    free, number = name, 1
+    while free in taken:
+        number += 1
+        free = f"{name}-{number}"
+    taken.add(free)
+    return free
+
+
+def profile_text(rows: Sequence[ProfileLine], *, name: str, readings: Sequence[Reading]) -> str:
     """The text of a profile.
 
     Parameters
@@ -318,34 +281,29 @@ def profile_text(rows: Sequence[ProfileLine], *, name: str, files: Sequence[tupl
         Its lines, those of a section side by side.
     name
         Name of the profile.
-    files
-        File and format of each source, for the description.
+    readings
+        Its files, for the description.
 
     Raises
     ------
     BusplanError
         It is larger than a profile may be.
     """
-    sources = ", ".join(f"{PurePath(file).name} ({title})" for file, title in files)
+    sources = ", ".join(f"{PurePath(reading.file).name} ({reading.title})" for reading in readings)
     head = [
         "schema_version = 1",
         f"name = {value_text(printable(name)[:_LONGEST_PROFILE_NAME].strip() or 'machine')}",
         f"description = {value_text(printable(f'Imported from {sources}')[:2000])}",
     ]
-    text = "\n".join([*head, sections_text(rows)])
-    text = text.encode("utf-8", "backslashreplace").decode()
-    if len(text.encode()) > MAX_FILE_BYTES:
+    text = "".join(f"{line}\n" for line in (*head, *_sections(rows)))
+    content = text.encode("utf-8", "backslashreplace")
+    if len(content) > MAX_FILE_BYTES:
         count = sum(row.key == "nodes" for row in rows)
         raise BusplanError(
             f"the profile would be larger than {MAX_FILE_BYTES:,} bytes: {count} groups of devices that differ from "
             "their neighbours; import a part of the machine"
         )
-    return text
-
-
-def sections_text(rows: Sequence[ProfileLine]) -> str:
-    """The text of sections, each after an empty line."""
-    return "".join(f"{line}\n" for line in _sections(rows))
+    return content.decode()
 
 
 def _sections(rows: Sequence[ProfileLine]) -> Iterator[str]:
@@ -363,169 +321,3 @@ def _sections(rows: Sequence[ProfileLine]) -> Iterator[str]:
         for row in section_rows:
             line, comment = f"{row.key} = {short_text(row.fact.value)}", row.fact.comment
             yield f"{line:{_COMMENTS_AT - 1}} # {comment}" if comment else line
-
-
-def group_name(text: str, taken: set[str]) -> str:
-    """A name that a profile takes, not used before: letters, digits, - and _.
-
-    Examples
-    --------
-    >>> taken = set()
-    >>> group_name("L7EC-1000S/C(COE)", taken), group_name("L7EC-1000S/C(COE)", taken), group_name("2 drives", taken)
-    ('L7EC-1000S-C-COE', 'L7EC-1000S-C-COE-2', 'n2-drives')
-    """
-    name = re.sub(r"[^A-Za-z0-9_-]+", "-", text).strip("-")[:_LONGEST_NAME] or "node"
-    name = name if name[0].isalpha() else f"n{name}"
-    free = name
-    number = 1
-    while free in taken:
-        number += 1
-        free = f"{name}-{number}"
-    taken.add(free)
-    return free
-
-
-def time_us(text: str) -> float:
-    """A time with its unit, as a kind of bus has its usual period [us].
-
-    Examples
-    --------
-    >>> time_us("4ms"), time_us("250us")
-    (4000.0, 250.0)
-    """
-    unit = text[-2:]
-    return float(text[:-2]) * _UNITS[unit]
-
-
-def assumed(rows: Iterable[ProfileLine]) -> list[ProfileLine]:
-    """Rows that nobody has measured or configured."""
-    return [row for row in rows if row.fact.grade == "assumed" and row.key not in ("grade", "kind", "master_grade")]
-
-
-MOST_BYTES: Final = 32_000_000
-"""Largest file; the ENI of 500 devices has some 20 MB."""
-
-
-_LONGEST_LINE: Final = 1000
-
-
-class Format(NamedTuple):
-    """A format that is read, and how it is recognised."""
-
-    title: str
-    """Name of the format, and what its files hold."""
-    module: str
-    roots: tuple[str, ...] = ()
-    """Tags of the root element, for XML."""
-    pattern: str = ""
-    """Pattern of a line that only files of the format have, for text."""
-    dialect: str = ""
-    """Argument of a reader that reads several formats."""
-    head: bytes = b""
-    """Pattern of the first bytes, for recordings."""
-
-
-_IGH: Final = r"=== Master \d+, Slave \d+ ===|SM\d+: PhysAddr 0x"
-FORMATS: Final = (
-    Format("ENI (a root <EtherCATConfig>)", "eni", roots=("EtherCATConfig", "EncryptedEtherCATConfig")),
-    Format("LinuxCNC's ethercat-conf.xml (a root <masters>)", "linuxcnc", roots=("masters",)),
-    Format("text of `ethercat slaves -v` or `ethercat pdos` (=== Master 0, Slave 0 ===)", "igh", pattern=_IGH),
-    Format("text of SOEM's slaveinfo (Slave:1)", "soem", pattern=r"Slave:\d+[ \t]*$"),
-    Format("DBC (BO_)", "can_database", pattern=r"[ \t]*BO_ +\d+ ", dialect="dbc"),
-    Format("SYM (FormatVersion=)", "can_database", pattern=r"[ \t]*FormatVersion *= *\d", dialect="sym"),
-    Format("KCD (a root <NetworkDefinition>)", "can_database", roots=("NetworkDefinition",), dialect="kcd"),
-    Format("ARXML (a root <AUTOSAR>)", "can_database", roots=("AUTOSAR",), dialect="arxml"),
-    Format("CANopen EDS or DCF ([DeviceInfo])", "canopen", pattern=r"[ \t]*\[(?i:DeviceInfo)\]"),
-    Format(
-        "a CAN log (candump -l, ASC, BLF, TRC)",
-        "can_log",
-        head=rb"\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#|date \S|LOGG|;[^\[]{0,2000}?(\$FILEVERSION|Start time:)",
-    ),
-)
-_ELSEWHERE: Final = {
-    "EtherCATInfo": "an ESI describes a kind of device and no machine; export the ENI of the machine",
-    "TcSmProject": "a project of TwinCAT; export its ENI (EtherCAT, Export Configuration File)",
-}
-
-
-def machines(names: Sequence[str], *, progress: Progress) -> list[Reading]:
-    """Read files, in their order.
-
-    Parameters
-    ----------
-    names
-        The files; "-" is standard input.
-    progress
-        Called with the bytes read of a recording and those of its file.
-
-    Raises
-    ------
-    BusplanError
-        A file cannot be read, is of no known format or of two, or is not valid, with its place.
-    """
-    return [_machine(name, progress) for name in names]
-
-
-def _machine(argument: str, progress: Progress) -> Reading:
-    name = "<stdin>" if argument == "-" else argument
-    content = read_bytes(Path(argument), name=name, limit=MOST_BYTES)
-    for known in FORMATS:
-        if known.head and re.match(known.head, content):
-            if argument == "-":
-                raise BusplanError(f"{name}: a recording is read from a file")
-            return _reader(known)(Path(argument), name, progress=progress)
-    if len(content) > MOST_BYTES:
-        raise BusplanError(f"{name}: is larger than {MOST_BYTES:,} bytes; no file of one machine is")
-    if not content.strip(b"\0 \t\r\n\xef\xbb\xbf\xff\xfe"):
-        raise BusplanError(f"{name}: is empty")
-    encoding = "utf-16" if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8"
-    if content[:1000].decode(encoding, "ignore").lstrip("\ufeff \t\r\n").startswith("<"):
-        return _of_root(content, root_tag(content, name=name), name)
-    return _of_text(_text(content, encoding, name), name)
-
-
-def _of_root(content: bytes, tag: str, name: str) -> Reading:
-    for known in FORMATS:
-        if tag in known.roots:
-            return _reader(known)(content, name)
-    reason = _ELSEWHERE.get(tag)
-    raise BusplanError(f"{name}: {reason}" if reason else _unknown(name, f"XML with a root <{tag[:60]}>, which is "))
-
-
-def _text(content: bytes, encoding: str, name: str) -> str:
-    """The text of a file: UTF-8, UTF-16, or a code page of Windows."""
-    if encoding == "utf-8" and b"\0" in content[:100_000]:
-        raise BusplanError(_unknown(name, "binary data, "))
-    try:
-        text = content.decode("utf-8-sig" if content.startswith(BOM_UTF8) else encoding)
-    except UnicodeDecodeError:
-        text = content.decode("cp1252", "replace")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _of_text(text: str, name: str) -> Reading:
-    matching = [known for known in FORMATS if known.pattern and re.search(f"^(?:{known.pattern})", text, re.MULTILINE)]
-    if not matching:
-        raise BusplanError(_unknown(name, ""))
-    if len(matching) > 1:
-        titles = " and ".join(known.title for known in matching)
-        raise BusplanError(f"{name}: has lines of {titles}; give a file for each")
-    if not matching[0].dialect:
-        # Values stand further to the front, and patterns take long on endless lines.
-        text = "\n".join(line[:_LONGEST_LINE] for line in text.split("\n"))
-    return _reader(matching[0])(text, name)
-
-
-def _reader(known: Format) -> Callable[..., Reading]:
-    read: Callable[..., Reading] = import_module(f"busplan.questions.import_.{known.module}").read
-    return partial(read, dialect=known.dialect) if known.dialect else read
-
-
-def _unknown(name: str, what: str) -> str:
-    formats = "; ".join(known.title for known in FORMATS)
-    return f"{name}: {what}none of what is looked for: {formats}"
-
-
-def stem_of(names: Sequence[str]) -> str:
-    """Name of a profile of some files."""
-    return Path(os.path.basename(names[0])).stem if names[0] != "-" else "machine"  # noqa: PTH119 - any text

@@ -1,13 +1,10 @@
 """Text of SOEM's `slaveinfo`: bits, delays since the first clock, ports and clocks."""
 
 import re
-from math import ceil
 from typing import Final
 
-from busplan.questions.import_.eni import CONTROL_WORDS, axes_fact
-from busplan.questions.import_.reading import Fact, Reading
+from busplan.questions.import_.reading import ControlWords, Facts, Reading
 
-TITLE: Final = "slaveinfo"
 _SLAVE: Final = re.compile(r"Slave:(\d{1,5})\s*$")
 _KEYS: Final = re.compile(r" (Name|Output size|Input size|Delay|Has DC|Activeports|MBX length wr): *(.*?)\s*$")
 _READ_LENGTH: Final = re.compile(r"rd: *(\d{1,5})")
@@ -23,22 +20,20 @@ def read(text: str, name: str) -> Reading:
     Raises
     ------
     BusplanError
-            A device is left out, or has no size; with its line.
+        A device is left out, or has no size; with its line.
     """
-    machine = Reading("ethercat", TITLE, name, rank=3)
+    machine = Reading("ethercat", "slaveinfo", name, rank=3)
     totals_ns: dict[int, tuple[int, int]] = {}
     ports: dict[int, int] = {}
     for number, lines in enumerate(_slaves(text, machine)):
         facts = machine.nodes[number] = {}
-        words: dict[int, int] = {}
-        mapped = None
+        words, mapped = ControlWords(), None
         for line, content in lines:
             if match := _MAPPED.match(content):
                 mapped = mapped or line
-                if int(match[1], 16) in CONTROL_WORDS:
-                    words.setdefault(int(match[1], 16), line)
+                words.add(int(match[1], 16), line)
             elif match := _KEYS.match(content):
-                _described(match[1], match[2], line, facts, machine)
+                _describe(match[1], match[2], line, facts, machine)
                 if match[1] == "Delay" and (delay := _DELAY.match(match[2])):
                     totals_ns[number] = int(delay[1]), line
                 elif match[1] == "Activeports":
@@ -46,9 +41,9 @@ def read(text: str, name: str) -> Reading:
         for title, key in _SIZES.items():
             if key not in facts:
                 raise machine.refusal(lines[0][0], f"slave {number + 1} has no {title}: cut off?")
-        facts["axes"] = axes_fact(words, machine, line=mapped)
+        facts["axes"] = words.axes(machine, line=mapped)
     _hops(totals_ns, ports, machine)
-    machine.bus["master"] = Fact("SOEM", machine.place(1), "derived", "slaveinfo is of its tools")
+    machine.bus["master"] = machine.fact("SOEM", 1, "derived", "slaveinfo is of its tools")
     return machine
 
 
@@ -65,16 +60,15 @@ def _slaves(text: str, machine: Reading) -> list[list[tuple[int, str]]]:
     return slaves
 
 
-def _described(key: str, value: str, line: int, facts: dict[str, Fact], machine: Reading) -> None:
-    place = machine.place(line)
+def _describe(key: str, value: str, line: int, facts: Facts, machine: Reading) -> None:
     if key in _SIZES and (bits := re.match(r"(\d{1,6})bits", value)):
-        facts[_SIZES[key]] = Fact(ceil(int(bits[1]) / 8), place, note=f"{bits[1]} bits")
+        facts[_SIZES[key]] = machine.bytes_of(int(bits[1]), line)
     elif key == "Name" and value:
-        facts["name"] = Fact(value, place)
+        facts["name"] = machine.fact(value, line)
     elif key == "Has DC" and value == "1":
-        facts["has_clock"] = Fact(True, place, "measured")
+        facts["has_clock"] = machine.fact(True, line, "measured")
     elif key == "MBX length wr" and (length := _READ_LENGTH.search(value)) and int(length[1]):
-        facts["mailbox_bytes"] = Fact(int(length[1]), place)
+        facts["mailbox_bytes"] = machine.fact(int(length[1]), line)
 
 
 def _hops(totals_ns: dict[int, tuple[int, int]], ports: dict[int, int], machine: Reading) -> None:
@@ -86,14 +80,14 @@ def _hops(totals_ns: dict[int, tuple[int, int]], ports: dict[int, int], machine:
     for number in range(1, len(machine.nodes)):
         before = _parent(number, ports)
         between = [hops_ns.get(device) for device in range(before + 1, number)]
-        known = all("has_clock" in machine.nodes[device] and device in totals_ns for device in (before, number))
-        if not known or None in between:
+        is_timed = all("has_clock" in machine.nodes[device] and device in totals_ns for device in (before, number))
+        if not is_timed or None in between:
             continue
         hop_ns = totals_ns[number][0] - totals_ns[before][0] - 2 * sum(ns for ns in between if ns)
         if hop_ns > 0:
             hops_ns[number] = hop_ns
-            place = machine.place(totals_ns[number][1])
-            machine.nodes[number]["delay_us"] = Fact(hop_ns / 1000, place, "measured", "cable included")
+            delay = machine.fact(hop_ns / 1000, totals_ns[number][1], "measured", "cable included")
+            machine.nodes[number]["delay_us"] = delay
 
 
 def _parent(number: int, ports: dict[int, int]) -> int:

@@ -27,12 +27,12 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.blocks import State as Tone
-from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Entry, Panel, Ruler, choices, letters
+from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Entry, Panel, choices, letters
 from busplan.forms.numbers import period_value, sentence_text, with_unit
 from busplan.questions.base.sentences import document, fields, with_profile
-from busplan.questions.fit.certainty import TIME
+from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.network import PERIOD, varied_nodes
-from busplan.questions.map import AXES, Cell, Direction, NotDrawn, Region, State, TradeOff
+from busplan.questions.map import AXES, Cell, Direction, MapAnswer, NotDrawn, Region, State
 from busplan.questions.sweep.digest import payload_sentences
 from busplan.sections.profile import Profile
 
@@ -61,94 +61,165 @@ LOOKS: Final[Mapping[State, Look]] = MappingProxyType(
     }
 )
 _BARRED: Final = Look("x", "barred", "neutral")
-"""Of what does not fit in any time; its letter is that of the limit."""
+"""Cells where no period helps; the letter names the limit."""
 
-Looks = Mapping[tuple[State, tuple[str, ...]], Look]
+
+def map_report(answer: MapAnswer) -> Report:
+    """Report of `map`."""
+    whole = map_document(answer)
+    return Report(
+        Sentence(("Map of ", Code(answer.profile.name))),
+        tuple(_blocks(answer)),
+        whole,
+        with_profile(answer.profile.name, whole["cells"]),
+    )
+
+
+def _blocks(answer: MapAnswer) -> Iterator[Block]:
+    """How much fits and whether this design does, the picture, and what limits each region."""
+    headline, looks = _headline(answer), _looks(answer)
+    yield headline
+    yield from _remarks(answer)
+    title = " against ".join(_title(direction, answer.profile) for direction in (answer.y, answer.x))
+    steps = "" if _is_even(answer.y) and _is_even(answer.x) else ", in unequal steps"
+    marked = "" if answer.design is None else ", this design marked"
+    caption = sentence(f"{{}} of {{}} settings fit, {title}{steps}{marked}", *_counts(answer))
+    yield Chart(_drawing(answer, looks, title=sentence_text(headline)), caption)
+    yield _regions_table(answer, looks)
+
+
+def _headline(answer: MapAnswer) -> Sentence:
+    """How many settings fit, and what this design does."""
+    fitting, drawn = _counts(answer)
+    circle = " with a circle that passes" if answer.with_circle else ""
+    words = f"{{}}: {{}} of {{}} {nouns(len(answer.cells), 'setting')} are shown to fit{circle}."
+    counts = sentence(words, Code(answer.profile.name), fitting, drawn)
+    design = answer.design
+    if design is None:
+        return joined(counts, Sentence(("This design is not on the map: it has other values.",)))
+    tone = LOOKS[design.state].tone
+    verdict = Sentence((f"This design ({_setting_words(answer, design)}): {_verdict_words(answer, design)}.",))
+    return joined(Sentence(counts.parts, "fails" if tone == "neutral" else tone), verdict)
+
+
+def _counts(answer: MapAnswer) -> tuple[ShownValue, ShownValue]:
+    """Settings that fit, and all."""
+    return count_value(sum(cell.state == FITS for cell in answer.cells)), count_value(len(answer.cells))
+
+
+def _remarks(answer: MapAnswer) -> Iterator[Sentence]:
+    """What is not drawn or not judged, and why."""
+    missing = answer.not_drawn
+    if missing:
+        number = count_value(len(missing))
+        yield sentence(f"{{}} {nouns(len(missing), 'setting')} cannot exist, as {missing[0].reason}.", number)
+    if any(cell.state == "circle not judged" for cell in answer.cells):
+        yield Sentence(
+            ("Not every circle is judged: no contour tolerance is asked for, or no error source matters.",), "warns"
+        )
+    yield from payload_sentences(answer.profile, (answer.x.key, answer.y.key))
+
+
+_Looks = Mapping[tuple[State, tuple[str, ...]], Look]
 """The look of each region, by its state and limits."""
 
 
-def looks_of(trade_off: TradeOff) -> Looks:
-    """Give each region of a map its look: that of its state, with a letter for each limit that no time helps.
-
-    Parameters
-    ----------
-    trade_off
-        The map.
-    """
-    looks = {(region.state, region.limited_by): LOOKS[region.state] for region in trade_off.regions}
+def _looks(answer: MapAnswer) -> _Looks:
+    """The look of each region: that of its state, with a letter for each limit where no period helps."""
+    looks = {(region.state, region.limited_by): LOOKS[region.state] for region in answer.regions}
     barred = [limits for state, limits in looks if state == "does not fit" and limits != (TIME,)]
     marks = zip(barred, letters(map("".join, barred)), strict=True)
     return looks | {("does not fit", limits): _BARRED._replace(mark=mark) for limits, mark in marks}
 
 
-def look_of(cell: Cell, looks: Looks) -> Look:
-    """Look of a cell."""
-    return looks[cell.state, cell.limited_by]
-
-
-def legend_of(trade_off: TradeOff, looks: Looks) -> Iterator[Entry]:
-    """Explain each look; a letter names its limit.
-
-    Parameters
-    ----------
-    trade_off
-        The map.
-    looks
-        From `looks_of`.
-    """
+def _drawing(answer: MapAnswer, looks: _Looks, *, title: str) -> Drawing:
+    """The verdict and its limit at each setting."""
+    legend = []
     for (state, limits), look in looks.items():
         limit = f": {' and '.join(limits)}" if look.ink == _BARRED.ink else ""
-        yield Entry(look.ink, f"{state_words(state, trade_off)}{limit}", look.mark)
+        legend.append(Entry(look.ink, f"{_state_words(answer, state)}{limit}", look.mark))
+    design = None
+    if answer.design_place is not None:
+        row, column = answer.design_place
+        design = (column, row)
+        legend.append(Entry("frame", "this design"))
+    if answer.not_drawn:
+        legend.append(Entry("blank", "blank: cannot exist"))
+    across, up = (
+        choices(
+            f"{_title(direction, answer.profile)}{'' if _is_even(direction) else ' in unequal steps'}",
+            (_value_text(direction, value) for value in direction.values),
+            own=place,
+        )
+        for direction, place in zip((answer.x, answer.y), design or (None, None), strict=True)
+    )
+    rows = tuple(tuple(_cell(answer, cell, looks) for cell in row) for row in answer.rows)
+    return Drawing(title, (Panel(ChartGrid(across, up, rows, tuple(legend), design)),), has_characters=True)
 
 
-def state_words(state: State, trade_off: TradeOff) -> str:
-    """Name of a state on a map."""
+def _cell(answer: MapAnswer, cell: Cell | NotDrawn, looks: _Looks) -> ChartCell | None:
+    if isinstance(cell, NotDrawn):
+        return None
+    look = looks[cell.state, cell.limited_by]
+    return ChartCell(look.ink, look.mark, f"{_setting_words(answer, cell)}: {_verdict_words(answer, cell)}", look.tone)
+
+
+def _regions_table(answer: MapAnswer, looks: _Looks) -> Table:
+    """How many cells each region has, and what limits it; the legend of the picture."""
+    columns = (
+        TableColumn("state", kind="words"),
+        TableColumn("limited by", kind="words", wraps=True),
+        TableColumn("settings"),
+    )
+    rows = []
+    for region in answer.regions:
+        look = looks[region.state, region.limited_by]
+        state = Swatch(look.ink, look.mark, _state_words(answer, region.state))
+        rows.append(TableRow((state, _limit_words(answer, region), count_value(region.cells, "cells"))))
+    return Table(columns, tuple(rows), Sentence(("What limits each region",)))
+
+
+def _setting_words(answer: MapAnswer, cell: Cell) -> str:
+    """The setting of a cell, as "8 axes, period 4 ms"."""
+    words = []
+    for direction, value in ((answer.x, cell.x), (answer.y, cell.y)):
+        text = _value_text(direction, value)
+        words.append(f"{text} axes" if direction.key == AXES else f"{_title(direction, answer.profile)} {text}")
+    return ", ".join(words)
+
+
+def _verdict_words(answer: MapAnswer, cell: Cell) -> str:
+    """The state of a cell, and its limit where it does not fit."""
+    return ", ".join(filter(None, (_state_words(answer, cell.state), _limit_words(answer, cell))))
+
+
+def _state_words(answer: MapAnswer, state: State) -> str:
     if state == "unsafe":
-        return f"unsafe {trade_off.network.bus.safety.setting}"
-    return f"{state}, and the circle passes" if state == "fits" and trade_off.with_circle else state
+        return f"unsafe {answer.network.bus.safety.setting}"
+    return f"{state}, and the circle passes" if state == FITS and answer.with_circle else state
 
 
-def limit_words(region: Region | Cell, trade_off: TradeOff) -> str:
+def _limit_words(answer: MapAnswer, region: Region | Cell) -> str:
     """Limits that keep a region from fitting; empty where it fits."""
     words = " and ".join(region.limited_by)
     if region.limited_by != (TIME,):
         return words
-    return f"{words}, largest term {trade_off.network.bus.figures.term_label(region.binding_term)}"
+    return f"{words}, largest term {answer.network.bus.figures.term_label(region.binding_term)}"
 
 
-def title_of(direction: Direction, profile: Profile) -> str:
+def _title(direction: Direction, profile: Profile) -> str:
     """Name of a direction."""
     if direction.key == AXES:
         return f"axes ({varied_nodes(profile).nodes_key})"
     return "period" if direction.key == PERIOD else direction.key
 
 
-def value_text(direction: Direction, value: Value) -> str:
+def _value_text(direction: Direction, value: Value) -> str:
     """Write a value of a direction in few characters: a period with its unit, any other in the unit of its key."""
     if isinstance(value, str | bool):
         return str(value).lower() if isinstance(value, bool) else value
     shown = period_value(value) if direction.key == PERIOD else ShownValue(value)
     return with_unit(shown._replace(digits=_DIGITS))
-
-
-def setting_words(trade_off: TradeOff, cell: Cell) -> str:
-    """Write the setting of a cell, as "8 axes, period 4 ms"."""
-    return ", ".join(
-        _along(direction, value, trade_off.profile)
-        for direction, value in ((trade_off.x, cell.x), (trade_off.y, cell.y))
-    )
-
-
-def _along(direction: Direction, value: Value, profile: Profile) -> str:
-    text = value_text(direction, value)
-    return f"{text} axes" if direction.key == AXES else f"{title_of(direction, profile)} {text}"
-
-
-def map_title(trade_off: TradeOff) -> str:
-    """Quantities on the y and x axis: "period against axes"."""
-    directions = (trade_off.y, trade_off.x)
-    title = " against ".join(title_of(direction, trade_off.profile) for direction in directions)
-    return title if all(map(_is_even, directions)) else f"{title}, in unequal steps"
 
 
 def _is_even(direction: Direction) -> bool:
@@ -158,160 +229,30 @@ def _is_even(direction: Direction) -> bool:
     return len(values) < len(direction.values) or all(isclose(step, steps[0], rel_tol=1e-6) for step in steps)
 
 
-def cell_words(trade_off: TradeOff, cell: Cell) -> str:
-    """Say the setting of a cell, its state and its limit."""
-    limit = limit_words(cell, trade_off)
-    return f"{setting_words(trade_off, cell)}: {state_words(cell.state, trade_off)}{limit and f', {limit}'}"
-
-
-def map_drawing(trade_off: TradeOff, *, title: str) -> Drawing:
-    """Draw the verdict and its limit at each setting.
-
-    Parameters
-    ----------
-    trade_off
-        The map.
-    title
-        Its message in a sentence.
-    """
-    looks = looks_of(trade_off)
-    legend = list(legend_of(trade_off, looks))
-    own_row, own_column = trade_off.own_place or (None, None)
-    if own_row is not None:
-        legend.append(Entry("frame", "this design"))
-    if trade_off.not_drawn:
-        legend.append(Entry("blank", "blank: cannot exist"))
-    grid = ChartGrid(
-        _ruler(trade_off.x, trade_off.profile, own=own_column),
-        _ruler(trade_off.y, trade_off.profile, own=own_row),
-        tuple(tuple(_cell(trade_off, cell, looks) for cell in row) for row in trade_off.rows),
-        tuple(legend),
-        None if own_row is None or own_column is None else (own_column, own_row),
-    )
-    return Drawing(title, (Panel(grid),), has_characters=True)
-
-
-def _ruler(direction: Direction, profile: Profile, *, own: int | None) -> Ruler:
-    title = f"{title_of(direction, profile)}{'' if _is_even(direction) else ' in unequal steps'}"
-    return choices(title, (value_text(direction, value) for value in direction.values), own=own)
-
-
-def _cell(trade_off: TradeOff, cell: Cell | NotDrawn, looks: Looks) -> ChartCell | None:
-    if isinstance(cell, NotDrawn):
-        return None
-    look = look_of(cell, looks)
-    return ChartCell(look.ink, look.mark, cell_words(trade_off, cell), look.tone)
-
-
-def map_report(trade_off: TradeOff) -> Report:
-    """Report of `map`."""
-    return Report(
-        Sentence(("Map of ", Code(trade_off.profile.name))),
-        tuple(_blocks(trade_off)),
-        map_document(trade_off),
-        with_profile(trade_off.profile.name, map_document(trade_off)["cells"]),
-    )
-
-
-def _blocks(trade_off: TradeOff) -> Iterator[Block]:
-    """How much fits and whether this design does, the picture, and what limits each region."""
-    yield headline(trade_off)
-    yield from _remarks(trade_off)
-    yield map_chart(trade_off)
-    yield regions_table(trade_off)
-
-
-def headline(trade_off: TradeOff) -> Sentence:
-    """Say how many settings fit, and what this design does."""
-    drawn, fitting = len(trade_off.cells), sum(cell.state == "fits" for cell in trade_off.cells)
-    circle = " with a circle that passes" if trade_off.with_circle else ""
-    counts = sentence(
-        f"{{}}: {{}} of {{}} {nouns(drawn, 'setting')} are shown to fit{circle}.",
-        Code(trade_off.profile.name),
-        count_value(fitting),
-        count_value(drawn),
-    )
-    own = trade_off.own
-    if own is None:
-        return joined(counts, Sentence(("This design is not on the map: it has other values.",)))
-    limit = limit_words(own, trade_off)
-    text = (
-        f"This design ({setting_words(trade_off, own)}): {state_words(own.state, trade_off)}{limit and f', {limit}'}."
-    )
-    tone = LOOKS[own.state].tone
-    return joined(Sentence(counts.parts, "fails" if tone == "neutral" else tone), Sentence((text,)))
-
-
-def _remarks(trade_off: TradeOff) -> Iterator[Sentence]:
-    """Say what is not drawn or not judged, and why."""
-    missing = trade_off.not_drawn
-    if missing:
-        number = count_value(len(missing))
-        yield sentence(f"{{}} {nouns(len(missing), 'setting')} cannot exist, as {missing[0].reason}.", number)
-    if any(cell.state == "circle not judged" for cell in trade_off.cells):
-        yield Sentence(
-            ("Not every circle is judged: no contour tolerance is asked for, or no error source matters.",), "warns"
-        )
-    yield from payload_sentences(trade_off.profile, (trade_off.x.key, trade_off.y.key))
-
-
-def map_chart(trade_off: TradeOff) -> Chart:
-    """The picture, with how much fits and what lies along which direction."""
-    fitting = sum(cell.state == "fits" for cell in trade_off.cells)
-    marked = "" if trade_off.own is None else ", this design marked"
-    caption = sentence(
-        f"{{}} of {{}} settings fit, {map_title(trade_off)}{marked}", *_counts(fitting, len(trade_off.cells))
-    )
-    return Chart(map_drawing(trade_off, title=sentence_text(headline(trade_off))), caption)
-
-
-def _counts(*numbers: int) -> tuple[ShownValue, ...]:
-    return tuple(count_value(number) for number in numbers)
-
-
-def regions_table(trade_off: TradeOff) -> Table:
-    """How many cells each region has, and what limits it; the legend of the picture."""
-    columns = (
-        TableColumn("state", kind="words"),
-        TableColumn("limited by", kind="words", wraps=True),
-        TableColumn("settings"),
-    )
-    rows = (_region_row(trade_off, region) for region in trade_off.regions)
-    return Table(columns, tuple(rows), Sentence(("What limits each region",)))
-
-
-def _region_row(trade_off: TradeOff, region: Region) -> TableRow:
-    look = looks_of(trade_off)[region.state, region.limited_by]
-    name = Swatch(look.ink, look.mark, state_words(region.state, trade_off))
-    cells = count_value(region.cells, "cells")
-    return TableRow((name, limit_words(region, trade_off), cells))
-
-
-def map_document(trade_off: TradeOff) -> JsonDocument:
+def map_document(answer: MapAnswer) -> JsonDocument:
     """Document of `busplan map --format json`."""
     return document(
         "map",
-        profile=trade_off.profile.name,
-        timing_model=trade_off.network.bus.deciding_model,
-        x={"key": trade_off.x.key, "values": list(trade_off.x.values)},
-        y={"key": trade_off.y.key, "values": list(trade_off.y.values)},
-        with_circle=trade_off.with_circle,
-        design=None if trade_off.own is None else _record(trade_off, trade_off.own),
-        regions=[fields(region, *region._fields) for region in trade_off.regions],
-        cells=[_record(trade_off, cell) for cell in trade_off.cells],
+        profile=answer.profile.name,
+        timing_model=answer.network.bus.deciding_model,
+        x={"key": answer.x.key, "values": list(answer.x.values)},
+        y={"key": answer.y.key, "values": list(answer.y.values)},
+        with_circle=answer.with_circle,
+        design=None if answer.design is None else _record(answer, answer.design),
+        regions=[fields(region, *region._fields) for region in answer.regions],
+        cells=[_record(answer, cell) for cell in answer.cells],
         not_drawn=[
-            {trade_off.x.key: absent.x, trade_off.y.key: absent.y, "reason": absent.reason}
-            for absent in trade_off.not_drawn
+            {answer.x.key: absent.x, answer.y.key: absent.y, "reason": absent.reason} for absent in answer.not_drawn
         ],
     )
 
 
-def _record(trade_off: TradeOff, cell: Cell) -> Record:
+def _record(answer: MapAnswer, cell: Cell) -> Record:
     """A cell as plain data, its values under the keys of the directions, as in a row of a sweep."""
-    safety = trade_off.network.bus.safety.figure
+    safety = answer.network.bus.safety.figure
     return {
-        trade_off.x.key: cell.x,
-        trade_off.y.key: cell.y,
+        answer.x.key: cell.x,
+        answer.y.key: cell.y,
         **fields(cell, "nodes", "axes", "state", "limited_by", "binding_term", "verdict"),
         **fields(cell, "margin_corrected_us", "uncertainty_us"),
         **({} if safety is None else {safety.key: cell.is_safe}),

@@ -220,7 +220,7 @@ def plan(
         "limits.reserve": None if reserve is None else finite(reserve, name="reserve"),
     }
     kept = _changes({key: from_numpy(value) for key, value in given.items() if value is not None})
-    kept += wanted.each if isinstance(wanted, KeyChanges) else _changes(values_by_key(wanted, name="wanted"))
+    kept += wanted.entries if isinstance(wanted, KeyChanges) else _changes(values_by_key(wanted, name="wanted"))
     if axes is not None:
         kept = (_nodes(own, whole(axes, name="axes"), kept), *kept)
     changes = KeyChanges(kept)

@@ -34,15 +34,14 @@ from busplan.questions.base.sentences import (
     change_meanings,
     document,
     fields,
-    key_value,
     margin_parts,
     reset_sentence,
     settings_sentence,
     warning_sentences,
     with_profile,
 )
-from busplan.questions.fit.certainty import FITS, limits_behind
-from busplan.questions.fit.figures import COUNTS
+from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.figures import COUNTS, limits_behind
 from busplan.questions.fit.network import PERIOD
 from busplan.questions.plan import Option, PlanAnswer, Relaxation
 from busplan.questions.plan.search import freedoms
@@ -165,7 +164,7 @@ def _record(plan: PlanAnswer, option: Option) -> Record:
 
 def _payload_bytes(profile: Profile, kind: TransactionKind) -> int | None:
     """Payload of the first nodes in one direction [bytes]; None without nodes."""
-    return next((int(alike.bytes_of(kind)) for alike in profile.alike_nodes), None)
+    return next((int(alike.bytes_of(kind)) for alike in profile.node_groups), None)
 
 
 def plan_records(plan: PlanAnswer) -> list[Record]:
@@ -234,7 +233,7 @@ def option_margin(option: Option) -> tuple[ShownValue, ShownValue]:
     margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     # A margin beyond its uncertainty is none of the causes where limits of the bus are.
     beyond_us = (figures.margin_corrected_us or 0.0) - (figures.uncertainty_us or 0.0)
-    is_enough = figures.verdict == FITS or (beyond_us > 0 and limits_behind(figures))
+    is_enough = figures.verdict == FITS or (beyond_us > 0 and limits_behind(figures, option.network))
     return margin._replace(state="neutral" if is_enough else "fails"), doubt
 
 
@@ -278,5 +277,5 @@ def _counted(words: str, value: BusValue) -> str:
 
 
 def _short_value(key: str, value: BusValue) -> ShownValue:
-    shown = key_value(key, value)
+    shown = ShownValue(value, key)
     return shown._replace(unit=period_value(float(value)).unit) if key.endswith("_us") else shown

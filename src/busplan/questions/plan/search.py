@@ -14,7 +14,7 @@ from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import TIME, certainty
 from busplan.questions.fit.network import PERIOD, at_period, changed
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, TRANSACTION_KINDS, TransactionKind
-from busplan.sections.machine import AlikeNodes
+from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import Profile
 
 _MOST_SLICE_US: Final = 1e12
@@ -68,7 +68,7 @@ class Room(NamedTuple):
 def rooms(network: Network) -> Iterator[Room]:
     """The network with the nodes that [limits] asks the bus to carry: more of each group, the others as they are."""
     limits = network.profile.limits
-    for alike in network.profile.alike_nodes:
+    for alike in network.profile.node_groups:
         more = {"limits.min_spare_nodes": limits.min_spare_nodes}
         if limits.min_spare_axes is not None and alike.node.axes:
             more["limits.min_spare_axes"] = ceil(limits.min_spare_axes / int(alike.node.axes))
@@ -76,7 +76,7 @@ def rooms(network: Network) -> Iterator[Room]:
             if spare is not None:
                 nodes = int(alike.nodes) + spare
                 of = f" of {alike.name}" if alike.name else ""
-                yield Room(key, network.asking(alike.name).with_nodes(nodes), f"{nodes} nodes{of}")
+                yield Room(key, network.varying(alike.name).with_nodes(nodes), f"{nodes} nodes{of}")
 
 
 def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
@@ -102,7 +102,7 @@ def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
         at_us = max(time.slice_us, least_us, MIN_STEP_US)
         at = network if limit.period is None else network._replace(period_us=at_us)
         if limit.shown.is_broken(at):
-            kept_us = limit.kept_from_us(at)
+            kept_us = plain(limit.shown.shortest_period_us(at))
             if kept_us == inf:
                 way_out = f" ({limit.way_out})" if limit.way_out else ""
                 yield Need(inf, limit.key, f"{limit.words(at)}{way_out}", inf)
@@ -432,7 +432,7 @@ def _ratios(network: Network) -> Iterator[Changes]:
 def _payloads(network: Network, kept: Collection[str]) -> Iterator[Changes]:
     """The largest payload with which all constraints hold, or the smallest one: the larger of read and write is cut."""
     profile, payloads = network.profile, network.bus.payloads(network)
-    cuts = [_cut(alike, kind) for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS)]
+    cuts = [_cut(alike, kind) for alike, kind in product(profile.node_groups, TRANSACTION_KINDS)]
     step = max(payloads.step_bytes, min((size for key, size in cuts if key not in kept), default=1))
     most = min(int(network.largest_payload_bytes) - 1, payloads.most_bytes)
     sizes = [size for size in range(step, most + 1, step) if _within(profile, size, kept)]
@@ -453,14 +453,14 @@ def _holds(network: Network, change: Changes | None) -> bool:
 def _within(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
     """The change to payloads of so many bytes or less; empty where they are, None where no payload would be left."""
     changes: dict[str, Value] = {}
-    for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS):
+    for alike, kind in product(profile.node_groups, TRANSACTION_KINDS):
         over, (key, bytes_cut) = int(alike.bytes_of(kind)) - most_bytes, _cut(alike, kind)
         if over > 0 and key not in kept:
             changes[key] = getattr(alike.payload, key.rpartition(".")[2]) - ceil(over / bytes_cut)
     return changes if all(int(value) > 0 for value in changes.values()) else None
 
 
-def _cut(alike: AlikeNodes, kind: TransactionKind) -> tuple[str, int]:
+def _cut(alike: ProfileGroup, kind: TransactionKind) -> tuple[str, int]:
     """The key that a payload is cut by, and what a byte of it takes away [bytes]; without axes it is the fixed part."""
     key, axes = alike.payload_key(kind), int(alike.node.axes)
     return (key, axes) if axes and key.endswith("_per_axis") else (key.removesuffix("_per_axis"), 1)
@@ -537,7 +537,7 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
         Nodes differ, so that axes do not say how many of which.
     """
     if profile.group:
-        own = {alike: int(alike.nodes) * int(alike.node.axes) for alike in profile.alike_nodes}
+        own = {alike: int(alike.nodes) * int(alike.node.axes) for alike in profile.node_groups}
         needed = {alike: axes - sum(own.values()) + own[alike] for alike in own if alike.node.axes}
         each = ", or ".join(
             f"set {alike.nodes_key}={ceil(of_group / int(alike.node.axes))}"
@@ -546,7 +546,7 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
         )
         instead = f"say instead: {each}" if each else "set the nodes of a group instead"
         raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
-    (alike,) = profile.alike_nodes
+    (alike,) = profile.node_groups
     return ceil(axes / int(alike.node.axes))
 
 

@@ -307,7 +307,7 @@ def _reported(
 
 
 def _without_period(changes: KeyChanges) -> KeyChanges:
-    return KeyChanges(tuple(change for change in changes.each if change.option != "--period"))
+    return KeyChanges(tuple(change for change in changes.entries if change.option != "--period"))
 
 
 def _asks_for_circle(profile: Profile, circle: bool | None) -> bool:

@@ -12,21 +12,19 @@ from busplan.buses.figure import TIMING_MODEL, unit_of
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
 from busplan.forms import ROWS_ENDINGS, RowsForm
-from busplan.forms.blocks import Code, Report, Sentence
+from busplan.forms.blocks import Chart, Code, Report, Sentence
 from busplan.forms.charts import Drawing
 from busplan.forms.csv_rows import spelled
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network
 from busplan.questions.circle import CIRCLE_BY_KEY
-from busplan.questions.sweep.asked import Sweep, checked_sweep, column_figures
-from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, mapper_of
+from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, mapper_of, summaries
 from busplan.questions.sweep.digest import default_columns, sentences, top_rows
-from busplan.questions.sweep.grid import Array, axis_values
-from busplan.questions.sweep.plot import FigureData, is_drawable, require_drawable
-from busplan.questions.sweep.rows import sweep_facts, written_rows
-from busplan.questions.sweep.seeds_run import summaries
-from busplan.questions.sweep.table import Columns, figure_table
+from busplan.questions.sweep.grid import Array, Columns, axis_values
+from busplan.questions.sweep.plot import not_drawable, require_drawable, sweep_drawing
+from busplan.questions.sweep.rows import arrow_table, written_rows
+from busplan.questions.sweep.table import Sweep, checked_sweep, column_figures, figure_table
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -152,9 +150,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
             pyarrow is not installed.
         """
         require_pyarrow("to_arrow()")
-        from busplan.questions.sweep.arrow import arrow_table
-
-        return arrow_table(self.sweep, self.table, sweep_facts(self.sweep))
+        return arrow_table(self.sweep, self.table)
 
     def to_polars(self) -> "pl.DataFrame":
         """Make a data frame of polars from `to_arrow`; words are categories.
@@ -218,14 +214,16 @@ class SweepAnswer(Answer, Mapping[str, Array]):
         """
         self.sweep.require_number(figure, name="figure")
         title = ", ".join(filter(None, (self.profile.name, self.sweep.changes.words)))
-        return FigureData(self.sweep, self.table, figure=figure).drawing(title)
+        return sweep_drawing(self.sweep, self.table, title=title, figure=figure)
 
     def _repr_html_(self) -> str:
         from busplan.forms.html import fragment
 
         report = self._shown()
-        charts = [FigureData(self.sweep, self.table).chart()] if is_drawable(self.sweep.grid) else []
-        return fragment(report._replace(blocks=(*report.blocks, *charts)))
+        if not not_drawable(self.sweep.grid):
+            drawing = sweep_drawing(self.sweep, self.table, title=self.profile.name)
+            report = report._replace(blocks=(*report.blocks, Chart(drawing, Sentence(drawing.words))))
+        return fragment(report)
 
     def sentences(self) -> tuple[Sentence, ...]:
         """How many points there are, how many fit, and what is wrong at others."""
@@ -337,16 +335,18 @@ def sweep(
         raise BusplanError(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
         )
-    asked = checked_sweep(network, vary, timing_models=models, group=group, circle=circle, summary=summary, force=force)
-    return computed(asked, executor=executor, progress=progress)
+    checked = checked_sweep(
+        network, vary, timing_models=models, group=group, circle=circle, summary=summary, force=force
+    )
+    return computed(checked, executor=executor, progress=progress)
 
 
-def computed(asked: Sweep, *, executor: Executor | None = None, progress: Progress = ignored) -> SweepAnswer:
+def computed(sweep: Sweep, *, executor: Executor | None = None, progress: Progress = ignored) -> SweepAnswer:
     """Compute a sweep.
 
     Parameters
     ----------
-    asked
+    sweep
         The sweep.
     executor, progress
         As for `sweep`.
@@ -358,25 +358,19 @@ def computed(asked: Sweep, *, executor: Executor | None = None, progress: Progre
     Exception
         Any error that `executor` raises.
     """
-    mapper = mapper_of(executor, circle=asked.circle)
-    models = len(asked.timing_models)
-    table = figure_table(
-        asked.network,
-        asked.grid,
-        timing_models=asked.timing_models,
-        group=asked.group,
-        progress=ignored if asked.circle else progress,
-    )
-    if asked.circle:
-        results = circle_results(asked.profile, asked.grid, asked.tests, mapper=mapper, progress=progress)
+    mapper = mapper_of(executor, circle=sweep.circle)
+    table = figure_table(sweep, progress=ignored if sweep.circle else progress)
+    if sweep.circle:
+        results = circle_results(sweep.profile, sweep.grid, sweep.tests, mapper=mapper, progress=progress)
         of_points = (
-            {name: _typed(name, own) for name, own in zip(CIRCLE_COLUMNS, results, strict=True)}
-            if asked.seeds is None
-            else summaries(results.reshape(len(CIRCLE_COLUMNS), asked.grid.points, -1))
+            {name: _typed(name, values) for name, values in zip(CIRCLE_COLUMNS, results, strict=True)}
+            if sweep.seeds is None
+            else summaries(results.reshape(len(CIRCLE_COLUMNS), sweep.grid.points, -1))
         )
         # One test a point, the same beside every timing model.
-        table |= {name: np.repeat(own, models) for name, own in of_points.items()}
-    return SweepAnswer(asked, table)
+        models = len(sweep.timing_models)
+        table |= {name: np.repeat(values, models) for name, values in of_points.items()}
+    return SweepAnswer(sweep, table)
 
 
 def _typed(name: str, values: Array) -> Array:

@@ -1,19 +1,26 @@
-"""Circle tests at the points of a grid or a map: here, or in chunks by an executor, which all give the same results."""
+"""Circle tests at the points of a grid or a map: here, or in chunks by an executor, which all give the same results.
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+A summary has one row for many seeds: how the figures are spread, and how often the circle fails.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from statistics import NormalDist
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from busplan.buses.network import Network
+from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
 from busplan.profile.document import override
 from busplan.progress import Progress
-from busplan.questions.circle.roundness import NOTHING, Estimate, announce, bus, circle_test, estimate, setup
-from busplan.questions.fit.circle_refusal import require_circle
+from busplan.questions.circle import CIRCLE_BY_KEY
+from busplan.questions.circle.roundness import Estimate, announce, estimate, run_circles, setup
+from busplan.questions.fit.circle_refusal import refusals
+from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
-from busplan.questions.sweep.grid import Array, Grid
+from busplan.questions.sweep.grid import Array, Columns, Grid
 from busplan.sections.profile import Profile
 
 Task = TypeVar("Task")
@@ -81,24 +88,6 @@ class CircleOutcome(NamedTuple):
         return None if passed is None else bool(passed)
 
 
-class CircleChunk(NamedTuple):
-    """Some points; a process can be handed it."""
-
-    profile: Profile
-    points: Sequence[Point]
-
-
-def run_chunk(chunk: CircleChunk) -> list[CircleOutcome]:
-    """Run the circle tests of a chunk."""
-    return [_outcome(network_of(override(chunk.profile, point))) for point in chunk.points]
-
-
-def _outcome(network: Network) -> CircleOutcome:
-    (result,) = circle_test(network, explain=False).results
-    figures = tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
-    return CircleOutcome(figures, tuple(failure.name for failure in result.failures))
-
-
 def circle_outcomes(
     profile: Profile, points: Sequence[Point], *, mapper: Mapper, progress: Progress
 ) -> Iterator[CircleOutcome]:
@@ -126,20 +115,30 @@ def circle_outcomes(
     announce(cost)
     done, size = 0, chunk_tests(len(points), time_s=cost.time_s)
     # A list, for Dask takes no iterator.
-    chunks = [CircleChunk(profile, points[start : start + size]) for start in range(0, len(points), size)]
-    for outcomes in mapper(run_chunk, chunks):
+    chunks = [(profile, points[start : start + size]) for start in range(0, len(points), size)]
+    for outcomes in mapper(_run_chunk, chunks):
         done += len(outcomes)
         progress(done, len(points))
         yield from outcomes
 
 
+def _run_chunk(chunk: tuple[Profile, Sequence[Point]]) -> list[CircleOutcome]:
+    """Run the circle tests of some points, perhaps in another process."""
+    profile, points = chunk
+    outcomes = []
+    for point in points:
+        (result,) = run_circles(network_of(override(profile, point)), explain=False).results
+        figures = tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
+        outcomes.append(CircleOutcome(figures, tuple(failure.name for failure in result.failures)))
+    return outcomes
+
+
 def cost_of(profile: Profile, points: Sequence[Point]) -> Estimate:
     """Estimate what the circle tests of some points cost; of many, from some of them."""
     some = np.random.default_rng(0).permutation(len(points))[:_ESTIMATED]
-    cost = NOTHING
-    for variant in (network_of(override(profile, points[number])) for number in some):
-        if bus(variant).fits:
-            cost = cost.then(estimate((), [setup(variant)]))
+    variants = (network_of(override(profile, points[number])) for number in some)
+    fitting = (network for network in variants if figures(network, model=network.bus.deciding_model).fits)
+    cost = estimate((), map(setup, fitting))
     times = len(points) / len(some)
     return cost._replace(steps=round(times * cost.steps), time_s=times * cost.time_s)
 
@@ -188,17 +187,17 @@ def circle_results(profile: Profile, grid: Grid, tests: Grid, *, mapper: Mapper,
         The first point whose circle test cannot be run, before any is run.
     """
     for point in grid.each_point():
-        _require(profile, point)
+        causes = refusals(network_of(override(profile, point)))
+        if causes:
+            places = [[f"{key} = {value}" for key, value in point.items() if key != cause.name] for cause in causes]
+            raise BusplanError(
+                *(
+                    f"at {', '.join(place)}: {cause.message}" if place else cause.message
+                    for place, cause in zip(places, causes, strict=True)
+                )
+            )
     outcomes = circle_outcomes(profile, [*tests.each_point()], mapper=mapper, progress=progress)
     return np.array([outcome.figures for outcome in outcomes], dtype=float).T
-
-
-def _require(profile: Profile, point: Point) -> None:
-    try:
-        require_circle(network_of(override(profile, point)))
-    except BusplanError as error:
-        place = ", ".join(f"{key} = {value}" for key, value in point.items())
-        raise BusplanError(*(f"at {place}: {problem}" for problem in error.problems)) from None
 
 
 def require_few(grid: Grid, *, seeds: int) -> None:
@@ -222,3 +221,132 @@ def require_few(grid: Grid, *, seeds: int) -> None:
             f"circle=True: {many} are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run without "
             "force=True; vary less, or give it"
         )
+
+
+SEED: Final = "delivery.seed"
+"""The key that a summary is over."""
+_SHARE: Final = 0.95
+_PARTS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "mean": "mean over the seeds: {}",
+        "std": "sample standard deviation over the seeds: {}",
+        "p95": "what 95 % of the seeds are no worse than: {}",
+        "worst": "worst of all seeds: {}",
+    }
+)
+_SPREAD: Final = tuple(key for key in CIRCLE_COLUMNS if CIRCLE_BY_KEY[key].sort == "number")
+
+
+def _key(key: str, part: str) -> str:
+    """Name of a part: the unit stays the end.
+
+    Examples
+    --------
+    >>> _key("max_contour_error_mm", "p95")
+    'max_contour_error_p95_mm'
+    """
+    stem, _, unit = key.rpartition("_")
+    return f"{stem}_{part}_{unit}"
+
+
+def _figure(key: str, part: str) -> Figure:
+    figure = CIRCLE_BY_KEY[key]
+    words = _PARTS[part]
+    better = "less" if part == "std" else figure.better
+    label = f"{figure.label}, {part}"
+    return figure._replace(key=_key(key, part), meaning=words.format(figure.meaning), label=label, better=better)
+
+
+_OF_PASSED: Final = "share of the seeds whose circle fails, 0..1; null where a circle is not judged"
+SUMMARY_FIGURES: Final = (
+    Figure("seeds", "n", "profile", "circle tests, one for each seed", "seeds", "1", "count"),
+    Figure("failed_share", "failed", "simulation", _OF_PASSED, "failed", "%", decimals=2, better="less"),
+    *(
+        Figure(
+            f"failed_share_{end}",
+            f"failed, {end}",
+            "Wilson 1927",
+            f"{end} end of its 95 % interval: what seeds that were not tested may give",
+            f"failed, {end} end",
+            "%",
+            decimals=2,
+            better="less",
+        )
+        for end in ("low", "high")
+    ),
+    *(_figure(key, part) for key in _SPREAD for part in _PARTS),
+)
+"""Figures of a summary, in place of the columns of circle tests."""
+SUMMARY_COLUMNS: Final = tuple(figure.key for figure in SUMMARY_FIGURES)
+
+
+def without_seed(grid: Grid) -> tuple[Grid, Array]:
+    """Split a grid into that of the other keys, and the seeds.
+
+    Parameters
+    ----------
+    grid
+        All varied keys.
+
+    Raises
+    ------
+    BusplanError
+        No seed varies.
+    """
+    if SEED not in grid.axes:
+        raise BusplanError(f"summary: is over seeds, and none vary; add {SEED} and its values, as {SEED}=1:1000")
+    return Grid({key: axis for key, axis in grid.axes.items() if key != SEED}), grid.axes[SEED]
+
+
+def summaries(results: Array) -> Columns:
+    """Summarise circle tests over seeds: `SUMMARY_COLUMNS`; NaN for what a circle lacks.
+
+    Parameters
+    ----------
+    results
+        Shape (CIRCLE_COLUMNS, points, seeds), as from `circle_results`.
+
+    Returns
+    -------
+    dict
+        Each of shape (points,).
+    """
+    by_key = dict(zip(CIRCLE_COLUMNS, results, strict=True))
+    points, seeds = by_key["passed"].shape
+    # Where no error source matters, a seed says nothing of the tolerance.
+    is_judged = ~np.isnan(by_key["passed"])
+    failed = np.where(is_judged.any(axis=1), np.sum(is_judged & (by_key["passed"] == 0), axis=1), np.nan)
+    columns = (
+        np.full(points, seeds),
+        *_shares(failed, seeds),
+        *(part for key in _SPREAD for part in _spread(by_key[key])),
+    )
+    return dict(zip(SUMMARY_COLUMNS, columns, strict=True))
+
+
+def _shares(failed: Array, tests: int) -> tuple[Array, ...]:
+    """Share of tests that failed, and its 95 % interval.
+
+    References
+    ----------
+    Wilson, Probable inference, the law of succession, and statistical inference, 1927.
+    """
+    z = NormalDist().inv_cdf((1 + _SHARE) / 2)
+    middle = (failed + z**2 / 2) / (tests + z**2)
+    half = z / (tests + z**2) * np.sqrt(failed * (tests - failed) / tests + z**2 / 4)
+    # Exactly 0 and 1 at the ends, whatever rounding gives.
+    low = np.where(failed == 0, 0.0, middle - half)
+    high = np.where(failed == tests, 1.0, middle + half)
+    return failed / tests, low, high
+
+
+def _spread(values: Array) -> tuple[Array, ...]:
+    """Mean, standard deviation, 95 % quantile and worst, in the order of `_PARTS`.
+
+    Errors are worse the larger they are; margins are of the loop, the same with every seed.
+    """
+    # From the first on, so that equal values have exactly their mean, and no deviation.
+    first = values[:, :1]
+    off = values - first
+    std = np.std(off, axis=1, ddof=1) if values.shape[1] > 1 else np.full(len(values), np.nan)
+    return first[:, 0] + off.mean(axis=1), std, np.quantile(values, _SHARE, axis=1), values.max(axis=1)

@@ -22,9 +22,9 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.questions.fit.certainty import FITS
-from busplan.questions.sweep.asked import Sweep, column_figures
+from busplan.questions.sweep.grid import Columns
 from busplan.questions.sweep.rows import plain_rows
-from busplan.questions.sweep.table import Columns
+from busplan.questions.sweep.table import Sweep, column_figures
 from busplan.sections.profile import Profile
 
 _RANKS: Final[Mapping[str, int]] = MappingProxyType(
@@ -41,13 +41,12 @@ _RANKS: Final[Mapping[str, int]] = MappingProxyType(
     }
 )
 """Default figures of a table, each with its `TableColumn.rank`."""
-CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed")
-"""Default figures of circle tests."""
-SUMMARY_COLUMNS: Final = (
+_OF_CIRCLES: Final = (
+    *("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed"),
     *("failed_share", "failed_share_high", "max_contour_error_mean_mm"),
     *("max_contour_error_std_mm", "max_contour_error_p95_mm", "max_contour_error_worst_mm"),
 )
-"""Default figures of a summary over seeds."""
+"""Default figures of circle tests, and of their summary over seeds."""
 
 
 def default_columns(sweep: Sweep) -> tuple[str, ...]:
@@ -57,8 +56,8 @@ def default_columns(sweep: Sweep) -> tuple[str, ...]:
     """
     if not sweep.profile.has_cycle:
         return (*(figure.key for figure in sweep.network.bus.figures.table), EXCEEDED.key, VERDICT.key)
-    of_circle = (key for key in (*CIRCLE_COLUMNS, *SUMMARY_COLUMNS) if key in sweep.columns)
-    return (*_RANKS, *(f"group.{group.name}.safe_nodes" for group in sweep.profile.group), *of_circle)
+    of_groups = (f"group.{group.name}.safe_nodes" for group in sweep.profile.group)
+    return (*_RANKS, *of_groups, *(key for key in _OF_CIRCLES if key in sweep.columns))
 
 
 def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
@@ -74,10 +73,10 @@ def sentences(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
     points, bus = sweep.grid.points, sweep.network.bus
     head = sentence(f"{{}}: {{}} {nouns(points, 'point')}; ", Code(sweep.profile.name), _points(points, "points"))
     fitting = (
-        sentence(f"{{}} shown to fit ({model} model)", _points(np.sum(own[VERDICT.key] == FITS)))
+        sentence(f"{{}} shown to fit ({model} model)", _points(np.sum(rows[VERDICT.key] == FITS)))
         if model == bus.deciding_model
-        else sentence(f"{{}} fit by the closed form of the {model} model", _points(np.sum(own["fits"])))
-        for model, own in _by_model(sweep, table)
+        else sentence(f"{{}} fit by the closed form of the {model} model", _points(np.sum(rows["fits"])))
+        for model, rows in _by_model(sweep, table)
     )
     yield joined(head, joined(*fitting, by=", "), Sentence((".",)), by="")
     # Settings of the bus and the circle are the same under every model.
@@ -109,12 +108,14 @@ def _points(number: float, key: str = "") -> ShownValue:
 
 
 def _circles(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
-    """Circle tests without a summary over seeds."""
-    passed = {model: own["passed"].tolist() for model, own in _by_model(sweep, table)}
+    """Points whose circle holds every tolerance, under each timing model."""
+    passed = {model: rows["passed"].tolist() for model, rows in _by_model(sweep, table)}
     unjudged = next(iter(passed.values())).count(None)
     yield from _unjudged(unjudged)
     if unjudged < sweep.grid.points:
-        counts = (sentence(f"{{}} by the {model} model", _points(own.count(True))) for model, own in passed.items())
+        counts = (
+            sentence(f"{{}} by the {model} model", _points(results.count(True))) for model, results in passed.items()
+        )
         head = Sentence(("The circle holds every tolerance at ",))
         yield joined(head, joined(*counts, by=" and "), Sentence((".",)), by="")
 
@@ -122,7 +123,7 @@ def _circles(sweep: Sweep, table: Columns) -> Iterator[Sentence]:
 def _over_seeds(figures: Columns, seeds: int) -> Iterator[Sentence]:
     """Points whose circle fails with no, some and every seed."""
     failed = figures["failed_share"]
-    judged, never, always = (int(np.sum(own)) for own in (failed >= 0, failed == 0, failed == 1))
+    judged, never, always = (int(np.sum(points)) for points in (failed >= 0, failed == 0, failed == 1))
     if judged:
         counts = map(_points, (seeds, never, judged - never - always, always))
         words = (
@@ -197,7 +198,7 @@ def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[Sen
     varied
         Keys that vary.
     """
-    for nodes in profile.alike_nodes:
+    for nodes in profile.node_groups:
         if nodes.node_key("axes") not in varied or nodes.payload.follows_axes:
             continue
         section = f"group.{nodes.name}" if nodes.name else "payload"

@@ -1,4 +1,4 @@
-"""The grid of a sweep: values of keys, its points, and what was asked for."""
+"""The grid of a sweep: its points, and the values of each key, from text or from Python, checked."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -24,25 +24,16 @@ from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 Array = NDArray[Any]
 """Numbers, truth values, or objects if there are words among them."""
+Columns = dict[str, Array]
+"""Columns by name, a row for each point and timing model, each of shape (rows,).
+
+Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
+"""
 
 _CHECKED_EACH: Final = 100
 """Up to this many values of a key are all checked; of more, the extremes: every valid range is an interval."""
 MOST_POINTS: Final = 1_000_000
 """Most points of a sweep: the work on them takes up to two gigabytes of memory."""
-
-
-def axis_of(values: Sequence[Value]) -> Array:
-    """Values of a key as an array: whole numbers, floats, or objects if there are words among them.
-
-    Parameters
-    ----------
-    values
-        Numbers, and words that the key takes.
-    """
-    if any(isinstance(value, str | bool) for value in values):
-        return np.array(values, dtype=object)
-    # NumPy keeps whole numbers beyond 64 bits as objects.
-    return np.array(values, dtype=float if any(isinstance(value, float) for value in values) else None)
 
 
 class Chunk(NamedTuple):
@@ -58,7 +49,7 @@ class Grid(NamedTuple):
     """Every combination of the values of some keys; the last key changes fastest."""
 
     axes: dict[str, Array]
-    """Values by key, each of shape (values,), as from `axis_of`."""
+    """Values by key, each of shape (values,): whole numbers, floats, or objects if there are words among them."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -97,8 +88,8 @@ class Grid(NamedTuple):
             *([slice(size)] for size in self.shape[cut + 1 :]),
         ]
         for part in product(*parts):
-            values = [axis[own] for axis, own in zip(self.axes.values(), part, strict=True)]
-            yield Chunk(tuple(own.size for own in values), dict(zip(self.axes, np.ix_(*values), strict=True)))
+            values = [axis[places] for axis, places in zip(self.axes.values(), part, strict=True)]
+            yield Chunk(tuple(map(len, values)), dict(zip(self.axes, np.ix_(*values), strict=True)))
 
 
 def checked_grid(profile: Profile, axes: Mapping[str, Array], *, with_circle: bool) -> Grid:
@@ -126,9 +117,10 @@ def checked_grid(profile: Profile, axes: Mapping[str, Array], *, with_circle: bo
     for key, values in samples.items():
         for value in values[1:]:
             override(profile, {**first, key: value})
-    # Constraints between keys show at the extremes.
-    for end in (_least, _greatest):
-        override(profile, {key: end(values) for key, values in samples.items()})
+    # Constraints between keys show at the extremes. A word is neither least nor greatest, and tried with the greatest.
+    parts = {key: _numbers_and_words(values) for key, values in samples.items()}
+    override(profile, {key: min(numbers, default=samples[key][0]) for key, (numbers, _) in parts.items()})
+    override(profile, {key: words[0] if words else max(numbers) for key, (numbers, words) in parts.items()})
     grid = Grid(dict(axes))
     if grid.points > MOST_POINTS:
         raise BusplanError(f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} a sweep takes; vary less")
@@ -162,10 +154,13 @@ def require_keys(profile: Profile, keys: Iterable[str], *, option: str, circle_o
                 f"{option} {key}: each group of {profile.name} has its own; give {listed(of_groups, 'or')}"
             )
         _require_known(profile, key, name=f"{option} {key}")
-        _require_read(profile, key, name=f"{option} {key}", circle_option=circle_option)
+        is_of_circle = key.partition(".")[0] in CIRCLE_SECTIONS
+        if key not in read and not (is_of_circle and circle_option is None):
+            more = f"; add {circle_option} to run circle tests" if is_of_circle else ""
+            raise BusplanError(f"{option} {key}: no figure of capacity depends on it{more}")
 
 
-def grid_models(network: Network, grid: Grid, asked: Sequence[str] | None) -> tuple[str, ...]:
+def grid_models(network: Network, grid: Grid, models: Sequence[str] | None) -> tuple[str, ...]:
     """Timing models of a sweep: those that can express every value of the grid.
 
     Parameters
@@ -174,20 +169,20 @@ def grid_models(network: Network, grid: Grid, asked: Sequence[str] | None) -> tu
         The network.
     grid
         Values of its keys.
-    asked
+    models
         Names of timing models; by default all that can.
 
     Raises
     ------
     BusplanError
-        A model that was asked for cannot express a value.
+        One of `models` cannot express a value.
     """
     variants = [changed(network, {key: value}) for key, axis in grid.axes.items() for value in _samples(axis)]
-    if asked is not None:
-        for model in asked:
+    if models is not None:
+        for model in models:
             for variant in variants:
                 known_model(variant, model, name="timing_model")
-        return tuple(asked)
+        return tuple(models)
     return tuple(model for model in model_names(network) if all(model in model_names(variant) for variant in variants))
 
 
@@ -212,36 +207,25 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
         raise BusplanError(f"{name}: is a {what}; expected the key of one number")
 
 
-def _require_read(profile: Profile, key: str, *, name: str, circle_option: str | None) -> None:
-    """Refuse a key that no computed figure depends on; without `circle_option`, circle tests are computed."""
-    if key in cycle_keys(profile):
-        return
-    section = key.partition(".")[0]
-    if section not in CIRCLE_SECTIONS:
-        raise BusplanError(f"{name}: no figure of capacity depends on it")
-    if circle_option is not None:
-        raise BusplanError(f"{name}: no figure of capacity depends on it; add {circle_option} to run circle tests")
-
-
 def _samples(axis: Array) -> list[Value]:
     """Values to check: all, or of many the extremes, the words and one fraction. Whole floats become ints."""
     values: list[Value] = axis.tolist()
     if len(values) > _CHECKED_EACH:
-        numbers = [value for value in values if not isinstance(value, str | bool)]
+        numbers, words = _numbers_and_words(values)
         # A fraction among whole numbers may lie between the extremes.
-        fractions = (value for value in numbers if value % 1)
-        words = (value for value in values if isinstance(value, str | bool))
+        fractions = (number for number in numbers if number % 1)
         values = [values[0], min(numbers), max(numbers), *islice(fractions, 1), *words]
     return [*dict.fromkeys(map(whole, values))]
 
 
-def _least(values: list[Value]) -> Value:
-    return min((value for value in values if not isinstance(value, str | bool)), default=values[0])
-
-
-def _greatest(values: list[Value]) -> Value:
-    words = [value for value in values if isinstance(value, str | bool)]
-    return words[0] if words else max(values)
+def _numbers_and_words(values: Iterable[Value]) -> tuple[list[int | float], list[str | bool]]:
+    numbers, words = [], []
+    for value in values:
+        if isinstance(value, str | bool):
+            words.append(value)
+        else:
+            numbers.append(value)
+    return numbers, words
 
 
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,2})?")
@@ -273,63 +257,34 @@ def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, na
     Raises
     ------
     BusplanError
-        Not values of the key.
-    """
-    words = words_of(profile, key)
-    if isinstance(given, str):
-        return parse_values(given, name=f"{name} {key}={given}", words=words)
-    if isinstance(given, range) and given[MOST_POINTS:]:
-        raise BusplanError(f"{name} {key}: more values than the {MOST_POINTS:,} points a sweep takes; vary less")
-    return listed_axis(items(given, name=f"{name} {key}"), name=f"{name} {key}", words=words)
-
-
-def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Array:
-    """Parse the text of some values.
-
-    Parameters
-    ----------
-    text
-        Values between commas, a range A:B in steps of 1, A:B:STEP, A:B:*FACTOR or A:B:#COUNT.
-    name
-        Name of the values in messages.
-    words
-        Words allowed instead of a number.
-
-    Raises
-    ------
-    BusplanError
-        Not a number, a repeated value, or a range that never reaches its end.
+        Not a number or a word of the key, a repeated value, or a range that never reaches its end.
 
     Examples
     --------
-    >>> parse_values("250:1000:*2", name="vary")
+    >>> from busplan.profile.sources import load
+    >>> axis_values(load("paper-4ms").profile, "cycle.period_us", "250:1000:*2", name="vary")
     array([ 250,  500, 1000])
     """
+    words = words_of(profile, key)
+    if isinstance(given, str):
+        return _parsed(given, name=f"{name} {key}={given}", words=words)
+    if isinstance(given, range) and given[MOST_POINTS:]:
+        raise BusplanError(f"{name} {key}: more values than the {MOST_POINTS:,} points a sweep takes; vary less")
+    return _listed(items(given, name=f"{name} {key}"), name=f"{name} {key}", words=words)
+
+
+def _parsed(text: str, *, name: str, words: Collection[str]) -> Array:
+    """Values from text as on the command line: between commas, or a range."""
     if ":" in text:
         return _range(name, text)
     parts = map(str.strip, text.split(","))
-    return listed_axis(
+    return _listed(
         (part if part in words else _plain(_number(name, part, words)) for part in parts), name=name, words=words
     )
 
 
-def listed_axis(values: Iterable[object], *, name: str, words: Collection[str] = ()) -> Array:
-    """Make an axis from single values.
-
-    Parameters
-    ----------
-    values
-        Finite numbers or words. A whole float becomes an int.
-    name
-        Name of the values in messages.
-    words
-        Words allowed among the values; true and false stand for truths.
-
-    Raises
-    ------
-    BusplanError
-        No values, one that is not allowed, or a repeated one.
-    """
+def _listed(values: Iterable[object], *, name: str, words: Collection[str]) -> Array:
+    """Single values: finite numbers, or words that the key takes. A whole float becomes an int."""
     unique: dict[int | float | str, None] = {}
     for given in values:
         value = _TRUTHS.get(given, given) if isinstance(given, str) and given in words else given
@@ -341,7 +296,7 @@ def listed_axis(values: Iterable[object], *, name: str, words: Collection[str] =
         unique[int(value) if isinstance(value, float) and _is_whole(value) else value] = None
     if not unique:
         raise BusplanError(f"{name}: no values; give at least one")
-    return axis_of([*unique])
+    return _axis_of([*unique])
 
 
 _TRUTHS: Final = {"true": True, "false": False}
@@ -357,6 +312,13 @@ def _is_value(value: object, words: Collection[str]) -> TypeGuard[int | float | 
 
 def _is_whole(number: float) -> bool:
     return number.is_integer() and abs(number) < _EXACT
+
+
+def _axis_of(values: Sequence[Value]) -> Array:
+    if any(isinstance(value, str | bool) for value in values):
+        return np.array(values, dtype=object)
+    # NumPy keeps whole numbers beyond 64 bits as objects.
+    return np.array(values, dtype=float if any(isinstance(value, float) for value in values) else None)
 
 
 def _range(name: str, text: str) -> Array:
@@ -378,7 +340,7 @@ def _range(name: str, text: str) -> Array:
 
 def _steps(name: str, first: Decimal, step: Decimal, size: int) -> Array:
     if size == 1:
-        return axis_of([_plain(first)])
+        return _axis_of([_plain(first)])
     decimals = max(0, *(-int(number.normalize().as_tuple().exponent) for number in (first, step)))
     start, stride = (int(number.scaleb(decimals)) for number in (first, step))
     if decimals > _MAX_DECIMALS or max(abs(start), abs(start + stride * size)) >= _EXACT:
@@ -404,7 +366,7 @@ def _geometric(name: str, first: Decimal, last: Decimal, factor: Decimal) -> Arr
             if len(values) > _MOST_LISTED:
                 raise BusplanError(f"{name}: more than {_MOST_LISTED:,} values; take a larger factor")
             first *= factor
-    return axis_of(values)
+    return _axis_of(values)
 
 
 def _even(name: str, first: Decimal, last: Decimal, count: str) -> Array:

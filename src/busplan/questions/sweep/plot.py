@@ -2,14 +2,13 @@
 
 from collections.abc import Iterable, Iterator
 from itertools import cycle, pairwise
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from busplan.buses.figure import NODES, PERIOD, VERDICT, Figure, unit_of
-from busplan.buses.network import Network
 from busplan.errors import BusplanError
-from busplan.forms.blocks import Chart, Sentence, ShownValue, figure_value
+from busplan.forms.blocks import ShownValue, figure_value
 from busplan.forms.charts import (
     ChartCell,
     ChartGrid,
@@ -30,15 +29,53 @@ from busplan.forms.numbers import SILENT_UNITS, factor_of, figure_text, with_uni
 from busplan.forms.scale import ticks
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.network import bus_of
-from busplan.questions.sweep.asked import Sweep, column_figures
-from busplan.questions.sweep.grid import Array, Grid
-from busplan.questions.sweep.table import Columns
+from busplan.questions.sweep.grid import Array, Columns, Grid
+from busplan.questions.sweep.table import Sweep, column_figures
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
+MAX_DRAWN: Final = 250_000
+"""Most points of a figure: more would not be visible."""
+_MAX_KEYS: Final = 2
+_DEFAULT_FIGURES: Final = ("safe_axes", "margin_corrected_us", "margin_us")
+"""Columns of which the first that varies is drawn, if no other is asked for."""
 _DIGITS: Final = 4
 _NO_UNITS: Final = ("_per_s", "_mbit_s", "_mm_s")
 """Ends of keys that a label keeps as they are."""
+_ROOM: Final = 0.06
+"""Empty room above and below curves, as a share of their range."""
+_MOST_DOTS: Final = 16
+"""Most points of a curve that have a mark each."""
+_DESIGN: Final = "this design"
+
+
+def not_drawable(grid: Grid) -> str:
+    """The reason why a figure over a grid cannot be drawn; empty if it can."""
+    varied = [key for key, axis in grid.axes.items() if axis.size > 1]
+    if not grid.axes:
+        return "draws figures over one or two keys, and none varies but the seed; vary another"
+    if len(varied) > _MAX_KEYS:
+        return f"draws one or two keys, and {', '.join(varied)} vary; give the others one value"
+    return f"{grid.points:,} points; a figure shows at most {MAX_DRAWN:,}" if grid.points > MAX_DRAWN else ""
+
+
+def require_drawable(grid: Grid, *, option: str = "the picture of a sweep") -> None:
+    """Refuse a figure over a grid that cannot be drawn.
+
+    Parameters
+    ----------
+    grid
+        The varied keys.
+    option
+        Name of the option that asks for the picture, for messages.
+
+    Raises
+    ------
+    BusplanError
+        More than two keys vary, or there are too many points.
+    """
+    if reason := not_drawable(grid):
+        raise BusplanError(f"{option}: {reason}")
 
 
 class PlotScale(NamedTuple):
@@ -49,95 +86,11 @@ class PlotScale(NamedTuple):
     places: Array
     """Where its values stand: the values themselves, or 0, 1, 2 and so on for choices."""
     labels: tuple[str, ...]
-    """Names of choices; empty on a number line."""
+    """Names of choices, which no number line joins; empty on a number line."""
     are_whole: bool
     """Whether all values are whole numbers."""
-    own: float | None
+    design: float | None
     """Place of this design; None if it is not on the axis."""
-
-    @property
-    def are_choices(self) -> bool:
-        """Whether the values are choices that no number line joins."""
-        return bool(self.labels)
-
-
-def plot_scale(profile: Profile, key: str, axis: Array, *, as_cells: bool) -> PlotScale:
-    """Make the scale of a key.
-
-    Words and numbers among words are choices, as are numbers that do not ascend. Others stand on a number line.
-
-    Parameters
-    ----------
-    profile
-        The network: this design.
-    key
-        Dotted key.
-    axis
-        Its values.
-    as_cells
-        If True, numbers that are not evenly spaced are choices, too: cells of a map are equally wide.
-    """
-    values, own = axis, value_at(profile, key)
-    are_choices = values.dtype == object or not _on_a_line(values, evenly=as_cells)
-    whole = values.dtype != object and bool(np.equal(np.mod(values, 1), 0).all())
-    label = key_label(profile, key)
-    if not are_choices:
-        inside = isinstance(own, int | float) and values.min() <= own <= values.max()
-        return PlotScale(label, values, (), whole, float(own) if inside else None)
-    names = tuple(_name(value) for value in values.tolist())
-    place = names.index(_name(own)) if _name(own) in names else None
-    return PlotScale(label, np.arange(values.size), names, whole, place)
-
-
-def _on_a_line(values: Array, *, evenly: bool) -> bool:
-    """Whether numbers ascend, in equal steps if `evenly`."""
-    steps = np.diff(values)
-    return bool((steps > 0).all() and (not evenly or np.allclose(steps, steps[:1], rtol=1e-6)))
-
-
-def _name(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else f"{value:.6g}"
-
-
-def key_label(profile: Profile, key: str) -> str:
-    """Name a key in words, with its unit.
-
-    Examples
-    --------
-    >>> from busplan.profile.sources import load
-    >>> profile = load("paper-4ms").profile
-    >>> [key_label(profile, key) for key in ("cycle.period_us", "bus.gap_count", "payload.read_bytes")]
-    ['period T_s, us', 'gap count', 'payload read, bytes']
-    """
-    setup = {f"bus.{setting.key}": setting for setting in bus_of(profile).figures.setup}
-    figure = {"cycle.period_us": PERIOD, "bus.nodes": NODES, **setup}.get(key)
-    if figure is not None:
-        return figure_label(figure)
-    unit = "" if key.endswith(_NO_UNITS) else unit_of(key)
-    name = key.removesuffix(f"_{unit.replace('/', '_per_')}".lower()) if unit else key
-    return ", ".join(filter(None, (name.replace(".", " ").replace("_", " "), unit)))
-
-
-def plotted_figure(network: Network, name: str) -> tuple[Figure, float]:
-    """The registered figure of a column, and the factor to the unit that it is drawn in.
-
-    Parameters
-    ----------
-    network
-        The network.
-    name
-        Name of the column: a figure, or one of a group.
-    """
-    figure = column_figures(network).get(name)
-    if figure is None:
-        return Figure(name, name, "", "", key_label(network.profile, name)), 1.0
-    return figure, factor_of(figure_value(figure, 0.0))
-
-
-def figure_label(figure: Figure) -> str:
-    """Name a figure with its unit, as a heading of a table does."""
-    unit = figure.column or figure.unit
-    return ", ".join(filter(None, (figure.label or figure.key, "" if unit in SILENT_UNITS else unit)))
 
 
 class SweptModel(NamedTuple):
@@ -170,10 +123,11 @@ class Plotted(NamedTuple):
     scales: tuple[PlotScale, ...]
     """Of two, the first is the y axis and the second the x axis."""
     panels: tuple[SweptModel, ...]
-    deciding: str
-    """The timing model that decides."""
+    """One for each timing model that has the figure."""
     safety: str
     """The setting of this kind of bus that must be safe."""
+    described: SweptModel | None
+    """The panel that the caption describes: that of the model that decides, where it has one."""
 
     @property
     def label(self) -> str:
@@ -198,32 +152,153 @@ class Plotted(NamedTuple):
         not_shown: Array = np.logical_or.reduce([np.zeros_like(self.unsafe), *frontiers])
         return not_shown
 
-    @property
-    def told(self) -> SweptModel | None:
-        """The panel that the caption tells of: that of the model that decides, where it has one."""
-        return next((panel for panel in self.panels if panel.model == self.deciding), next(iter(self.panels), None))
-
-    def value_at_own(self, panel: SweptModel) -> float | None:
+    def design_value(self, panel: SweptModel) -> float | None:
         """The figure at this design; None if it is no point of the grid."""
-        places = []
-        for scale in self.scales:
-            at_own = np.flatnonzero(scale.places == scale.own) if scale.own is not None else np.array([], dtype=int)
-            if not at_own.size:
-                return None
-            places.append(int(at_own[0]))
-        value = float(panel.values[tuple(places)])
+        places = [np.flatnonzero(scale.places == scale.design) for scale in self.scales if scale.design is not None]
+        if len(places) < len(self.scales) or not all(place.size for place in places):
+            return None
+        value = float(panel.values[tuple(place[0] for place in places)])
         return None if np.isnan(value) else value
+
+
+def sweep_drawing(sweep: Sweep, table: Columns, *, title: str, figure: str | None = None) -> Drawing:
+    """Draw a figure over one key as curves, over two as maps, one for each timing model.
+
+    Parameters
+    ----------
+    sweep
+        The sweep; its profile is this design, which the picture marks.
+    table
+        All its columns.
+    title
+        Title of the picture; the figure, and the keys with one value, follow it.
+    figure
+        Name of a column in numbers; by default the safe axes and, where these do not vary, the corrected margin.
+
+    Raises
+    ------
+    BusplanError
+        As `require_drawable`.
+    """
+    require_drawable(sweep.grid)
+    axes, profile = sweep.grid.axes, sweep.profile
+    varied = [key for key, axis in axes.items() if axis.size > 1] or [next(iter(axes))]
+    single = {key: axis.tolist()[0] for key, axis in axes.items() if key not in varied}
+    is_design = all(value_at(profile, key) == value for key, value in single.items())
+    scales = tuple(plot_scale(profile, key, axes[key], as_cells=len(varied) == _MAX_KEYS) for key in varied)
+    plotted = _plotted(
+        sweep, table, scales if is_design else tuple(scale._replace(design=None) for scale in scales), name=figure
+    )
+    panels: Iterable[Panel] = ()
+    if plotted.panels:
+        panels = [_curves(plotted)] if len(scales) == 1 else _maps(plotted)
+    fixed = "".join(f"; {key_label(profile, key)}: {value}" for key, value in single.items())
+    words = caption(plotted)
+    return Drawing(f"{title}: {plotted.label}{fixed}", tuple(panels), (words,), words)
+
+
+def _plotted(sweep: Sweep, table: Columns, scales: tuple[PlotScale, ...], *, name: str | None) -> Plotted:
+    """The values of a figure under each timing model, in the unit that they are drawn in."""
+    bus, models = sweep.network.bus, sweep.timing_models
+    by_model = {key: column.reshape(-1, len(models)).T for key, column in table.items()}
+    candidates = {key: by_model[key].astype(float) for key in ((name,) if name else _DEFAULT_FIGURES)}
+    # The first that varies; if none does, the first that a timing model has.
+    existing = {key: values for key, values in candidates.items() if not np.isnan(values).all()}
+    varying = (key for key, values in existing.items() if not all(map(is_constant, values)))
+    drawn = next(varying, next(iter(existing or candidates)))
+    figure = column_figures(sweep.network).get(drawn)
+    factor = 1.0 if figure is None else factor_of(figure_value(figure, 0.0))
+    shape = tuple(scale.places.size for scale in scales)
+    panels = {}
+    for place, model in enumerate(models):
+        values = candidates[drawn][place]
+        if np.isnan(values).all():
+            continue  # the model does not have the figure
+        safe = by_model[bus.safety.figure.key][place].astype(bool) if bus.safety.figure else np.ones(values.size, bool)
+        fits = by_model[VERDICT.key][place] == FITS if model == bus.deciding_model else None
+        panels[model] = SweptModel(
+            model, factor * values.reshape(shape), ~safe.reshape(shape), None if fits is None else fits.reshape(shape)
+        )
+    return Plotted(
+        figure or Figure(drawn, drawn, "", "", key_label(sweep.profile, drawn)),
+        scales,
+        tuple(panels.values()),
+        bus.safety.setting,
+        panels.get(bus.deciding_model, next(iter(panels.values()), None)),
+    )
+
+
+def plot_scale(profile: Profile, key: str, axis: Array, *, as_cells: bool) -> PlotScale:
+    """Make the scale of a key.
+
+    Words and numbers among words are choices, as are numbers that do not ascend. Others stand on a number line.
+
+    Parameters
+    ----------
+    profile
+        The network: this design.
+    key
+        Dotted key.
+    axis
+        Its values.
+    as_cells
+        If True, numbers that are not evenly spaced are choices, too: cells of a map are equally wide.
+    """
+    label, design = key_label(profile, key), value_at(profile, key)
+    whole = axis.dtype != object and bool(np.equal(np.mod(axis, 1), 0).all())
+    if axis.dtype != object and _is_on_a_line(axis, evenly=as_cells):
+        inside = isinstance(design, int | float) and axis.min() <= design <= axis.max()
+        return PlotScale(label, axis, (), whole, float(design) if inside else None)
+    names = tuple(map(_name, axis.tolist()))
+    return PlotScale(
+        label, np.arange(axis.size), names, whole, names.index(_name(design)) if _name(design) in names else None
+    )
+
+
+def _is_on_a_line(values: Array, *, evenly: bool) -> bool:
+    """Whether numbers ascend, in equal steps if `evenly`."""
+    steps = np.diff(values)
+    return bool((steps > 0).all() and (not evenly or np.allclose(steps, steps[:1], rtol=1e-6)))
+
+
+def _name(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else f"{value:.6g}"
+
+
+def key_label(profile: Profile, key: str) -> str:
+    """Name a key in words, with its unit.
+
+    Examples
+    --------
+    >>> from busplan.profile.sources import load
+    >>> profile = load("paper-4ms").profile
+    >>> [key_label(profile, key) for key in ("cycle.period_us", "bus.gap_count", "payload.read_bytes")]
+    ['period T_s, us', 'gap count', 'payload read, bytes']
+    """
+    setup = {f"bus.{setting.key}": setting for setting in bus_of(profile).figures.setup}
+    figure = {"cycle.period_us": PERIOD, "bus.nodes": NODES, **setup}.get(key)
+    if figure is not None:
+        return figure_label(figure)
+    unit = "" if key.endswith(_NO_UNITS) else unit_of(key)
+    name = key.removesuffix(f"_{unit.replace('/', '_per_')}".lower()) if unit else key
+    return ", ".join(filter(None, (name.replace(".", " ").replace("_", " "), unit)))
+
+
+def figure_label(figure: Figure) -> str:
+    """Name a figure with its unit, as a heading of a table does."""
+    unit = figure.column or figure.unit
+    return ", ".join(filter(None, (figure.label or figure.key, "" if unit in SILENT_UNITS else unit)))
 
 
 def caption(plotted: Plotted) -> str:
     """Say what the figure shows, and where the cycle is shown to fit."""
-    panel = plotted.told
+    panel = plotted.described
     if panel is None:
         return f"No timing model gives {plotted.figure.label or plotted.figure.key} here."
     known = panel.values[np.isfinite(panel.values)]
-    own = plotted.value_at_own(panel)
+    design_value = plotted.design_value(panel)
     by = f"by the {panel.model} model"
-    design = "" if own is None else f"; this design has {value_text(plotted, own)}"
+    design = "" if design_value is None else f"; this design has {value_text(plotted, design_value)}"
     name = plotted.figure.label or plotted.figure.key
     if plotted.has_zero and panel.fits is None and known.min() < 0 <= known.max():
         settings = f"{int((known >= 0).sum()):,} of {known.size:,} settings"
@@ -260,32 +335,9 @@ def shown_value(value: float) -> ShownValue:
     return ShownValue(value, digits=max(_DIGITS, len(f"{abs(value):.0f}")))
 
 
-_ROOM: Final = 0.06
-"""Empty room above and below curves, as a share of their range."""
-_MOST_DOTS: Final = 16
-"""Most points of a curve that have its mark each."""
-_OWN: Final = "this design"
-
-
-def sweep_drawing(plotted: Plotted, *, title: str) -> Drawing:
-    """Draw a figure over one key as curves, over two as maps, one for each timing model.
-
-    Parameters
-    ----------
-    plotted
-        The figure, its scales and its values.
-    title
-        Title of the picture.
-    """
-    panels: Iterable[Panel] = ()
-    if plotted.panels:
-        panels = [_curves(plotted)] if len(plotted.scales) == 1 else _maps(plotted)
-    return Drawing(title, tuple(panels), (caption(plotted),), caption(plotted))
-
-
 def _ruler(scale: PlotScale, *, as_cells: bool, most: int = 6) -> Ruler:
-    if scale.are_choices:
-        return choices(scale.label, scale.labels, own=scale.own)
+    if scale.labels:
+        return choices(scale.label, scale.labels, own=scale.design)
     half = (scale.places[1] - scale.places[0]) / 2 if as_cells and scale.places.size > 1 else 0.5 * as_cells
     low, high = float(scale.places[0] - half), float(scale.places[-1] + half)
     return numbers(scale.label, low, high, most=most, whole=scale.are_whole)
@@ -309,14 +361,14 @@ def _curves(plotted: Plotted) -> Panel:
     shades = [Shade(Entry("gap", "not shown to fit"), *ends) for ends in _runs(edges, plotted.not_shown)]
     shades += [Shade(Entry("unsafe", f"unsafe {plotted.safety}", "!"), *ends) for ends in _runs(edges, plotted.unsafe)]
     guides = [Guide(Entry("limit", f"{plotted.figure.label} of 0", shape="line"), y=0.0)] if plotted.has_zero else []
-    guides += [] if scale.own is None else [Guide(Entry("own", _OWN, shape="line"), x=scale.own)]
+    guides += [] if scale.design is None else [Guide(Entry("own", _DESIGN, shape="line"), x=scale.design)]
     marks = letters(panel.model for panel in plotted.panels)
     curves = (
         Curve(
             Entry(ink, f"{panel.model} model", mark, "line"),
             tuple(zip(scale.places.tolist(), _known(panel.values), strict=True)),
-            has_dots=scale.are_choices or scale.places.size <= _MOST_DOTS,
-            has_line=not scale.are_choices,
+            has_dots=bool(scale.labels) or scale.places.size <= _MOST_DOTS,
+            has_line=not scale.labels,
         )
         for panel, mark, ink in zip(plotted.panels, marks, cycle(("first", "second")))
     )
@@ -338,7 +390,7 @@ def _maps(plotted: Plotted) -> Iterator[Panel]:
     """A map for each timing model, all with the same colours; a figure that is always the same is said instead."""
     varying = tuple(panel for panel in plotted.panels if not is_constant(panel.values))
     for panel in plotted.panels:
-        if is_constant(panel.values) and panel is not plotted.told:  # the caption tells of that
+        if is_constant(panel.values) and panel is not plotted.described:  # the caption tells of that
             value = value_text(plotted, float(panel.values.flat[0]))
             yield Panel(None, f"{panel.model} model: {value} at every setting")
     low, high = _ends(plotted._replace(panels=varying))
@@ -372,8 +424,8 @@ def _map(plotted: Plotted, panel: SweptModel, inner: list[float], levels: list[E
         legend.append(Entry("border", "edge of what is shown to fit", shape="line"))
     if panel.unsafe.any():
         legend.append(Entry("blank", f"unsafe {plotted.safety}", "!"))
-    if up.own is not None and across.own is not None:
-        legend.append(Entry("frame", _OWN))
+    if up.design is not None and across.design is not None:
+        legend.append(Entry("frame", _DESIGN))
     if not known.all():
         legend.append(Entry("blank", "blank: no value"))
     looks = {
@@ -390,140 +442,7 @@ def _map(plotted: Plotted, panel: SweptModel, inner: list[float], levels: list[E
         )
         for parts in zip(known, numbers_, panel.unsafe, fits, strict=True)
     )
-    own = None if up.own is None or across.own is None else (across.own, up.own)
-    return ChartGrid(_ruler(across, as_cells=True), _ruler(up, as_cells=True, most=8), tuple(rows), tuple(legend), own)
-
-
-MAX_DRAWN: Final = 250_000
-"""Most points of a figure: more would not be visible."""
-_MAX_KEYS: Final = 2
-
-
-_DEFAULT_FIGURES: Final = ("safe_axes", "margin_corrected_us", "margin_us")
-"""Columns of which the first that varies is drawn, if none is asked for."""
-
-
-def is_drawable(grid: Grid) -> bool:
-    """Whether a figure over a grid can be drawn."""
-    return not _not_drawable(grid)
-
-
-def _not_drawable(grid: Grid) -> str:
-    """The reason why a figure over a grid cannot be drawn; empty if it can."""
-    varied = [key for key, axis in grid.axes.items() if axis.size > 1]
-    if not grid.axes:
-        return "draws figures over one or two keys, and none varies but the seed; vary another"
-    if len(varied) > _MAX_KEYS:
-        return f"draws one or two keys, and {', '.join(varied)} vary; give the others one value"
-    return f"{grid.points:,} points; a figure shows at most {MAX_DRAWN:,}" if grid.points > MAX_DRAWN else ""
-
-
-def require_drawable(grid: Grid, *, option: str = "the picture of a sweep") -> None:
-    """Refuse a figure over a grid that cannot be drawn.
-
-    Parameters
-    ----------
-    grid
-        The varied keys.
-    option
-        Name of the option that asks for the picture, for messages.
-
-    Raises
-    ------
-    BusplanError
-        More than two keys vary, or there are too many points.
-    """
-    if reason := _not_drawable(grid):
-        raise BusplanError(f"{option}: {reason}")
-
-
-class FigureData:
-    """One figure over the whole grid under each timing model.
-
-    Parameters
-    ----------
-    sweep
-        The sweep; its profile is this design, which the picture marks.
-    table
-        All its columns.
-    figure
-        Name of the column; by default the safe axes and, where these do not vary, the corrected margin.
-
-    Raises
-    ------
-    BusplanError
-        As `require_drawable`.
-    """
-
-    def __init__(self, sweep: Sweep, table: Columns, *, figure: str | None = None) -> None:
-        require_drawable(sweep.grid)
-        self._network, self._grid, self._models = sweep.network, sweep.grid, sweep.timing_models
-        by_model = {name: column.reshape(-1, len(self._models)) for name, column in table.items()}
-        self._values = {name: by_model[name].astype(float) for name in ((figure,) if figure else _DEFAULT_FIGURES)}
-        bus = sweep.network.bus
-        safe = by_model[bus.safety.figure.key].astype(bool) if bus.safety.figure else True
-        self._unsafe = ~np.broadcast_to(safe, by_model[VERDICT.key].shape)
-        self._fits = (by_model[VERDICT.key] == FITS).any(axis=1)
-
-    def drawing(self, title: str) -> Drawing:
-        """Draw the collected values.
-
-        Parameters
-        ----------
-        title
-            Name of the profile, and what was set.
-        """
-        plotted = self.plotted()
-        return sweep_drawing(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
-
-    def chart(self) -> Chart:
-        """The picture as a block of a page."""
-        drawing = self.drawing(self._network.profile.name)
-        return Chart(drawing, Sentence(drawing.words))
-
-    def plotted(self) -> Plotted:
-        """The picture's content, in words and in the unit of the figure."""
-        keys = self._varied()
-        name = self._drawn()
-        figure, factor = plotted_figure(self._network, name)
-        shape, bus = tuple(self._grid.axes[key].size for key in keys), self._network.bus
-        panels = tuple(
-            SweptModel(
-                model,
-                factor * values.reshape(shape),
-                unsafe.reshape(shape),
-                self._fits.reshape(shape) if model == bus.deciding_model else None,
-            )
-            for number, (model, values, unsafe) in enumerate(
-                zip(self._models, self._values[name].T, self._unsafe.T, strict=True)
-            )
-            if not np.isnan(values).all()  # a figure that the model does not have
-        )
-        as_cells = len(keys) == _MAX_KEYS
-        scales = tuple(plot_scale(self._network.profile, key, self._grid.axes[key], as_cells=as_cells) for key in keys)
-        if not self._is_own():
-            scales = tuple(scale._replace(own=None) for scale in scales)
-        return Plotted(figure, scales, panels, bus.deciding_model, bus.safety.setting)
-
-    def _drawn(self) -> str:
-        """Name of the first figure that varies; if none does, of the first that a timing model has."""
-        known = {name: values for name, values in self._values.items() if not np.isnan(values).all()}
-        varying = (name for name, values in known.items() if not all(map(is_constant, values.T)))
-        return next(varying, next(iter(known or self._values)))
-
-    def _varied(self) -> list[str]:
-        """Keys with several values; the only key if none has."""
-        varied = [key for key, axis in self._grid.axes.items() if axis.size > 1]
-        return varied or [next(iter(self._grid.axes))]
-
-    def _single(self) -> dict[str, object]:
-        """Keys with one value."""
-        varied = self._varied()
-        return {key: axis[:1].tolist()[0] for key, axis in self._grid.axes.items() if key not in varied}
-
-    def _is_own(self) -> bool:
-        """Whether the keys with one value have that of this design."""
-        return all(value_at(self._network.profile, key) == value for key, value in self._single().items())
-
-    def _fixed(self) -> str:
-        return "".join(f"; {key_label(self._network.profile, key)}: {value}" for key, value in self._single().items())
+    design = None if up.design is None or across.design is None else (across.design, up.design)
+    return ChartGrid(
+        _ruler(across, as_cells=True), _ruler(up, as_cells=True, most=8), tuple(rows), tuple(legend), design
+    )

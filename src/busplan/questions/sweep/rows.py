@@ -1,20 +1,27 @@
-"""Rows of a sweep as CSV, as one JSON document, and as Apache Parquet."""
+"""Rows of a sweep as CSV, as one JSON document, and as a table of Apache Arrow or a Parquet file by pyarrow."""
 
 import csv
 import io
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
+from busplan import __version__
+from busplan.buses.figure import unit_of
 from busplan.english import json_text
 from busplan.forms import RowsForm
 from busplan.forms.blocks import JsonDocument
-from busplan.forms.csv_rows import csv_cell
+from busplan.forms.csv_rows import csv_cell, spelled
+from busplan.profile.edit import profile_text
 from busplan.questions.base.sentences import changed_document, document
-from busplan.questions.sweep.asked import Sweep, column_figures
-from busplan.questions.sweep.grid import Array
-from busplan.questions.sweep.table import Columns
+from busplan.questions.sweep.grid import Array, Columns
+from busplan.questions.sweep.table import Sweep, column_figures
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 _ROWS_AT_ONCE: Final = 4096
+_GROUP_ROWS: Final = 1 << 16
+"""Rows of a row group of Parquet: readers skip and share out whole groups."""
 _NUMBERS: Final = {int, float, type(None)}
 
 
@@ -45,9 +52,7 @@ def written_rows(form: RowsForm, sweep: Sweep, table: Columns) -> Iterator[bytes
         Its columns, or some of them.
     """
     if form == "parquet":
-        from busplan.questions.sweep.arrow import parquet_bytes
-
-        yield parquet_bytes(sweep, table, sweep_facts(sweep))
+        yield _parquet(sweep, table)
         return
     for text in (_csv if form == "csv" else _json)(sweep, table):
         yield text.encode("utf-8", "backslashreplace")
@@ -106,3 +111,53 @@ def plain_rows(sweep: Sweep, table: Columns, places: Array) -> list[dict[str, An
     columns = plain_columns(sweep, {name: values[places] for name, values in table.items()})
     rows = ([list(value) if isinstance(value, tuple) else value for value in row] for row in zip(*columns, strict=True))
     return [dict(zip(table, row, strict=True)) for row in rows]
+
+
+def arrow_table(sweep: Sweep, table: Columns) -> "pa.Table":
+    """Table of pyarrow: float64, int64, bool, or text as a dictionary; null where there is no value.
+
+    Each field has its unit and meaning as metadata. The metadata of the table are `busplan.version`, `busplan.profile`
+    (TOML) and `busplan.sweep` (the JSON document without its rows).
+
+    Parameters
+    ----------
+    sweep
+        The sweep.
+    table
+        Its columns, or some of them.
+    """
+    import pyarrow as pa
+
+    text = pa.dictionary(pa.int32(), pa.string())
+    types = {"number": pa.float64(), "count": pa.int64(), "truth": pa.bool_(), "word": text, "words": text}
+    figures = column_figures(sweep.network)
+    fields, arrays = [], []
+    for name, values in table.items():
+        if name in sweep.grid.axes:
+            are_truths = all(isinstance(value, bool) for value in sweep.grid.axes[name])
+            kind = pa.from_numpy_dtype(values.dtype) if values.dtype != object else pa.bool_() if are_truths else text
+            metadata = {"unit": unit_of(name)}
+        else:
+            kind = types[figures[name].sort]
+            metadata = {"unit": figures[name].unit, "meaning": figures[name].meaning}
+        fields.append(pa.field(name, kind, metadata=metadata))
+        # Text is as in CSV, null where that is empty.
+        words = {word: str(spelled(word)) or None for word in set(values.tolist())} if kind == text else {}
+        cells = [words[word] for word in values.tolist()] if kind == text else values
+        arrays.append(pa.array(cells, type=kind, from_pandas=True))
+    facts = {
+        "busplan.version": __version__,
+        "busplan.profile": profile_text(sweep.profile),
+        "busplan.sweep": json_text(sweep_facts(sweep)),
+    }
+    return pa.table(arrays, schema=pa.schema(fields, metadata=facts))
+
+
+def _parquet(sweep: Sweep, table: Columns) -> bytes:
+    import pyarrow as pa
+    from pyarrow.parquet import write_table
+
+    sink = pa.BufferOutputStream()
+    write_table(arrow_table(sweep, table), sink, row_group_size=_GROUP_ROWS)
+    content: bytes = sink.getvalue().to_pybytes()
+    return content

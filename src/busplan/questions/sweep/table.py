@@ -1,22 +1,26 @@
-"""Capacity over a grid: the figures of `capacity` for many profiles at once, by the same functions.
+"""A sweep as asked for, checked; and its table: the figures of `capacity` for many profiles at once.
 
-Those functions accept arrays, so a profile whose keys hold arrays gives arrays. The values of each key lie along an
-axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are added here.
+The functions of `capacity` accept arrays, so a profile whose keys hold arrays gives arrays. The values of each key lie
+along an axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are
+added here.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache, partial, reduce
+from functools import cache, reduce
 from math import inf, prod
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from busplan.buses.cycle import BusCycle
-from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, Sort
+from busplan.buses.figure import CERTAINTY, FITS, TIMING_MODEL, Figure, Sort, by_key
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
 from busplan.elementwise import Number
+from busplan.errors import BusplanError
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.progress import Progress, ignored
+from busplan.questions.circle import CIRCLE_FIGURES
 from busplan.questions.fit.certainty import (
     TIME,
     VERDICTS,
@@ -29,8 +33,16 @@ from busplan.questions.fit.certainty import (
     verdict_code,
 )
 from busplan.questions.fit.figures import COUNTS, certainty_numbers, most_nodes, numeric_figures
-from busplan.questions.fit.network import network_of
-from busplan.questions.sweep.grid import Array, Grid
+from busplan.questions.fit.network import network_of, varied_nodes
+from busplan.questions.sweep.circles import (
+    CIRCLE_COLUMNS,
+    SEED,
+    SUMMARY_COLUMNS,
+    SUMMARY_FIGURES,
+    require_few,
+    without_seed,
+)
+from busplan.questions.sweep.grid import Array, Columns, Grid, axis_values, checked_grid, grid_models
 from busplan.sections.base import with_all_unchecked
 from busplan.sections.profile import Profile
 
@@ -39,11 +51,117 @@ CHUNK_POINTS: Final = 1 << 14
 
 _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
 
-Columns: TypeAlias = dict[str, Array]
-"""Columns by name, a row for each point and timing model, each of shape (rows,).
 
-Numbers (NaN where there is none), truth values, or objects: words, tuples of words, and None where there is none.
-"""
+class Sweep(NamedTuple):
+    """A table with a row for each point of a grid and each timing model, as it is asked for."""
+
+    network: Network
+    """The network, with its changes."""
+    grid: Grid
+    """Points of the rows."""
+    timing_models: tuple[str, ...]
+    group: str
+    """Group whose nodes vary for the most nodes and axes of the whole; empty where all nodes are alike."""
+    circle: bool = False
+    """If True, the circle test of each point is run."""
+    seeds: Array | None = None
+    """Seeds that each row is over; None without a summary."""
+    changes: KeyChanges = NO_CHANGES
+
+    @property
+    def profile(self) -> Profile:
+        """The profile of the network."""
+        profile: Profile = self.network.profile
+        return profile
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests."""
+        of_circle = CIRCLE_COLUMNS if self.seeds is None else SUMMARY_COLUMNS
+        return (*self.grid.axes, *figure_names(self.network), *(of_circle if self.circle else ()))
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Columns in numbers."""
+        figures, axes = column_figures(self.network), self.grid.axes
+        is_word = {
+            name: axes[name].dtype == object if name in axes else "word" in figures[name].sort for name in self.columns
+        }
+        return tuple(name for name in self.columns if not is_word[name])
+
+    def require_columns(self, columns: Iterable[str], *, name: str) -> None:
+        """Refuse columns that do not exist.
+
+        Parameters
+        ----------
+        columns
+            Their names.
+        name
+            Name of the argument in messages.
+        """
+        for column in columns:
+            if column not in self.columns:
+                raise BusplanError(f"{name} {column}: no such column; there are {', '.join(self.columns)}")
+
+    def require_number(self, column: str | None, *, name: str) -> None:
+        """Refuse a column that does not exist or is not numeric; None is none."""
+        if column is not None and column not in self.numbers:
+            raise BusplanError(f"{name} {column}: expected a column in numbers: {', '.join(self.numbers)}")
+
+    @property
+    def tests(self) -> Grid:
+        """Points of the circle tests, where there are any; seeds change fastest."""
+        return self.grid if self.seeds is None else Grid({**self.grid.axes, SEED: self.seeds})
+
+
+def checked_sweep(
+    network: Network,
+    vary: Mapping[str, str | Iterable[object]],
+    *,
+    timing_models: Sequence[str] | None,
+    group: str | None,
+    circle: bool,
+    summary: bool,
+    force: bool,
+    changes: KeyChanges = NO_CHANGES,
+) -> Sweep:
+    """Check what is asked of a sweep.
+
+    Parameters
+    ----------
+    network
+        The network, with its changes.
+    vary
+        Values by dotted key, as `sweep` takes them.
+    timing_models
+        Names of timing models; by default all that can express every value.
+    group
+        Name of the group whose nodes vary for the most nodes and axes; by default that with the most axes.
+    circle, summary, force
+        Run circle tests, summarise them over seeds, and run any number of them.
+    changes
+        The changes of the profile, for the answer to name them.
+
+    Raises
+    ------
+    BusplanError
+        No such group; as `axis_values`, `checked_grid`, `without_seed`, `grid_models` and `require_few`.
+    """
+    if summary and not circle:
+        raise BusplanError("summary: goes with circle")
+    profile = network.profile
+    names = [nodes.name for nodes in profile.group]
+    if group is not None and group not in names:
+        known = f"the groups {', '.join(names)}" if names else "no groups"
+        raise BusplanError(f"group {group}: {profile.name} has {known}")
+    axes = {key: axis_values(profile, key, given, name="vary") for key, given in vary.items()}
+    grid = checked_grid(profile, axes, with_circle=circle)
+    grid, seeds = without_seed(grid) if summary else (grid, None)
+    models = grid_models(network, grid, timing_models)
+    varied = group or (varied_nodes(profile).name if names else "")
+    if circle and not force:
+        require_few(grid, seeds=1 if seeds is None else seeds.size)
+    return Sweep(network, grid, models, varied, circle, seeds, changes)
 
 
 def figure_names(network: Network) -> tuple[str, ...]:
@@ -52,30 +170,24 @@ def figure_names(network: Network) -> tuple[str, ...]:
     return (*(figure.key for figure in network.bus.figures.capacity), *groups)
 
 
-def figure_table(
-    network: Network,
-    grid: Grid,
-    *,
-    timing_models: Sequence[str],
-    group: str = "",
-    with_counts: bool = True,
-    progress: Progress = ignored,
-) -> Columns:
-    """Compute all figures of `capacity` over a grid.
+def column_figures(network: Network) -> dict[str, Figure]:
+    """The registered figures of a sweep's columns, those of groups with the name of the group."""
+    figures = by_key((*CIRCLE_FIGURES, *SUMMARY_FIGURES, *network.bus.figures.capacity))
+    groups = {
+        f"group.{group.name}.{key}": figures[key]._replace(label=f"{figures[key].label} of {group.name}")
+        for group in network.profile.group
+        for key in COUNTS
+    }
+    return {**figures, **groups}
+
+
+def figure_table(sweep: Sweep, *, progress: Progress = ignored) -> Columns:
+    """Compute all figures of `capacity` over the grid of a sweep.
 
     Parameters
     ----------
-    network
-        The network.
-    grid
-        Values of its keys, from `checked_grid`.
-    timing_models
-        Timing models, in this order.
-    group
-        Group of the profile whose nodes vary for the most nodes and axes of the whole, the others as they are; empty
-        where all nodes are alike.
-    with_counts
-        Whether there are columns of the most nodes and axes, which take the cycle at other numbers of nodes.
+    sweep
+        The sweep.
     progress
         Called with the points that are done, and all of them.
 
@@ -83,49 +195,41 @@ def figure_table(
     ----------
     Paper, equations (1)-(11).
     """
-    profile = network.profile
+    grid, profile = sweep.grid, sweep.profile
+    names = (*grid.axes, *figure_names(sweep.network))
     parts: list[Columns] = []
     done = 0
     for chunk in grid.chunks(CHUNK_POINTS):
-        figures_of = partial(_figures, profile, chunk.values, group=group)
-        columns = [{**chunk.values, **figures_of(model, with_counts=with_counts)} for model in timing_models]
-        names = (name for name in (*grid.axes, *figure_names(network)) if name in columns[0])
-        parts.append({name: _interleaved([own[name] for own in columns], chunk.shape) for name in names})
+        by_model = [
+            {**chunk.values, **_figures(profile, chunk.values, model, group=sweep.group)}
+            for model in sweep.timing_models
+        ]
+        parts.append({name: _interleaved([columns[name] for columns in by_model], chunk.shape) for name in names})
         done += prod(chunk.shape)
         progress(done, grid.points)
     # A part lets go of a column when it is in the table.
-    return {name: np.concatenate([part.pop(name) for part in parts]) for name in [*parts[0]]}
+    return {name: np.concatenate([part.pop(name) for part in parts]) for name in names}
 
 
 def _interleaved(by_model: Sequence[Array], shape: tuple[int, ...]) -> Array:
     """Arrays that broadcast to a shape, one for each timing model: point by point, and for each model by model."""
-    return np.stack([np.broadcast_to(own, shape).ravel() for own in by_model], axis=1).ravel()
+    return np.stack([np.broadcast_to(column, shape).ravel() for column in by_model], axis=1).ravel()
 
 
-def _figures(
-    profile: Profile, values: Mapping[str, Array], model: str, *, group: str, with_counts: bool
-) -> dict[str, Array]:
+def _figures(profile: Profile, values: Mapping[str, Array], model: str, *, group: str) -> dict[str, Array]:
     """All figures of a chunk under one timing model; they broadcast to its shape."""
-    for number, (key, own) in enumerate(values.items()):
-        if own.dtype == object and own.size > 1:
+    for place, (key, axis) in enumerate(values.items()):
+        if axis.dtype == object and axis.size > 1:
             # Words among numbers: compute each value by itself and join the results along the axis.
             parts = [
-                _figures(
-                    profile,
-                    {**values, key: np.take(own, [index], axis=number)},
-                    model,
-                    group=group,
-                    with_counts=with_counts,
-                )
-                for index in range(own.size)
+                _figures(profile, {**values, key: np.take(axis, [index], axis=place)}, model, group=group)
+                for index in range(axis.size)
             ]
-            return {name: _joined([part[name] for part in parts], axis=number) for name in parts[0]}
-    figures = _columns(_at(profile, values), model, group=group, with_counts=with_counts)
-    return {name: _with_axes(column, len(values)) for name, column in figures.items()}
-
-
-def _with_axes(column: Array, axes: int) -> Array:
-    return column.reshape((1,) * axes) if column.size == 1 else column
+            return {name: _joined([part[name] for part in parts], axis=place) for name in parts[0]}
+    at_points = {key: axis.item() if axis.size == 1 else axis.astype(float) for key, axis in values.items()}
+    figures = _columns(network_of(with_all_unchecked(profile, at_points)), model, group=group)
+    one = (1,) * len(values)
+    return {name: column.reshape(one) if column.size == 1 else column for name, column in figures.items()}
 
 
 def _joined(parts: list[Array], *, axis: int) -> Array:
@@ -133,15 +237,8 @@ def _joined(parts: list[Array], *, axis: int) -> Array:
     return np.concatenate([np.broadcast_to(part, shape) for part in parts], axis=axis)
 
 
-def _at(profile: Profile, values: Mapping[str, Array]) -> Profile:
-    """Return a copy whose keys hold arrays, unvalidated."""
-    return with_all_unchecked(
-        profile, {key: own.item() if own.size == 1 else own.astype(float) for key, own in values.items()}
-    )
-
-
-def _columns(where: Profile, model: str, *, group: str, with_counts: bool) -> dict[str, Array]:
-    network = network_of(where)
+def _columns(network: Network, model: str, *, group: str) -> dict[str, Array]:
+    """All figures of a network whose keys hold arrays."""
     bus = network.bus
     cycle = bus.cycle(network, model=model)
     figures = numeric_figures(cycle)
@@ -152,40 +249,31 @@ def _columns(where: Profile, model: str, *, group: str, with_counts: bool) -> di
     broken = {**_where(codes, BROKEN), TIME: late}
     numbers = {**figures, **cycle.figures(), **terms, FITS.key: np.logical_not(reduce(np.logical_or, broken.values()))}
     words = {
-        TIMING_MODEL.key: _word(model),
+        TIMING_MODEL.key: _objects([model]),
         "binding_term": _chosen([term.name for term in cycle.terms], _largest([*terms.values()]))
         if network.groups
-        else _word(None),
+        else _objects([None]),
         "exceeded": _sets(broken),
         **(_certainty(cycle, codes) if model == bus.deciding_model else _UNDECIDED),
-        **(_counts(network, limits, model=model, group=group) if with_counts else {}),
+        **_counts(network, limits, model=model, group=group),
     }
     sorts = {figure.key: figure.sort for figure in bus.figures.capacity}
-    return {
-        key: words[key] if key in words else _number(numbers[key], sorts[key])
-        for key in figure_names(network)
-        if with_counts or key.rpartition(".")[2] not in COUNTS
-    }
+    return {key: words[key] if key in words else _number(numbers[key], sorts[key]) for key in figure_names(network)}
 
 
-def _chosen(words: Iterable[object], codes: Array) -> Array:
-    """Words by their place."""
-    chosen: Array = _words(tuple(words))[np.atleast_1d(codes)]
-    return chosen
-
-
-def _word(word: object) -> Array:
-    return _chosen([word], np.zeros(1, int))
-
-
-@cache
-def _words(words: tuple[object, ...]) -> Array:
+def _objects(words: Sequence[object]) -> Array:
     return np.fromiter(words, dtype=object, count=len(words))
+
+
+def _chosen(words: Sequence[object], codes: Array) -> Array:
+    """Words by their place."""
+    chosen: Array = _objects(words)[np.atleast_1d(codes)]
+    return chosen
 
 
 _NO_NUMBER: Final = np.full((), np.nan)
 _UNDECIDED: Final = {
-    figure.key: _word(None) if figure.sort in ("word", "words") else _NO_NUMBER
+    figure.key: _objects([None]) if figure.sort in ("word", "words") else _NO_NUMBER
     for figure in CERTAINTY
     if figure.key not in COUNTS
 }
@@ -203,12 +291,16 @@ def _number(number: Number | None, sort: Sort) -> Array:
 def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str) -> dict[str, Array]:
     """How many nodes fit: of each group, and of the whole where one group varies and the others are as they are."""
     if not network.groups:
-        return {**dict.fromkeys(COUNTS, _NO_NUMBER), "limited_by": _word(None), "safe_limited_by": _word(None)}
-    counts = {name: _counts_of(network.asking(name), limits, model=model) for name in network.names}
+        return {
+            **dict.fromkeys(COUNTS, _NO_NUMBER),
+            "limited_by": _objects([None]),
+            "safe_limited_by": _objects([None]),
+        }
+    counts = {name: _counts_of(network.varying(name), limits, model=model) for name in network.names}
     whole = counts[group]
     if network.is_uniform:
         return whole
-    varied = network.asking(group).asked_nodes
+    varied = network.varying(group).varied_group
     beside = {"nodes": network.nodes - varied.nodes, "axes": network.axes - varied.nodes * varied.node.axes}
     # Where not even one of its nodes fits, there is no number of the whole.
     more = {
@@ -223,14 +315,14 @@ def _counts(network: Network, limits: Sequence[Limit], *, model: str, group: str
 
 
 def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict[str, Array]:
-    most, axes = most_nodes(network, limits), network.asked_nodes.node.axes
+    most, axes = most_nodes(network, limits), network.varied_group.node.axes
     counted = {
         "max_nodes": _number(most.nodes, "count"),
         "max_axes": _number(axes * most.nodes, "count"),
         "limited_by": _chosen([limit.key for limit in limits], np.asarray(most.limit, int)),
     }
     if model != network.bus.deciding_model:
-        return {**counted, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _word(None)}
+        return {**counted, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _objects([None])}
     to_be_safe = limits_to_be_safe(network)
     # No more nodes are shown to fit than fit.
     safe = most_nodes(network, to_be_safe, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
@@ -256,7 +348,7 @@ def _certainty(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Array
 
 def _where(codes: Mapping[str, Number], code: int) -> dict[str, Array]:
     """Where each limit has a verdict."""
-    return {key: np.equal(np.asarray(own), code) for key, own in codes.items()}
+    return {key: np.equal(np.asarray(place), code) for key, place in codes.items()}
 
 
 def _sets(flags: Mapping[str, Array]) -> Array:
@@ -269,7 +361,7 @@ def _sets(flags: Mapping[str, Array]) -> Array:
 @cache
 def _combinations(keys: tuple[str, ...]) -> Array:
     """Every set of keys, by the number whose bits are its members."""
-    return _words(
+    return _objects(
         tuple(tuple(key for bit, key in enumerate(keys) if code >> bit & 1) for code in range(1 << len(keys)))
     )
 

@@ -79,28 +79,27 @@ def timeline(
     [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.733)]
     """
     network = network_of(with_cycle(load_profile(profile), question="timeline"))
-    asked = None if transaction is None else _transaction(transaction, network)
     model = None if timing_model is None else checked_models([timing_model], network)[0]
     window = zoom(
         schedule(network, model=model, number=None if cycle is None else whole(cycle, name="cycle")),
         from_us=None if from_us is None else finite(from_us, name="from_us"),
         to_us=None if to_us is None else finite(to_us, name="to_us"),
-        transaction=asked,
+        transaction=None if transaction is None else _transaction(transaction, network),
     )
     return TimelineAnswer(*window)
 
 
-def _transaction(asked: object, network: Network) -> tuple[str, int]:
+def _transaction(given: object, network: Network) -> tuple[str, int]:
     """Kind and node of a transaction of the profile's bus."""
-    match asked:
-        case str():
-            text, written = asked, _TRANSACTION.fullmatch(asked)
+    match given:
+        case str() as text:
+            written = _TRANSACTION.fullmatch(text)
             kind, node = (written["kind"], int(written["node"])) if written else ("", 0)
         case (str() as kind, number):
             node = whole(number, name="transaction")
             text = f"{kind}:{node}"
         case _:
-            raise BusplanError(f'transaction {asked!r}: expected one of one node, as ("read", 1)')
+            raise BusplanError(f'transaction {given!r}: expected one of one node, as ("read", 1)')
     kinds, nodes = [kind.key for kind in network.bus.stretch_kinds], int(plain(network.nodes))
     if kind in kinds and 1 <= node <= nodes:
         return kind, node

@@ -5,7 +5,6 @@ one must be the same.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property
 from itertools import islice
 from math import fsum
 from typing import Final, NamedTuple
@@ -68,8 +67,10 @@ class Schedule(NamedTuple):
     """End of the window [us]."""
     required_us: float
     """Closed form of the time that the cycle needs [us]."""
-    number: int | None = None
+    number: int | None
     """Which cycle of the common multiple of the rates was asked for, from 1; None for that of the verdict."""
+    cycles: int
+    """Cycles until all groups meet again [1]."""
 
     @property
     def profile(self) -> Profile:
@@ -118,12 +119,6 @@ class Total(NamedTuple):
     """Share of the window, 0..1."""
 
 
-def drawn_cycle(network: Network, *, model: str, number: int | None) -> BusCycle:
-    """The cycle that a timeline shows under a timing model; parameters as `schedule` has them."""
-    cycle = network.bus.cycle(network, model=model)
-    return cycle if number is None else cycle.at(number)
-
-
 def schedule(network: Network, *, model: str | None = None, number: int | None = None) -> Schedule:
     """Lay out one communication cycle, node by node.
 
@@ -160,11 +155,11 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
     nodes = int(plain(network.nodes))
     if nodes > MOST_NODES:
         limit = network.bus.limit("nodes")
-        carries = "" if limit is None else f"; one bus carries {limit.bound.most(network):g}"
+        carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
         where = "bus.nodes" if network.is_uniform else "nodes of all groups"
         raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
     model = leading_model(network) if model is None else model
-    closed, cycle = figures(network, model=model), drawn_cycle(network, model=model, number=number)
+    closed, cycle = figures(network, model=model), cycle_of(network, model, number)
     events = list(islice(_laid_out(cycle.events()), MOST_EVENTS + 1))
     if len(events) > MOST_EVENTS:
         raise BusplanError(f"a timeline shows up to {MOST_EVENTS:,} events, and this cycle has more")
@@ -180,6 +175,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         to_us=events[-1].end_us,
         required_us=plain(cycle.required_us),
         number=number,
+        cycles=common_multiple(cycle.rates),
     )
 
 
@@ -210,12 +206,12 @@ def zoom(
     end_us = min(laid_out.to_us, laid_out.to_us if to_us is None else to_us)
     span = f"the cycle runs from 0 to {laid_out.end_us:.12g} us"
     if transaction is not None:
-        own = [event for event in laid_out.cycle_events if (event.transaction, event.node) == transaction]
-        if not own:
+        of_transaction = [event for event in laid_out.cycle_events if (event.transaction, event.node) == transaction]
+        if not of_transaction:
             raise BusplanError(f"{transaction[0]}:{transaction[1]}: no such transaction in this cycle")
-        start_us, end_us = max(start_us, own[0].start_us), min(end_us, own[-1].end_us)
-        owner = f"the {transaction[0]} of node {transaction[1]}"
-        span = f"{owner} runs from {own[0].start_us:.12g} to {own[-1].end_us:.12g} us"
+        first_us, last_us = of_transaction[0].start_us, of_transaction[-1].end_us
+        start_us, end_us = max(start_us, first_us), min(end_us, last_us)
+        span = f"the {transaction[0]} of node {transaction[1]} runs from {first_us:.12g} to {last_us:.12g} us"
     if not start_us < end_us:
         shown = " ".join(
             f"{word} {value:.12g} us" for word, value in (("from", from_us), ("to", to_us)) if value is not None
@@ -267,85 +263,43 @@ class DistinctCycle(NamedTuple):
     """Time that each of these cycles needs [us]."""
 
 
-class CommonMultiple:
-    """The cycles until all groups meet again, of which a schedule shows one.
-
-    Parameters
-    ----------
-    schedule
-        The cycle that is drawn.
-    """
-
-    def __init__(self, schedule: Schedule) -> None:
-        self._schedule = schedule
-        self._cycle = schedule.network.bus.cycle(schedule.network, model=schedule.figures.timing_model)
-        self._rates = self._cycle.rates
-
-    @cached_property
-    def cycles(self) -> int:
-        """How many they are [1]."""
-        return common_multiple(self._rates)
-
-    @cached_property
-    def number(self) -> int:
-        """Which of them is drawn, from 1."""
-        asked = self._schedule.number
-        return self._cycle.fullest if asked is None else (asked - 1) % self.cycles + 1
-
-    @cached_property
-    def distinct(self) -> tuple[DistinctCycle, ...] | None:
-        """Those that differ, the longest first; None where there are more cycles than are listed."""
-        if self.cycles > MOST_LISTED:
-            return None
-        each = map(self._distinct, numbers_by_due(self._rates).values())
-        return tuple(sorted(each, key=lambda distinct: -distinct.required_us))
-
-    def _distinct(self, numbers: tuple[int, ...]) -> DistinctCycle:
-        due = self._due(numbers[0])
-        nodes = sum(int(plain(group.nodes)) for group in due)
-        return DistinctCycle(numbers, _names(due), nodes, plain(self._cycle.at(numbers[0]).required_us))
-
-    def _due(self, number: int) -> list[Group]:
-        both = zip(self._cycle.network.groups, self._rates, strict=True)
-        return [group for group, rate in both if rate.is_due(number)]
-
-    def sentences(self) -> Iterator[str]:
-        """Say which cycle is drawn, and what each needs; nothing where all are alike and none was asked for."""
-        asked = self._schedule.number
-        if self.cycles == 1:
-            if asked is not None:
-                yield "All cycles are alike."
-            return
-        if asked not in (None, self.number):
-            yield f"Cycle {asked} repeats cycle {self.number}."
-        meet = "The nodes are due" if self._cycle.network.is_uniform else "The groups meet"
-        yield f"{meet} every {self.cycles} cycles; this is {self._drawn}. {self._listed}"
-
-    @property
-    def _drawn(self) -> str:
-        """The cycle that is drawn, in words."""
-        if self._schedule.number is None:
-            return "the fullest"
-        due = self._due(self.number)
-        return f"cycle {self.number}, with {self._words(_names(due), len(due))}"
-
-    @property
-    def _listed(self) -> str:
-        """What each cycle needs, in words."""
-        if self.distinct is None:
-            return f"More than {MOST_LISTED} cycles are not listed."
-        each = []
-        for numbers, groups, nodes, required_us in self.distinct:
-            each.append(f"{', '.join(map(str, numbers))}: {self._words(groups, nodes)} ({required_us:.3f} us)")
-        return f"Cycles {'; '.join(each)}."
-
-    def _words(self, names: Sequence[str], due: int) -> str:
-        """Groups that are due, in words; where all nodes are alike, all of them or none."""
-        if self._cycle.network.is_uniform:
-            return "all nodes" if due else "no node"
-        return ", ".join(names) or "no group"
+def cycle_of(network: Network, model: str, number: int | None) -> BusCycle:
+    """The cycle of a number under a timing model; without a number the one that the verdict is for."""
+    cycle = network.bus.cycle(network, model=model)
+    return cycle if number is None else cycle.at(number)
 
 
-def _names(groups: Sequence[Group]) -> tuple[str, ...]:
+def drawn_number(laid_out: Schedule) -> int | None:
+    """Which cycle of the common multiple is laid out, from 1; None where it is a bound on several."""
+    if laid_out.number is None:
+        return cycle_of(laid_out.network, laid_out.figures.timing_model, None).fullest
+    return (laid_out.number - 1) % laid_out.cycles + 1
+
+
+def distinct_cycles(laid_out: Schedule) -> tuple[DistinctCycle, ...] | None:
+    """The cycles of the common multiple that differ, the longest first; None where more are than can be listed."""
+    if laid_out.cycles > MOST_LISTED:
+        return None
+    cycle = cycle_of(laid_out.network, laid_out.figures.timing_model, None)
+    distinct = (
+        DistinctCycle(
+            numbers,
+            group_names(due := due_groups(laid_out, numbers[0])),
+            sum(int(plain(group.nodes)) for group in due),
+            plain(cycle.at(numbers[0]).required_us),
+        )
+        for numbers in numbers_by_due(cycle.rates).values()
+    )
+    return tuple(sorted(distinct, key=lambda each: -each.required_us))
+
+
+def due_groups(laid_out: Schedule, number: int) -> list[Group]:
+    """Groups whose data go in a cycle of the common multiple."""
+    cycle = cycle_of(laid_out.network, laid_out.figures.timing_model, None)
+    pairs = zip(cycle.network.groups, cycle.rates, strict=True)
+    return [group for group, rate in pairs if rate.is_due(number)]
+
+
+def group_names(groups: Sequence[Group]) -> tuple[str, ...]:
     """Names of groups of the profile."""
-    return tuple(alike.name for group in groups for alike in group.members or (group.said,) if alike.name)
+    return tuple(member.name for group in groups for member in group.members if member.name)

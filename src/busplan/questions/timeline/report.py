@@ -1,14 +1,15 @@
 """Answer of `busplan timeline`."""
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
+from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
-from busplan.buses.limits import IDLE, EventKind
+from busplan.buses.limits import IDLE
 from busplan.elementwise import plain
 from busplan.english import nouns
 from busplan.forms.blocks import (
-    Block,
     Chart,
     Code,
     JsonDocument,
@@ -30,33 +31,57 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
 from busplan.forms.numbers import figure_text, period_value, sentence_text, with_unit
-from busplan.questions.base.sentences import document, safety_record, story, warning_sentences
+from busplan.questions.base.sentences import document, fields, safety_record, story, warning_sentences
 from busplan.questions.fit.certainty import FITS, fits_in
 from busplan.questions.fit.figures import margin_us
-from busplan.questions.fit.network import bus_of, model_names
+from busplan.questions.fit.network import model_names
 from busplan.questions.timeline.events import (
     EVENTS,
+    MOST_LISTED,
     SHARE,
     TOTAL,
-    CommonMultiple,
+    DistinctCycle,
     Event,
     Schedule,
     Total,
-    drawn_cycle,
+    cycle_of,
+    distinct_cycles,
+    drawn_number,
+    due_groups,
+    group_names,
     totals,
 )
-from busplan.sections.profile import Profile
 
 _MOST_EVENT_LANES: Final = 20
 """Up to this many events have a lane each; more are drawn in a lane for each node. A cycle of one node has 20."""
+_MOST_LANES: Final = 128
+"""Most lanes of nodes; of more nodes, neighbours share one."""
 _MOST_BARS: Final = 400
-"""Most bars in the lanes of nodes; of more events, a bar is a transaction."""
+"""Most bars on a scale: of more events, a bar is a transaction; of more transactions, a bar is a share of the scale."""
 _NEEDED: Final = Entry("long-gap", "needed", "#")
 _LEFT: Final = Entry("fits", "margin", ".")
 _BEYOND: Final = Entry("late", "beyond the slice", "!")
 _REST: Final = Entry("track", "rest of the period", "-")
 _WINDOW: Final = Entry("window", "shown below", "^")
-_END: Final = "end of the slice"
+
+
+def timeline_report(schedule: Schedule) -> Report:
+    """Report of `timeline`: whether the cycle fits, the cycle to scale, and the total of each kind of event."""
+    needs, distinct = model_needs(schedule), distinct_cycles(schedule)
+    summary = _headline(schedule)
+    return Report(
+        Sentence(("Timeline of ", Code(schedule.profile.name))),
+        (
+            summary,
+            *warning_sentences(schedule.network),
+            _margins(needs),
+            *(Sentence((words,)) for words in _cycle_words(schedule, distinct)),
+            _chart(schedule, needs, title=sentence_text(summary)),
+            _totals_table(schedule),
+        ),
+        _document(schedule, needs, distinct),
+        _records(schedule),
+    )
 
 
 class ModelNeeds(NamedTuple):
@@ -68,105 +93,188 @@ class ModelNeeds(NamedTuple):
 
 
 def model_needs(schedule: Schedule) -> tuple[ModelNeeds, ...]:
-    """Time of the slice that each timing model needs which can express the profile.
-
-    Parameters
-    ----------
-    schedule
-        The cycle, under one of them.
-    """
-    available_us, needs = schedule.figures.available_us, []
+    """Time of the slice that each timing model needs which can express the profile."""
+    needs, available_us = [], schedule.figures.available_us
     for model in model_names(schedule.network):
-        required_us = drawn_cycle(schedule.network, model=model, number=schedule.number).required_us
-        left_us = plain(margin_us(required_us, available_us=available_us))
-        needs.append(ModelNeeds(model, plain(required_us), left_us))
+        required_us = plain(cycle_of(schedule.network, model, schedule.number).required_us)
+        needs.append(ModelNeeds(model, required_us, plain(margin_us(required_us, available_us=available_us))))
     return tuple(needs)
 
 
-def timeline_drawing(schedule: Schedule, *, title: str) -> Drawing:
-    """Draw the whole period, and the window below it.
-
-    Parameters
-    ----------
-    schedule
-        The cycle, narrowed to its window.
-    title
-        Its message in a sentence.
-    """
-    window = drawn_window(schedule)
-    words = sentence_text(charged(window))
-    return Drawing(title, (_period(schedule), _lanes(window)), (words,), words, has_characters=True)
-
-
-def drawn_window(schedule: Schedule) -> Schedule:
-    """The part that the lanes show: the window or, without one, the cycle without its idle rest."""
-    return schedule._replace(to_us=schedule.used_us) if schedule.is_whole else schedule
+def _headline(schedule: Schedule) -> Sentence:
+    """Say what the fullest cycle leaves of its slice by its timing model, and the verdict if this model decides."""
+    figures = schedule.figures
+    parts: tuple[Part, ...] = (
+        *(Code(schedule.profile.name), " at ", period_value(figures.period_us), ": "),
+        *story(figures, schedule.network),
+        f" by the {figures.timing_model} model",
+        " in the fullest cycle" if schedule.number is not None and schedule.cycles > 1 else "",
+    )
+    if figures.verdict is None:
+        return Sentence((*parts, ", which does not affect the verdict."), state_of(figures.fits and figures.safe))
+    state = state_of(figures.verdict == FITS and figures.safe)
+    verdict = figure_value(VERDICT, figures.verdict)._replace(state=state)
+    return Sentence((*parts, "; verdict: ", verdict, "."), state)
 
 
-def is_coarse(window: Schedule) -> bool:
-    """Whether a bar is a whole transaction instead of an event."""
-    return len(window.events) > _MOST_BARS
+def _margins(needs: Sequence[ModelNeeds]) -> Sentence:
+    """Say what each timing model leaves of the slice."""
+    margins = (
+        sentence(f"{{}} by the {model.timing_model} model", figure_value(MARGIN, model.margin_us)) for model in needs
+    )
+    return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
 
 
-def kind_of(profile: Profile, key: str) -> EventKind:
-    """Name and style of an event, or of a stretch of events, on the profile's kind of bus."""
-    return bus_of(profile).event_kind(key)
+def _cycle_words(schedule: Schedule, distinct: Sequence[DistinctCycle] | None) -> Iterator[str]:
+    """Say which cycle is drawn, and what each needs; nothing where all are alike and none was asked for."""
+    number, is_uniform = drawn_number(schedule), schedule.network.is_uniform
+
+    def due_words(names: Sequence[str], due: int) -> str:
+        if is_uniform:
+            return "all nodes" if due else "no node"
+        return ", ".join(names) or "no group"
+
+    if schedule.cycles == 1:
+        if schedule.number is not None:
+            yield "All cycles are alike."
+        return
+    drawn = "the fullest"
+    if schedule.number is not None and number is not None:
+        due = due_groups(schedule, number)
+        drawn = f"cycle {number}, with {due_words(group_names(due), len(due))}"
+        if schedule.number != number:
+            yield f"Cycle {schedule.number} repeats cycle {number}."
+    if distinct is None:
+        listed = f"More than {MOST_LISTED} cycles are not listed."
+    else:
+        needs = (
+            f"{', '.join(map(str, cycle.numbers))}: {due_words(cycle.groups, cycle.nodes)} ({cycle.required_us:.3f} us)"
+            for cycle in distinct
+        )
+        listed = f"Cycles {'; '.join(needs)}."
+    meet = "The nodes are due" if is_uniform else "The groups meet"
+    yield f"{meet} every {schedule.cycles} cycles; this is {drawn}. {listed}"
 
 
-def charged(schedule: Schedule) -> Sentence:
+def _chart(schedule: Schedule, needs: Sequence[ModelNeeds], *, title: str) -> Chart:
+    """The whole period to scale, and below it the window or, without one, the cycle without its idle rest."""
+    window = schedule._replace(to_us=schedule.used_us) if schedule.is_whole else schedule
+    lanes, legend = _lanes(window)
+    words = _charged(window)
+    text = sentence_text(words)
+    drawing = Drawing(title, (_period(schedule, needs), lanes), (text,), text, has_characters=True)
+    return Chart(drawing, joined(_most(window), words, by="; "), Sentence((legend,)) if legend else None)
+
+
+def _most(window: Schedule) -> Sentence:
+    """Say what takes most of the window."""
+    model = f"by the {window.figures.timing_model} model"
+    busy = [total for total in totals(window) if total.kind != IDLE.key]
+    if not busy:
+        return Sentence((f"Nothing but idle time {model}",))
+    most = max(busy, key=lambda total: total.total_us)
+    label = window.network.bus.event_kind(most.kind).label
+    return sentence(f"Mostly {label}, {{}} {model}", ShownValue(most.total_us, TOTAL.key, "us", TOTAL.decimals))
+
+
+def _charged(window: Schedule) -> Sentence:
     """Say what is shown, and which distance on the wire each node is charged with."""
-    nodes, common, cycle = schedule.figures.nodes, CommonMultiple(schedule), "the cycle"
-    if schedule.number is not None and common.cycles > 1:
-        cycle = f"cycle {common.number} of {common.cycles}"
-    setup = ", ".join((nouns(nodes, "node"), *schedule.network.bus.setup_words(schedule.network)))
-    way = schedule.network.bus.way_charged(schedule.network)
+    network, nodes, cycle = window.network, window.figures.nodes, "the cycle"
+    if window.number is not None and window.cycles > 1:
+        cycle = f"cycle {drawn_number(window)} of {window.cycles}"
+    setup, path = ", ".join((nouns(nodes, "node"), *network.bus.setup_words(network))), network.bus.path_words(network)
     return sentence(
-        f"{{}} {setup}; {{}} to {{}} of {cycle}, {way}",
+        f"{{}} {setup}; {{}} to {{}} of {cycle}{path and f', {path}'}",
         count_value(nodes, "nodes"),
-        ShownValue(schedule.from_us, "from_us", "", TOTAL.decimals),
-        ShownValue(schedule.to_us, "to_us", "us", TOTAL.decimals),
+        ShownValue(window.from_us, "from_us", "", TOTAL.decimals),
+        ShownValue(window.to_us, "to_us", "us", TOTAL.decimals),
     )
 
 
-def overruns(schedule: Schedule) -> bool:
-    """Whether the cycle takes more than its slice."""
-    return not fits_in(schedule.required_us, available_us=schedule.figures.available_us)
-
-
-def _period(schedule: Schedule) -> Panel:
+def _period(schedule: Schedule, needs: Sequence[ModelNeeds]) -> Panel:
     """The whole period, transaction by transaction, and what each timing model needs and leaves of its slice."""
-    figures, needs = schedule.figures, model_needs(schedule)
-    slice_us, period_us, end_us = figures.available_us, figures.period_us, schedule.end_us
-    lanes = [Lane("cycle", (*_stretches(schedule, schedule.cycle_events), *_part(_REST, end_us, period_us)))]
+    figures, end_us = schedule.figures, schedule.end_us
+    slice_us, period_us = figures.available_us, figures.period_us
+    scale_us = max(period_us, end_us, *(model.required_us for model in needs))
+    spans, _ = _bounded([list(_transactions(schedule, schedule.cycle_events))], 0.0, scale_us)
+    lanes = [Lane("cycle", (*spans[0], *_part(_REST, end_us, period_us)))]
     for model in needs:
-        used_us = max(model.required_us, slice_us)
         parts = (
             *_part(_NEEDED, 0.0, min(model.required_us, slice_us)),
             *_part(_LEFT, model.required_us, slice_us),
             *_part(_BEYOND, slice_us, model.required_us),
-            *_part(_REST, used_us, period_us),
+            *_part(_REST, max(model.required_us, slice_us), period_us),
         )
         left = with_unit(figure_value(MARGIN, abs(model.margin_us)))
         words = f"{left} short" if model.margin_us < 0 else f"margin {left}"
         needed = with_unit(figure_value(REQUIRED, model.required_us))
         lanes.append(Lane(model.timing_model, parts, f"{needed} needed, {words}", is_thin=True))
     slice_words, title = _time(slice_us), f"The period of {_time(period_us)} us"
-    if overruns(schedule):
+    if _overruns(schedule):
         lanes.append(_over(schedule))
         title = f"{title}: its cycle of {_time(end_us)} us is beyond its slice of {slice_words} us"
     else:
         title = f"{title} and its slice of {slice_words} us"
     if not schedule.is_whole:
         lanes.append(Lane("window", tuple(_part(_WINDOW, schedule.from_us, schedule.to_us)), is_thin=True))
-    return Panel(_plot(schedule, max(period_us, end_us, *(model.required_us for model in needs)), lanes), title)
+    return Panel(_plot(schedule, scale_us, lanes), title)
+
+
+def _lanes(window: Schedule) -> tuple[Panel, str]:
+    """The window: a lane for each event where they are few, else for the bus and the nodes; and what a bar is."""
+    title, events, legend = f"{_time(window.from_us)} to {_time(window.to_us)} us", window.events, ""
+    has_each = len(events) <= _MOST_EVENT_LANES
+    if has_each:
+        owners = {(event.transaction, event.node) for event in events}
+        ((kind, node), *more) = owners
+        is_single = not more and node is not None
+        title = f"{f'The {kind} of node {node}' if is_single else 'Events'}, {title}"
+        lanes = [
+            Lane(
+                event.label if is_single else _title(event),
+                tuple(_events(window, [event])),
+                f"{_time(event.duration_us)} us",
+            )
+            for event in events
+        ]
+    else:
+        title = f"{title} by node"
+        nodes = sorted({event.node for event in events if event.node is not None})
+        size = ceil(len(nodes) / _MOST_LANES) or 1
+        shared = [nodes[start : start + size] for start in range(0, len(nodes), size)]
+        lane_of = {node: number for number, members in enumerate(shared, start=1) for node in members}
+        of_lane: list[list[Event]] = [[] for _ in range(len(shared) + 1)]
+        for event in events:
+            of_lane[lane_of.get(event.node or 0, 0)].append(event)
+        draw = _events
+        if len(events) > _MOST_BARS:
+            draw, legend = _transactions, "A bar is a whole transaction."
+        spans, is_cut = _bounded([list(draw(window, own)) for own in of_lane], window.from_us, window.to_us)
+        if is_cut:
+            legend = f"A bar is what takes most of a {_MOST_BARS}th of the scale."
+        labels = ["bus", *(f"node {n[0]}" if len(n) == 1 else f"nodes {n[0]} to {n[-1]}" for n in shared)]
+        lanes = [Lane(label, bars) for label, bars in zip(labels, spans, strict=True) if bars]
+    if _overruns(window) and window.to_us > window.figures.available_us:
+        lanes.append(_over(window))
+    plot = _plot(window, window.to_us, lanes, start_us=window.from_us, is_beside=not has_each)
+    return Panel(plot, title), legend
 
 
 def _plot(schedule: Schedule, end_us: float, lanes: Sequence[Lane], *, start_us: float = 0.0, **layout: bool) -> Lanes:
     """Lanes on a scale of time, with the end of the slice if the scale goes beyond it."""
     slice_us = schedule.figures.available_us
-    end = Entry("edge" if overruns(schedule) else "limit", _END, shape="line")
+    end = Entry("edge" if _overruns(schedule) else "limit", "end of the slice", shape="line")
     guides = (Guide(end, x=slice_us),) if start_us < slice_us < end_us else ()
     return Lanes(numbers("us", start_us, end_us), tuple(lanes), guides, **layout)
+
+
+def _overruns(schedule: Schedule) -> bool:
+    """Whether the cycle takes more than its slice."""
+    return not fits_in(schedule.required_us, available_us=schedule.figures.available_us)
+
+
+def _over(schedule: Schedule) -> Lane:
+    return Lane("over", tuple(_part(_BEYOND, schedule.figures.available_us, schedule.end_us)), is_thin=True)
 
 
 def _part(entry: Entry, start_us: float, end_us: float) -> Iterator[Span]:
@@ -175,65 +283,59 @@ def _part(entry: Entry, start_us: float, end_us: float) -> Iterator[Span]:
         yield Span(entry, start_us, end_us, _tip(entry.words, start_us, end_us))
 
 
-def _over(schedule: Schedule) -> Lane:
-    return Lane("over", tuple(_part(_BEYOND, schedule.figures.available_us, schedule.end_us)), is_thin=True)
-
-
-def _lanes(window: Schedule) -> Panel:
-    """The window: a lane for each event where they are few, else one for the bus and each node."""
-    title, events = f"{_time(window.from_us)} to {_time(window.to_us)} us", window.events
-    owners = {(event.transaction, event.node) for event in events}
-    has_each = len(events) <= _MOST_EVENT_LANES
-    if has_each:
-        ((kind, node), *more) = owners
-        is_one = not more and node is not None
-        title = f"{f'The {kind} of node {node}' if is_one else 'Events'}, {title}"
-        lanes = [
-            Lane(
-                event.label if is_one else _title(event),
-                tuple(_bars(window, [event])),
-                f"{_time(event.duration_us)} us",
-            )
-            for event in events
-        ]
-    else:
-        title = f"{title} by node"
-        of_node: dict[int, list[Event]] = {}
-        for event in events:
-            of_node.setdefault(event.node or 0, []).append(event)
-        draw = _stretches if is_coarse(window) else _bars
-        lanes = [
-            Lane(f"node {node}" if node else "bus", tuple(draw(window, of_node[node]))) for node in sorted(of_node)
-        ]
-    if overruns(window) and window.to_us > window.figures.available_us:
-        lanes.append(_over(window))
-    return Panel(_plot(window, window.to_us, lanes, start_us=window.from_us, is_beside=not has_each), title)
-
-
-def _bars(schedule: Schedule, events: Sequence[Event]) -> Iterator[Span]:
+def _events(schedule: Schedule, events: Sequence[Event]) -> Iterator[Span]:
     """A bar for each event."""
     for event in events:
         yield _bar(schedule, event.kind, _title(event), event.start_us, event.end_us)
 
 
-def _stretches(schedule: Schedule, events: Sequence[Event]) -> Iterator[Span]:
+def _transactions(schedule: Schedule, events: Sequence[Event]) -> Iterator[Span]:
     """A bar for each transaction, and for each event of the bus."""
-    merged: list[tuple[Event, float]] = []
-    for event in events:
-        last = merged[-1][0] if merged else None
-        if last and event.transaction and (event.node, event.transaction) == (last.node, last.transaction):
-            merged[-1] = last, event.end_us
-        else:
-            merged.append((event, event.end_us))
-    for event, end_us in merged:
-        kind = event.transaction or event.kind
-        owner = kind_of(schedule.profile, kind).label if event.node is None else f"{kind} of node {event.node}"
-        yield _bar(schedule, kind, owner, event.start_us, end_us)
+
+    def owner(numbered: tuple[int, Event]) -> tuple[object, ...]:
+        number, event = numbered
+        return (event.node, event.transaction) if event.transaction else (number,)
+
+    for _, members in groupby(enumerate(events), owner):
+        (_, first), *more = members
+        kind = first.transaction or first.kind
+        label = schedule.network.bus.event_kind(kind).label
+        title = label if first.node is None else f"{kind} of node {first.node}"
+        yield _bar(schedule, kind, title, first.start_us, more[-1][1].end_us if more else first.end_us)
 
 
 def _bar(schedule: Schedule, kind: str, title: str, start_us: float, end_us: float) -> Span:
-    look = kind_of(schedule.profile, kind)
+    look = schedule.network.bus.event_kind(kind)
     return Span(Entry(look.ink, look.label, look.mark), start_us, end_us, _tip(title, start_us, end_us))
+
+
+def _bounded(lanes: Sequence[Sequence[Span]], start_us: float, end_us: float) -> tuple[list[tuple[Span, ...]], bool]:
+    """The bars of lanes on one scale; where they are too many, those whose middles are in one share of it together.
+
+    Returns
+    -------
+    tuple
+        The bars of each lane, and whether any stand for several.
+    """
+    share_us = (end_us - start_us) / _MOST_BARS
+    if sum(map(len, lanes)) <= _MOST_BARS or share_us <= 0:
+        return [tuple(bars) for bars in lanes], False
+
+    def place(bar: Span) -> int:
+        return int(((bar.start + bar.end) / 2 - start_us) / share_us)
+
+    return [tuple(_together(list(bars)) for _, bars in groupby(lane, place)) for lane in lanes], True
+
+
+def _together(bars: Sequence[Span]) -> Span:
+    """One bar for several side by side, of the kind that takes most of their time."""
+    if len(bars) == 1:
+        return bars[0]
+    times_us: dict[Entry, float] = {}
+    for bar in bars:
+        times_us[bar.entry] = times_us.get(bar.entry, 0.0) + bar.end - bar.start
+    entry, start_us, end_us = max(times_us, key=lambda kind: times_us[kind]), bars[0].start, bars[-1].end
+    return Span(entry, start_us, end_us, _tip(f"{len(bars)} bars, mostly {entry.words}", start_us, end_us))
 
 
 def _title(event: Event) -> str:
@@ -253,86 +355,9 @@ def _time(time_us: float) -> str:
 _TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
 
 
-def timeline_report(schedule: Schedule) -> Report:
-    """Report of `timeline`."""
-    return Report(
-        Sentence(("Timeline of ", Code(schedule.profile.name))),
-        tuple(_blocks(schedule)),
-        timeline_document(schedule),
-        timeline_records(schedule),
-    )
-
-
-def _blocks(schedule: Schedule) -> Iterator[Block]:
-    """Whether the cycle fits, the cycle to scale, and the total of each kind of event."""
-    yield headline(schedule)
-    yield from warning_sentences(schedule.network)
-    yield margins_sentence(schedule)
-    yield from (Sentence((words,)) for words in CommonMultiple(schedule).sentences())
-    yield timeline_chart(schedule)
-    yield totals_table(schedule)
-
-
-def headline(schedule: Schedule) -> Sentence:
-    """Say what the fullest cycle leaves of its slice by its timing model, and the verdict if this model decides."""
-    figures = schedule.figures
-    parts: tuple[Part, ...] = (
-        *(Code(schedule.profile.name), " at ", period_value(figures.period_us), ": "),
-        *story(figures, schedule.network),
-        f" by the {figures.timing_model} model",
-        *((" in the fullest cycle",) if schedule.number is not None and CommonMultiple(schedule).cycles > 1 else ()),
-    )
-    if figures.verdict is None:
-        return Sentence((*parts, ", which does not affect the verdict."), state_of(figures.fits and figures.safe))
-    state = state_of(figures.verdict == FITS and figures.safe)
-    verdict = figure_value(VERDICT, figures.verdict)._replace(state=state)
-    return Sentence((*parts, "; verdict: ", verdict, "."), state)
-
-
-def timeline_chart(schedule: Schedule) -> Chart:
-    """The cycle to scale.
-
-    Parameters
-    ----------
-    schedule
-        The cycle, narrowed to its window.
-    """
-    window = drawn_window(schedule)
-    caption = joined(_most(window), charged(window), by="; ")
-    legend = Sentence(("A bar is a whole transaction.",)) if is_coarse(window) else None
-    return Chart(timeline_drawing(schedule, title=sentence_text(headline(schedule))), caption, legend)
-
-
-def _most(window: Schedule) -> Sentence:
-    """Say what takes most of the window."""
-    model = f"by the {window.figures.timing_model} model"
-    busy = [total for total in totals(window) if total.kind != IDLE.key]
-    if not busy:
-        return Sentence((f"Nothing but idle time {model}",))
-    most = max(busy, key=lambda total: total.total_us)
-    label = kind_of(window.profile, most.kind).label
-    taken = ShownValue(most.total_us, TOTAL.key, "us", TOTAL.decimals)
-    return sentence(f"Mostly {label}, {{}} {model}", taken)
-
-
-def margins_sentence(schedule: Schedule) -> Sentence:
-    """Say what each timing model leaves of the slice."""
-    margins = (
-        sentence(f"{{}} by the {model.timing_model} model", figure_value(MARGIN, model.margin_us))
-        for model in model_needs(schedule)
-    )
-    return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
-
-
-def totals_table(schedule: Schedule) -> Table:
-    """Total time of each kind of event in the window.
-
-    Parameters
-    ----------
-    schedule
-        The cycle, narrowed to its window.
-    """
-    whole = "the cycle" if overruns(schedule) else "the slice"
+def _totals_table(schedule: Schedule) -> Table:
+    """Total time of each kind of event in the window."""
+    whole = "the cycle" if _overruns(schedule) else "the slice"
     part = whole if schedule.is_whole else "the window"
     return Table(
         (
@@ -345,14 +370,16 @@ def totals_table(schedule: Schedule) -> Table:
 
 
 def _total_row(schedule: Schedule, total: Total) -> TableRow:
-    kind = kind_of(schedule.profile, total.kind)
+    kind = schedule.network.bus.event_kind(total.kind)
     values = (attribute_value(figure, total) for figure in _TOTAL_FIGURES)
     return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 
-def _facts(schedule: Schedule) -> JsonDocument:
-    """The document without events: the cycle that is drawn, the verdict, the cycles that differ, and the window."""
-    figures, common = schedule.figures, CommonMultiple(schedule)
+def _document(
+    schedule: Schedule, needs: Sequence[ModelNeeds], distinct: Sequence[DistinctCycle] | None
+) -> JsonDocument:
+    """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
+    figures, network = schedule.figures, schedule.network
     values = figures.values()
     return document(
         "timeline",
@@ -360,10 +387,10 @@ def _facts(schedule: Schedule) -> JsonDocument:
         timing_model=figures.timing_model,
         period_us=figures.period_us,
         nodes=figures.nodes,
-        **{key: values[key] for key in schedule.network.bus.figures.headings},
-        cycle=common.number,
-        common_multiple=common.cycles,
-        distinct_cycles=None if common.distinct is None else [alike._asdict() for alike in common.distinct],
+        **{key: values[key] for key in network.bus.figures.headings},
+        cycle=drawn_number(schedule),
+        common_multiple=schedule.cycles,
+        distinct_cycles=None if distinct is None else [cycle._asdict() for cycle in distinct],
         required_us=schedule.required_us,
         available_us=figures.available_us,
         margin_us=schedule.margin_us,
@@ -371,21 +398,17 @@ def _facts(schedule: Schedule) -> JsonDocument:
         not_shown=None if figures.not_shown is None else list(figures.not_shown),
         fits=figures.fits,
         verdict=figures.verdict,
-        **safety_record(figures, schedule.network),
-        warnings=schedule.network.bus.warnings(schedule.network, nodes=[figures.nodes]),
+        **safety_record(figures, network),
+        warnings=network.bus.warnings(network, nodes=[figures.nodes]),
         from_us=schedule.from_us,
         to_us=schedule.to_us,
+        margins=[model._asdict() for model in needs],
+        events=_event_records(schedule),
+        totals=[total._asdict() for total in totals(schedule)],
     )
 
 
-def timeline_document(schedule: Schedule) -> JsonDocument:
-    """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
-    margins = [model._asdict() for model in model_needs(schedule)]
-    totals_ = [total._asdict() for total in totals(schedule)]
-    return {**_facts(schedule), "margins": margins, "events": _event_records(schedule), "totals": totals_}
-
-
-def timeline_records(schedule: Schedule) -> list[Record]:
+def _records(schedule: Schedule) -> list[Record]:
     """One row for each event, with profile and timing model in front."""
     head = {"profile": schedule.profile.name, "timing_model": schedule.figures.timing_model}
     return [{**head, **record} for record in _event_records(schedule)]
@@ -393,16 +416,6 @@ def timeline_records(schedule: Schedule) -> list[Record]:
 
 def _event_records(schedule: Schedule) -> list[Record]:
     """One row for each event of the window."""
-    return [
-        {
-            "kind": event.kind,
-            "node": event.node,
-            "transaction": event.transaction,
-            "packet": event.packet,
-            "start_us": event.start_us,
-            "end_us": event.end_us,
-            "duration_us": event.duration_us,
-            "equation": kind_of(schedule.profile, event.kind).reference,
-        }
-        for event in schedule.events
-    ]
+    keys = ("kind", "node", "transaction", "packet", "start_us", "end_us", "duration_us")
+    event_kind = schedule.network.bus.event_kind
+    return [{**fields(event, *keys), "equation": event_kind(event.kind).reference} for event in schedule.events]

@@ -1,0 +1,192 @@
+"""The cycles of a capture: which frames make a cycle, and which cycle of the plan each is."""
+
+from math import inf, log
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from busplan.buses.ethercat.frames import UnitCycle, cycles_of
+from busplan.buses.network import Network
+from busplan.elementwise import plain
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, grid
+
+Places = npt.NDArray[np.int64]
+_JUMP: Final = 1.01
+"""Least ratio of a pause between cycles to one within a cycle."""
+_FARTHEST: Final = log(8)
+"""Logarithm of the largest ratio of a recorded period to the planned one that pauses are looked for with."""
+_SAME: Final = 0.1
+"""Difference of logarithms of periods that are taken for the same."""
+_BURST: Final = 1 / 20
+"""Share of the planned period that is no distance of cycles, but of frames that were stamped in bursts."""
+
+
+class PlannedCycles:
+    """The cycles of the common multiple of the rates; a single one without rates."""
+
+    def __init__(self, network: Network) -> None:
+        self.sorts = cycles_of(network)
+        """The cycles that differ, the fullest first."""
+        self.sort = np.zeros(sum(len(sort.numbers) for sort in self.sorts), dtype=np.int64)
+        """Place in `sorts` of each cycle."""
+        for place, sort in enumerate(self.sorts):
+            self.sort[np.array(sort.numbers) - 1] = place
+        self.data_bytes = np.array([float(sort.data_bytes) for sort in self.sorts])[self.sort]
+        """Process data of each cycle [bytes]."""
+        self._filled = np.concatenate(([0], np.cumsum(self.data_bytes > 0)))
+        filled = np.flatnonzero(self.data_bytes)
+        apart = np.diff(filled, append=filled[:1] + len(self.sort)) if len(filled) else np.ones(1, dtype=np.int64)
+        self.least_apart = int(apart.min())
+        """Least distance of two cycles with process data, in cycles."""
+        self.least_share = float(np.mean(apart == self.least_apart))
+        """Share of such distances that are no longer."""
+
+    def filled_before(self, number: Places) -> Places:
+        """How many cycles before one, from 0, have process data; the common multiple repeats itself."""
+        whole, rest = np.divmod(number, len(self.sort))
+        return np.asarray(whole * self._filled[-1] + self._filled[rest])
+
+    def phase(self, places: Places, data_bytes: npt.NDArray[Any]) -> int:
+        """The cycle of the common multiple that place 0 is, so that process data match best.
+
+        Parameters
+        ----------
+        places, data_bytes
+            Places of n cycles in a recording, by periods, and their process data [bytes].
+        """
+        count = len(self.sort)
+        pairs, often = np.unique(np.stack((places % count, data_bytes), axis=1), axis=0, return_counts=True)
+        planned = self.data_bytes[(pairs[:, :1].astype(np.int64) + np.arange(count)) % count]
+        return int(np.argmax(often @ (planned - np.abs(planned - pairs[:, 1:]))))
+
+
+class SeenCycles(NamedTuple):
+    """Cycles with process data, n of them."""
+
+    frames: Places
+    """Places of all their frames in the recording."""
+    number: Places
+    """Cycle that each frame belongs to, from 0."""
+    first: Places
+    """Places of their first frames."""
+    periods: PeriodicEvents | None
+    """When they begin; None of too few cycles, or of stamps in bursts."""
+    in_bursts: bool
+    """Whether stamps come in bursts, which have no period."""
+    sorts: tuple[UnitCycle, ...]
+    """The cycles of the plan that differ, the fullest first."""
+    sort: Places
+    """Place in `sorts` of each cycle."""
+    gaps: Places
+    """Cycles of the plan with process data that are missing between each cycle and the next."""
+    left_out: int
+    """Frames of the master's start and end, where more cycles are missing than there are, and of cycles in part."""
+
+
+def seen_cycles(frames: Places, times_us: Floats, kinds: Places, data_bytes: Floats, network: Network) -> SeenCycles:
+    """Tell which frames make a cycle, and number the cycles by their times and their process data.
+
+    Parameters
+    ----------
+    frames
+        Places of the frames of process data in the recording, in the order of their times, at least one.
+    times_us, kinds, data_bytes
+        When each was sent, what tells its process data apart, and its process data [bytes].
+    network
+        The plan, of plain numbers.
+    """
+    plan = PlannedCycles(network)
+    period_us = plain(network.period_us)
+    starts, near_us = _starts(times_us, kinds, plan, period_us)
+    in_bursts = len(starts) > 1 and float(np.median(np.diff(times_us[starts]))) < _BURST * period_us
+    begin, end = 0, len(starts)
+    while True:
+        kept = slice(int(starts[begin]), int(np.append(starts, len(frames))[end]))
+        first = starts[begin:end]
+        number = np.searchsorted(first, np.arange(kept.start, kept.stop), side="right") - 1
+        periods = None if in_bursts else grid(times_us[first], near_us)
+        of_plan, gaps = np.zeros(len(first), dtype=np.int64), np.zeros(len(first) - 1, dtype=np.int64)
+        if periods is not None:
+            in_cycle_bytes = np.bincount(number, weights=data_bytes[kept]).astype(np.float64)
+            of_plan, gaps = _numbered(plan, periods.places, in_cycle_bytes)
+        sort = plan.sort[of_plan]
+        all_cycles = 0, len(first)
+        taken = _in_operation(gaps)
+        if periods is not None and taken == all_cycles:
+            taken = _whole(np.bincount(number), sort)
+        if taken == all_cycles:
+            left_out = len(frames) - len(number)
+            return SeenCycles(frames[kept], number, frames[first], periods, in_bursts, plan.sorts, sort, gaps, left_out)
+        begin, end = begin + taken[0], begin + taken[1]
+
+
+def _starts(times_us: Floats, kinds: Places, plan: PlannedCycles, period_us: float) -> tuple[Places, float]:
+    """Frames that begin a cycle, and about the period of the master's task [us].
+
+    Frames with the same process data behind the same others come at a usual distance. Where it is longer than a bound,
+    the frame begins a cycle. Bounds are tried at each jump of the usual distances: that with the period nearest to the
+    planned one is taken, of those with the same period the one that the fewest frames contradict, as cycles closer to
+    each other than half the period, and frames of a cycle farther apart.
+    """
+    apart_us = np.diff(times_us)
+    _, pair = np.unique(kinds[:-1] * (int(kinds.max()) + 1) + kinds[1:], return_inverse=True)
+    by_pair = np.split(apart_us[np.argsort(pair, kind="stable")], np.cumsum(np.bincount(pair))[:-1])
+    usual_us = np.array([float(np.median(distances)) for distances in by_pair if len(distances)])
+    ordered_us = np.sort(usual_us)
+    within_us = ordered_us[:-1][ordered_us[1:] > _JUMP * ordered_us[:-1]]
+    tried = []
+    for longest_us in (-inf, *within_us):
+        begins = np.concatenate(([True], usual_us[pair] > longest_us))
+        starts = np.flatnonzero(begins)
+        between_us = np.diff(times_us[starts])
+        least_us = float(np.quantile(between_us, plan.least_share / 2)) if len(between_us) else 0.0
+        for cycles in range(1, plan.least_apart + 1):
+            near_us = least_us / cycles
+            beside = abs(log(near_us / period_us)) if near_us > 0 else inf
+            close, far = between_us < near_us / 2, apart_us[~begins[1:]] > near_us / 2
+            tried.append((beside, int(np.count_nonzero(close) + np.count_nonzero(far)), starts, near_us))
+    least = min(beside for beside, *_ in tried)
+    if least > _FARTHEST:
+        return tried[0][2:]
+    return min((bound for bound in tried if bound[0] <= least + _SAME), key=lambda bound: bound[1])[2:]
+
+
+def _numbered(plan: PlannedCycles, places: Places, data_bytes: npt.NDArray[Any]) -> tuple[Places, Places]:
+    """Cycle of the common multiple of each recorded one, and how many with process data are missing behind it."""
+    count, apart = len(plan.sort), np.diff(places)
+    phase = plan.phase(places, data_bytes)
+    of_plan = (places + phase) % count
+    # A master that leaves out a cycle may go on with the next one of its own count.
+    for part in np.split(np.arange(len(places)), np.flatnonzero(apart > plan.least_apart) + 1):
+        if np.any(data_bytes[part] != plan.data_bytes[(places[part] + phase) % count]):
+            phase = plan.phase(places[part], data_bytes[part])
+        of_plan[part] = (places[part] + phase) % count
+    gaps = plan.filled_before(of_plan[:-1] + apart) - plan.filled_before(of_plan[:-1] + 1)
+    return of_plan, gaps
+
+
+def _in_operation(gaps: Places) -> tuple[int, int]:
+    """The first cycle and the one behind the last, without the master's start and end.
+
+    They lie before the first and behind the last ten cycles in a row, where more cycles are missing than there are.
+    """
+    in_a_row = np.convolve(np.append(gaps, 1) == 0, np.ones(LEAST_EVENTS - 1), "full")[LEAST_EVENTS - 2 :]
+    rows = np.flatnonzero(in_a_row == LEAST_EVENTS - 1)
+    if not len(rows):
+        return 0, len(gaps) + 1
+    first, last = int(rows[0]), int(rows[-1]) + LEAST_EVENTS
+    before, behind = int(gaps[:first].sum()), int(gaps[last - 1 :].sum())
+    return first if before > first else 0, last if behind > len(gaps) + 1 - last else len(gaps) + 1
+
+
+def _whole(frames: Places, sort: Places) -> tuple[int, int]:
+    """The first cycle and the one behind the last, without those that the capture begins or ends within.
+
+    Parameters
+    ----------
+    frames, sort
+        Frames of n cycles, and which cycles of the plan they are.
+    """
+    has_less = [frames[end] < np.median(frames[sort == sort[end]]) for end in (0, -1)]
+    return int(has_less[0]), len(frames) - int(has_less[1])

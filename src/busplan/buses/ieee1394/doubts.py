@@ -1,0 +1,267 @@
+"""How well a cycle is known: the residual of Table I, the bias by it, and the doubt of each input."""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from math import sqrt
+from typing import Any, Final, NamedTuple
+
+from busplan.buses.cycle import Doubt
+from busplan.buses.ieee1394.constants import (
+    ARBITRATION_GAP_TICKS,
+    BASE_RATE_MBIT_S,
+    DATA_RATE_MBIT_S,
+    MAX_GAP_COUNT,
+    PACKET_OVERHEAD_BYTES,
+    PHY_DELAY_HALF_WIDTH_US,
+    REFERENCE_CABLE_M,
+)
+from busplan.buses.ieee1394.timing import (
+    Delays,
+    Link,
+    Responder,
+    TimingModelName,
+    between_packets_us,
+    delays,
+    transaction,
+)
+from busplan.buses.ieee1394.transactions import ARBITRATION, PACKET_PARTS, Exchange
+from busplan.buses.network import Network
+from busplan.buses.published import Spread, rows_of
+from busplan.elementwise import Number, choose, is_off, larger, named, total, traced_with
+from busplan.sourced import Sourced
+
+_BENCH: Final = Link(float(DATA_RATE_MBIT_S["S400"]), MAX_GAP_COUNT, 1, float(REFERENCE_CABLE_M))
+"""The way of a packet on the bench."""
+_RECTANGULAR: Final = sqrt(3)
+"""Half of a range over its standard uncertainty (JCGM 100, 4.3.7)."""
+
+
+class ModelResidual(NamedTuple):
+    """Measured less computed time of half a transaction [us]."""
+
+    mean_us: Sourced
+    uncertainty_us: Sourced
+    """Standard uncertainty of the next half: `Spread`."""
+
+
+@cache
+def residual(model: TimingModelName = "standard") -> ModelResidual:
+    """Residual of T1 + T2, equation (13), over the rows of Table I.
+
+    Parameters
+    ----------
+    model
+        Timing model.
+
+    Examples
+    --------
+    >>> round(residual().mean_us, 3), round(residual("paper").mean_us, 3)
+    (0.827, 3.131)
+    """
+    differences = []
+    for row in rows_of("paper", "bias and U"):
+        phases = transaction(
+            "write",
+            model=model,
+            delays=delays(_BENCH, model=model),
+            payload_bytes=row["set"]["payload.write_bytes"],
+            responder=Responder(0.0),
+            overhead_bytes=int(PACKET_OVERHEAD_BYTES),
+        )
+        differences.append(row["published"] - float(phases.request_and_acknowledge_us))
+    spread = Spread.of(differences)
+
+    def sourced(us: float, meaning: str, symbol: str) -> Sourced:
+        source = f"paper, Table I, less the {model} model at its {len(differences)} payloads"
+        return Sourced(us, unit="us", grade="derived", source=source, meaning=meaning, symbol=symbol)
+
+    return ModelResidual(
+        sourced(spread.mean, "what half a transaction takes beyond the model, on the mean", "b"),
+        sourced(spread.uncertainty, "standard uncertainty of that for one more payload", "u(b)"),
+    )
+
+
+def gap_term_us(gap_count: Number, *, measured: Number = MAX_GAP_COUNT, symbol: str = "d") -> Number:
+    """Half of what the gap term of equation (4) changes between two gap counts: d [us].
+
+    Parameters
+    ----------
+    gap_count
+        Gap count in force [1].
+    measured
+        Gap count that the error of the model was measured at, by default that of Table I [1].
+    symbol
+        Symbol in a derivation.
+    """
+    ticks = traced_with(ARBITRATION_GAP_TICKS, gap_count) / 2
+    return named(ticks * (measured - gap_count) / BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)
+
+
+def bias_us(exchanges: Sequence[Exchange], network: Network, *, gap_count: Number) -> Number:
+    """Mean time of a cycle beyond the model [us].
+
+    Half-count (b + d): b is the mean residual of Table I. d is the middle of two readings of it, which a single gap
+    count cannot tell apart: that the difference is constant, and that it stands in the gap term of equation (4). An
+    execution time that was fitted against the model holds the error of split transactions, and of no others.
+
+    Parameters
+    ----------
+    exchanges
+        Every transaction of the cycle.
+    network
+        The network.
+    gap_count
+        Gap count in force [1].
+    """
+    mean_us = residual().mean_us
+    of_split = total(
+        halves * (choose(_is_fitted(node), 0.0, mean_us) + _split_gap_term_us(node, gap_count))
+        for node, halves in _split_halves(exchanges)
+    )
+    return of_split + _other_halves(exchanges, network) * (mean_us + gap_term_us(gap_count))
+
+
+def of_cycle(
+    exchanges: Sequence[Exchange], network: Network, *, delays: Delays, hop_delays: Number
+) -> tuple[Doubt, ...]:
+    """The standard uncertainty of a cycle of the individual schedule by each of its inputs.
+
+    Parameters
+    ----------
+    exchanges
+        Every transaction of the cycle.
+    network
+        The network.
+    delays
+        Delays to the farthest node.
+    hop_delays
+        How often the delay of all hops stands in the cycle beside its transactions [1].
+    """
+    host_us: Number = network.profile.host.standard_uncertainty_us
+    split, other_halves = _split_halves(exchanges), _other_halves(exchanges, network)
+    link, spread_us = delays.link, residual().uncertainty_us
+    # One reading is wrong by the same share in all: signs count.
+    of_split_us = total(halves * _split_gap_term_us(node, link.gap_count) for node, halves in split)
+    of_packets = total(exchange.nodes * _hop_delays(exchange) for exchange in exchanges)
+
+    def busy_swing_us(exchange: Exchange, execution_us: Number, host_us: Number) -> Number:
+        """Change of a transaction by a standard uncertainty of its execution or of the host."""
+        responder = exchange.responder
+        if is_off(execution_us if responder.answer == "split" else 0.0) and is_off(host_us):
+            return 0.0
+        bound_us = responder.execution_us + responder.worst_extra_us
+
+        def busy_us(steps: int) -> Number:
+            between_us = between_packets_us(
+                responder.answer,
+                gaps=delays.gaps,
+                execution_us=bound_us + steps * execution_us if steps else bound_us,
+                host_us=responder.host_us + steps * host_us if steps else responder.host_us,
+            )
+            return named(between_us, "busy_us", f"busy{steps:+d}u" if steps else "busy")
+
+        return swing_us(busy_us)
+
+    return of_inputs(
+        residual_us=total(halves * choose(_is_fitted(node), 0.0, spread_us) for node, halves in split)
+        + other_halves * spread_us,
+        gap_term_us=of_split_us + other_halves * gap_term_us(link.gap_count),
+        execution=Doubt(
+            "node.execution" if network.is_uniform else "group.execution",
+            "execution time",
+            # Times of several groups are measured, or guessed, in the same way: they are taken to err together.
+            total(
+                exchange.nodes * busy_swing_us(exchange, exchange.execution_uncertainty_us, 0.0)
+                for exchange in exchanges
+            ),
+        ),
+        phy_delays=of_packets + hop_delays * link.hops,
+        link=link,
+        host_us=total(exchange.nodes * busy_swing_us(exchange, 0.0, host_us) for exchange in exchanges),
+    )
+
+
+def of_inputs(
+    *,
+    residual_us: Number,
+    gap_term_us: Number,
+    phy_delays: Number,
+    link: Link,
+    host_us: Number,
+    execution: Doubt | None = None,
+) -> tuple[Doubt, ...]:
+    """The standard uncertainty of a cycle by each of its inputs.
+
+    Parameters
+    ----------
+    residual_us
+        By the residual of Table I [us].
+    gap_term_us
+        Sum of the gap terms d [us].
+    phy_delays
+        How often the delay of a PHY stands in the cycle [1].
+    link
+        The link: a profile that gives the delay of a PHY leaves no doubt of it.
+    host_us
+        By the host's own time [us].
+    execution
+        Doubt of the execution times, where the cycle has any.
+    """
+    half_width_us = traced_with(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
+    return (
+        Doubt("residual", "residual of Table I", residual_us),
+        Doubt("gap_term", "gap term of eq (4)", larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
+        *((execution,) if execution else ()),
+        Doubt("bus.phy_delay_us", "PHY delay", phy_delays * half_width_us / _RECTANGULAR),
+        Doubt("host.transaction_us", "host time", host_us),
+    )
+
+
+def swing_us(time_us: Callable[[int], Number]) -> Number:
+    """Change by a standard uncertainty: half the larger of two steps, two uncertainties up and two down [us].
+
+    The cycle never falls with a time and has kinks, at which a central difference covers too little.
+
+    Parameters
+    ----------
+    time_us
+        From a number of standard uncertainties to the time [us].
+    """
+    above_us, planned_us, below_us = time_us(2), time_us(0), time_us(-2)
+    return larger(above_us - planned_us, planned_us - below_us) / 2
+
+
+def _hop_delays(exchange: Exchange) -> Number:
+    """Delays of hops in a transaction: arbitrations over the way to the root, other parts over the node's own [1]."""
+    packets = [part.term for part in exchange.parts if part.term in PACKET_PARTS]
+    arbitrations = packets.count(ARBITRATION)
+    hops = (len(packets) - arbitrations) * exchange.delays.link.hops
+    return hops + arbitrations * exchange.delays.arbitration_hops
+
+
+def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ...]:
+    """Halves of split transactions in the cycle, each a packet that is acknowledged: by sort of node [1]."""
+    counts: dict[int, tuple[Any, list[Number]]] = {}
+    for exchange in exchanges:
+        if exchange.responder.answer == "split":
+            counts.setdefault(id(exchange.group.node), (exchange.group.node, []))[1].append(2 * exchange.nodes)
+    return tuple((node, named(total(halves), "split_halves", "halves")) for node, halves in counts.values())
+
+
+def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
+    """Halves of all other transactions in the cycle, and retries [1]."""
+    unsplit = [exchange for exchange in exchanges if exchange.responder.answer != "split"]
+    halves = total(exchange.nodes * (1 if exchange.responder.answer == "unified" else 2) for exchange in unsplit)
+    return named(halves + network.profile.cycle.retries, "other_halves", "halves_other")
+
+
+def _is_fitted(node: Any) -> Number:
+    """Whether an execution time holds the error of the model, because it was fitted against it: a truth."""
+    truth: Number = node.execution.residual == "standard"
+    return truth
+
+
+def _split_gap_term_us(node: Any, gap_count: Number) -> Number:
+    """Gap term of a split transaction, from the gap count at which its error is known [us]."""
+    measured = choose(_is_fitted(node), node.execution.measured_gap_count, MAX_GAP_COUNT)
+    return gap_term_us(gap_count, measured=measured, symbol="d_split")

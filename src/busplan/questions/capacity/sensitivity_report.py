@@ -1,0 +1,250 @@
+"""Report of `busplan capacity --sensitivity`: the effect of each small change, and the next bottleneck."""
+
+from collections.abc import Iterator
+from itertools import chain
+from typing import Final
+
+from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
+from busplan.buses.network import Network
+from busplan.english import listed, nouns
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Chart,
+    Record,
+    Report,
+    Sentence,
+    ShownValue,
+    Table,
+    TableColumn,
+    TableRow,
+    count_value,
+    figure_value,
+    joined,
+    sentence,
+)
+from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
+from busplan.forms.numbers import decimals_of, period_value, sentence_text
+from busplan.questions.base.sentences import fields, with_profile
+from busplan.questions.capacity import CapacityAnswer
+from busplan.questions.capacity.report import capacity_report
+from busplan.questions.capacity.sensitivity import Effect, NextBottleneck, NextLimit, Sensitivity
+from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.figures import FitFigures, limits_behind
+
+_DECIMALS: Final = 3
+_DIGITS: Final = 4
+"""Digits of what changes: enough to see a tenth of it."""
+
+
+def sensitivity_report(answer: CapacityAnswer) -> Report:
+    """Report of `capacity --sensitivity`."""
+    report, sensitivities = capacity_report(answer), answer.sensitivities
+    effects = [[_record(effect, at.network) for effect in at.effects] for at in sensitivities]
+    verdicts = [
+        {**verdict, "sensitivity": records, "next_bottleneck": _bottleneck_record(at.next_bottleneck, at.network)}
+        for verdict, records, at in zip(report.document["verdicts"], effects, sensitivities, strict=True)
+    ]
+    rows = [
+        {"period_us": at.network.profile.cycle.period_us, "timing_model": at.timing_model, **record}
+        for at, records in zip(sensitivities, effects, strict=True)
+        for record in records
+    ]
+    return report._replace(
+        blocks=(*report.blocks, *chain.from_iterable(map(_blocks, sensitivities))),
+        document={**report.document, "verdicts": verdicts},
+        records=with_profile(answer.profile.name, rows),
+        is_card_enough=False,
+    )
+
+
+def _record(effect: Effect, network: Network) -> Record:
+    then, safe = effect.then, network.bus.safety.figure
+    return {
+        "change": effect.change,
+        "key": effect.key,
+        "from": effect.before,
+        "to": effect.after,
+        "margin_change_us": effect.margin_change_us,
+        **fields(then, "margin_corrected_us", "uncertainty_us", "verdict", "exceeded", "not_shown"),
+        **({} if safe is None else {safe.key: then and then.safe}),
+        "note": effect.note or None,
+    }
+
+
+def _bottleneck_record(bottleneck: NextBottleneck, network: Network) -> Record:
+    """What binds now and next, with the sentence that says it; limits of groups are a list."""
+    limits = [
+        {
+            "safe_limited_by": limit.limited_by,
+            "safe_nodes": limit.safe_nodes,
+            "next_safe_limited_by": limit.next_limited_by,
+            "next_safe_nodes": limit.next_safe_nodes,
+        }
+        for limit in bottleneck.limits
+    ]
+    whole: Record = limits[0]
+    if bottleneck.limits[0].group:
+        names = [{"name": limit.group} for limit in bottleneck.limits]
+        groups = [{**name, **record} for name, record in zip(names, limits, strict=True)]
+        whole = {**dict.fromkeys(whole), "groups": groups}
+    return {
+        "binding_term": bottleneck.binding_term.name,
+        "binding_term_us": bottleneck.binding_term.us,
+        "next_binding_term": bottleneck.next_binding_term.name,
+        "next_binding_term_us": bottleneck.next_binding_term.us,
+        "next_margin_corrected_us": bottleneck.next_margin_corrected_us,
+        **whole,
+        "text": sentence_text(_bottleneck_sentence(bottleneck, network)),
+    }
+
+
+def _blocks(sensitivity: Sensitivity) -> Iterator[Block]:
+    """Effects of small changes at one period."""
+    effects = sensitivity.effects
+    yield _table(sensitivity)
+    if (drawn := _drawing(sensitivity)) is not None:
+        change = _capital(effects[0].change)
+        sides = "a bar to the left takes from it, one to the right adds to it"
+        yield Chart(drawn, Sentence((f"{change} moves the margin most; {sides}, in us",)))
+    yield _headline(sensitivity)
+    yield from (Sentence((f"{_capital(effect.change)}: {effect.note}.",)) for effect in effects if effect.note)
+    yield _bottleneck_sentence(sensitivity.next_bottleneck, sensitivity.network)
+
+
+def _table(sensitivity: Sensitivity) -> Table:
+    """Every change with what it does to the margin, the largest effect first."""
+    caption = sentence(
+        f"What moves the margin of {{}} at {{}}, by the {sensitivity.timing_model} model",
+        figure_value(MARGIN_CORRECTED, sensitivity.now.margin_corrected_us),
+        period_value(sensitivity.network.profile.cycle.period_us),
+    )
+    columns = (
+        TableColumn("what changes", kind="words"),
+        TableColumn("from -> to", kind="words", rank=1),
+        TableColumn("change", "us", group="margin"),
+        TableColumn("then", "us", group="margin"),
+        TableColumn("verdict then", kind="words", wraps=True),
+    )
+    rows = (
+        TableRow(
+            (
+                effect.change,
+                _step(effect),
+                ShownValue(effect.margin_change_us, "margin_change_us", "us", _DECIMALS, signed=True),
+                figure_value(MARGIN_CORRECTED, effect.then and effect.then.margin_corrected_us),
+                _verdict(effect.then, sensitivity.network),
+            )
+        )
+        for effect in sensitivity.effects
+    )
+    return Table(columns, tuple(rows), caption)
+
+
+def _step(effect: Effect) -> Cell:
+    """From which value to which; nothing where the change has no single one."""
+    if effect.before is None or effect.after is None:
+        return ""
+    before = ShownValue(effect.before, effect.key, digits=_DIGITS)
+    after = ShownValue(effect.after, effect.key, unit_of(effect.key), digits=_DIGITS)
+    return sentence("{} -> {}", before, after)
+
+
+def _verdict(then: FitFigures | None, network: Network) -> Cell:
+    """The verdict with the limits that are broken, or that the bus is unsafe."""
+    if then is None:
+        return figure_value(VERDICT, None)
+    why = [limit.key for limit in limits_behind(then, network)]
+    is_well = then.verdict == FITS and then.safe
+    if not why and then.verdict == FITS and not then.safe:
+        why = [f"unsafe {network.bus.safety.setting}"]
+    shown = figure_value(VERDICT, then.verdict)
+    return Sentence((shown, *(f", {reason}" for reason in why)), "neutral" if is_well else "fails")
+
+
+def _drawing(sensitivity: Sensitivity) -> Drawing | None:
+    """A bar for each change that can be made, on one scale; None if nothing moves the margin."""
+    moved = [(effect.change, effect.margin_change_us) for effect in sensitivity.effects]
+    changes = [(change, us) for change, us in moved if us is not None]
+    least, most = (pick((0.0, *(us for _, us in changes))) for pick in (min, max))
+    left_us = sensitivity.now.margin_corrected_us or 0.0
+    if least == most:
+        return None
+    lanes = tuple(
+        Lane(change, tuple(_bar(us)), f"{decimals_of(us, _DECIMALS, signed=True)} us", is_thin=True)
+        for change, us in changes
+    )
+    guides = [Guide(Entry("zero"), x=0.0)]
+    if least <= -left_us < 0:
+        guides.append(Guide(Entry("edge", "nothing is left of the margin", shape="line"), x=-left_us))
+    title = "What each small change does to the corrected margin"
+    return Drawing(title, (Panel(Lanes(numbers("us", least, most), lanes, tuple(guides))),))
+
+
+def _bar(us: float) -> Iterator[Span]:
+    if us < 0:
+        yield Span(Entry("takes", "takes from the margin"), us, 0.0)
+    elif us > 0:
+        yield Span(Entry("hides", "adds to it"), 0.0, us)
+
+
+def _headline(sensitivity: Sensitivity) -> Sentence:
+    """Say which change moves the margin most, and after which ones all is no longer well."""
+    first = sensitivity.effects[0]
+    if not first.margin_change_us:
+        return Sentence(("None of these changes moves the margin.",))
+    most = sentence(
+        f"{_capital(first.change)} moves the margin most, by {{}} to {{}}.",
+        ShownValue(first.margin_change_us, "margin_change_us", "us", _DECIMALS, signed=True),
+        figure_value(MARGIN_CORRECTED, first.then and first.then.margin_corrected_us),
+    )
+    return joined(most, *_after_each(sensitivity))
+
+
+def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
+    """Say what becomes of a cycle that is shown to fit."""
+    if sensitivity.now.verdict != FITS:
+        return
+    made = [(effect.change, effect.then) for effect in sensitivity.effects if effect.then is not None]
+    lost = [change for change, then in made if then.verdict != FITS]
+    unsafe = [change for change, then in made if then.verdict == FITS and sensitivity.now.safe and not then.safe]
+    if lost:
+        yield Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
+    if unsafe:
+        yield Sentence((f"Its {sensitivity.network.bus.safety.setting} is unsafe after {listed(unsafe, 'or')}.",))
+    if not lost and not unsafe:
+        yield Sentence(("The cycle is shown to fit after each of them alone.",))
+
+
+def _bottleneck_sentence(bottleneck: NextBottleneck, network: Network) -> Sentence:
+    """Say what binds once the largest term, or the limit of the nodes, is gone."""
+    now, behind = bottleneck.binding_term, bottleneck.next_binding_term
+    labels = by_key(network.bus.figures.terms)
+    label, label_behind = labels[now.key].label, labels[behind.key].label
+    us = ShownValue(now.us, "binding_term_us", "us", _DECIMALS)
+    us_behind = ShownValue(behind.us, "next_binding_term_us", "us", _DECIMALS)
+    if bottleneck.next_margin_corrected_us is not None:
+        margin = ShownValue(bottleneck.next_margin_corrected_us, "next_margin_corrected_us", "us", _DECIMALS)
+        text = (
+            f"Next bottleneck: without {label}, now {{}}, the largest term is {label_behind}, {{}}, and the margin {{}}"
+        )
+        of_term = sentence(text, us, us_behind, margin)
+    else:
+        then = f"which no key takes away, comes {label_behind}, {{}}"
+        of_term = sentence(f"Next bottleneck: after {label}, {{}}, {then}", us, us_behind)
+    return joined(joined(of_term, *map(_limit, bottleneck.limits), by="; "), Sentence((".",)), by="")
+
+
+def _limit(limit: NextLimit) -> Sentence:
+    """Say what limits the nodes, or those of a group, now and next."""
+    of = f" of {limit.group}" if limit.group else ""
+    return sentence(
+        f"without the limit of {limit.limited_by}, now at {{}} {nouns(limit.safe_nodes, 'node')}{of}, the next limit "
+        f"is {limit.next_limited_by}, at {{}} {nouns(limit.next_safe_nodes, 'node')}",
+        count_value(limit.safe_nodes, SAFE_NODES.key),
+        count_value(limit.next_safe_nodes, "next_safe_nodes"),
+    )
+
+
+def _capital(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"

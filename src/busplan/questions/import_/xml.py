@@ -1,0 +1,138 @@
+"""XML of machines: elements with their lines, without entities, bounded in number and depth."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+from xml.parsers import expat
+
+from busplan.errors import BusplanError
+
+_MOST_DEPTH: Final = 64
+_MOST_ELEMENTS: Final = 1_000_000
+_CHUNK_BYTES: Final = 4096
+_FAR: Final = 300
+"""Columns that a person counts; some tools write all in one line."""
+
+
+@dataclass(slots=True)
+class Element:
+    """An element of an XML file."""
+
+    tag: str
+    """Without its namespace."""
+    line: int | str
+    """Its line, with the column if the line is long."""
+    attributes: dict[str, str]
+    children: list["Element"] = field(default_factory=list)
+    text: str = ""
+    """Behind its last child."""
+
+    def all(self, path: str) -> Iterator["Element"]:
+        """Elements of a path of tags below this one, as "Config/Slave"."""
+        tag, _, rest = path.partition("/")
+        for child in self.children:
+            if child.tag == tag:
+                yield from child.all(rest) if rest else (child,)
+
+    def first(self, path: str) -> "Element | None":
+        """The first element of a path; None if there is none."""
+        return next(self.all(path), None)
+
+
+def parsed(content: bytes, *, name: str, skipped: Collection[str] = ()) -> Element:
+    """Read an XML file.
+
+    Parameters
+    ----------
+    content
+        The file.
+    name
+        Its name in messages.
+    skipped
+        Tags whose elements are left out, with all below them.
+
+    Raises
+    ------
+    BusplanError
+        It is no XML, or has a document type (which is where entities are declared), too many elements, or too many
+        inside each other; with its line.
+    """
+    reader = _Reader(name, frozenset(skipped))
+    reader.read(content)
+    return next(iter(reader.root.children), reader.root)
+
+
+def root_tag(content: bytes, *, name: str) -> str:
+    """Tag of the root element of an XML file, without reading the rest.
+
+    Raises
+    ------
+    BusplanError
+        As `parsed`.
+    """
+    reader = _Reader(name, frozenset())
+    for start in range(0, len(content), _CHUNK_BYTES):
+        reader.read(content[start : start + _CHUNK_BYTES], is_last=start + _CHUNK_BYTES >= len(content))
+        if reader.root.children:
+            break
+    return reader.root.children[0].tag
+
+
+class _Reader:
+    def __init__(self, name: str, skipped: frozenset[str]) -> None:
+        self.name, self.skipped = name, skipped
+        self.root = Element("", 0, {})
+        self.open = [self.root]
+        self.texts: list[str] = []
+        self.depth = self.elements = self.skips = 0
+        self.parser = expat.ParserCreate()
+        self.parser.buffer_text = True
+        self.parser.StartDoctypeDeclHandler = self._doctype
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._text
+
+    def read(self, content: bytes, *, is_last: bool = True) -> None:
+        """Read the file, or the next part of it."""
+        try:
+            self.parser.Parse(content, is_last)
+        except expat.ExpatError as error:
+            what = expat.ErrorString(error.code)
+            raise BusplanError(f"{self.name}:{error.lineno}:{error.offset + 1}: not valid XML: {what}") from None
+        except (ValueError, LookupError) as error:  # an encoding that Python does not know
+            raise BusplanError(f"{self.name}:1: not valid XML: {error}") from None
+
+    def _refuse(self, message: str) -> BusplanError:
+        return BusplanError(f"{self.name}:{self.parser.CurrentLineNumber}: {message}")
+
+    def _doctype(self, *_: Any) -> None:
+        raise self._refuse("a document type (<!DOCTYPE>) is not read: it can declare entities; remove it")
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.depth += 1
+        self.elements += 1
+        if self.depth > _MOST_DEPTH:
+            raise self._refuse(f"elements inside each other more than {_MOST_DEPTH} deep; no such file is a machine's")
+        if self.elements > _MOST_ELEMENTS:
+            raise self._refuse(f"more than {_MOST_ELEMENTS:,} elements; no such file is a machine's")
+        tag = tag.rpartition(":")[2]
+        if self.skips or tag in self.skipped:
+            self.skips += 1
+            return
+        line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber
+        element = Element(tag, f"{line}:{column + 1}" if column > _FAR else line, attributes)
+        self.open[-1].children.append(element)
+        self.texts.clear()
+        self.open.append(element)
+
+    def _end(self, _tag: str) -> None:
+        self.depth -= 1
+        if self.skips:
+            self.skips -= 1
+        else:
+            self.open.pop().text = "".join(self.texts)
+            self.texts.clear()
+
+    def _text(self, text: str) -> None:
+        if not self.skips:
+            self.texts.append(text)

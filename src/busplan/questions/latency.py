@@ -1,0 +1,292 @@
+"""`busplan.latency`."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from operator import itemgetter
+from typing import Final, NamedTuple
+
+from busplan.buses.figure import Figure
+from busplan.buses.network import Network
+from busplan.elementwise import Number, existing, plain, within
+from busplan.errors import BusplanError
+from busplan.forms.blocks import (
+    Block,
+    Code,
+    Record,
+    Report,
+    Sentence,
+    Table,
+    TableColumn,
+    TableRow,
+    attribute_value,
+)
+from busplan.questions.base.answer import Answer
+from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network, one_or_several, whole
+from busplan.questions.base.sentences import (
+    Owner,
+    document,
+    execution_sentence,
+    figure_table,
+    warning_sentences,
+    with_profile,
+)
+from busplan.questions.fit.network import with_payloads
+from busplan.sections.cycle import TableExecution
+from busplan.sections.profile import Profile
+
+
+class Transaction(NamedTuple):
+    """The phases of a read or a write of the farthest node, of a message, or of a whole cycle."""
+
+    timing_model: str
+    transaction: str
+    group: str
+    """Name of its group of nodes; empty where all are alike."""
+    payload_bytes: int | None
+    nodes: int
+    phases: Mapping[str, float | None]
+    """Figures by their key in the register of the bus."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class LatencyAnswer(Answer):
+    """Answer of `latency`.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    networks
+        The network with each payload; without payloads as the profile has it.
+    tables
+        The transactions of each of these networks, each under every timing model.
+    """
+
+    profile: Profile
+    networks: tuple[Network, ...]
+    tables: tuple[tuple[Transaction, ...], ...]
+
+    @property
+    def transactions(self) -> tuple[Transaction, ...]:
+        """One transaction for each payload, kind and timing model, nested in this order, with its `phases`."""
+        return tuple(transaction for table in self.tables for transaction in table)
+
+    @property
+    def subject(self) -> str:
+        """What has these latencies, in words."""
+        network = self.networks[0]
+        return network.bus.latency_subject(network)
+
+    def report(self) -> Report:
+        """The answer in blocks."""
+        name, records = self.profile.name, _records(self.transactions)
+        return Report(
+            Sentence(("Latency of ", Code(name))),
+            tuple(_blocks(self)),
+            document("latency", profile=name, transactions=records),
+            with_profile(name, records),
+        )
+
+    def _headline(self) -> str:
+        return f"{self.profile.name}: {self.subject}"
+
+
+def latency(
+    profile: ProfileLike,
+    *,
+    payload_bytes: int | Iterable[int] | None = None,
+    timing_model: Models | None = None,
+) -> LatencyAnswer:
+    """Show how long data takes to arrive, phase by phase, as `busplan latency` does.
+
+    Parameters
+    ----------
+    profile
+        The network: a `Profile`, a path or a shipped name.
+    payload_bytes
+        Payload of both read and write [bytes], or n of them; by default the profile's own.
+    timing_model
+        Name of a timing model, or several in this order; by default all of the kind of bus. IEEE 1394 has "paper" for
+        the paper's equations as published, and "standard" for the standard's clock and packets.
+
+    Returns
+    -------
+    LatencyAnswer
+        Its `transactions`: on IEEE 1394 2 n for each timing model, a read and a write; on CAN one for each message.
+        Times are in us.
+
+    Raises
+    ------
+    BusplanError
+        Not a profile, an invalid payload or one whose execution time is not known, or an unknown timing model.
+
+    References
+    ----------
+    Paper, equations (3)-(10), (12)-(14).
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.latency("paper-two-node", payload_bytes=[4, 1024], timing_model="paper")
+    >>> [(row.transaction, row.payload_bytes, round(row.phases["latency_us"], 2)) for row in answer.transactions]
+    [('read', 4, 43.17), ('write', 4, 43.17), ('read', 1024, 474.57), ('write', 1024, 474.57)]
+    """
+    network = load_network(profile)
+    models = checked_models(timing_model, network)
+    networks = [network]
+    if payload_bytes is not None:
+        given = one_or_several(payload_bytes, name="payload_bytes")
+        sizes = [whole(size, name="payload_bytes") for size in given]
+        _require_execution(network.profile, sizes)
+        networks = [with_payloads(network, [(size, size)] * len(network.profile.node_groups)) for size in sizes]
+    tables = tuple(_transactions(variant, models) for variant in networks)
+    return LatencyAnswer(network.profile, tuple(networks), tables)
+
+
+def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
+    """Refuse payloads whose execution time is not known, all in one error."""
+    unknown = dict.fromkeys(
+        f"payload {size} bytes: outside the execution table of {alike.name or profile.name}, {execution.range_bytes}; "
+        "nothing is extrapolated"
+        for alike in profile.node_groups
+        if isinstance(execution := alike.node.execution, TableExecution)
+        for size in payloads_bytes
+        if not execution.covers(size)
+    )
+    if unknown:
+        raise BusplanError(*unknown)
+
+
+def _transactions(network: Network, models: Sequence[str]) -> tuple[Transaction, ...]:
+    nodes = int(plain(network.nodes))
+    by_model = (network.bus.cycle(network, model=model).latencies() for model in models)
+    return tuple(
+        Transaction(model, phased.name, phased.group, phased.payload_bytes, nodes, _whole_bytes(phased.phases))
+        for of_models in zip(*by_model, strict=True)
+        for model, phased in zip(models, of_models, strict=True)
+    )
+
+
+def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float | None]:
+    """Phases with the sizes of packets as whole numbers; None for one that does not exist."""
+    numbers = {key: existing(value) for key, value in phases.items()}
+    return {
+        key: int(value) if value is not None and key.endswith("_bytes") else value for key, value in numbers.items()
+    }
+
+
+def _records(transactions: Sequence[Transaction]) -> list[Record]:
+    """One flat row for each transaction and its phases; all have a group where one has, None for what has none."""
+    has_groups = any(transaction.group for transaction in transactions)
+    return [
+        {
+            "timing_model": transaction.timing_model,
+            "transaction": transaction.transaction,
+            **({"group": transaction.group or None} if has_groups else {}),
+            "payload_bytes": transaction.payload_bytes,
+            "nodes": transaction.nodes,
+            **transaction.phases,
+        }
+        for transaction in transactions
+    ]
+
+
+def _blocks(answer: LatencyAnswer) -> Iterator[Block]:
+    """Phases of each transaction, the timing models side by side; one table for each payload."""
+    network = answer.networks[0]
+    yield from _deadline_sentence(answer)
+    yield from _tables(answer)
+    yield Sentence((Code(answer.profile.name), f": {answer.subject}."))
+    for model in network.bus.timing_models:
+        if keys := network.bus.cannot_express(network, model=model.name):
+            yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
+    yield from execution_sentence(network, of_latency=True)
+    broken = (limit.words(network) for network in answer.networks for limit in network.bus.broken(network))
+    yield from (Sentence((f"Warning: {words}.",), "warns") for words in dict.fromkeys(broken))
+    yield from warning_sentences(network)
+
+
+def _deadline_sentence(answer: LatencyAnswer) -> Iterator[Sentence]:
+    """Say whether all transactions keep their deadlines by the model of the verdict, and which is the closest."""
+    bus = answer.networks[0].bus
+    keys, model = bus.figures.deadlines, bus.deciding_model
+    due = [
+        (share, transaction)
+        for transaction in answer.transactions
+        if transaction.timing_model == model and (share := _share(transaction, keys))
+    ]
+    if not keys or not due:
+        return
+    late = sum(not within(share, 1.0) for share, _ in due)
+    _, latest = max(due, key=itemgetter(0))
+    us, deadline_us = (latest.phases[key] for key in keys)
+    misses = "misses its deadline" if late == 1 else "miss their deadlines"
+    is_kept = f"{late} of {len(due)} messages {misses}" if late else "Every message keeps its deadline"
+    time = "has no worst-case response time" if us is None else f"takes up to {us:g} us of {deadline_us:g}"
+    yield Sentence((f"{is_kept} by the {model} model; {_name(latest)} {time}.",), "fails" if late else "neutral")
+
+
+def _share(transaction: Transaction, keys: tuple[str, str] | None) -> float:
+    """Time of a transaction over its deadline [1]: infinite without a time, 0 without a deadline."""
+    us, deadline_us = (transaction.phases[key] for key in keys) if keys else (None, None)
+    if deadline_us is None:
+        return 0.0
+    return inf if us is None else us / deadline_us
+
+
+def _tables(answer: LatencyAnswer) -> Iterator[Table]:
+    """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
+    register = answer.networks[0].bus.figures
+    figures = [
+        figure
+        for figure in register.latency_table
+        if all(figure.key in transaction.phases for transaction in answer.transactions)
+    ]
+    if register.has_many_transactions:
+        yield from _by_transaction(answer, figures, register.deadlines)
+        return
+    caption = Sentence((f"Phases in us, {answer.subject}",))
+    for table in answer.tables:
+        owners = [
+            Owner(TableColumn(transaction.timing_model, group=_name(transaction)), transaction.phases)
+            for transaction in table
+        ]
+        yield figure_table([(figure, 0) for figure in figures], owners, caption=caption, unit=False)
+
+
+_MOST_ROWS: Final = 30
+"""Transactions of a table beyond which it shows so many of them."""
+
+
+def _by_transaction(
+    answer: LatencyAnswer, figures: Sequence[Figure], deadlines: tuple[str, str] | None
+) -> Iterator[Table]:
+    """One row for each transaction; one table for each payload and timing model.
+
+    A time and its deadline come first. Of many transactions those closest to their deadlines are shown. What is 0 for
+    all has no column.
+    """
+    figures = [
+        figure for figure in figures if any(transaction.phases[figure.key] for transaction in answer.transactions)
+    ]
+    figures.sort(key=lambda figure: figure.key not in (deadlines or ()))
+    columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
+    for table in answer.tables:
+        for model in dict.fromkeys(transaction.timing_model for transaction in table):
+            shares = [(row, _share(row, deadlines)) for row in table if row.timing_model == model]
+            least = sorted((share for _, share in shares), reverse=True)[:_MOST_ROWS][-1]
+            rows = (
+                TableRow(
+                    (_name(transaction), *(attribute_value(figure, transaction.phases) for figure in figures)),
+                    is_detail=share < least,
+                )
+                for transaction, share in shares
+            )
+            yield Table(columns, tuple(rows), Sentence((f"By the {model} model in us, {answer.subject}",)), heads=1)
+
+
+def _name(transaction: Transaction) -> str:
+    """Name of a transaction: its group, its kind and its payload."""
+    payload = "" if transaction.payload_bytes is None else f"{transaction.payload_bytes} B"
+    return " ".join(filter(None, (transaction.group, transaction.transaction, payload)))

@@ -1,0 +1,248 @@
+"""`busplan.measured`: a recording beside the plan, and its answer in blocks."""
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from pathlib import PurePath
+from typing import Final
+
+from busplan.buses.rule import RecordedFigure, RecordedVerdict
+from busplan.english import plural
+from busplan.errors import BusplanError
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Code,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    ShownValue,
+    Snippet,
+    State,
+    Table,
+    TableColumn,
+    TableRow,
+    Words,
+)
+from busplan.profile.edit import value_text
+from busplan.progress import Progress
+from busplan.questions.base.answer import Answer
+from busplan.questions.base.inputs import Path, ProfileLike, finite, load_profile
+from busplan.questions.base.sentences import document, with_profile
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.profile import Profile
+
+_COLUMNS: Final = (
+    TableColumn("figure", kind="words", wraps=True),
+    TableColumn("unit", kind="words"),
+    TableColumn("planned"),
+    TableColumn("recorded"),
+    TableColumn("residual", rank=1),
+    TableColumn("U"),
+    TableColumn("within", kind="words"),
+    TableColumn("n", rank=2),
+    TableColumn("note", kind="words", rank=3, leaves="below", wraps=True),
+)
+_DECIMALS: Final = {"us": 3, "1": 0, "bytes": 0, "share": 2, "kbit/s": 1}
+_UNITS: Final = {"1": "", "share": "%"}
+"""How a unit is shown, where not as it is."""
+_WITHIN: Final[dict[RecordedVerdict | None, Cell]] = {
+    None: "",
+    "within": Words("yes", "passes"),
+    "not shown": Words("not shown", "warns"),
+    "outside": Words("no", "fails"),
+}
+_SMALL_US: Final = 1.0
+"""A time below it has more decimals."""
+_LEAST_QUANTILE = 0.5
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class MeasuredAnswer(Answer):
+    """Answer of `measured`.
+
+    Parameters
+    ----------
+    profile
+        The plan.
+    source
+        Name of the recording.
+    quantile
+        Share of the events that worst cases hold for, 0.5..1.
+    figures
+        Every figure planned beside the recorded one.
+    remarks
+        Sentences on what the recording has beside that, and what it does not show.
+    edits
+        New value of each key that was measured, as `--apply` writes them; None removes a key.
+    day
+        Day of the recording in UTC, as 2026-11-23; empty where its stamps do not say it.
+    shows_nothing
+        Why the recording as a whole shows no machine within its plan; empty where it can.
+    """
+
+    profile: Profile
+    source: str
+    quantile: float
+    figures: tuple[RecordedFigure, ...]
+    remarks: tuple[str, ...]
+    edits: Mapping[str, object]
+    day: str
+    shows_nothing: tuple[str, ...]
+
+    @property
+    def outside(self) -> tuple[RecordedFigure, ...]:
+        """Figures that lie outside their plan, by more than their doubt at 99.9 %."""
+        return tuple(figure for figure in self.figures if figure.verdict == "outside")
+
+    @property
+    def notes(self) -> dict[str, str]:
+        """The comment that `--apply` writes above each section: how, how many, from which file, of which day."""
+        return {section: self._origin(section) for section in {key.rpartition(".")[0]: None for key in self.edits}}
+
+    def _origin(self, section: str) -> str:
+        """Origin of the measured values of a section, as a one-line comment for the profile."""
+        figures = [figure for figure in self.figures if figure.key.startswith(f"{section}.")] or self.figures
+        if all(figure.is_mean for figure in figures):
+            share = "the mean"
+        else:
+            share = "the worst" if self.quantile == 1 else f"{100 * self.quantile:g} %"
+        count = plural(max(figure.events for figure in figures), "event")
+        day = f" of {self.day}" if self.day else ""
+        return f"busplan measured: {share} of {count} in {PurePath(self.source).name}{day}"
+
+    def report(self, *, applied_to: str | None = None) -> Report:
+        """The answer in blocks.
+
+        Parameters
+        ----------
+        applied_to
+            The profile's file that measured values were written into; by default none.
+        """
+        records = [_record(figure) for figure in self.figures]
+        return Report(
+            Sentence((Code(self.profile.name), " beside the recording ", Code(self.source))),
+            tuple(_blocks(self)),
+            _document(self, records, applied_to=applied_to),
+            with_profile(self.profile.name, records),
+        )
+
+
+def measured(
+    profile: ProfileLike, recording: Path, *, quantile: float = 1.0, progress: Progress | None = None
+) -> MeasuredAnswer:
+    """Show what a machine does by a recording of its bus, beside what was planned.
+
+    Parameters
+    ----------
+    profile
+        The plan: a `Profile`, a path or a shipped name. It is not changed.
+    recording
+        A file of the profile's kind of bus. EtherCAT: a capture of the master's port, pcap or pcapng. CAN: a log of
+        `candump -l`, ASC, BLF or TRC (with the extra `import`).
+    quantile
+        Share of the events that jitter and times are to hold for, 0.5..1; 1 is the worst one recorded.
+    progress
+        Called with the bytes read and those of the file.
+
+    Returns
+    -------
+    MeasuredAnswer
+        Its `figures`, in their `unit`; those `outside` the plan; and `edits`, the keys that were measured.
+
+    Raises
+    ------
+    BusplanError
+        Not a profile, a quantile outside its range, or no recording that can be compared with the profile.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.measured("machine.toml", "capture.pcapng", quantile=0.999)  # doctest: +SKIP
+    >>> [figure.quantity for figure in answer.outside]  # doctest: +SKIP
+    """
+    plan = load_profile(profile)
+    share = finite(quantile, name="quantile")
+    if not _LEAST_QUANTILE <= share <= 1:
+        raise BusplanError(f"quantile {share:g}: expected a share of {_LEAST_QUANTILE:g} to 1, as 0.999")
+    if not isinstance(recording, str | os.PathLike):
+        raise BusplanError(f"recording {recording!r}: expected the path of a file")
+    source = os.fspath(recording)
+    if source == "-" or "\0" in source:
+        raise BusplanError(f"{source}: a recording is read from a file")
+    recorded = bus_of(plan).recorded(
+        network_of(plan), FilePath(source), share=share, progress=progress or (lambda _done, _total: None)
+    )
+    return MeasuredAnswer(plan, source, share, *recorded)
+
+
+def _blocks(answer: MeasuredAnswer) -> Iterator[Block]:
+    counts = Counter(figure.verdict for figure in answer.figures if figure.verdict)
+    state: State = "fails" if counts["outside"] else "warns" if answer.shows_nothing else "passes"
+    inside = f"{counts['within']} of {plural(counts.total(), 'figure')} within the plan"
+    share = "the worst recorded" if answer.quantile == 1 else f"those of {100 * answer.quantile:g} % of the events"
+    yield Sentence(
+        (
+            Code(answer.profile.name),
+            " beside ",
+            Code(answer.source),
+            ": ",
+            Words(inside, state),
+            f"{_named(answer, 'outside')}{_named(answer, 'not shown')}. Jitter and times are {share}.",
+        )
+    )
+    yield from (Sentence((Words("Shows nothing", "warns"), f": {reason}.")) for reason in answer.shows_nothing)
+    yield Table(_COLUMNS, tuple(map(_row, answer.figures)), stacks=True)
+    yield from (Sentence((remark,)) for remark in answer.remarks)
+    values = [f"{key} = {value_text(value)}" for key, value in answer.edits.items() if value is not None]
+    if values:
+        yield Sentence(("Measured (--apply writes it into the profile):",))
+        yield Snippet(tuple(values))
+
+
+def _named(answer: MeasuredAnswer, verdict: RecordedVerdict) -> str:
+    names = [figure.quantity for figure in answer.figures if figure.verdict == verdict]
+    return f"; {verdict}: {', '.join(names)}" if names else ""
+
+
+def _row(figure: RecordedFigure) -> TableRow:
+    shown = (_value(figure, name) for name in ("planned", "recorded", "residual", "uncertainty"))
+    unit = _UNITS.get(figure.unit, figure.unit)
+    note = ", ".join(filter(None, (figure.hidden, figure.note)))
+    return TableRow((figure.quantity, unit, *shown, _WITHIN[figure.verdict], ShownValue(figure.events, "events"), note))
+
+
+def _value(figure: RecordedFigure, name: str) -> ShownValue:
+    value = getattr(figure, name)
+    decimals = _DECIMALS[figure.unit]
+    if figure.unit == "us" and max(map(abs, filter(None, (figure.planned, figure.recorded))), default=1) < _SMALL_US:
+        decimals = 5
+    return ShownValue(
+        value, name, _UNITS.get(figure.unit, figure.unit), decimals, signed=name == "residual", fixed=True
+    )
+
+
+def _record(figure: RecordedFigure) -> Record:
+    fields = figure._asdict()
+    del fields["is_mean"]
+    texts = {name: fields.pop(name) or None for name in ("key", "note", "hidden")}
+    return {**fields, "residual": figure.residual, "verdict": figure.verdict, **texts}
+
+
+def _document(answer: MeasuredAnswer, records: list[Record], *, applied_to: str | None) -> JsonDocument:
+    return document(
+        "measured",
+        profile=answer.profile.name,
+        source=answer.source,
+        day=answer.day or None,
+        quantile=answer.quantile,
+        figures=records,
+        outside=[figure.quantity for figure in answer.outside],
+        shows_nothing=list(answer.shows_nothing),
+        remarks=list(answer.remarks),
+        measured=dict(answer.edits),
+        applied_to=applied_to,
+    )

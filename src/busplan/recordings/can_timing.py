@@ -1,0 +1,220 @@
+"""Timing of a CAN log: its clock, the frames of each identifier, event models, and the least bit rate of the bus."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import ceil
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from busplan.english import plural
+from busplan.recordings.can import CanFrames
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, Quantile, ahead, grid
+
+LISTED: Final = 6
+"""Most identifiers that a sentence lists."""
+CAN_BIT_RATE: Final = 1000.0
+"""No classical bus is faster [kbit/s]."""
+_WINDOWS: Final = (10, 20, 30)
+"""Frames over which stamps show a bit rate: of two the stamps may be wrong."""
+_LATE_SHARE: Final = 0.05
+"""Share by which frames are closer than on any bus where a driver took several at once."""
+_LATEST_US: Final = 1000.0
+"""Latest stamp of a driver that takes several frames at once: later ones are stamps of no bus [us]."""
+_LATE_US: Final = 100.0
+"""Latest stamp of a driver that takes each frame by itself [us]."""
+_LEAST_US: Final = 1e-3
+_FEW: Final = 3
+_STEP_BACK_US: Final = -1000.0
+"""Neighbours are further out of order only where a clock was set [us]."""
+_PERIODIC: Final = 0.15
+"""Largest standard deviation of a periodic message, as a share of its period."""
+_MISSING: Final = 0.1
+"""Most periods of a periodic message without a frame, as a share of its frames."""
+_ROUNDING: Final = 1e-9
+"""Share of a period that the rounding of floats may add to several."""
+
+
+class SentFrames(NamedTuple):
+    """Frames of an identifier."""
+
+    identifier: int
+    extended: bool
+    """Whether the identifier has 29 bits."""
+    times_us: Floats
+    most_bytes: int
+    is_fd: bool
+    """Whether any of them is of CAN FD."""
+    switches: bool
+    """Whether all frames of CAN FD have their data at the data bit rate."""
+    grid: PeriodicEvents | None
+    """Its periods; None of a message that is not periodic."""
+
+    @property
+    def mean(self) -> Quantile:
+        """Mean distance of its frames, two or more, lost frames of a periodic message counted [us]."""
+        span_us = float(self.times_us[-1] - self.times_us[0])
+        if self.grid is None:
+            return Quantile(span_us / (len(self.times_us) - 1), None)
+        return mean_period(self.times_us, self.grid)
+
+
+def mean_period(times_us: Floats, periods: PeriodicEvents) -> Quantile:
+    """The period of events over all of a recording, with its standard uncertainty [us].
+
+    The first event and the last lie no further beside their places than all do.
+    """
+    number = int(periods.places[-1])
+    return Quantile(float(times_us[-1] - times_us[0]) / number, float(np.ptp(periods.late_us)) / number)
+
+
+class EventModel(NamedTuple):
+    """A message as a profile plans it: at most burst - 1 + ceil((w + jitter) / period) frames in a time w."""
+
+    burst: int
+    jitter_us: float
+
+
+def event_model(times_us: Floats, period_us: float, *, stamp_error_us: float, tolerance: float) -> EventModel:
+    """The least burst or jitter with which frames are those of a mean period.
+
+    Parameters
+    ----------
+    times_us
+        Ascending times, n of them [us].
+    period_us
+        The period [us].
+    stamp_error_us
+        Largest error of a stamp [us].
+    tolerance
+        Share by which clocks may make the period shorter.
+
+    Examples
+    --------
+    >>> event_model(np.array([0.0, 80, 200]), 100, stamp_error_us=1, tolerance=0)
+    EventModel(burst=1, jitter_us=21)
+    >>> event_model(np.array([0.0, 0, 200]), 100, stamp_error_us=0, tolerance=0)
+    EventModel(burst=1, jitter_us=100)
+    >>> event_model(np.array([0.0, 1, 2, 1000]), 300, stamp_error_us=1, tolerance=0)
+    EventModel(burst=3, jitter_us=0.0)
+    >>> event_model(np.array([38.0, 38, 38, 38]), 1.9, stamp_error_us=0, tolerance=0)
+    EventModel(burst=4, jitter_us=0.0)
+    """
+    jitter_us = float(ahead(times_us, period_us * (1 - tolerance)).max()) + stamp_error_us
+    if jitter_us <= period_us:
+        return EventModel(1, min(ceil(jitter_us), period_us))
+    return EventModel(1 + ceil(jitter_us / period_us - _ROUNDING), 0.0)
+
+
+class ClockStretch(NamedTuple):
+    """The longest part of a log in which its clock was not set back."""
+
+    taken: npt.NDArray[np.int64]
+    """Places of its frames in the log, by their stamps."""
+    times_us: Floats
+    """Their stamps, ascending [us]."""
+    steps_back: int
+    """Number of times that the clock was set back in the whole log [1]."""
+
+
+def longest_stretch(frames: CanFrames) -> ClockStretch:
+    """The longest part in which the clock was not set back; queues may put neighbours out of order."""
+    steps_back = np.flatnonzero(np.diff(frames.times_us) < _STEP_BACK_US) + 1
+    ends = np.concatenate(([0], steps_back, [len(frames.times_us)]))
+    longest = int(np.argmax(np.diff(ends)))
+    taken = np.arange(ends[longest], ends[longest + 1])
+    taken = taken[np.argsort(frames.times_us[taken], kind="stable")]
+    return ClockStretch(taken, frames.times_us[taken], len(steps_back))
+
+
+def sent_messages(frames: CanFrames, stretch: ClockStretch) -> Mapping[tuple[int, bool], SentFrames]:
+    """Frames of each identifier, by it and whether it has 29 bits, ascending."""
+    key = frames.identifiers[stretch.taken] * 2 + frames.extended[stretch.taken]
+    order = np.argsort(key, kind="stable")
+    messages = {}
+    for places in np.split(order, np.flatnonzero(np.diff(key[order])) + 1):
+        identifier, extended = divmod(int(key[places[0]]), 2)
+        times_us, taken = stretch.times_us[places], stretch.taken[places]
+        periods = grid(times_us)
+        if periods is not None and not _is_periodic(periods):
+            periods = None
+        messages[identifier, bool(extended)] = SentFrames(
+            identifier,
+            bool(extended),
+            times_us,
+            int(frames.sizes[taken].max()),
+            bool(frames.is_fd[taken].any()),
+            bool(frames.switched[taken][frames.is_fd[taken]].all()),
+            periods,
+        )
+    return messages
+
+
+def _is_periodic(periods: PeriodicEvents) -> bool:
+    late_us = float(np.std(periods.late_us))
+    return late_us <= _PERIODIC * periods.period_us and periods.missing <= _MISSING * len(periods.late_us)
+
+
+def step_us(stretch: ClockStretch) -> float:
+    """Step of the stamps: the time that all distances are multiples of [us].
+
+    Few distances, none of them 0, are those of frames that come to the microsecond: it is then the step of logs, 1 us.
+    """
+    apart_us = np.unique(np.diff(np.rint(stretch.times_us).astype(np.int64)))
+    if len(apart_us) < _FEW and apart_us.all():
+        return 1.0
+    return float(np.gcd.reduce(apart_us))
+
+
+class LeastBitRate(NamedTuple):
+    """A bit rate below which a log is not possible [kbit/s]."""
+
+    likely: float
+    """With stamps as late as those of most drivers."""
+    surely: float
+    """With stamps up to a millisecond late."""
+
+
+def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
+    """The bit rate that a bus has at least, for frames do not overlap; 0 of too few frames.
+
+    Frames are stamped at their ends, or by some controllers at their starts: the smaller sum of bits lies between both
+    stamps in either case. A stamp may be wrong by its step and by the delay of a driver: where frames come closer than
+    on any bus, a driver took several at once, the first of them late by as much as they take.
+    """
+    bits, times_us = frames.bits[stretch.taken].astype(np.float64), stretch.times_us
+    sent, error_us = np.concatenate(([0.0], np.cumsum(bits))), step_us(stretch)
+
+    def rates(count: int, late_us: float) -> Floats:
+        window_us = times_us[count:] - times_us[:-count] + error_us + late_us
+        between = np.minimum(sent[count + 1 :] - sent[1:-count], sent[count:-1] - sent[: -count - 1])
+        return np.asarray(1000 * between / np.maximum(window_us, _LEAST_US), dtype=np.float64)
+
+    def most(windows: Sequence[int], late_us: float) -> float:
+        return max((float(rates(count, late_us).max()) for count in windows if len(bits) > count), default=0.0)
+
+    closer = rates(1, 0.0) > CAN_BIT_RATE * (1 + _LATE_SHARE) if len(bits) > 1 else np.zeros(0, dtype=np.bool_)
+    if np.count_nonzero(closer) < LEAST_EVENTS:
+        least = most((4, *_WINDOWS), _LATE_US)
+    else:
+        starts, ends = (np.flatnonzero(np.diff(np.concatenate(([0], closer, [0]))) == step) for step in (1, -1))
+        at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / CAN_BIT_RATE
+        least = most(_WINDOWS, min(at_once_us, _LATEST_US))
+    return LeastBitRate(least, most((4, *_WINDOWS), _LATEST_US))
+
+
+def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:
+    """Why stamps are not those of a bus, by its least bit rate; empty where they may be."""
+    if bit_rate_kbit_s <= CAN_BIT_RATE:
+        return ""
+    return (
+        f"its frames need {bit_rate_kbit_s:,.0f} kbit/s, more than a CAN bus has: the stamps are not those of the bus"
+    )
+
+
+def faults(frames: CanFrames, stretch: ClockStretch) -> Iterator[str]:
+    """Sentences on a log that is damaged, and on its clock."""
+    if frames.broken:
+        yield f"The log is cut or damaged after frame {len(frames.times_us):,}, read up to there: {frames.broken}."
+    if stretch.steps_back:
+        yield f"Its clock was set back {plural(stretch.steps_back, 'time')}: the longest stretch between is taken."
