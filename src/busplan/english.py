@@ -4,14 +4,14 @@ from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
 
-def did_you_mean(typed: str, known: Iterable[str]) -> str:
-    """Ask for the known name that is nearest to a typed name; empty if none is near.
+def did_you_mean(typed: str, names: Iterable[str]) -> str:
+    """Ask whether the nearest name was meant; empty if none is near.
 
     Parameters
     ----------
     typed
         The name as it was typed.
-    known
+    names
         Names that there are.
 
     Examples
@@ -19,9 +19,9 @@ def did_you_mean(typed: str, known: Iterable[str]) -> str:
     >>> did_you_mean("capcity", ["capacity", "latency"]), did_you_mean("x", ["capacity"])
     ('did you mean capacity?', '')
     """
-    names = {name.casefold(): name for name in known}
-    close = get_close_matches(typed.casefold(), names, n=1)
-    return f"did you mean {names[close[0]]}?" if close else ""
+    folded = {name.casefold(): name for name in names}
+    close = get_close_matches(typed.casefold(), folded, n=1)
+    return f"did you mean {folded[close[0]]}?" if close else ""
 
 
 def has_controls(text: str) -> bool:

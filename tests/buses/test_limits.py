@@ -1,5 +1,6 @@
 """The limit that a node is done once a cycle: by hand, in three verdicts, and what plan and compare make of it."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -7,9 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses import kind_named
-from busplan.buses.limits import NODE_LIMIT
-from busplan.questions.fit.network import network_of
 
 KINDS = ("ethercat", "sercos3", "sercos2")
 
@@ -45,35 +43,42 @@ def test_a_node_is_done_once_a_cycle() -> None:
 @given(st.sampled_from(KINDS), st.floats(1, 5000), st.floats(0, 300), st.floats(0, 500))
 def test_the_limit_is_that_by_hand(kind: str, base_us: float, uncertainty_us: float, extra_us: float) -> None:
     changes = {"base_us": base_us, "uncertainty_us": uncertainty_us, "worst_extra_us": extra_us}
-    one = network_of(network(kind, **{f"node__execution__{key}": value for key, value in changes.items()}))
+    one = network(kind, **{f"node__execution__{key}": value for key, value in changes.items()})
+    found = busplan.capacity(one).verdicts[0].deciding
     busy_us, doubt_us = 2 * (base_us + extra_us), 2 * 2 * uncertainty_us
-    assert NODE_LIMIT.shown.shortest_period_us(one) == pytest.approx(busy_us + doubt_us)
-    expected = 0 if busy_us + doubt_us <= 1000 else 2 if busy_us - doubt_us > 1000 else 1
-    assert NODE_LIMIT.verdict_code(one) == expected
+    assert ("node" in found.exceeded) == (busy_us - doubt_us > 1000)
+    assert ("node" in (found.not_shown or ())) == (busy_us - doubt_us <= 1000 < busy_us + doubt_us)
+    # Nothing else asks for more than a fifth of the period.
+    assert found.min_period_us is not None
+    assert found.min_period_us >= busy_us * (1 - 1e-12)
+    assert found.safe_min_period_us is None or found.safe_min_period_us >= (busy_us + doubt_us) * (1 - 1e-12)
 
 
-def test_the_slowest_group_counts() -> None:
-    group = {"axes": 1, "read_bytes": 8, "write_bytes": 8}
-    execution = {"kind": "linear", "grade": "measured", "per_byte_us": 0.0}
-    data = {
-        "schema_version": 1,
-        "name": "press",
-        "bus": {"kind": "sercos3"},
-        "cycle": {"period_us": 1000.0},
-        "group": [
-            {"name": "quick", "nodes": 3, **group, "execution": {**execution, "base_us": 480.0, "uncertainty_us": 1.0}},
-            {
-                "name": "vague",
-                "nodes": 2,
-                **group,
-                "execution": {**execution, "base_us": 470.0, "uncertainty_us": 20.0},
-            },
-        ],
-    }
-    one = kind_named("sercos3").profile_model().model_validate(data)
-    assert NODE_LIMIT.shown.shortest_period_us(network_of(one)) == pytest.approx(2 * 470 + 4 * 20)
+PRESS = """
+schema_version = 1
+name = "press"
+bus = {kind = "sercos3"}
+cycle = {period_us = 1000}
+"""
+GROUP = """
+[[group]]
+name = "{name}"
+nodes = 3
+axes = 1
+read_bytes = 8
+write_bytes = 8
+execution = {{kind = "linear", grade = "measured", base_us = {base_us}, per_byte_us = 0, uncertainty_us = {doubt_us}}}
+"""
+
+
+def test_the_slowest_group_counts(tmp_path: Path) -> None:
+    groups = GROUP.format(name="quick", base_us=480, doubt_us=1) + GROUP.format(name="vague", base_us=470, doubt_us=20)
+    (tmp_path / "press.toml").write_text(PRESS + groups, encoding="utf-8")
+    one = busplan.load_profile(tmp_path / "press.toml")
     found = busplan.capacity(one).verdicts[0].deciding
     assert (found.verdict, found.not_shown) == ("not shown to fit", ("node",))
+    # 2 x 470 + 4 x 20 us: the next period that SERCOS III knows is 1,250 us.
+    assert (found.min_period_us, found.safe_min_period_us) == (1000, 1250)
     assert "vague: a node executes for 940.0 +/- 80.0 us of 1000.0 us" in str(busplan.capacity(one))
     # Surely late, though the other may take longer.
     late = busplan.load_profile(one, changes={"group.quick.execution.base_us": 503.0})
@@ -94,4 +99,5 @@ def test_the_smallest_period_of_a_comparison_leaves_the_nodes_their_time() -> No
     found = busplan.compare("paper-1ms", buses=KINDS)
     for one in found.compared:
         assert one.smallest.us is not None
-        assert one.smallest.us >= NODE_LIMIT.shown.shortest_period_us(one.network)
+        # A read and a write of 36.73 us, and as much again as two tenths of them, for nobody has measured it there.
+        assert one.smallest.us >= 2 * 36.73 * 1.2

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 import busplan
 from busplan.buses import kind_named
 from busplan.buses.limits import ANY_PERIOD, Periods
-from busplan.questions.fit.network import network_of
 
 Run = Callable[..., Any]
 FEW = settings(max_examples=15)
@@ -163,7 +162,6 @@ def test_a_map_has_known_periods(kind: str) -> None:
 @KINDS
 def test_nobody_s_execution_time_is_in_the_cycle(kind: str) -> None:
     profile = busplan.load_profile(f"{kind}-servo-8")
-    assert not kind_named(kind).has_execution(network_of(profile))
     slower = busplan.load_profile(profile, changes={"node.execution.base_us": 999.0})
     assert busplan.capacity(slower).results[0].required_us == busplan.capacity(profile).results[0].required_us
     assert "The execution time behind these figures is assumed." in str(busplan.latency(profile))

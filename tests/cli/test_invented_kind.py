@@ -22,7 +22,7 @@ from busplan.buses import kind_names, registered
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut
 from busplan.buses.cycle import Run as EventRun
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import (
     Cost,
     EventKind,
@@ -132,7 +132,7 @@ class Ring(Bus):
     title = "Token ring"
     timing_models: ClassVar[tuple[TimingModel, ...]] = (TimingModel("plain", "as it is"),)
     deciding_model = "plain"
-    figures = BusFigures(TERMS, capacity_figures(TERMS, own=(ROUNDS,)), table=(ROUNDS,))
+    figures = BusFigures(TERMS, added=(ROUNDS,), table=(ROUNDS,))
     limits = (
         Limit(
             "nodes",

@@ -57,7 +57,7 @@ class Scene(NamedTuple):
     hold_us: float = 0.0
     """From the acknowledge to a concatenated response."""
     host_us: float = 0.0
-    """Own time of the host."""
+    """Time of the host itself before a request."""
     priority: bool = False
     """Whether responses go with priority."""
     busy: tuple[int, ...] = ()
@@ -209,7 +209,7 @@ def simulate(scene: Scene, execution: Execution, *, cycles: int = 1) -> Run:
 def simulate_broadcasts(scene: Scene, *, isochronous: bool, slot_us: float = 0.0, cycles: int = 1) -> Run:
     """Run cycles of the broadcast schedule: a query, a packet of each node, one read of the hub, one write.
 
-    Node 1 is the hub here, at its own hops. Each node starts when it has heard the one before it, the first one when
+    Node 1 is the hub here, at its own hops. Each node starts when it has heard the node before it, the first when
     its clock has counted 150 from the query; with slots, no node before its own time behind that. The host knows only
     its own clock: it waits 10 us and 5 us a node behind the acknowledge of its query, and has its own time before each
     request.
@@ -283,10 +283,10 @@ def _packets(node: Node, kind: str) -> tuple[int, int]:
 def timeline(packets: Sequence[Packet]) -> str:
     """The packets as text, each with the idle bus before it."""
     lines, idle_since_us = [], 0.0
-    for one in packets:
-        idle_us = one.start_us - idle_since_us
-        lines.append(f"{one.start_us:9.3f} ..{one.end_us:9.3f}  {one.what:20s} after {idle_us:7.3f} idle")
-        idle_since_us = one.end_us
+    for packet in packets:
+        idle_us = packet.start_us - idle_since_us
+        lines.append(f"{packet.start_us:9.3f} ..{packet.end_us:9.3f}  {packet.what:20s} after {idle_us:7.3f} idle")
+        idle_since_us = packet.end_us
     return "\n".join(lines)
 
 

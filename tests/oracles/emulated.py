@@ -2,7 +2,7 @@
 
     python -m tests.oracles.emulated --count 100 --seed 1 --kind can --fault "SYNC missing" --keep missed
 
-Of each machine a recording is written by `can_recording` or `ethercat_recording`, which know the truth of it. Said are:
+A recording of each machine is written by `can_recording` or `ethercat_recording`, which know its truth. The tables tell
 how many machines without a fault have an error of the gate; how many of the figures of `measured` lie within their U of
 the truth; and how often the gate names each fault. A fault is larger than U, and occurs three times or more.
 """
@@ -102,8 +102,8 @@ class Subject:
         if file.failure:
             return Recording(truth, {}, (("refused", file.failure),))
         figures = {figure.quantity: figure for figure in busplan.measured(self.path, path).figures}
-        found = ((one.severity, one.message) for one in file.findings if one.code.startswith("BP40"))
-        return Recording(truth, figures, tuple(found))
+        findings = ((finding.severity, finding.message) for finding in file.findings if finding.code.startswith("BP40"))
+        return Recording(truth, figures, tuple(findings))
 
     @cached_property
     def clean(self) -> "Recording":
@@ -120,17 +120,17 @@ class Subject:
 
     def beyond(self, pattern: str) -> float:
         """A value some U beyond the planned one, of the first figure of such a quantity."""
-        each = (figure for quantity, figure in self.clean.figures.items() if re.fullmatch(pattern, quantity))
-        figure = next(each, None)
+        figures = (figure for quantity, figure in self.clean.figures.items() if re.fullmatch(pattern, quantity))
+        figure = next(figures, None)
         if figure is None or None in (figure.planned, figure.recorded):
             raise NoPlaceError
         return float(figure.planned + self.times_u * (figure.uncertainty or 0))
 
     def some(self, every: int = 0) -> frozenset[int]:
-        """Some cycles of the recording; in so many events the nodes have PDOs, those of a rate where it is said."""
+        """Some cycles of the recording; in so many events the nodes have PDOs, those of a rate if it is given."""
         nodes = list(can.nodes_of(self.plan)) if self.kind == "can" else []
-        each = every or min((node.every for node in nodes), default=1)
-        number = max(self.cycles // 50, self.events * each)
+        rate = every or min((node.every for node in nodes), default=1)
+        number = max(self.cycles // 50, self.events * rate)
         if 2 * number > self.cycles or (self.kind == "can" and not nodes):
             raise NoPlaceError
         return frozenset(self.random.sample(range(3, self.cycles), number))
@@ -142,13 +142,13 @@ class Recording(NamedTuple):
     truth: dict[str, float]
     figures: dict[str, Any]
     """Figures of `measured` by their quantity."""
-    found: tuple[tuple[str, str], ...]
+    findings: tuple[tuple[str, str], ...]
     """Severity and words of what the gate finds."""
 
     @property
     def errors(self) -> list[str]:
         """Words of what is no warning."""
-        return [words for severity, words in self.found if severity != "warning"]
+        return [words for severity, words in self.findings if severity != "warning"]
 
     def judged(self) -> Iterator[tuple[str, bool]]:
         """Name of each figure whose truth is known, and whether it lies within its U of it.
@@ -184,8 +184,8 @@ class Fault(NamedTuple):
 
     def is_named(self, recording: Recording) -> bool:
         """Whether the gate names it."""
-        words = recording.errors if self.named else [words for _, words in recording.found]
-        return any(re.search(self.named, own) for own in words)
+        words = recording.errors if self.named else [words for _, words in recording.findings]
+        return any(re.search(self.named, message) for message in words)
 
 
 def commands_late(subject: Subject, least: float, most: float) -> Any:
@@ -223,7 +223,7 @@ def other_period(subject: Subject) -> Any:
 def most_frequent(subject: Subject) -> tuple[Plan, Plan]:
     """A plan to be changed, and in it the message of the shortest period; thirty of it come or so."""
     plan = deepcopy(subject.plan)
-    message: Plan | None = min(plan["message"], key=lambda own: float(own["period_us"]), default=None)
+    message: Plan | None = min(plan["message"], key=lambda message: float(message["period_us"]), default=None)
     if message is None or message["period_us"] * 30 > subject.cycles * subject.machine().period_us:
         raise NoPlaceError
     return plan, message
@@ -335,19 +335,19 @@ class Tried(NamedTuple):
     """Whether there is an error, whether the fault is named, and the share of figures within U of the truth."""
 
 
-def tried(kind: str, seed: int, said: argparse.Namespace) -> Tried:
+def tried(kind: str, seed: int, options: argparse.Namespace) -> Tried:
     """Emulate a machine, and it with each fault."""
     with TemporaryDirectory() as name:
-        folder = said.keep / f"{kind}-{seed}" if said.keep else Path(name)
+        folder = options.keep / f"{kind}-{seed}" if options.keep else Path(name)
         folder.mkdir(parents=True, exist_ok=True)
-        subject = Subject(kind, seed, folder, said.times, said.events)
+        subject = Subject(kind, seed, folder, options.times, options.events)
         faults: dict[str, tuple[float, ...]] = {}
         for fault in (*FAULTS, *HIDDEN):
-            if fault.kind == kind and said.fault in fault.name and (one := subject.with_fault(fault)):
-                within = [is_within for _, is_within in one.judged()] or [False]
-                faults[fault.name] = bool(one.errors), fault.is_named(one), sum(within) / len(within)
+            if fault.kind == kind and options.fault in fault.name and (recording := subject.with_fault(fault)):
+                within = [is_within for _, is_within in recording.judged()] or [False]
+                faults[fault.name] = bool(recording.errors), fault.is_named(recording), sum(within) / len(within)
         clean, recorder = subject.clean, subject.recorder or subject.machine().form
-        return Tried(recorder, clean.errors, bool(clean.found), list(clean.judged()), faults)
+        return Tried(recorder, clean.errors, bool(clean.findings), list(clean.judged()), faults)
 
 
 def main() -> None:
@@ -361,17 +361,29 @@ def main() -> None:
     parser.add_argument("--events", type=int, default=5, help="times that a fault occurs at least")
     parser.add_argument("--keep", type=Path, help="folder for all plans and recordings")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
-    said = parser.parse_args()
-    for kind in said.kind or PLANS:
-        seeds = range(said.seed, said.seed + said.count)
-        with ProcessPoolExecutor(said.jobs) as pool:
-            each = list(pool.map(partial(tried, kind, said=said), seeds))
-        wrong = [seed for seed, one in zip(seeds, each, strict=True) if one.errors]
-        write(f"\n{kind}: {len(each)} machines; {len(wrong)} without a fault have an error: {wrong}")
-        table("stamps", ("error", "any word"), ((one.recorder, (bool(one.errors), one.is_warned)) for one in each))
-        table("error without a fault", (), ((quantity_of(words), ()) for one in each for words in one.errors))
-        table("figure", ("within U",), ((name, (is_within,)) for one in each for name, is_within in one.judged))
-        table("fault", ("error", "named", "within U"), (pair for one in each for pair in one.faults.items()))
+    options = parser.parse_args()
+    for kind in options.kind or PLANS:
+        seeds = range(options.seed, options.seed + options.count)
+        with ProcessPoolExecutor(options.jobs) as pool:
+            machines = list(pool.map(partial(tried, kind, options=options), seeds))
+        wrong = [seed for seed, machine in zip(seeds, machines, strict=True) if machine.errors]
+        write(f"\n{kind}: {len(machines)} machines; {len(wrong)} without a fault have an error: {wrong}")
+        table(
+            "stamps",
+            ("error", "any word"),
+            ((machine.recorder, (bool(machine.errors), machine.is_warned)) for machine in machines),
+        )
+        table(
+            "error without a fault", (), ((quantity_of(words), ()) for machine in machines for words in machine.errors)
+        )
+        table(
+            "figure",
+            ("within U",),
+            ((name, (is_within,)) for machine in machines for name, is_within in machine.judged),
+        )
+        table(
+            "fault", ("error", "named", "within U"), (pair for machine in machines for pair in machine.faults.items())
+        )
 
 
 def quantity_of(words: str) -> str:
@@ -386,9 +398,9 @@ def table(name: str, columns: tuple[str, ...], rows: Iterable[tuple[str, tuple[f
     for key, values in rows:
         by_name[key].append(values)
     write(f"\n{name:32}     n", *(f"{column:>9}" for column in columns))
-    for key, each in by_name.items():
-        means = (sum(column) / len(column) for column in zip(*each, strict=True))
-        write(f"{key:32} {len(each):5}", *(f"{mean:9.1%}" for mean in means))
+    for key, of_key in by_name.items():
+        means = (sum(column) / len(column) for column in zip(*of_key, strict=True))
+        write(f"{key:32} {len(of_key):5}", *(f"{mean:9.1%}" for mean in means))
 
 
 def write(*words: str) -> None:

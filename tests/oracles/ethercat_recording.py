@@ -185,33 +185,35 @@ def truth(machine: Machine, cycles: int, start_us: float, *, seed: int) -> dict[
 
     Round trip, frames and bytes are those of the fullest cycle, and of each sort of cycle by its name.
     """
-    each = [trip for trip in trips(machine, cycles, seed=seed) if trip.us >= start_us]
+    sent = [trip for trip in trips(machine, cycles, seed=seed) if trip.us >= start_us]
     begun: dict[int, list[Trip]] = defaultdict(list)
-    for trip in each:
+    for trip in sent:
         if not trip.is_poll:
             begun[trip.cycle].append(trip)
-    by_cycle = {cycle: own for cycle, own in begun.items() if len(own) == len(machine.frames(cycle))}
+    by_cycle = {
+        cycle: begun_trips for cycle, begun_trips in begun.items() if len(begun_trips) == len(machine.frames(cycle))
+    }
     sorts: dict[str, dict[int, list[Trip]]] = defaultdict(dict)
     for cycle in by_cycle.keys() - machine.lost:
         sorts[machine.names[cycle % len(machine.names)]][cycle] = by_cycle[cycle]
     late_us, host_us = zip(*starts_and_hosts(machine, cycles, seed=seed), strict=True)
     due = [cycle for cycle in range(min(by_cycle), max(by_cycle) + 1) if machine.frames(cycle)]
-    found: dict[str, float] = {
+    truth: dict[str, float] = {
         "period": machine.period_us * (1 + (machine.clock_ppm + machine.bend_ppm) / 1e6),
         "latest start": max(late_us[cycle] for cycle in by_cycle) - min(late_us[cycle] for cycle in by_cycle),
-        "lost": sum(trip.cycle in machine.lost for trip in each),
-        "wrong": sum(trip.cycle in machine.wrong for trip in each),
+        "lost": sum(trip.cycle in machine.lost for trip in sent),
+        "wrong": sum(trip.cycle in machine.wrong for trip in sent),
         "without a frame": len(due) - len(by_cycle),
     }
-    fullest = max(sorts.values(), key=lambda own: sum(map(_wire_us, next(iter(own.values())))))
-    for name, own in (*sorts.items(), ("", fullest)):
-        frames = next(iter(own.values()))
-        found[f"frames in a cycle{name}"] = len(frames)
-        found[f"datagrams of a cycle{name}"] = sum(size + 12 for trip in frames for size in _sizes(trip))
-        found[f"round trip{name}"] = max(trip[-1].back_us - trip[0].us for trip in own.values())
-    found["master, least"] = max(host_us[cycle] for cycle in fullest)
-    found["master, most"] = max(host_us[cycle] for own in sorts.values() for cycle in own)
-    return found
+    fullest = max(sorts.values(), key=lambda of_sort: sum(map(_wire_us, next(iter(of_sort.values())))))
+    for name, of_sort in (*sorts.items(), ("", fullest)):
+        frames = next(iter(of_sort.values()))
+        truth[f"frames in a cycle{name}"] = len(frames)
+        truth[f"datagrams of a cycle{name}"] = sum(size + 12 for trip in frames for size in _sizes(trip))
+        truth[f"round trip{name}"] = max(trip[-1].back_us - trip[0].us for trip in of_sort.values())
+    truth["master, least"] = max(host_us[cycle] for cycle in fullest)
+    truth["master, most"] = max(host_us[cycle] for of_sort in sorts.values() for cycle in of_sort)
+    return truth
 
 
 def _sizes(trip: Trip) -> list[int]:
@@ -251,14 +253,14 @@ def bytes_of(group: dict[str, Any], way: str) -> int:
 
 def first_cycles(groups: list[dict[str, Any]], sizes: list[int], *, is_spread: bool) -> list[int]:
     """First cycle of each group: the faster first, of one rate the larger, where the fullest of its cycles is least."""
-    found, filled = [0] * len(groups), [0] * lcm(*(group["every"] for group in groups))
+    starts, filled = [0] * len(groups), [0] * lcm(*(group["every"] for group in groups))
     for place in sorted(range(len(groups)), key=lambda place: (groups[place]["every"], -sizes[place])):
         every = groups[place]["every"]
         if is_spread:
-            found[place] = min(range(every), key=lambda start: max(filled[start::every]))
-        for cycle in range(found[place], len(filled), every):
+            starts[place] = min(range(every), key=lambda start: max(filled[start::every]))
+        for cycle in range(starts[place], len(filled), every):
             filled[cycle] += sizes[place]
-    return found
+    return starts
 
 
 def schedule_of(plan: dict[str, Any]) -> Iterator[tuple[str, tuple[Datagrams, ...]]]:
@@ -270,12 +272,12 @@ def schedule_of(plan: dict[str, Any]) -> Iterator[tuple[str, tuple[Datagrams, ..
     sizes = [max(pair) if layout == "LRW-shared" else sum(pair) for pair in both]
     totals = [size * group["nodes"] for size, group in zip(sizes, groups, strict=True)]
     first = first_cycles(groups, totals, is_spread=bus.get("units", "spread") == "spread")
-    each = list(zip(groups, first, both, sizes, accumulate(totals, initial=0x10000), strict=False))
+    units = list(zip(groups, first, both, sizes, accumulate(totals, initial=0x10000), strict=False))
     added = housekeeping(bus, sum(group["nodes"] for group in groups))
     most = MOST_BYTES - (24 if layout == "LRD-LWR" else 12)
     cycles = lcm(*(group["every"] for group in groups))
     for cycle in range(cycles):
-        due = [own for own in each if (cycle - own[1]) % own[0]["every"] == 0]
+        due = [unit for unit in units if (cycle - unit[1]) % unit[0]["every"] == 0]
         packed: list[list[tuple[int, int, int]]] = [[]]
         room = most - sum(size + 12 for *_, size in added)
         for group, _, (read, write), size, address in due:
@@ -285,20 +287,20 @@ def schedule_of(plan: dict[str, Any]) -> Iterator[tuple[str, tuple[Datagrams, ..
                     room = most
                 packed[-1].append((read, write, address + device * size))
                 room -= size
-        frames = [(*(() if place else added), *_process(own, layout)) for place, own in enumerate(packed)]
+        frames = [(*(() if place else added), *_process(devices, layout)) for place, devices in enumerate(packed)]
         names = f" with {' and '.join(own[0]['name'] for own in due) or 'no group'}" if cycles > 1 else ""
         yield names, tuple(filter(None, frames))
 
 
-def _process(own: list[tuple[int, int, int]], layout: str) -> Datagrams:
+def _process(devices: list[tuple[int, int, int]], layout: str) -> Datagrams:
     """Datagrams of the process data of some devices: what each is read and written, and its logical address."""
-    if not own:
+    if not devices:
         return ()
-    address = own[0][2]
+    address = devices[0][2]
     if layout == "LRD-LWR":
-        reads, writes = sum(read for read, *_ in own), sum(write for _, write, _ in own)
+        reads, writes = sum(read for read, *_ in devices), sum(write for _, write, _ in devices)
         return (LRD, address, reads), (LWR, address + 0x800000, writes)
-    return ((LRW, address, sum(max(pair) if layout == "LRW-shared" else sum(pair) for *pair, _ in own)),)
+    return ((LRW, address, sum(max(pair) if layout == "LRW-shared" else sum(pair) for *pair, _ in devices)),)
 
 
 def groups_of(plan: dict[str, Any]) -> list[dict[str, Any]]:

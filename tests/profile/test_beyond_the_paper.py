@@ -8,11 +8,10 @@ from typing import Any
 import pytest
 
 import busplan
-from busplan.profile.sources import locate
 
 Run = Callable[..., Any]
 
-TEXT = locate("paper-4ms")[0].read_text(encoding="utf-8")
+TEXT = (Path(__file__).parents[2] / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
 BEYOND = {
     "bus.cycle_master": ("[bus]", "cycle_master = true"),
     "bus.phy_delay_us": ("[bus]", "phy_delay_us = 0.144"),

@@ -5,6 +5,8 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache
 from itertools import count
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -12,12 +14,11 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.errors import BusplanError
-from busplan.profile.document import Document, validate
+import busplan
+from busplan import BusplanError, Profile
 from busplan.profile.edit import edited_file
-from busplan.profile.kinds import dotted_keys
-from busplan.profile.sources import load, shipped_names
-from busplan.profile.starter import starter_text
+
+FOLDER = Path(__file__).parents[2] / "profiles"
 
 LINEAR = {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}
 TABLE = {"kind": "table", "payload_bytes": [4, 64, 1024], "time_us": [30, 50.5, 400.0]}
@@ -123,13 +124,21 @@ class Writer:
 
 
 @cache
-def shipped(name: str) -> Document:
-    return load(name).document
+def shipped(name: str) -> str:
+    """Text of a shipped profile."""
+    return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def read(text: str) -> Profile:
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "x.toml")
+        path.write_text(text, encoding="utf-8")
+        return busplan.load_profile(path)
 
 
 @st.composite
 def layouts(draw: st.DrawFn, *, usual: bool) -> list[Chunk]:
-    data = shipped("paper-two-node").data()
+    data = tomllib.loads(shipped("paper-two-node"))
     if draw(st.booleans()):
         data["node"]["execution"] = LINEAR
     return list(Writer(draw, usual=usual).table((), data))
@@ -170,7 +179,7 @@ def makes_a_profile(data: dict[str, Any]) -> bool:
             table = table.setdefault(name, {})
         table[last] = value
     try:
-        validate(Document("x.toml", tomli_w.dumps(nested)))
+        read(tomli_w.dumps(nested))
     except BusplanError:
         return False
     return True
@@ -235,13 +244,11 @@ def check_lines(new: str, chunks: list[Chunk], changed: set[str]) -> None:
 
 
 @given(
-    st.sampled_from(
-        [one for one in shipped_names() if not (found := load(one).profile).group and found.bus.kind == "ieee1394"]
-    ),
+    st.sampled_from(["dvrk", "paper-1ms", "paper-4ms", "paper-dma", "paper-optimal-gap", "paper-two-node"]),
     edits(),
 )
 def test_shipped_profiles(name: str, changes: dict[str, Any]) -> None:
-    check(chunks_of(shipped(name).text), changes, usual=True)
+    check(chunks_of(shipped(name)), changes, usual=True)
 
 
 MARKS = st.sampled_from([b"", b"\xef\xbb\xbf"])
@@ -399,24 +406,10 @@ def test_a_file_keeps_its_line_ends_and_its_byte_order_mark() -> None:
     )
 
 
-def test_a_file_never_grows_beyond_what_is_read() -> None:
-    sizes = list(range(1, 200_000))
-    changes = {"node.execution.payload_bytes": sizes, "node.execution.time_us": sizes}
-    with pytest.raises(BusplanError, match="larger than 2,000,000 bytes"):
-        edited(PLAIN.replace("# the smallest", ""), changes)
-
-
 @pytest.mark.parametrize("name", ["\udc80", "\x9b2J", "\u202e"])
 def test_a_text_that_is_no_text_is_refused(name: str) -> None:
     with pytest.raises(BusplanError):
         edited(PLAIN, {"name": name})
-
-
-def test_a_new_profile_can_be_edited() -> None:
-    text = starter_text("paper-4ms", name="mine")
-    new = edited(text, {"bus.nodes": 3, "bus.gap_count": 10, "node.axes": 2})
-    changed = [line for line in new.splitlines() if line not in text.splitlines()]
-    assert [line.partition(" #")[0].rstrip() for line in changed] == ["gap_count = 10", "nodes = 3", "axes = 2"]
 
 
 GRADED = """
@@ -450,7 +443,7 @@ def test_a_comment_that_grades_the_old_value_says_so_and_every_other_stays() -> 
 
 
 def test_keys_of_groups_are_edited_where_they_stand() -> None:
-    text = load("gantry-24").document.text
+    text = shipped("gantry-24")
     changes = {
         "group.drives.nodes": 5,
         "group.tool.execution.base_us": 17.5,
@@ -463,13 +456,14 @@ def test_keys_of_groups_are_edited_where_they_stand() -> None:
     assert [line for line in before if line not in after and "# assumed" not in line] == ["nodes = 4"]
     assert new.count("# busplan calibrate: here\n[group.execution]") == 1
     assert new.index("calibrate: here") > new.index('name = "tool"')
-    profile = validate(Document("x", new))
+    profile = read(new)
     assert [(one.nodes, one.execution.uncertainty_us) for one in profile.group] == [(5, None), (1, None), (1, 0.5)]
-    assert (profile.group[1].read_bytes, dotted_keys(profile)["group.tool.execution.base_us"].value) == (None, 17.5)
+    tool: Any = profile.group[1]
+    assert (tool.read_bytes, tool.execution.base_us) == (None, 17.5)
 
 
 def test_an_inline_group_is_left_with_its_lines() -> None:
-    text = load("gantry-24").document.text
+    text = shipped("gantry-24")
     head, rest = text.split("[[group]]", 1)
     tail = rest[rest.index("[limits]") :]
     inline = (

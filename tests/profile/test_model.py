@@ -1,63 +1,45 @@
-"""The profile's models: strict, frozen and closed; ranges, defaults, and what the sections compute."""
+"""What a profile may say: strict, frozen and closed; ranges, defaults, and what the sections compute."""
 
 import math
 from collections.abc import Iterable, Iterator
-from copy import deepcopy
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
-from busplan.buses.ieee1394.constants import MAX_PAYLOAD_BYTES
-from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.section import (
-    Host,
-    Ieee1394Bus,
-    Ieee1394CycleSection,
-    Ieee1394LinearExecution,
-    Ieee1394Node,
-    Ieee1394Payload,
-    Ieee1394Profile,
-    Ieee1394TableExecution,
-    Sync,
-)
-from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, link_of
-from busplan.questions.fit.network import network_of
-from busplan.sections.cycle import Limits, LinearExecution, TableExecution
-from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
+import busplan
 
+TEXT = """\
+schema_version = 1
+name = "test"
+bus = {kind = "ieee1394", speed = "S400", nodes = 2}
+cycle = {period_us = 4000}
+payload = {read_bytes = 12, write_bytes = 12}
+node = {axes = 4, execution = {kind = "linear", base_us = 30, per_byte_us = 0.35}}
+"""
 TABLE = {"kind": "table", "payload_bytes": [4, 16, 64], "time_us": [40.0, 34.0, 58.0]}
 
 
-def data(**changes: object) -> dict[str, Any]:
-    """Data of a smallest profile, with new values by key, two underscores for the dot; ... takes a key away."""
-    made: dict[str, Any] = {
-        "schema_version": 1,
-        "name": "test",
-        "bus": {"kind": "ieee1394", "speed": "S400", "nodes": 2},
-        "cycle": {"period_us": 4000},
-        "payload": {"read_bytes": 12, "write_bytes": 12},
-        "node": {"axes": 4, "execution": {"kind": "linear", "base_us": 30, "per_byte_us": 0.35}},
-    }
-    for key, value in changes.items():
-        *tables, last = key.split("__")
-        table = made
-        for name in tables:
-            table = table.setdefault(name, {})
-        if value is ...:
-            del table[last]
-        else:
-            table[last] = deepcopy(value)
-    return made
+@cache
+def smallest() -> busplan.Profile:
+    """A smallest profile."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "test.toml")
+        path.write_text(TEXT, encoding="utf-8")
+        return busplan.load_profile(path)
 
 
-def profile(**changes: object) -> Ieee1394Profile:
-    return Ieee1394Profile.model_validate(data(**changes))
+def profile(**changes: object) -> Any:
+    """A smallest profile with new values by key, two underscores for the dot."""
+    return busplan.load_profile(smallest(), changes={key.replace("__", "."): to for key, to in changes.items()})
 
 
-def value_of(model: BaseModel, key: str) -> object:
+def value_of(model: Any, key: str) -> object:
     value: object = model
     for name in key.split("__"):
         value = getattr(value, name)
@@ -65,12 +47,16 @@ def value_of(model: BaseModel, key: str) -> object:
 
 
 def refused(**changes: object) -> list[str]:
-    """What is said of a profile that must not load."""
-    with pytest.raises(ValidationError) as caught:
+    """What is said of changes that are refused, without the words on what was changed."""
+    with pytest.raises(busplan.BusplanError) as caught:
         profile(**changes)
-    return [
-        problem.message for details in caught.value.errors() for problem in details.get("ctx", {}).get("problems", ())
-    ] or [details["msg"] for details in caught.value.errors()]
+    return [problem.partition(": ")[2] for problem in caught.value.problems]
+
+
+def figures(**changes: object) -> dict[str, Any]:
+    """Figures of `capacity` by the standard."""
+    (found,) = busplan.capacity(profile(**changes), timing_model="standard").results
+    return dict(found.by_key())
 
 
 # --- strictness -------------------------------------------------------------------------------------------
@@ -143,15 +129,6 @@ def each(keys: Iterable[str], *values: object) -> Iterator[tuple[str, Any]]:
     return ((key, value) for key in keys for value in (values if key in KINDS else values[:1]))
 
 
-@pytest.mark.parametrize("key", [*SECTION_KEYS, "limits", ""])
-def test_every_section_is_strict_frozen_and_closed(key: str) -> None:
-    loaded = profile(limits={}, cycle__sync={})
-    section = value_of(loaded, key) if key else loaded
-    assert isinstance(section, BaseModel)
-    config = section.model_config
-    assert (config["strict"], config["frozen"], config["extra"]) == (True, True, "forbid")
-
-
 def test_a_number_is_nothing_but_a_number() -> None:
     for key, value in each(NUMBERS, "1", "", b"1", True, False, [1], {"a": 1}, 1j):
         assert refused(**{key: value})
@@ -199,24 +176,13 @@ def test_a_section_is_a_table() -> None:
     "key", ["", "bus__", "cycle__", "cycle__sync__", "payload__", "node__", "node__execution__", "host__", "limits__"]
 )
 def test_an_unknown_key_is_refused_in_every_section(key: str) -> None:
-    assert refused(**{f"{key}surprise": 1}) == ["Extra inputs are not permitted"]
+    (message,) = refused(**{f"{key}surprise": 1})
+    assert message.startswith("unknown key; known here: ")
 
 
 def test_a_key_of_the_other_form_of_execution_is_unknown() -> None:
-    assert refused(node__execution__time_us=[1]) == ["Extra inputs are not permitted"]
-
-
-def test_a_key_without_a_default_is_asked_for() -> None:
-    for key in [
-        *("name", "schema_version", "bus", "bus__kind", "bus__speed", "bus__nodes", "cycle", "cycle__period_us"),
-        *("payload", "node", "node__axes", "node__execution"),
-        *("node__execution__base_us", "node__execution__per_byte_us"),
-    ]:
-        assert refused(**{key: ...}) == ["Field required"]
-
-
-def test_the_execution_time_is_asked_for_its_kind() -> None:
-    assert len(refused(node__execution__kind=...)) == 1
+    (message,) = refused(node__execution__time_us=[1])
+    assert message.startswith("unknown key; known here: ")
 
 
 @pytest.mark.parametrize("key", ["name", "bus__nodes", "cycle__period_us", "cycle__sync__ping_us", "node__axes"])
@@ -228,14 +194,6 @@ def test_a_profile_is_frozen(key: str) -> None:
         setattr(owner, last, 1)
     with pytest.raises(ValidationError, match="frozen"):
         delattr(owner, last)
-
-
-def test_a_profile_keeps_nothing_of_the_data_it_was_made_of() -> None:
-    source = data(node__execution=TABLE)
-    loaded = Ieee1394Profile.model_validate(source)
-    source["node"]["execution"]["time_us"][0] = 0.0
-    assert isinstance(loaded.node_groups[0].node.execution, TableExecution)
-    assert loaded.node_groups[0].node.execution.time_us == (40.0, 34.0, 58.0)
 
 
 # --- ranges -----------------------------------------------------------------------------------------------
@@ -295,23 +253,14 @@ def test_defaults_are_those_of_the_reference() -> None:
     assert loaded.bus.timing_model == "standard"
     assert (loaded.cycle.slice_ratio, loaded.cycle.nonperiodic_us) == (0.5, 0.0)
     assert (loaded.cycle.sync.ping_us, loaded.cycle.sync.ping_per_node_us) == (0.3, 0.1)
-    assert loaded.node_groups[0].payload.overhead_bytes == 20
+    assert loaded.payload.overhead_bytes == 20
     # What no bus of the paper has is off.
     assert (loaded.bus.cycle_master, loaded.bus.isochronous_us, loaded.bus.phy_delay_us) == (False, 0.0, None)
     assert (loaded.cycle.retries, loaded.limits.reserve) == (0, 0.0)
-    assert (
-        loaded.node_groups[0].node.read_response,
-        loaded.node_groups[0].node.write_response,
-        loaded.node_groups[0].node.response_us,
-    ) == ("split", "split", 1.63)
-    assert (loaded.node_groups[0].node.execution.residual, loaded.node_groups[0].node.execution.measured_gap_count) == (
-        "none",
-        63,
-    )
-    assert (
-        loaded.node_groups[0].node.execution.uncertainty_us,
-        loaded.node_groups[0].node.execution.worst_extra_us,
-    ) == (None, 0.0)
+    node, execution = loaded.node, loaded.node.execution
+    assert (node.read_response, node.write_response, node.response_us) == ("split", "split", 1.63)
+    assert (execution.residual, execution.measured_gap_count) == ("none", 63)
+    assert (execution.grade, execution.uncertainty_us, execution.worst_extra_us) == (None, None, 0.0)
     assert (loaded.host.transaction_us, loaded.host.uncertainty_us) == (0.0, None)
 
 
@@ -321,7 +270,7 @@ def test_a_key_of_words_takes_each_of_them_and_no_other(key: str) -> None:
     assert [value_of(profile(**{key: word}), key) for word in own] == [*own]
     for word in ("", own[0].upper(), f"{own[0]} ", "both", {"split": "none"}.get(own[0], "split")):
         (message,) = refused(**{key: word})
-        assert all(f"'{one}'" in message for one in own)
+        assert all(f'"{one}"' in message for one in own)
 
 
 def test_reads_and_writes_are_not_answered_alike() -> None:
@@ -351,9 +300,9 @@ def test_isochronous_traffic_needs_a_cycle_master() -> None:
 def test_what_is_not_said_of_an_uncertainty_follows_from_the_grade_or_is_a_tenth() -> None:
     by_grade = {"measured": 0.1 / math.sqrt(12), "derived": 1 / math.sqrt(3), "calibrated": 4, "assumed": 4, None: 4}
     for grade, expected in by_grade.items():
-        execution = profile(node__execution__grade=grade).node_groups[0].node.execution
+        execution = profile(node__execution__grade=grade).node.execution
         assert execution.standard_uncertainty_us(40.0) == pytest.approx(expected)
-        said = profile(node__execution__grade=grade, node__execution__uncertainty_us=0.25).node_groups[0].node.execution
+        said = profile(node__execution__grade=grade, node__execution__uncertainty_us=0.25).node.execution
         assert said.standard_uncertainty_us(40.0) == 0.25
     assert profile(host__transaction_us=5).host.standard_uncertainty_us == 0.5
     assert profile(host__transaction_us=5, host__uncertainty_us=0).host.standard_uncertainty_us == 0
@@ -363,38 +312,17 @@ def test_what_is_not_said_of_an_uncertainty_follows_from_the_grade_or_is_a_tenth
     "execution", [{"kind": "linear", "base_us": 1, "per_byte_us": 0}, TABLE], ids=["linear", "table"]
 )
 def test_both_forms_of_execution_may_have_a_grade(execution: dict[str, object]) -> None:
-    assert profile(node__execution=execution).node_groups[0].node.execution.grade is None
+    assert profile(node__execution=execution).node.execution.grade is None
     for grade in ("measured", "derived", "calibrated", "assumed", None):
-        assert profile(node__execution={**execution, "grade": grade}).node_groups[0].node.execution.grade == grade
+        assert profile(node__execution={**execution, "grade": grade}).node.execution.grade == grade
 
 
 def test_every_default_is_a_value_that_the_schema_takes() -> None:
     # Pydantic does not check defaults: a wrong one would load.
-    assert Ieee1394Profile.model_validate(profile().model_dump()) == profile()
-
-
-SECTIONS = (
-    Ieee1394Profile,
-    Ieee1394Bus,
-    Ieee1394CycleSection,
-    Sync,
-    Ieee1394Payload,
-    Ieee1394Node,
-    Ieee1394LinearExecution,
-    Ieee1394TableExecution,
-    Host,
-    Limits,
-)
-
-
-@pytest.mark.parametrize("section", SECTIONS)
-def test_every_key_is_described_and_its_example_is_one_that_the_schema_takes(section: type[BaseModel]) -> None:
-    # Messages about a missing key show the first one.
-    examples = {name: field.examples[0] for name, field in section.model_fields.items() if field.examples}
-    sections = {"bus": data()["bus"], "cycle": data()["cycle"], "payload": data()["payload"], "node": data()["node"]}
-    rest = {Ieee1394Profile: sections, Ieee1394Node: {"execution": data()["node"]["execution"]}}
-    assert section.model_validate({**examples, **rest.get(section, {})})
-    assert [name for name, field in section.model_fields.items() if not field.description] == []
+    loaded = smallest()
+    whole = loaded.model_dump()
+    sections = ("bus", "cycle", "payload", "node", "servo", "mechanics", "delivery", "circle", "tolerance", "limits")
+    assert busplan.load_profile(loaded, changes={name: whole[name] for name in sections}) == loaded
 
 
 # --- the bus ----------------------------------------------------------------------------------------------
@@ -428,10 +356,8 @@ def test_what_is_no_speed_at_all_is_refused_without_that_reason(speed: str) -> N
 
 
 def test_a_chain_has_as_many_hops_as_nodes_and_a_tree_as_many_as_it_says() -> None:
-    chain = network_of(profile(bus__nodes=5))
-    assert [hops_of(chain.with_nodes(nodes)) for nodes in (1, 5, 62)] == [1, 5, 62]
-    tree = network_of(profile(bus__nodes=5, bus__max_hops=3))
-    assert [hops_of(tree.with_nodes(nodes)) for nodes in (1, 5, 62)] == [3, 3, 3]
+    assert [figures(bus__nodes=nodes)["hops"] for nodes in (1, 5, 62)] == [1, 5, 62]
+    assert [figures(bus__nodes=nodes, bus__max_hops=3)["hops"] for nodes in (1, 5, 62)] == [3, 3, 3]
 
 
 # From the gap-count table of IEEE 1394a for cables of 4.5 m, by hand.
@@ -439,14 +365,12 @@ def test_a_chain_has_as_many_hops_as_nodes_and_a_tree_as_many_as_it_says() -> No
     ("hops", "gap_count"), [(1, 5), (2, 7), (3, 8), (16, 43), (22, 59), (23, 62), (24, 63), (500, 63)]
 )
 def test_the_optimal_gap_count_follows_the_hops(hops: int, gap_count: int) -> None:
-    chain = network_of(profile(bus__gap_count="optimal"))
-    assert gap_count_of(chain.with_nodes(hops)) == gap_count
-    tree = network_of(profile(bus__gap_count="optimal", bus__max_hops=hops))
-    assert gap_count_of(tree.with_nodes(1)) == gap_count
+    assert figures(bus__gap_count="optimal", bus__nodes=hops)["gap_count"] == gap_count
+    assert figures(bus__gap_count="optimal", bus__nodes=1, bus__max_hops=hops)["gap_count"] == gap_count
 
 
 def test_a_gap_count_that_is_given_does_not_follow_the_hops() -> None:
-    assert gap_count_of(network_of(profile(bus__gap_count=7)).with_nodes(16)) == 7
+    assert figures(bus__gap_count=7, bus__nodes=16)["gap_count"] == 7
 
 
 def test_the_optimal_gap_count_is_refused_for_cables_the_table_does_not_know() -> None:
@@ -461,13 +385,13 @@ def test_the_optimal_gap_count_is_refused_for_cables_the_table_does_not_know() -
 @pytest.mark.parametrize(
     ("speed", "rate_mbit_s", "limit"), [("S100", 98.304, 512), ("S200", 196.608, 1024), ("S400", 393.216, 2048)]
 )
-def test_a_link_has_the_rate_and_the_limits_of_its_speed(speed: str, rate_mbit_s: float, limit: int) -> None:
-    loaded = profile(bus__speed=speed, bus__gap_count=9, bus__cable_length_m=2)
-    link = link_of(network_of(loaded).with_nodes(3))
-    assert tuple(link)[:4] == pytest.approx((rate_mbit_s, 9, 3, 2.0), rel=1e-15)
-    assert link.phy_delay_us is None
-    assert link_of(network_of(profile(bus__phy_delay_us=0.05))).phy_delay_us == 0.05
-    assert float(MAX_PAYLOAD_BYTES[loaded.bus.speed]) == limit
+def test_a_packet_has_the_rate_and_the_limit_of_its_speed(speed: str, rate_mbit_s: float, limit: int) -> None:
+    found: Any = busplan.latency(profile(bus__speed=speed), payload_bytes=[12, 112], timing_model="paper").transactions
+    small_us, large_us = (float(one.phases["response_data_us"]) for one in found if one.transaction == "read")
+    assert large_us - small_us == pytest.approx(8 * 100 / rate_mbit_s)
+    largest = dict.fromkeys(("payload__read_bytes", "payload__write_bytes"), limit)
+    assert "payload" not in figures(bus__speed=speed, **largest)["exceeded"]
+    assert "payload" in figures(bus__speed=speed, **dict.fromkeys(largest, limit + 1))["exceeded"]
 
 
 @pytest.mark.parametrize(
@@ -491,26 +415,31 @@ def test_what_breaks_the_standards_limits_loads(changes: dict[str, object]) -> N
 
 
 def test_the_synchronous_packet_is_a_ping_for_the_paper_and_a_broadcast_for_the_standard() -> None:
-    network = network_of(profile(cycle__sync={"ping_us": 0.3, "ping_per_node_us": 0.1}))
-    paper = [Ieee1394Cycle(network.with_nodes(nodes), "paper").sync_us for nodes in (1, 2, 11)]
-    assert paper == pytest.approx([0.3, 0.4, 1.3])
+    def sync_us(model: str) -> list[Any]:
+        cycles = (busplan.capacity(profile(bus__nodes=nodes), timing_model=model).results[0] for nodes in (1, 2, 11))
+        return [next(term.us for term in cycle.terms if term.name == "sync") for cycle in cycles]
+
+    assert sync_us("paper") == pytest.approx([0.3, 0.4, 1.3])
     # 20 bytes at 393.216 Mbit/s, arbitration of (4) and the arbitration reset gap of (10) at gap count 63, and twice
     # the hops: the measured ping is propagation, and in them.
     hop_us, gaps_us = 0.023 + 14 / 98.304, 1.63 + (4 * 63 + 53 + 32 * 63) / 98.304
-    standard = [Ieee1394Cycle(network.with_nodes(nodes), "standard").sync_us for nodes in (1, 2, 11)]
-    assert standard == pytest.approx([160 / 393.216 + gaps_us + 2 * nodes * hop_us for nodes in (1, 2, 11)])
+    expected = [160 / 393.216 + gaps_us + 2 * nodes * hop_us for nodes in (1, 2, 11)]
+    assert sync_us("standard") == pytest.approx(expected)
 
 
 # --- execution times --------------------------------------------------------------------------------------
 
 
 def test_a_linear_execution_time_grows_with_the_payload() -> None:
-    execution = LinearExecution(kind="linear", base_us=30, per_byte_us=0.25)
+    execution = profile(node__execution={"kind": "linear", "base_us": 30, "per_byte_us": 0.25}).node.execution
     assert [execution.execution_us(size) for size in (1, 4, 1000)] == [30.25, 31.0, 280.0]
 
 
-def table(payload_bytes: list[int], time_us: list[float]) -> TableExecution:
-    return TableExecution.model_validate({"kind": "table", "payload_bytes": payload_bytes, "time_us": time_us})
+def table(payload_bytes: list[int], time_us: list[float]) -> Any:
+    """An execution time by a table; payloads are the first of it, for a profile knows all of its own."""
+    execution = {"kind": "table", "payload_bytes": payload_bytes, "time_us": time_us}
+    sizes = dict.fromkeys(("payload__read_bytes", "payload__write_bytes"), payload_bytes[-1])
+    return profile(node__execution=execution, **sizes).node.execution
 
 
 def test_a_table_is_exact_at_its_points_and_linear_between_them() -> None:
@@ -521,7 +450,7 @@ def test_a_table_is_exact_at_its_points_and_linear_between_them() -> None:
 
 
 @given(
-    points=st.dictionaries(st.integers(0, 4096), st.floats(0, 1e6), min_size=1, max_size=8),
+    points=st.dictionaries(st.integers(1, 4096), st.floats(0, 1e6), min_size=1, max_size=8),
     share=st.floats(0, 1),
 )
 def test_between_two_points_a_time_is_between_their_times(points: dict[int, float], share: float) -> None:
@@ -551,7 +480,7 @@ def test_a_table_of_one_point_knows_that_point() -> None:
     ("payload_bytes", "time_us", "messages"),
     [
         pytest.param(
-            [4, 16], [1.0], ["has 1 values and payload_bytes has 2: the two must be of one length"], id="times too few"
+            [4, 16], [1.0], ["has 1 value and payload_bytes has 2: the two must be of one length"], id="times too few"
         ),
         pytest.param(
             [4], [1.0, 2.0], ["has 2 values and payload_bytes has 1: the two must be of one length"], id="too many"
@@ -564,7 +493,7 @@ def test_a_table_of_one_point_knows_that_point() -> None:
             [
                 "payloads must ascend, and this follows 4",
                 "payloads must ascend, and this follows 8",
-                "has 1 values and payload_bytes has 4: the two must be of one length",
+                "has 1 value and payload_bytes has 4: the two must be of one length",
             ],
             id="both at once",
         ),
@@ -574,7 +503,9 @@ def test_what_is_no_table_is_refused_with_all_its_faults(
     payload_bytes: list[int], time_us: list[float], messages: list[str]
 ) -> None:
     execution = {"kind": "table", "payload_bytes": payload_bytes, "time_us": time_us}
-    assert refused(node__execution=execution) == messages
+    found = refused(node__execution=execution)
+    assert len(found) == len(messages)
+    assert all(map(str.endswith, found, messages))
 
 
 @pytest.mark.parametrize("key", ["payload_bytes", "time_us"])
@@ -606,18 +537,3 @@ def test_a_payload_outside_the_table_is_refused_each_with_its_key(
 
 def test_a_linear_execution_time_knows_every_payload() -> None:
     assert profile(payload__read_bytes=1_000_000)
-
-
-def test_the_kind_of_bus_is_the_unions_tag() -> None:
-    assert refused(bus__kind="can")
-    assert isinstance(profile().bus, Ieee1394Bus)
-
-
-def test_what_a_profile_does_not_say_is_what_the_servo_core_assumes() -> None:
-    profile = Ieee1394Profile.model_validate(data())
-    assert Axis(**profile.servo.axis_keys("x")) == Axis()
-    assert Delivery(**profile.delivery.model_dump()) == Delivery()
-    assert Mechanics(**profile.mechanics.model_dump()) == Mechanics()
-    assert LoopTiming(period_us=4000, step_us=profile.servo.step_us, loop=profile.servo.loop) == LoopTiming(
-        period_us=4000, interpolation=profile.servo.interpolation
-    )

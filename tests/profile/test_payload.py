@@ -1,5 +1,6 @@
 """Payloads of a node: a fixed part, a part for each of its axes, or both."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -7,9 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.errors import PlacedError
-from busplan.profile.document import decode, validate
-from busplan.questions.fit.network import network_of
 
 TEXT = """schema_version = 1
 name = "gantry"
@@ -30,12 +28,18 @@ axes = 4
 LINE = 'kind = "linear"\nbase_us = 20\nper_byte_us = 0.1'
 
 
+@pytest.fixture(autouse=True)
+def _work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
 def profile(payload: str, execution: str = LINE) -> busplan.Profile:
-    return validate(decode(TEXT.format(payload=payload, execution=execution).encode(), name="gantry.toml"))
+    Path("gantry.toml").write_text(TEXT.format(payload=payload, execution=execution), encoding="utf-8")
+    return busplan.load_profile("gantry.toml")
 
 
 def refused(payload: str, execution: str = LINE) -> list[str]:
-    with pytest.raises(PlacedError) as caught:
+    with pytest.raises(busplan.BusplanError) as caught:
         profile(payload, execution)
     return list(caught.value.problems)
 
@@ -55,8 +59,8 @@ def test_what_each_axis_adds_is_as_if_it_stood_in_the_payload(fixed: int, per_ax
     if fixed:
         added += f"\nread_bytes = {fixed}\nwrite_bytes = {fixed}"
     size = fixed + per_axis * axes
-    alike = (profile(added), profile(f"read_bytes = {size}\nwrite_bytes = {size}"))
-    first, second = (busplan.load_profile(one, changes={"node.axes": axes}) for one in alike)
+    both = (profile(added), profile(f"read_bytes = {size}\nwrite_bytes = {size}"))
+    first, second = (busplan.load_profile(one, changes={"node.axes": axes}) for one in both)
     assert figures_of(first) == figures_of(second)
 
 
@@ -116,8 +120,7 @@ def test_a_plan_cuts_what_each_axis_adds() -> None:
 
 def test_another_payload_in_latency_is_the_whole_of_it() -> None:
     own = profile("read_bytes_per_axis = 8\nwrite_bytes_per_axis = 8")
-    group = network_of(own).groups[0]
-    assert (group.read_bytes, group.write_bytes) == (32, 32)
+    assert {one.payload_bytes for one in busplan.latency(own).transactions} == {32}
     asked = busplan.latency(own, payload_bytes=[12]).transactions
     plain = busplan.latency(profile("read_bytes = 12\nwrite_bytes = 12")).transactions
     assert asked == plain

@@ -8,22 +8,26 @@ from pathlib import Path
 
 import pytest
 
-from busplan.errors import BusplanError
-from busplan.profile import sources as revision
-from busplan.profile.sources import load_revision
+import busplan
+from busplan import BusplanError, Profile
 
 Git = Callable[..., bytes]
 
 
+def profile(argument: str) -> Profile:
+    """The profile, as diff reads it."""
+    return busplan.diff(argument, "paper-4ms").a.profile
+
+
 def refusal(argument: str) -> str:
     with pytest.raises(BusplanError) as caught:
-        load_revision(argument)
+        profile(argument)
     assert len(caught.value.problems) == 1
     return caught.value.problems[0]
 
 
 def period_us(argument: str) -> float:
-    return load_revision(argument).profile.cycle.period_us
+    return profile(argument).cycle.period_us
 
 
 @pytest.mark.parametrize("name", ["v1", "HEAD~1", "main~1", "HEAD^{/one}", "HEAD", "main", "@"])
@@ -32,9 +36,8 @@ def test_it_is_the_file_that_git_shows(
     repository: Path, git: Git, monkeypatch: pytest.MonkeyPatch, name: str, path: str
 ) -> None:
     monkeypatch.chdir(repository)
-    document = load_revision(f"{name}:{path}").document
-    assert document.text.encode() == git("show", f"{name}:{path}")
-    assert document.name == f"{name}:{path}"
+    Path("shown.toml").write_bytes(git("show", f"{name}:{path}"))
+    assert profile(f"{name}:{path}") == busplan.load_profile("shown.toml")
 
 
 def test_the_path_begins_at_the_current_folder(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,8 +84,8 @@ def test_what_is_there_under_that_name_comes_first(repository: Path, monkeypatch
     (repository / "HEAD:profiles" / "line.toml").write_text(text.replace("1000", "777"), encoding="utf-8")
     assert period_us("HEAD:profiles/line.toml") == 777
     (repository / "paper-4ms").write_text(text, encoding="utf-8")
-    assert load_revision("paper-4ms").document.name == "paper-4ms.toml"
-    assert load_revision("profiles/line.toml").profile.name == "line"
+    assert profile("paper-4ms") == busplan.load_profile("paper-4ms")
+    assert profile("profiles/line.toml").name == "line"
 
 
 @pytest.mark.parametrize(
@@ -166,13 +169,13 @@ def test_without_git(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert refusal("HEAD:line.toml") == (
         "HEAD:line.toml: no such file; to read REV:path needs git, and there is no git on PATH"
     )
-    assert load_revision("paper-4ms").profile.name == "paper-4ms"
+    assert profile("paper-4ms").name == "paper-4ms"
 
 
 def test_a_git_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     fake_git(tmp_path, monkeypatch, "exec sleep 60")
-    monkeypatch.setattr(revision, "TIMEOUT_S", 0.2)
+    monkeypatch.setattr("busplan.profile.sources.TIMEOUT_S", 0.2)
     assert refusal("HEAD:line.toml") == "HEAD:line.toml: git gave no answer within 0.2 s"
 
 

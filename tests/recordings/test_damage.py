@@ -6,22 +6,19 @@ import subprocess
 import sys
 import zlib
 from collections.abc import Callable
-from datetime import UTC, datetime
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from struct import pack
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import can
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
 from busplan.errors import BusplanError
-from busplan.recordings.can import CanFrames, read_can
-from busplan.recordings.ethercat import read_ethercat
 from tests.oracles.can_recording import arbitrated, candump, servo_8
 from tests.oracles.ethercat_recording import Machine, pcap, pcapng, simulated
 
@@ -34,8 +31,10 @@ MANY = 1_000_000
 """Far less than the bytes of a bomb, far more than those of any container [kB]."""
 
 
-def read(path: Path) -> CanFrames:
-    return read_can(path, progress=lambda _done, _total: None)
+def broken(answer: busplan.MeasuredAnswer) -> str:
+    """Where and why a log is read no further."""
+    start = "The log is cut or damaged after frame "
+    return next((remark.removeprefix(start) for remark in answer.remarks if remark.startswith(start)), "")
 
 
 LINES = {
@@ -54,11 +53,10 @@ def test_what_no_frame_can_be_ends_the_log_and_is_said(words: str, tmp_path: Pat
     whole, damaged = tmp_path / "whole.log", tmp_path / "damaged.log"
     whole.write_text(candump(LOGGED))
     damaged.write_text(f"{candump(LOGGED)}{LINES[words]}\n{candump(LOGGED[:9], start_s=1_700_000_002)}")
-    expected, found = (busplan.measured("can-servo-8", path) for path in (whole, damaged))
-    assert found.figures == expected.figures
-    said = f"The log is cut or damaged after frame {len(LOGGED):,}, read up to there: {words}."
-    assert said in found.remarks
-    assert [remark for remark in found.remarks if remark != said] == list(expected.remarks)
+    expected, answer = (busplan.measured("can-servo-8", path) for path in (whole, damaged))
+    assert answer.figures == expected.figures
+    assert broken(answer) == f"{len(LOGGED):,}, read up to there: {words}."
+    assert [remark for remark in answer.remarks if broken(answer) not in remark] == list(expected.remarks)
     damaged.write_text(f"{LINES[words]}\n{candump(LOGGED)}")
     if "days" not in words:  # of a first frame nobody knows when it came
         with pytest.raises(BusplanError, match="has no CAN frame") as caught:
@@ -76,17 +74,31 @@ def test_an_absurd_stamp_makes_no_load_smaller(run: Run, tmp_path: Path) -> None
         assert (done.returncode, "BP401 error: name: load: " in done.stdout) == (1, True)
 
 
-def test_an_identifier_of_29_bits_without_its_mark_is_damage(tmp_path: Path) -> None:
+def test_stamps_a_day_apart_are_no_damage(tmp_path: Path) -> None:
+    path = tmp_path / "bus.log"
+    day_later = "".join(f"({1_700_086_400 + number}.000000) can0 181#00\n" for number in range(2))
+    path.write_text(f"(1700000000.000000) can0 181#00\n{day_later}")
+    assert broken(busplan.measured("can-servo-8", path)) == ""
+    path.write_text(f"(1700000000.000000) can0 181#00\n{day_later.replace('86400.000000', '86400.000002')}")
+    assert broken(busplan.measured("can-servo-8", path)).startswith("1, read up to there: a stamp 1.0 days after")
+
+
+@pytest.mark.parametrize(
+    ("word", "is_damage"),
+    [("7FF", False), ("800", True), ("18FEF100", True), ("18FEF100x", False), ("1FFFFFFFx", False)],
+)
+def test_an_identifier_that_has_no_room_in_its_bits_is_damage(word: str, is_damage: bool, tmp_path: Path) -> None:
     path = tmp_path / "bus.asc"
     head = "date Thu Jan 1 10:00:00.000 am 2024\nbase hex  timestamps absolute\nBegin Triggerblock\n"
-    words = ("123", "7FF", "18FEF100")
-    frames = "".join(f"   {number}.0 1  {word} Rx   d 2 00 11\n" for number, word in enumerate(words))
-    path.write_text(head + frames + frames.replace("18FEF100", "18FEF100x"))
-    found = read(path)
-    assert found.identifiers.tolist() == [0x123, 0x7FF]
-    assert found.broken == "an identifier of 0x18fef100, which has no room in 11 bits"
-    path.write_text(head + frames.replace("18FEF100", "18FEF100x"))
-    assert read(path).identifiers.tolist() == [0x123, 0x7FF, 0x18FEF100]
+    words = ("123", word, "124")
+    path.write_text(head + "".join(f"   {number}.0 1  {word} Rx   d 2 00 11\n" for number, word in enumerate(words)))
+    answer = busplan.measured("can-servo-8", path)
+    (unplanned,) = (figure for figure in answer.figures if figure.quantity.startswith("frames of no message"))
+    assert unplanned.recorded == (1 if is_damage else 3)
+    identifier = f"{int(word.rstrip('x'), 16):#x}"
+    why = f"1, read up to there: an identifier of {identifier}, which has no room in 11 bits."
+    assert broken(answer) == (why if is_damage else "")
+    assert is_damage or identifier in unplanned.note
 
 
 @cache
@@ -126,16 +138,13 @@ def test_frames_are_taken_whole_or_not_at_all(
     path = folder / f"bus.{ending}"
     path.write_bytes(content)
     try:
-        found = read(path)
+        answer = busplan.measured("can-servo-8", path)
     except BusplanError:
         return
-    arrays: list[Any] = [field for field in found if isinstance(field, np.ndarray)]
-    assert {len(array) for array in arrays} == {len(found.times_us)}
-    assert np.isfinite(found.times_us).all()
-    assert np.diff(found.times_us, prepend=0).max() <= 86_400e6
-    assert datetime.fromtimestamp(found.start_s, tz=UTC)
-    assert (found.identifiers < np.where(found.extended, 1 << 29, 1 << 11)).all()
-    assert found.sizes.max() <= 64
+    values = [value for figure in answer.figures for value in (figure.planned, figure.recorded, figure.uncertainty)]
+    assert all(value is None or isfinite(value) for value in values)
+    assert all(figure.recorded <= 64 for figure in answer.figures if figure.unit == "bytes" and figure.recorded)
+    assert answer.day in ("", "1970-01-01") or "2023" <= answer.day[:4] <= "2242"
 
 
 @pytest.mark.parametrize("form", ["pcap", "pcapng"])
@@ -145,24 +154,21 @@ def test_a_packet_of_another_century_ends_a_capture(form: str, tmp_path: Path) -
     late = [(us + (2e15 if place == 150 else 0), packet) for place, (us, packet) in enumerate(packets)]
     path = tmp_path / "capture"
     path.write_bytes(write(packets[:150]))
-    expected = read_ethercat(path, progress=lambda _done, _total: None)
+    expected = busplan.measured("ethercat-servo-8", path)
     path.write_bytes(write(late))
-    found = read_ethercat(path, progress=lambda _done, _total: None)
-    assert np.array_equal(found.times_ns, expected.times_ns)
-    assert found.notes.packets == 150
-    # It is the first one behind those.
-    assert found.notes.broken_at is not None
-    assert 0 <= found.notes.broken_at - len(write(packets[:150])) <= 32
+    answer = busplan.measured("ethercat-servo-8", path)
+    assert answer.figures == expected.figures
+    (remark,) = (remark for remark in answer.remarks if remark not in expected.remarks)
+    words, _, at = remark.removesuffix(" on: read up to there.").rpartition(" ")
+    assert words == "The file is cut or damaged from byte"
+    # It is the first packet behind those.
+    assert 0 <= int(at.replace(",", "")) - len(write(packets[:150])) <= 32
 
 
 PEAK = """
-import resource, sys
-from busplan.recordings.can import read_can
-from pathlib import Path
-try:
-    print(read_can(Path("bus.blf"), progress=lambda *_: None).broken)
-except Exception as error:
-    print(error)
+import resource
+import busplan
+print(*busplan.measured("can-servo-8", "bus.blf").remarks, sep="\\n")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
@@ -187,11 +193,12 @@ def test_a_container_is_inflated_no_further_than_one_can_be(tmp_path: Path) -> N
         done = subprocess.run(
             [sys.executable, "-c", PEAK], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=300
         )
-        *_, said, peak_kb = done.stdout.splitlines()
-        assert said == "a container of over 16,000,000 bytes"
+        *remarks, peak_kb = done.stdout.splitlines()
+        assert any(remark.endswith(": a container of over 16,000,000 bytes.") for remark in remarks)
         assert int(peak_kb) < resource.getrusage(resource.RUSAGE_SELF).ru_maxrss + MANY // 2
     path.write_bytes(whole + object_of(10, pack("<H6xII", 3, 0, 0) + b"?"))
-    assert read(path).broken == "a container that is compressed by method 3"
+    why = broken(busplan.measured("can-servo-8", path))
+    assert why.endswith("read up to there: a container that is compressed by method 3.")
 
 
 @pytest.mark.parametrize("command", [("measured", "can-servo-8"), ("measured", "ethercat-servo-8"), ("import",)])

@@ -43,8 +43,8 @@ def test_figures_lie_within_their_u_of_the_truth(kind: str, subjects: Subjects) 
 def test_a_fault_larger_than_u_is_named_and_a_recording_that_shows_nothing_says_so(
     fault: Fault, subjects: Subjects
 ) -> None:
-    found = {seed: subjects(fault.kind, seed).with_fault(fault) for seed in SEEDS[fault.kind]}
-    named = {seed: fault.is_named(one) for seed, one in found.items() if one is not None}
+    recordings = {seed: subjects(fault.kind, seed).with_fault(fault) for seed in SEEDS[fault.kind]}
+    named = {seed: fault.is_named(recording) for seed, recording in recordings.items() if recording is not None}
     assert len(named) >= 2
     assert [seed for seed, is_named in named.items() if not is_named] == []
 

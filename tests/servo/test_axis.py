@@ -41,9 +41,9 @@ def ramp(speed_mm_s: float, *, cycles: int, period_s: float = 1e-3) -> Floats:
 
 def test_with_feed_forward_an_ideal_drive_stands_on_its_target() -> None:
     setpoints = 10 * np.sin(np.linspace(0, 3, 300))
-    found = simulate_axis(setpoints, axis=an_axis(velocity_feedforward=1.0), timing=TIMING)
-    line = np.interp(np.arange(1, len(found) + 1) / 10 - 1, np.arange(300), setpoints)
-    np.testing.assert_allclose(found, line, rtol=0, atol=1e-12)
+    positions = simulate_axis(setpoints, axis=an_axis(velocity_feedforward=1.0), timing=TIMING)
+    line = np.interp(np.arange(1, len(positions) + 1) / 10 - 1, np.arange(300), setpoints)
+    np.testing.assert_allclose(positions, line, rtol=0, atol=1e-12)
 
 
 def test_acceleration_feed_forward_makes_up_for_the_drive_lag() -> None:
@@ -85,10 +85,10 @@ def test_a_drive_told_a_velocity_approaches_it_exponentially() -> None:
     for step_us in (50.0, 100.0, 500.0):
         timing = LoopTiming(period_us=1000.0, step_us=step_us)
         axis = an_axis(position_gain_per_s=0.0, velocity_feedforward=1.0, drive_lag_us=lag_s * 1e6)
-        found = simulate_axis(ramp(speed, cycles=50), axis=axis, timing=timing)
-        time_s = np.arange(1, len(found) + 1) * step_us / 1e6 - 1e-3
+        positions = simulate_axis(ramp(speed, cycles=50), axis=axis, timing=timing)
+        time_s = np.arange(1, len(positions) + 1) * step_us / 1e6 - 1e-3
         exact = np.where(time_s > 0, speed * (time_s - lag_s * -np.expm1(-np.maximum(time_s, 0) / lag_s)), 0.0)
-        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(positions, exact, rtol=0, atol=1e-12)
 
 
 def test_halving_the_step_halves_the_distance_to_the_continuous_loop() -> None:
@@ -117,9 +117,9 @@ def test_a_start_from_rest_costs_the_friction_times_its_recovery_and_a_reversal_
         reversal_smoothing_mm_s=0.5,
     )
     there_and_back = 50e-3 * np.concatenate([np.arange(200), np.arange(199, -1, -1)])
-    found = simulate_axis(there_and_back, axis=axis, timing=LoopTiming(period_us=1000.0, step_us=10.0))
-    at_turn = found[200 * 100] - 199 * 50e-3
-    at_end = found[-1] - 50e-3
+    positions = simulate_axis(there_and_back, axis=axis, timing=LoopTiming(period_us=1000.0, step_us=10.0))
+    at_turn = positions[200 * 100] - 199 * 50e-3
+    at_end = positions[-1] - 50e-3
     assert at_turn == pytest.approx(-1.6 * 10e-3, rel=2e-3)
     assert at_end - at_turn == pytest.approx(2 * 1.6 * 10e-3, rel=2e-3)
 
@@ -134,9 +134,9 @@ def test_the_loop_does_not_see_below_half_an_encoder_count() -> None:
         setpoints = np.full(100, start + shift)
         setpoints[0] = start
         assert (np.abs(np.diff(simulate_axis(setpoints, axis=axis, timing=TIMING))) > 0).any() == moves
-    found = simulate_axis(np.append(start, np.full(200, start + 1.0)), axis=axis, timing=TIMING)
-    assert found[-1] == pytest.approx(start + 1.0, abs=0.5001 * 0.01)
-    assert found[-1] != start + 1.0
+    positions = simulate_axis(np.append(start, np.full(200, start + 1.0)), axis=axis, timing=TIMING)
+    assert positions[-1] == pytest.approx(start + 1.0, abs=0.5001 * 0.01)
+    assert positions[-1] != start + 1.0
 
 
 def test_an_axis_that_starts_between_two_counts_gets_no_kick_from_its_derivative() -> None:
@@ -154,18 +154,18 @@ def test_the_dac_has_exactly_its_levels_between_its_limits() -> None:
 
 
 def test_a_velocity_beyond_the_limit_is_clipped() -> None:
-    found = simulate_axis(np.append(0.0, np.full(1000, 500.0)), axis=an_axis(max_velocity_mm_s=10.0), timing=TIMING)
-    assert np.diff(found).max() == pytest.approx(10.0 * STEP_S)
+    positions = simulate_axis(np.append(0.0, np.full(1000, 500.0)), axis=an_axis(max_velocity_mm_s=10.0), timing=TIMING)
+    assert np.diff(positions).max() == pytest.approx(10.0 * STEP_S)
 
 
 def test_the_integral_does_not_wind_up() -> None:
     """Half a second at the limit with an integral of 8 mm s would overshoot by far more than the step."""
     axis = an_axis(position_gain_per_s=50.0, integral_gain_per_s2=600.0, max_velocity_mm_s=100.0)
-    found = simulate_axis(np.append(0.0, np.full(2000, 50.0)), axis=axis, timing=TIMING)
-    assert found.max() < 50 * 1.02
-    assert found[-1] == pytest.approx(50.0, abs=1e-6)
+    positions = simulate_axis(np.append(0.0, np.full(2000, 50.0)), axis=axis, timing=TIMING)
+    assert positions.max() < 50 * 1.02
+    assert positions[-1] == pytest.approx(50.0, abs=1e-6)
     back = simulate_axis(np.append(0.0, np.full(2000, -50.0)), axis=axis, timing=TIMING)
-    np.testing.assert_allclose(back, -found, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(back, -positions, rtol=0, atol=1e-12)
 
 
 # --- chunks -----------------------------------------------------------------------------------------------
@@ -194,7 +194,7 @@ def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch, loop: str) -> None:
     whole = simulate_axis(setpoints, **kwargs)  # type: ignore[arg-type]
     monkeypatch.setattr(axis_module, "_CHUNK_STEPS", {False: 70, True: 70})
     told: list[tuple[int, int]] = []
-    chunked = simulate_axis(setpoints, **kwargs, progress=lambda *one: told.append(one))  # type: ignore[arg-type]
+    chunked = simulate_axis(setpoints, **kwargs, progress=lambda *counts: told.append(counts))  # type: ignore[arg-type]
     np.testing.assert_array_equal(chunked, whole)
     assert len(told) == math.ceil(300 / 7)
     assert told == sorted(told)

@@ -16,9 +16,9 @@ ANGLE = np.linspace(0.3, 0.3 + 2 * np.pi, 70_000, endpoint=False)
 def test_a_nanometre_is_found_on_a_metre(a: float, b: float, deviation: float) -> None:
     angle = ANGLE[::500]
     x, y = (1000 + deviation) * np.cos(angle) + a, (1000 + deviation) * np.sin(angle) + b
-    found = measure_contour(x, y_mm=y, radius_mm=1000.0, part=slice(0, len(x)))
-    assert found.centre_offset_mm == pytest.approx((a, b), abs=1e-10)
-    assert found.radius_deviation_mm == pytest.approx(deviation, abs=1e-10)
+    contour = measure_contour(x, y_mm=y, radius_mm=1000.0, part=slice(0, len(x)))
+    assert contour.centre_offset_mm == pytest.approx((a, b), abs=1e-10)
+    assert contour.radius_deviation_mm == pytest.approx(deviation, abs=1e-10)
 
 
 def test_the_fit_is_scipys() -> None:
@@ -27,29 +27,29 @@ def test_the_fit_is_scipys() -> None:
     angle = random.uniform(0, 4, 400)
     x, y = distance * np.cos(angle) + 1.0, distance * np.sin(angle) - 2.0
     expected = least_squares(lambda p: np.hypot(x - p[0], y - p[1]) - 20 - p[2], np.zeros(3), xtol=1e-15, ftol=1e-15)
-    found = measure_contour(x, y_mm=y, radius_mm=20.0, part=slice(0, len(x)))
-    assert (*found.centre_offset_mm, found.radius_deviation_mm) == pytest.approx(expected.x, abs=1e-6)
+    contour = measure_contour(x, y_mm=y, radius_mm=20.0, part=slice(0, len(x)))
+    assert (*contour.centre_offset_mm, contour.radius_deviation_mm) == pytest.approx(expected.x, abs=1e-6)
 
 
 def test_the_measures_of_an_oval_off_its_place() -> None:
     radial = 0.004 * np.cos(2 * ANGLE)
     x, y = (50 + radial) * np.cos(ANGLE) + 0.002, (50 + radial) * np.sin(ANGLE)
-    found = measure_contour(x, y_mm=y, radius_mm=50.0, part=slice(0, len(ANGLE)), turn_share=1.0)
+    contour = measure_contour(x, y_mm=y, radius_mm=50.0, part=slice(0, len(ANGLE)), turn_share=1.0)
     error = np.hypot(x, y) - 50
-    assert found.mean_contour_error_mm == pytest.approx(np.abs(error).mean(), rel=1e-12)
-    assert found.max_contour_error_mm == np.abs(error).max()
-    assert (found.radial_deviation_min_mm, found.radial_deviation_max_mm) == (error.min(), error.max())
-    assert found.circular_deviation_mm == pytest.approx(0.008, rel=2e-3)
-    assert found.centre_offset_mm == pytest.approx((0.002, 0.0), abs=1e-7)
+    assert contour.mean_contour_error_mm == pytest.approx(np.abs(error).mean(), rel=1e-12)
+    assert contour.max_contour_error_mm == np.abs(error).max()
+    assert (contour.radial_deviation_min_mm, contour.radial_deviation_max_mm) == (error.min(), error.max())
+    assert contour.circular_deviation_mm == pytest.approx(0.008, rel=2e-3)
+    assert contour.centre_offset_mm == pytest.approx((0.002, 0.0), abs=1e-7)
 
 
 def test_only_the_part_at_constant_speed_counts_for_iso_and_all_of_it_for_the_contour_error() -> None:
     x, y = 10 * np.cos(ANGLE), 10 * np.sin(ANGLE)
     x[:100] *= 1.5
-    found = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(100, len(x)))
-    assert found.max_contour_error_mm > 1
-    assert found.radial_deviation_max_mm < 1e-12
-    assert found.circular_deviation_mm is None
+    contour = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(100, len(x)))
+    assert contour.max_contour_error_mm > 1
+    assert contour.radial_deviation_max_mm < 1e-12
+    assert contour.circular_deviation_mm is None
 
 
 @given(share=st.floats(0.01, 1))
@@ -57,11 +57,11 @@ def test_the_last_step_of_a_turn_counts_by_its_share(share: float) -> None:
     """Off its place by a, a circle has a mean error of 2 a / pi; what is left is of second order in a step."""
     angle = 0.3 + 2 * np.pi * np.arange(200) / (199 + share)
     x, y = 10 * np.cos(angle) + 0.002, 10 * np.sin(angle)
-    found = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(0, 200), turn_share=share)
-    assert found.mean_contour_error_mm == pytest.approx(0.004 / np.pi, rel=(2 * np.pi / 199) ** 2)
-    assert found.centre_offset_mm == pytest.approx((0.002, 0.0), abs=1e-10)
-    assert found.radius_deviation_mm == pytest.approx(0.0, abs=1e-10)
-    assert found.circular_deviation_mm == pytest.approx(0.0, abs=1e-10)
+    contour = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(0, 200), turn_share=share)
+    assert contour.mean_contour_error_mm == pytest.approx(0.004 / np.pi, rel=(2 * np.pi / 199) ** 2)
+    assert contour.centre_offset_mm == pytest.approx((0.002, 0.0), abs=1e-10)
+    assert contour.radius_deviation_mm == pytest.approx(0.0, abs=1e-10)
+    assert contour.circular_deviation_mm == pytest.approx(0.0, abs=1e-10)
 
 
 def test_blocks_do_not_show() -> None:
@@ -82,7 +82,7 @@ def test_the_angle_is_that_from_the_first_to_the_last_point_of_the_part() -> Non
 @given(points=st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), min_size=1, max_size=20))
 def test_even_a_lost_table_has_finite_measures(points: list[tuple[float, float]]) -> None:
     x, y = (np.array(column) for column in zip(*points, strict=True))
-    found = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(0, len(x)), turn_share=0.5)
-    assert found.circular_deviation_mm is not None
-    numbers = [found.circular_deviation_mm, found.radius_deviation_mm, *found.centre_offset_mm]
+    contour = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(0, len(x)), turn_share=0.5)
+    assert contour.circular_deviation_mm is not None
+    numbers = [contour.circular_deviation_mm, contour.radius_deviation_mm, *contour.centre_offset_mm]
     assert np.all(np.isfinite(numbers))

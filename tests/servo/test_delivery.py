@@ -15,9 +15,9 @@ def test_the_seed_decides_and_nothing_else() -> None:
     first, again = (arrivals(delivery, name="x", cycles=500, period_us=1000.0) for _ in range(2))
     np.testing.assert_array_equal(first.offsets_us, again.offsets_us)
     np.testing.assert_array_equal(first.lost, again.lost)
-    other = arrivals(Delivery(jitter_us=5.0, loss_probability=0.3, seed=8), name="x", cycles=500, period_us=1000.0)
-    assert (first.offsets_us != other.offsets_us).any()
-    assert (first.lost != other.lost).any()
+    reseeded = arrivals(Delivery(jitter_us=5.0, loss_probability=0.3, seed=8), name="x", cycles=500, period_us=1000.0)
+    assert (first.offsets_us != reseeded.offsets_us).any()
+    assert (first.lost != reseeded.lost).any()
 
 
 def test_the_jitter_is_common_to_both_axes_uniform_and_bounded() -> None:

@@ -54,13 +54,13 @@ timings = st.builds(
 def test_both_engines_give_the_same_bits(axis: Axis, timing: LoopTiming, backlash_mm: float) -> None:
     delivery = Delivery(jitter_us=30.0, skew_us=11.0, loss_probability=0.02, on_loss="extrapolate")
     arriving = arrivals(delivery, name="y", cycles=300, period_us=1000.0)
-    found = []
+    results = []
     for name in ("python", "compiled"):
         position = simulate_axis(WAVE, axis=axis, timing=timing, arrivals=arriving, engine=name)
         motor = position.copy()
         add_backlash(position, backlash_mm=backlash_mm, engine=name)
-        found.append((motor.tobytes(), position.tobytes()))
-    assert found[0] == found[1]
+        results.append((motor.tobytes(), position.tobytes()))
+    assert results[0] == results[1]
 
 
 @needs_compiled

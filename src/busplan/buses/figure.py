@@ -301,57 +301,28 @@ TRANSACTION: Final = Figure("transaction", "kind", "profile", "what is timed", s
 PAYLOAD_BYTES: Final = Figure("payload_bytes", "P", "profile", "payload of the transaction", sort="count")
 
 
-def capacity_figures(
-    terms: Iterable[Figure],
-    *,
-    setup: Iterable[Figure] = (),
-    own: Iterable[Figure] = (),
-    counted: Iterable[Figure] = (),
-) -> tuple[Figure, ...]:
-    """Put the figures of `capacity` together, in the order of its document.
-
-    Parameters
-    ----------
-    terms
-        The terms of the kind's cycle.
-    setup
-        Figures that say how the bus is set.
-    own
-        What else the kind has.
-    counted
-        Other counts of its nodes.
-    """
-    return (
-        *(TIMING_MODEL, PERIOD, NODES, AXES),
-        *setup,
-        *(AVAILABLE, REQUIRED, TIME_SLICE, REQUIRED_TIME_SLICE),
-        *own,
-        *terms,
-        *(BINDING_TERM, UTILISATION, MARGIN),
-        *counted,
-        *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS),
-        *CERTAINTY,
-    )
-
-
 class BusFigures(NamedTuple):
     """Figures of a kind of bus, and where answers show them."""
 
     terms: tuple[Figure, ...]
     """Figures of the terms, in the order of the wire."""
-    capacity: tuple[Figure, ...]
-    """Figures of `capacity`, in the order of its document: see `capacity_figures`."""
+    document_terms: tuple[Figure, ...] = ()
+    """The same in the order of the document of `capacity`, where that is another one."""
     setup: tuple[Figure, ...] = ()
     """Figures that say how the bus is set."""
     headings: tuple[str, ...] = ()
     """Keys of the set-up figures that a page's heading shows."""
+    added: tuple[Figure, ...] = ()
+    """Other figures of `capacity`."""
+    counts: tuple[Figure, ...] = ()
+    """Other counts of nodes in `capacity`."""
     table: tuple[Figure, ...] = ()
     """Rows of the kind in the table of `capacity`."""
     compared: tuple[Figure, ...] = ()
     """Figures of the kind that `diff` compares under each timing model."""
     planned: tuple[str, ...] = ()
     """Keys of figures of the kind that a plan's options show."""
-    phases: tuple[Figure, ...] = ()
+    latency_rows: tuple[Figure, ...] = ()
     """Rows of the table of `latency`, where they are not the terms."""
     latency_document: tuple[Figure, ...] = ()
     """Figures of `latency`, in the order of its document, where it has more than those rows."""
@@ -361,9 +332,24 @@ class BusFigures(NamedTuple):
     """Keys of the time and of the deadline of a transaction, where a kind has such."""
 
     @property
+    def capacity(self) -> tuple[Figure, ...]:
+        """Figures of `capacity`, in the order of its document."""
+        return (
+            *(TIMING_MODEL, PERIOD, NODES, AXES),
+            *self.setup,
+            *(AVAILABLE, REQUIRED, TIME_SLICE, REQUIRED_TIME_SLICE),
+            *self.added,
+            *(self.document_terms or self.terms),
+            *(BINDING_TERM, UTILISATION, MARGIN),
+            *self.counts,
+            *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS),
+            *CERTAINTY,
+        )
+
+    @property
     def latency_table(self) -> tuple[Figure, ...]:
         """Rows of the table of `latency`."""
-        return self.phases or (*self.terms, REQUIRED)
+        return self.latency_rows or (*self.terms, REQUIRED)
 
     @property
     def latency(self) -> tuple[Figure, ...]:

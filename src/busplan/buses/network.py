@@ -7,22 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from busplan.elementwise import Number, is_everywhere, larger, total
 from busplan.sections.machine import ProfileGroup
-from busplan.sourced import SYMBOLS
 
 if TYPE_CHECKING:
     from busplan.buses.bus import Bus
-
-
-SYMBOLS.update(
-    {
-        "period_us": "T_s",
-        "slice_ratio": "alpha",
-        "nodes": "N",
-        "available_us": "alpha T_s",
-        "required_us": "T_need",
-        "nonperiodic_us": "T_npd",
-    }
-)
 
 
 class Rate(NamedTuple):

@@ -272,16 +272,12 @@ def refused_changes(
     sources: dict[KeyPath, str] = {
         path_of(data, key): origin.get(key, f"{key} {value}") for key, value in changes.items()
     }
-    return BusplanError(*(_of_changes(finding, sources, kind=kind_of(data)) for finding in findings(error, data)))
+    return BusplanError(*(_of_changes(finding, sources) for finding in findings(error, data)))
 
 
-def _of_changes(finding: KeyFinding, sources: dict[KeyPath, str], *, kind: str | None) -> str:
+def _of_changes(finding: KeyFinding, sources: dict[KeyPath, str]) -> str:
     """Message for a problem after changes: of a changed key, of a key around or inside it, or of any other key."""
     if finding.path in sources:
-        if finding.kind == "unknown-key" and finding.key not in sources[finding.path]:
-            # The option stands for a key that its user did not write.
-            what = str(finding.path[-1]).replace("_", " ")
-            return f"{sources[finding.path]}: a bus of kind {kind} has no {what}"
         return f"{sources[finding.path]}: {finding.message}"
     near = [source for path, source in sources.items() if all(map(eq, path, finding.path))]
     if near:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal, Self
 from pydantic import Field, model_validator
 
 from busplan.elementwise import Number, choose, interpolated
+from busplan.english import plural
 from busplan.sections.base import (
     MAX_COUNT,
     MAX_TIME_US,
@@ -130,7 +131,7 @@ class TableExecution(GradedExecution):
             if before >= after
         ]
         if len(self.payload_bytes) != len(self.time_us):
-            values = f"has {len(self.time_us)} values and payload_bytes has {len(self.payload_bytes)}"
+            values = f"has {plural(len(self.time_us), 'value')} and payload_bytes has {len(self.payload_bytes)}"
             problems.append(Problem(f"{values}: the two must be of one length", key="time_us", kind="inconsistent"))
         if problems:
             raise refused(*problems)

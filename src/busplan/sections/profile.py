@@ -86,7 +86,7 @@ class Profile(Section):
 
     @property
     def asks_for_circle(self) -> bool:
-        """Whether the profile says anything that a circle test is for."""
+        """Whether the profile has a section of the circle test."""
         return not self.model_fields_set.isdisjoint(CIRCLE_SECTIONS)
 
     @property
@@ -102,23 +102,23 @@ class Profile(Section):
         return True
 
     @classmethod
-    def nodes_problems(cls, said: Collection[str]) -> Iterator[Problem]:
-        """Tell what is wrong with the way a profile says its nodes: all alike, or in groups.
+    def nodes_problems(cls, given: Collection[str]) -> Iterator[Problem]:
+        """Tell what is wrong with the way a profile gives its nodes: all alike, or in groups.
 
         Parameters
         ----------
-        said
-            Which sections, and which of the key bus.nodes, it has.
+        given
+            The sections that it has, and "bus.nodes" if it has that key.
         """
         for key in OF_ALIKE_NODES:
-            if "group" in said and key in said:
+            if "group" in given and key in given:
                 where = ", as group.NAME.nodes" if key == "bus.nodes" else ""
                 yield Problem(f"each [[group]] has its own{where}; remove one of the two", key=key, kind="inconsistent")
-            elif "group" not in said and key not in said:
+            elif "group" not in given and key not in given:
                 yield Problem(MISSING, key=key, kind="missing-key")
 
     @model_validator(mode="after")
-    def _nodes_are_said_once(self) -> Self:
+    def _nodes_are_given_once(self) -> Self:
         present = {name for name in self.model_fields_set if getattr(self, name) not in (None, ())}
         problems = list(self.nodes_problems(present | ({"bus.nodes"} if self.bus.nodes is not None else set())))
         names = [group.name for group in self.group]

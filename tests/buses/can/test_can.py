@@ -277,11 +277,6 @@ def test_latency_says_first_whether_all_messages_are_in_time_and_shows_the_lates
     assert "\nm0 " in whole
 
 
-def test_its_verdict_says_by_how_much_the_model_errs_to_the_safe_side(run: Run) -> None:
-    errs = "this timing model takes 8 to 15% more than classical frames that were measured"
-    assert f"  bias            none corrected: {errs}\n" in run("capacity", "can-servo-8").stdout
-
-
 def test_a_cure_of_the_load_is_a_longer_period(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "press.toml"
     path.write_text(text_of(profile(limits__max_load=0.4)), encoding="utf-8")

@@ -1,22 +1,19 @@
 """Networks of messages alone, as a car's: no nodes, no SYNC, no cycle; loads, response times and deadlines."""
 
 import json
+import tomllib
 from collections.abc import Callable, Sequence
-from itertools import combinations, count
+from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.can.frames import identifiers_twice, streams, traffic_of_profile
-from busplan.buses.can.rules import LIMITS
-from busplan.buses.can.section import CanProfile
-from busplan.errors import BusplanError
-from busplan.profile.document import Document, validate
-from busplan.questions.fit.network import network_of
+from tests.buses.can import machines
+from tests.buses.can.machines import figures, loaded, phases
 
 Run = Callable[..., Any]
 CAR = """\
@@ -52,21 +49,20 @@ deadline_us = 50000
 
 
 def car(**changes: Any) -> Any:
-    return busplan.load_profile(validate(Document("car.toml", CAR)), changes=changes)
+    return loaded(tomllib.loads(CAR), **changes)
 
 
 def network(
     *messages: dict[str, Any], bit_rate_kbit_s: float = 500, data_bit_rate_kbit_s: float | None = None
-) -> CanProfile:
+) -> busplan.Profile:
     data = {} if data_bit_rate_kbit_s is None else {"data_bit_rate_kbit_s": data_bit_rate_kbit_s}
     named = [{"name": f"m{number}", **message} for number, message in enumerate(messages)]
     bus = {"kind": "can", "bit_rate_kbit_s": bit_rate_kbit_s, **data}
-    return CanProfile.model_validate({"schema_version": 1, "name": "alone", "bus": bus, "message": named})
+    return loaded({"schema_version": 1, "name": "alone", "bus": bus, "message": named})
 
 
 def responses(own: Any) -> list[float | None]:
-    answers = busplan.latency(own, timing_model="worst-stuffing").transactions
-    return [answer.phases["worst_response_us"] for answer in answers]
+    return [*machines.responses(own).values()]
 
 
 # --- outside oracles --------------------------------------------------------------------------------------------------
@@ -96,32 +92,56 @@ def test_the_worst_instance_is_not_the_first() -> None:
     assert responses(own) == [2000, 3000, 3500]
 
 
-def simulated(own: CanProfile) -> list[float]:
+class Sent(NamedTuple):
+    """A message as an arbiter has it."""
+
+    place: str
+    """Its bits in the arbitration, of which the smaller wins: 11, RTR and IDE, or 11, SRR, IDE, 18 and RTR."""
+    frame_us: float
+    period_us: float
+    jitter_us: float
+
+
+def sent_messages(own: Any) -> list[Sent]:
+    frames_us = [each["frame_us"] for each in phases(own).values()]
+    return [
+        Sent(
+            f"{message.identifier:011b}00"
+            if (message.identifier_bits or own.bus.identifier_bits) == 11
+            else f"{message.identifier >> 18:011b}11{message.identifier & 0x3FFFF:018b}0",
+            us,
+            message.period_us,
+            message.jitter_us,
+        )
+        for message, us in zip(own.message, frames_us, strict=True)
+    ]
+
+
+def simulated(own: Any) -> list[float]:
     """The longest response of each message by an arbiter, from its critical instant to the end of its busy period.
 
     All messages of higher priorities are queued at once, as late as they may be and then as early, just after the
     longest frame of a lower priority has started.
     """
-    each = streams(traffic_of_profile(own), is_stuffed=True)
-    bit_us = 1000 / own.bus.bit_rate_kbit_s
-    return [_simulated(stream, each, bit_us) for stream in each]
+    each = sent_messages(own)
+    return [_simulated(message, each, 1000 / own.bus.bit_rate_kbit_s) for message in each]
 
 
-def _simulated(own: Any, each: Sequence[Any], bit_us: float) -> float:
-    lower = [stream.frame_us for stream in each if stream.first_place > own.first_place]
-    rivals = sorted((stream for stream in each if stream.first_place <= own.first_place), key=lambda it: it.first_place)
+def _simulated(own: Sent, each: Sequence[Sent], bit_us: float) -> float:
+    lower = [message.frame_us for message in each if message.place > own.place]
+    rivals = sorted(message for message in each if message.place <= own.place)
     now_us, sent, longest_us = max(lower, default=0.0), dict.fromkeys(range(len(rivals)), 0), 0.0
     for _ in count():
         # What is queued within a bit of the start still takes part in the arbitration; our own frame is the last.
-        for number, stream in enumerate(rivals):
-            queued_us = max(sent[number] * stream.period_us - stream.jitter_us, 0.0) if sent[number] else 0.0
-            if queued_us < now_us + bit_us - 1e-9 if stream is not own else queued_us <= now_us + 1e-9:
+        for number, message in enumerate(rivals):
+            queued_us = max(sent[number] * message.period_us - message.jitter_us, 0.0) if sent[number] else 0.0
+            if queued_us < now_us + bit_us - 1e-9 if message is not own else queued_us <= now_us + 1e-9:
                 break
         else:
             return longest_us
-        now_us += stream.frame_us
-        if stream is own:
-            due_us = sent[number] * stream.period_us - stream.jitter_us
+        now_us += message.frame_us
+        if message is own:
+            due_us = sent[number] * message.period_us - message.jitter_us
             longest_us = max(longest_us, now_us - due_us)
         sent[number] += 1
     raise AssertionError
@@ -162,10 +182,10 @@ def test_a_simulated_arbiter_never_takes_longer_and_reaches_the_bound(
     st.one_of(st.none(), st.tuples(st.integers(1, 9), st.integers(1, 20))),
 )
 @settings(max_examples=200, deadline=None)
-def test_identifiers_that_stand_twice_are_counted_pair_by_pair(
+def test_identifiers_that_stand_twice_are_told(
     said: list[tuple[int, int, bool]], machine: tuple[int, int] | None
 ) -> None:
-    """With and without a cycle, against every pair of streams; PDOs of over 8 bytes have frames 256 apart."""
+    """With and without a cycle; PDOs of over 8 bytes have frames 256 apart."""
     messages = [
         {"identifier": own, "identifier_bits": bits, "payload_bytes": 1, "period_us": 1e6, "name": f"m{number}"}
         | ({"per_node": True} if each and machine else {})
@@ -181,12 +201,16 @@ def test_identifiers_that_stand_twice_are_counted_pair_by_pair(
         data |= {"payload": {"read_bytes": size, "write_bytes": size}}
     elif not messages:
         return
-    traffic = traffic_of_profile(CanProfile.model_validate(data))
-    owners = [
-        {(number, stream.identifier_bits) for number in range(int(stream.first), int(stream.last) + 1)}
-        for stream in streams(traffic, is_stuffed=True)
-    ]
-    assert identifiers_twice(traffic) == sum(len(early & late) for early, late in combinations(owners, 2))
+    nodes, size = machine or (0, 0)
+    frames = [(own, bits) for own, bits, each in said if not (each and machine)]
+    frames += [(own + node, bits) for own, bits, each in said if each for node in range(1, nodes + 1)]
+    pdos = [first + 0x100 * number for first in (0x181, 0x201) for number in range(-(-size // 8))]
+    frames += [(first + node, 11) for first in pdos for node in range(nodes)]
+    frames += [(0x80, 11)] if machine else []
+    is_shared = len(set(frames)) < len(frames)
+    profile = loaded(data)
+    assert ("identifiers" in figures(profile).exceeded) == is_shared
+    assert any(one.finding.code == "BP122" for one in busplan.check(profile).findings) == is_shared
 
 
 # --- what each question says ------------------------------------------------------------------------------------------
@@ -215,16 +239,6 @@ def test_the_verdict_is_by_load_and_deadlines() -> None:
     assert [*late.verdicts[0].change.changes] == ["bus.bit_rate_kbit_s"]
     full = busplan.capacity(car(**{"limits.max_load": 0.05}))
     assert full.verdicts[0].deciding.exceeded == ("load",)
-
-
-def test_the_limit_of_deadlines_is_the_largest_response_over_its_deadline() -> None:
-    (deadline,) = (limit for limit in LIMITS if limit.key == "deadline")
-    late = car(**{"message.doors.deadline_us": 8000, "message.lights.deadline_us": 10_000})
-    largest = max(us / own.deadline_us for us, own in zip(responses(late)[1:], late.message[1:], strict=True) if us)
-    assert largest > 1
-    assert deadline.value(network_of(late)) == pytest.approx(largest)
-    assert deadline.is_broken(network_of(late))
-    assert not deadline.is_broken(network_of(car()))
 
 
 def test_a_card_says_loads_and_the_latest_message_and_nothing_of_a_cycle(run: Run, tmp_path: Path) -> None:
@@ -328,12 +342,11 @@ def test_many_messages_are_answered_as_few_are(number: int) -> None:
         for own in range(number)
     ]
     own = network(*messages, bit_rate_kbit_s=1000)
-    each = streams(traffic_of_profile(own), is_stuffed=True)
-    assert sum(stream.frames_us / stream.period_us for stream in each) < 1
+    each = sent_messages(own)
+    assert sum(message.frame_us / message.period_us for message in each) < 1
     us = responses(own)
-    for place_ in {0, number // 2, number - 1}:
-        bit_us = 1.0
-        assert us[place_] == pytest.approx(_simulated(each[place_], each, bit_us))
+    for place in {0, number // 2, number - 1}:
+        assert us[place] == pytest.approx(_simulated(each[place], each, bit_us=1.0))
 
 
 @pytest.mark.parametrize(
@@ -351,12 +364,12 @@ def test_many_messages_are_answered_as_few_are(number: int) -> None:
     ],
 )
 def test_what_asks_for_a_cycle_refuses_them(ask: Callable[[Any], Any], words: str) -> None:
-    with pytest.raises(BusplanError, match=words):
+    with pytest.raises(busplan.BusplanError, match=words):
         ask(car())
 
 
 @pytest.mark.parametrize(
-    ("more", "place_", "words"),
+    ("more", "place", "words"),
     [
         ("[cycle]\nperiod_us = 4000\n", "cycle", "has no nodes; add bus.nodes, [node] and [payload], or remove it"),
         ("[servo]\nstep_us = 100\n", "servo", "asks for nodes, and a network of messages alone has none"),
@@ -369,10 +382,10 @@ def test_what_asks_for_a_cycle_refuses_them(ask: Callable[[Any], Any], words: st
         ("[payload]\nread_bytes = 8\nwrite_bytes = 8\n", "", "missing section [node]"),
     ],
 )
-def test_keys_of_a_cycle_are_refused_where_they_stand(more: str, place_: str, words: str) -> None:
-    with pytest.raises(BusplanError) as refused:
-        validate(Document("car.toml", CAR + more))
-    assert any(words in problem and place_ in problem for problem in refused.value.problems)
+def test_keys_of_a_cycle_are_refused_where_they_stand(more: str, place: str, words: str) -> None:
+    with pytest.raises(busplan.BusplanError) as refused:
+        loaded(tomllib.loads(CAR + more))
+    assert any(words in problem and place in problem for problem in refused.value.problems)
 
 
 def test_the_report_has_no_part_of_a_cycle(run: Run, tmp_path: Path) -> None:

@@ -5,20 +5,10 @@ from math import lcm
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import busplan
-from busplan.buses.can.cycle import NONE, WORST, CanCycle
-from busplan.buses.can.frames import streams, traffic_of_profile
-from busplan.buses.can.rules import LIMITS
-from busplan.buses.can.section import CanProfile
-from busplan.elementwise import plain
-from busplan.profile.conversion import converted
-from busplan.profile.edit import profile_text
-from busplan.questions.fit.network import network_of
-from busplan.sections.base import with_unchecked
-from busplan.sections.profile import Profile
+from tests.buses.can.machines import WORST, figures, loaded, responses, terms, text_of
 
 Run = Callable[..., Any]
 
@@ -33,7 +23,7 @@ def message(name: str, identifier: int, **keys: Any) -> dict[str, Any]:
     return {"name": name, "identifier": identifier, "payload_bytes": 8, "period_us": 1e5, **keys}
 
 
-def machine(*groups: dict[str, Any], messages: tuple[dict[str, Any], ...] = (), **bus: Any) -> CanProfile:
+def machine(*groups: dict[str, Any], messages: tuple[dict[str, Any], ...] = (), **bus: Any) -> busplan.Profile:
     data = {
         "schema_version": 1,
         "name": "mixed",
@@ -42,23 +32,19 @@ def machine(*groups: dict[str, Any], messages: tuple[dict[str, Any], ...] = (), 
         "group": groups,
         "message": messages,
     }
-    return CanProfile.model_validate(data)
+    return loaded(data)
 
 
 DRIVES = group("drives", 4)
 
 
-def mixed(every: int = 4, **keys: Any) -> CanProfile:
+def mixed(every: int = 4, **keys: Any) -> busplan.Profile:
     return machine(DRIVES, group("io", 6, axes=0, every=every, **keys), messages=(message("sdo", 0x600),))
 
 
-def cycle(own: Profile, model: str = WORST) -> CanCycle:
-    return CanCycle(network_of(own), model)
-
-
-def responses(own: Profile) -> dict[str, float | None]:
-    answers = busplan.latency(own, timing_model=[WORST]).transactions
-    return {f"{answer.group} {answer.transaction}".strip(): answer.phases["worst_response_us"] for answer in answers}
+def load(own: busplan.Profile, model: str = WORST) -> float:
+    share: float = figures(own, model).own["bus_load"]
+    return share
 
 
 @pytest.mark.parametrize("rates", [(1, 1, 1), (1, 4, 2), (3, 4, 6), (2, 2, 2), (5, 1, 240)])
@@ -68,15 +54,15 @@ def test_the_load_is_that_of_all_cycles_of_the_common_multiple(rates: tuple[int,
     for number in range(cycles):
         due = [nodes.nodes for nodes, every in zip(own.group, rates, strict=True) if number % every == 0]
         sent_us += 55 + sum(2 * nodes * 85 for nodes in due)
-    assert plain(cycle(own).load) == pytest.approx(sent_us / cycles / 4000)
+    assert load(own) == pytest.approx(sent_us / cycles / 4000)
 
 
 def test_the_fullest_cycle_decides() -> None:
     slow, fast = mixed(every=4), mixed(every=1)
-    for model in (WORST, NONE):
-        assert cycle(slow, model).by_term == cycle(fast, model).by_term
-        assert plain(cycle(slow, model).load) < plain(cycle(fast, model).load)
-    one, other = (busplan.capacity(own).results[0] for own in (slow, fast))
+    for model in (WORST, "no-stuffing"):
+        assert terms(slow, model) == terms(fast, model)
+        assert load(slow, model) < load(fast, model)
+    one, other = figures(slow), figures(fast)
     assert (one.margin_us, one.uncertainty_us) == (other.margin_us, other.uncertainty_us)
 
 
@@ -88,7 +74,7 @@ def test_every_cycle_is_what_it_was_without_the_key() -> None:
 
 def test_nodes_that_are_alike_may_all_be_slow() -> None:
     own = busplan.load_profile("can-servo-8", changes={"payload.every": 3})
-    assert plain(cycle(own).load) < plain(cycle(busplan.load_profile(own, changes={"payload.every": 1})).load)
+    assert load(own) < load(busplan.load_profile(own, changes={"payload.every": 1}))
 
 
 def test_slow_pdos_go_before_a_message_less_often() -> None:
@@ -100,8 +86,6 @@ def test_slow_pdos_go_before_a_message_less_often() -> None:
         bit_rate_kbit_s=125,
     )
     slower = busplan.load_profile(own, changes={"cycle.period_us": 9000.0, "limits.max_load": 0.95})
-    each = {stream.label: stream for stream in streams(traffic_of_profile(slower), is_stuffed=True)}
-    assert each["io feedback"].period_us == 4 * each["drives feedback"].period_us == 36_000
     slow, fast = (
         responses(busplan.load_profile(slower, changes={"group.io.every": every}))["long"] for every in (4, 1)
     )
@@ -133,13 +117,20 @@ def test_no_cycle_lasts_longer_than_the_fullest() -> None:
     drives = group("drives", 1, size=1)
     slow = group("io", 1, size=1, axes=0, every=2, feedback_identifier=0x7F0, command_identifier=0x7F1)
     own, alone = (machine(*groups, messages=(own_message,)) for groups in ((drives, slow), (drives,)))
-    fullest_us = plain(cycle(busplan.load_profile(own, changes={"group.io.every": 1})).required_us)
+    fullest_us = figures(busplan.load_profile(own, changes={"group.io.every": 1})).required_us
     assert fullest_us == 55 + 2 * 41 + 4 * 65 + 135
     # By its deadline alone it could block twice, and the two missing PDOs of one byte are shorter.
-    assert plain(cycle(alone).required_us) == fullest_us - 2 * 65 + 135
-    assert plain(cycle(own).required_us) == fullest_us
-    shown = busplan.timeline(own)
-    assert shown.used_us == pytest.approx(plain(cycle(own).required_us))
+    assert figures(alone).required_us == fullest_us - 2 * 65 + 135
+    assert figures(own).required_us == fullest_us
+    assert busplan.timeline(own).used_us == pytest.approx(fullest_us)
+    assert busplan.timeline(own, cycle=2).used_us == pytest.approx(fullest_us - 4 * 65 + 2 * 65)
+
+
+def test_a_cycle_of_sync_alone_waits_for_a_single_frame() -> None:
+    low = tuple(message(f"low{number}", 0x7F0 + number) for number in range(3))
+    own = machine(group("io", 2, size=8, every=2), messages=low)
+    assert busplan.timeline(own, cycle=1).used_us == 55 + 2 * 48 + 4 * 135 + 3 * 135
+    assert busplan.timeline(own, cycle=2).used_us == 55 + 135
 
 
 def test_a_loop_waits_for_the_cycle_in_which_its_commands_are_due() -> None:
@@ -159,37 +150,9 @@ def test_the_circle_needs_a_set_point_in_every_cycle() -> None:
         busplan.circle_test(own)
 
 
-def test_arrays_of_points_give_what_each_point_gives() -> None:
-    own = machine(
-        group("drives", 2, size=1),
-        group("io", 1, size=1, axes=0, every=2, feedback_identifier=0x7A0, command_identifier=0x7C0),
-        messages=(message("between", 0x300, period_us=2000.0), message("low", 0x7FF, deadline_us=5000.0)),
-    )
-    keys = {
-        "group.io.every": np.array([1, 2, 5]).reshape(-1, 1, 1),
-        "group.io.nodes": np.array([1, 4, 12]).reshape(-1, 1),
-        "cycle.period_us": np.array([1500.0, 4000.0]),
-    }
-    varied: Any = own
-    for key, values in keys.items():
-        varied = with_unchecked(varied, key, values.astype(float))
-    together, shape = network_of(varied), (3, 3, 2)
-
-    def answers(network: Any) -> dict[str, Any]:
-        found: dict[str, Any] = {limit.key: limit.is_broken(network) for limit in LIMITS}
-        run = CanCycle(network, WORST)
-        return {**found, "required": run.required_us, "load": run.load, "jitter": run.sync_jitter_us()}
-
-    told = {key: np.broadcast_to(each, shape) for key, each in answers(together).items()}
-    for place in np.ndindex(shape):
-        at = {key: np.broadcast_to(values, shape)[place].item() for key, values in keys.items()}
-        expected = answers(network_of(busplan.load_profile(own, changes=at)))
-        assert {key: each[place] for key, each in told.items()} == pytest.approx(expected), at
-
-
 def test_every_question_takes_a_machine_of_two_rates(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "arm.toml").write_text(profile_text(mixed()), encoding="utf-8")
-    (tmp_path / "old.toml").write_text(profile_text(mixed(every=1)), encoding="utf-8")
+    (tmp_path / "arm.toml").write_text(text_of(mixed()), encoding="utf-8")
+    (tmp_path / "old.toml").write_text(text_of(mixed(every=1)), encoding="utf-8")
     for command in ("capacity", "latency", "timeline", "map", "plan", "compare", "check"):
         assert run(command, "arm.toml", cwd=tmp_path).returncode in (0, 1), command
     assert "% with all PDOs in every cycle" in run("capacity", "arm.toml", cwd=tmp_path).stdout
@@ -202,13 +165,7 @@ def test_every_question_takes_a_machine_of_two_rates(run: Run, tmp_path: Path) -
 
 
 def test_rates_of_groups_go_along_where_the_other_kind_has_them() -> None:
-    own = mixed()
-    without, rates = converted(own, "sercos3"), converted(own, "ethercat")
-    assert "group.io.every" in without.left_out
-    assert not any(key.endswith(".every") for key in rates.left_out)
-    assert [group.every for group in network_of(rates.profile).groups] == [
-        group.every for group in network_of(own).groups
-    ]
-    back = converted(rates.profile, "can").profile
-    assert [group.every for group in network_of(back).groups] == [group.every for group in network_of(own).groups]
-    assert "Data at a slower rate go in every cycle there" in str(busplan.compare(own))
+    answer = busplan.compare(mixed(), buses=["ethercat", "sercos3"])
+    left_out = {bus["kind"]: bus["left_out"] for bus in answer.to_dict()["buses"]}
+    assert ("group.io.every" in left_out["sercos3"], "group.io.every" in left_out["ethercat"]) == (True, False)
+    assert "Data at a slower rate go in every cycle there" in str(answer)

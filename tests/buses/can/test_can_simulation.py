@@ -3,37 +3,24 @@
 The simulation, tests/oracles/can_simulation.py, sends frame by frame and knows nothing of the model. Networks are
 drawn, and an adversary climbs from random moments of messages, nodes and host to worse ones. For many more networks:
 
-    python tests/buses/can/test_can_simulation.py 0 5000
+    python -m tests.buses.can.test_can_simulation 0 5000
 
 takes that many from a seed on, and says what came closest to the bounds. Times are whole microseconds, and a bit takes
 one.
 """
 
-import importlib.util
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
-from itertools import cycle, islice
-from pathlib import Path
+from math import inf, lcm
 from random import Random
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import pytest
 
-from busplan.buses.can.frames import SYNC, Message, Pdos, Stream, Traffic, streams
-from busplan.buses.can.waiting import responses, waits
-from busplan.elementwise import plain
-from busplan.sections.base import TRANSACTION_KINDS
-
-if TYPE_CHECKING:
-    from tests.oracles.can_simulation import Frame, Run, SimulatedMessage, SimulatedNode, simulate
-else:
-    path = Path(__file__).parents[2] / "oracles" / "can_simulation.py"
-    spec = importlib.util.spec_from_file_location("can_simulation", path)
-    oracle = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(oracle)
-    Frame, Run, simulate = oracle.Frame, oracle.Run, oracle.simulate
-    SimulatedMessage, SimulatedNode = oracle.SimulatedMessage, oracle.SimulatedNode
+import busplan
+from busplan.buses.can.equations import frame_us
+from tests.buses.can.machines import loaded, responses
+from tests.oracles.can_simulation import Frame, Run, SimulatedMessage, SimulatedNode, simulate
 
 CYCLES: Final = 4
 FULL: Final = 1
@@ -46,58 +33,162 @@ ROUNDING: Final = 1e-9
 Whole = tuple[int, ...]
 
 
-class Scene(NamedTuple):
-    """A network whose cycle and messages are in time, with the bounds of the model [us]."""
+class Message(NamedTuple):
+    """A message beside SYNC and PDOs."""
 
-    traffic: Traffic
-    each: tuple[Stream, ...]
-    nodes: int
-    write_us: int
-    lasts_us: float
-    """From the start of a cycle to the end of its last command."""
-    responses_us: dict[str, float]
-    """Of SYNC and of all messages."""
+    name: str
+    identifier: int
+    size: int
+    period_us: int
+    jitter_us: int = 0
+    deadline_us: float = 50_000
+    bits: int = 11
+    senders: int = 1
+    """Nodes that send it, each with the identifier behind that of the node before."""
+    data_bit_rate: int = 0
+    """Of CAN FD; 0 of a classical frame [kbit/s]."""
+    burst: int = 1
+
+
+class Group(NamedTuple):
+    """Nodes that are alike, with a PDO in either direction."""
+
+    sizes: tuple[int, int] = (8, 8)
+    """Feedback and command [bytes]."""
+    identifiers: tuple[int, int] = (0x181, 0x201)
+    nodes: int = 1
+    every: int = 1
+
+
+class Traffic(NamedTuple):
+    """All that is sent."""
+
+    groups: tuple[Group, ...]
+    messages: tuple[Message, ...] = ()
+    sync_identifier: int = 0x80
+    sync_bytes: int = 0
+    read_us: int = 0
+    """Slowest execution of any node, of feedback as of a command."""
+    host_us: int = 0
+    bit_rate: int = 1000
+    data_bit_rate: int = 0
+    """Of SYNC and PDOs as frames of CAN FD; 0 of classical ones."""
 
     @property
-    def period_us(self) -> int:
-        """Communication period [us]."""
-        return int(plain(self.traffic.period_us))
+    def nodes(self) -> int:
+        """Nodes of all groups."""
+        return len(self.each)
 
-    def frames(self, name: str) -> list[tuple[Frame, ...]]:
-        """Frames of each node in one direction."""
-        parts = [one for one in self.each if one.name == name]
-        if self.traffic.pdos[0].group:  # each node is a group
-            own = (pdos.group for pdos in self.traffic.pdos if pdos.name == name)
-            return [tuple(frame(one, 0) for one in parts if one.group == group) for group in own]
-        return [tuple(frame(one, node) for one in parts) for node in range(self.nodes)]
+    @property
+    def each(self) -> list[Group]:
+        """The group of each node."""
+        return [group for group in self.groups for _ in range(group.nodes)]
 
-    def due(self, number: int) -> frozenset[str]:
-        """Groups whose PDOs are in a cycle."""
-        return frozenset(pdos.group for pdos in self.traffic.pdos if not (number - FULL) % int(plain(pdos.every)))
+    def frame(self, identifier: int, size: int, *, bits: int = 11, data_bit_rate: int | None = None) -> Frame:
+        """A frame for the simulation, whose smaller number wins: its bits on the wire up to 32."""
+        base = f"{identifier:011b}00"  # 11 bits, RTR 0, IDE 0
+        extended = f"{identifier >> 18:011b}11{identifier & 0x3FFFF:018b}0"  # 11 bits, SRR 1, IDE 1, 18 bits, RTR 0
+        word = base if bits == 11 else extended
+        rate = self.data_bit_rate if data_bit_rate is None else data_bit_rate
+        us = frame_us(
+            size,
+            identifier_bits=bits,
+            bit_rate_kbit_s=self.bit_rate,
+            data_bit_rate_kbit_s=rate,
+            is_stuffed=True,
+        )
+        return Frame(int(word.ljust(32, "0"), 2), int(us))
 
-    def own_us(self, number: int) -> float:
-        """From the start of a cycle to the end of its last command, or of SYNC where it has none, by its own bound."""
-        sent, due = self.traffic, self.due(number)
-        cyclic = (one for one in self.each if one.name == SYNC or (not one.is_message and one.group in due))
-        us = sum(one.identifiers * one.frame_us for one in cyclic)
-        us += plain(sent.read_us) + plain(sent.host_us) if due else 0
-        return plain(waits(sent, us, due, is_stuffed=True).lasts_us)
+    @property
+    def sync(self) -> Frame:
+        """The frame of SYNC."""
+        return self.frame(self.sync_identifier, self.sync_bytes)
+
+    def pdos(self, direction: int) -> list[tuple[Frame, ...]]:
+        """Frames of the PDO of each node: of feedback, 0, or of the command, 1."""
+        most = 64 if self.data_bit_rate else 8
+        return [
+            tuple(
+                self.frame(group.identifiers[direction] + node + 0x100 * number, min(left, most))
+                for number, left in enumerate(range(group.sizes[direction], 0, -most))
+            )
+            for group in self.groups
+            for node in range(group.nodes)
+        ]
 
     @property
     def senders(self) -> list[tuple[Message, Frame]]:
         """Each sender of each message, with its frame."""
-        sent = zip(self.traffic.messages, (one for one in self.each if one.is_message), strict=True)
-        return [(message, frame(one, place)) for message, one in sent for place in range(one.identifiers)]
+        return [
+            (
+                message,
+                self.frame(
+                    message.identifier + node, message.size, bits=message.bits, data_bit_rate=message.data_bit_rate
+                ),
+            )
+            for message in self.messages
+            for node in range(message.senders)
+        ]
+
+    def profile(self, period_us: float) -> busplan.Profile:
+        """A profile of it."""
+        bus = {"kind": "can", "bit_rate_kbit_s": self.bit_rate, "sync_identifier": self.sync_identifier}
+        bus |= {"sync_counter": bool(self.sync_bytes), "host_us": self.host_us}
+        if self.data_bit_rate:
+            bus["data_bit_rate_kbit_s"] = self.data_bit_rate
+        execution = {"kind": "linear", "grade": "measured", "base_us": self.read_us, "per_byte_us": 0}
+        groups = [
+            {
+                "name": f"g{place}",
+                "nodes": group.nodes,
+                "axes": 1,
+                "every": group.every,
+                "execution": execution,
+                **dict(zip(("read_bytes", "write_bytes"), group.sizes, strict=True)),
+                **dict(zip(("feedback_identifier", "command_identifier"), group.identifiers, strict=True)),
+            }
+            for place, group in enumerate(self.groups)
+        ]
+        messages = [
+            {
+                "name": message.name,
+                "identifier": message.identifier - (message.senders > 1),
+                "identifier_bits": message.bits,
+                "per_node": message.senders > 1,
+                "fd": bool(message.data_bit_rate),
+                "brs": message.data_bit_rate != self.bit_rate,
+                "payload_bytes": message.size,
+                "period_us": message.period_us,
+                "jitter_us": message.jitter_us,
+                "deadline_us": message.deadline_us,
+                "burst": message.burst,
+            }
+            for message in self.messages
+        ]
+        data = {"schema_version": 1, "name": "any", "bus": bus, "cycle": {"period_us": period_us}, "group": groups}
+        return loaded({**data, "message": messages})
 
 
-def frame(own: Stream, place: int) -> Frame:
-    """A frame of a stream for the simulation, whose smaller number wins: its bits on the wire up to 32."""
-    identifier = own.first + place
-    if own.identifier_bits == 11:  # 11 bits, RTR 0, IDE 0
-        bits = f"{identifier:011b}00"
-    else:  # 11 bits, SRR 1, IDE 1, 18 bits, RTR 0
-        bits = f"{identifier >> 18:011b}11{identifier & 0x3FFFF:018b}0"
-    return Frame(int(bits.ljust(32, "0"), 2), int(own.frame_us))
+class Scene(NamedTuple):
+    """A network whose cycle and messages are in time, with the bounds of the model [us]."""
+
+    traffic: Traffic
+    period_us: int
+    lasts_us: float
+    """From the start of a cycle to the effect of its last command."""
+    responses_us: dict[str, float]
+    """Of SYNC and of all messages."""
+
+    def due(self, number: int) -> frozenset[int]:
+        """Places of the groups whose PDOs are in a cycle."""
+        groups = enumerate(self.traffic.groups)
+        return frozenset(place for place, group in groups if (number - FULL) % group.every == 0)
+
+    def own_us(self, number: int) -> float:
+        """From the start of a cycle to the effect of its last command, or to the end of SYNC, by its own bound."""
+        cycles = lcm(*(group.every for group in self.traffic.groups))
+        shown = busplan.timeline(self.traffic.profile(self.period_us), cycle=(number - 1) % cycles + 1)
+        return float(shown.used_us)
 
 
 class Moments(NamedTuple):
@@ -123,75 +214,71 @@ def traffic(random: Random, *, nodes: int) -> Traffic:
         size = random.choice([0, 1, 8, 8])
         messages.append(Message(f"m{number}", identifier, size, period_us, jitter_us, deadline_us))
     if random.random() < 0.4:  # some that block, seldom
-        messages += (Message(f"low{number}", 0x7F0 + number, 8, 50_000, 0, 50_000) for number in range(3))
-    command = random.choice([0x201, 0x201, 0x120])
+        messages += (Message(f"low{number}", 0x7F0 + number, 8, 50_000) for number in range(3))
+    sizes = random.choice([1, 4, 8, 8, 10, 16]), random.choice([1, 4, 8, 8, 10, 16])
     return Traffic(
-        period_us=1.0,
-        bit_rate_kbit_s=1000,
-        data_bit_rate_kbit_s=0.0,
-        identifier_bits=11,
+        (Group(sizes, (0x181, random.choice([0x201, 0x201, 0x120])), nodes),),
+        tuple(messages),
         sync_identifier=random.choice([0x80, 0x80, 0x80, 0x15, 0x650]),
         sync_bytes=random.randint(0, 1),
         read_us=random.choice([0, 1, random.randint(0, 150), random.randint(0, 900)]),
         host_us=random.choice([0, 1, random.randint(1, 400)]),
-        pdos=(
-            Pdos("read", "", 0x181, nodes, random.choice([1, 4, 8, 8, 10, 16])),
-            Pdos("write", "", command, nodes, random.choice([1, 4, 8, 8, 10, 16])),
-        ),
-        messages=tuple(messages),
     )
 
 
-def of_both_formats(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
+def of_both_formats(sent: Traffic, random: Random) -> Traffic:
     """The same with some messages of the other format, and some that each node sends."""
     each = []
     for message in sent.messages:
-        bits, identifier = random.choice([11, 29]), int(plain(message.identifier))
+        bits, identifier = random.choice([11, 29]), message.identifier
         if bits == 29:
-            identifier = (identifier << 18) + random.choice([0, 5, (1 << 18) - 200])
-        senders = random.choice([1, 1, nodes])
-        each.append(message._replace(identifier=identifier, identifier_bits=bits, senders=senders))
-    return replace(sent, messages=tuple(each))
+            identifier = (identifier << 18) + random.choice([1, 5, (1 << 18) - 200])
+        # Behind 0x780 there is no room for all node-IDs.
+        senders = random.choice([1, 1, sent.nodes]) if identifier < 0x780 or bits == 29 else 1
+        each.append(message._replace(identifier=identifier, bits=bits, senders=senders))
+    return sent._replace(messages=tuple(each))
 
 
-def of_fd(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
+def of_fd(sent: Traffic, random: Random) -> Traffic:
     """The same on CAN FD with two bit rates, of which both make whole microseconds: frames of all sorts."""
     each = []
-    for message in of_both_formats(sent, random, nodes=nodes).messages:
+    for message in of_both_formats(sent, random).messages:
         own = message._replace(period_us=2 * message.period_us, deadline_us=2 * message.deadline_us)
         if random.random() < 0.6:
             size, data_bit_rate = random.choice([0, 8, 10, 16, 32, 64]), random.choice([1000, 1000, 500])
-            own = own._replace(payload_bytes=size, data_bit_rate_kbit_s=data_bit_rate)
+            own = own._replace(size=size, data_bit_rate=data_bit_rate)
         each.append(own)
-    pdos = (
-        own._replace(frame_bytes=(64,), most_bytes=256, payload_bytes=random.choice([1, 8, 20, 64, 70]))
-        for own in sent.pdos
-    )
-    return replace(sent, bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=tuple(pdos), messages=tuple(each))
+    sizes = random.choice([1, 8, 20, 64, 70]), random.choice([1, 8, 20, 64, 70])
+    groups = tuple(group._replace(sizes=sizes) for group in sent.groups)
+    return sent._replace(bit_rate=500, data_bit_rate=1000, groups=groups, messages=tuple(each))
 
 
-def of_rates(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
+def of_rates(sent: Traffic, random: Random) -> Traffic:
     """The same with each node a group, most of them not in every cycle, in any order of identifiers."""
-    rates = [random.choice([1, 1, 2, 2, 3, 4]) for _ in range(nodes)]
-    pdos = [
-        Pdos(kind, f"g{place}", base + 8 * start, 1, random.choice([1, 8, 8, 16]), every=rates[place])
-        for kind, base in zip(TRANSACTION_KINDS, (0x181, random.choice([0x201, 0x201, 0x120])), strict=True)
-        for place, start in enumerate(random.sample(range(nodes), nodes))
+    nodes, command = sent.nodes, random.choice([0x201, 0x201, 0x120])
+    orders = random.sample(range(nodes), nodes), random.sample(range(nodes), nodes)
+    groups = [
+        Group(
+            (random.choice([1, 8, 8, 16]), random.choice([1, 8, 8, 16])),
+            (0x181 + 8 * orders[0][place], command + 8 * orders[1][place]),
+            every=random.choice([1, 1, 2, 2, 3, 4]),
+        )
+        for place in range(nodes)
     ]
     between = (0x188, 0x18D, 0x195, 0x208, 0x20E, 0x215, 0x12E)  # and further frames
     fresh = [one._replace(identifier=random.choice([one.identifier, *between])) for one in sent.messages]
-    return replace(sent, pdos=tuple(pdos), messages=tuple(fresh))
+    return sent._replace(groups=tuple(groups), messages=tuple(fresh))
 
 
-def of_bursts(sent: Traffic, random: Random, *, nodes: int) -> Traffic:
+def of_bursts(sent: Traffic, random: Random) -> Traffic:
     """The same with several frames at once, and jitters beyond the period."""
     each = []
-    for message in of_both_formats(sent, random, nodes=nodes).messages:
-        burst, period_us = random.choice([1, 2, 2, 3, 6]), int(plain(message.period_us))
+    for message in of_both_formats(sent, random).messages:
+        burst, period_us = random.choice([1, 2, 2, 3, 6]), message.period_us
         jitter_us = random.choice([0, 0, random.randint(0, 3 * period_us)])
-        deadline_us = jitter_us + random.choice([1, 2, 5]) * plain(message.deadline_us)
+        deadline_us = jitter_us + random.choice([1, 2, 5]) * message.deadline_us
         each.append(message._replace(burst=burst, jitter_us=jitter_us, deadline_us=deadline_us))
-    return replace(sent, messages=tuple(each))
+    return sent._replace(messages=tuple(each))
 
 
 KINDS: Final = {"both formats": of_both_formats, "CAN FD": of_fd, "rates": of_rates, "bursts": of_bursts}
@@ -200,50 +287,55 @@ KINDS: Final = {"both formats": of_both_formats, "CAN FD": of_fd, "rates": of_ra
 
 def scene(random: Random, *, kind: str = "") -> Scene | None:
     """A random network; None where identifiers stand twice, the bus is full, or a message is late."""
-    nodes = random.randint(1, 4)
-    sent, write_us = traffic(random, nodes=nodes), random.choice([0, 0, random.randint(0, 300)])
+    sent = traffic(random, nodes=random.randint(1, 4))
     if kind:
-        sent = KINDS[kind](sent, random, nodes=nodes)
+        sent = KINDS[kind](sent, random)
     slack_us = random.choice([0, 0, 1, random.randint(0, 300), random.randint(0, 4000)])
-    found = judged(sent, nodes=nodes, write_us=write_us, slack_us=slack_us)
+    found = judged(sent, slack_us=slack_us)
     if found is None or random.random() < 0.4:
         return found
     # The tightest deadlines: fewer frames block.
-    tight = (one._replace(deadline_us=found.responses_us[one.name]) for one in sent.messages)
-    return judged(replace(sent, messages=tuple(tight)), nodes=nodes, write_us=write_us, slack_us=slack_us)
+    tight = (message._replace(deadline_us=found.responses_us[message.name]) for message in sent.messages)
+    return judged(sent._replace(messages=tuple(tight)), slack_us=slack_us)
 
 
-def judged(sent: Traffic, *, nodes: int, write_us: int, slack_us: int) -> Scene | None:
+def judged(sent: Traffic, *, slack_us: int = 0) -> Scene | None:
     """A network at the smallest period and some slack, with the bounds of the model."""
-    each = streams(sent, is_stuffed=True)
-    identifiers = [frame(one, place).identifier for one in each for place in range(one.identifiers)]
+    ways = zip(sent.each, sent.pdos(0), sent.pdos(1), strict=True)
+    pdos = [
+        (frame, group.every) for group, feedback, command in ways for frames in (feedback, command) for frame in frames
+    ]
+    identifiers = [frame.identifier for frame in (sent.sync, *(frame for frame, _ in pdos))]
+    identifiers += (frame.identifier for _, frame in sent.senders)
     if len(set(identifiers)) < len(identifiers):
         return None
-    own_us = sum(one.identifiers * one.frame_us for one in each if not one.is_message)
-    lasts_us = waits(sent, own_us + plain(sent.read_us) + plain(sent.host_us), is_stuffed=True).lasts_us
-    sent = replace(sent, period_us=int(lasts_us) + write_us + slack_us)
-    each = streams(sent, is_stuffed=True)
-    if sum(one.frames_us / one.period_us for one in each) > MOST_LOAD:
+    lasts_us = responses(sent.profile(1e6))["loop"]
+    if lasts_us is None:
         return None
-    worst = responses(sent, is_stuffed=True)
-    if any(one.is_message and found.us > one.deadline_us for one, found in worst):
+    period_us = int(lasts_us) + slack_us
+    load = (sent.sync.us + sum(frame.us / every for frame, every in pdos)) / period_us
+    if load + sum(frame.us / message.period_us for message, frame in sent.senders) > MOST_LOAD:
         return None
-    bounds = {one.name: found.us for one, found in worst if one.is_message or one.name == SYNC}
-    return Scene(sent, each, nodes, write_us, lasts_us, bounds)
+    bounds = {name: inf if us is None else us for name, us in responses(sent.profile(period_us)).items()}
+    if any(bounds[message.name] > message.deadline_us for message in sent.messages):
+        return None
+    return Scene(sent, period_us, lasts_us, bounds)
 
 
 def run(own: Scene, at: Moments) -> Run:
     """Simulate a network at some moments."""
-    (sync,) = (one for one in own.each if one.name == SYNC)
-    ways = zip(own.frames("feedback"), own.frames("command"), at.reads_us, strict=True)
-    sent = (sent for _, sent in own.senders)
+    sent, writes_us = own.traffic, (own.traffic.read_us,) * CYCLES
+    ways = zip(sent.pdos(0), sent.pdos(1), at.reads_us, sent.each, strict=True)
     return simulate(
-        frame(sync, 0),
+        sent.sync,
         [
-            SimulatedNode(*way, (own.write_us,) * CYCLES, int(plain(pdos.every)), FULL)
-            for way, pdos in zip(ways, islice(cycle(own.traffic.pdos), own.nodes), strict=True)
+            SimulatedNode(feedback, command, reads_us, writes_us, group.every, FULL)
+            for feedback, command, reads_us, group in ways
         ],
-        [SimulatedMessage(*one) for one in zip(sent, at.due_us, at.queued_us, strict=True)],
+        [
+            SimulatedMessage(frame, due, queued)
+            for (_, frame), due, queued in zip(sent.senders, at.due_us, at.queued_us, strict=True)
+        ],
         period_us=own.period_us,
         host_us=at.host_us,
         late_us=at.late_us,
@@ -256,10 +348,10 @@ def moments(own: Scene, random: Random) -> Moments:
     def some(most: float) -> int:
         return random.choice([0, int(most), int(most), random.randint(0, int(most))])
 
-    each = [_instants(message, own, random) for message, _ in own.senders]
+    each = [_instants(message, own, random) for message, _ in own.traffic.senders]
     return Moments(
-        reads_us=tuple(tuple(some(plain(own.traffic.read_us)) for _ in range(CYCLES)) for _ in range(own.nodes)),
-        host_us=tuple(some(plain(own.traffic.host_us)) for _ in range(CYCLES)),
+        reads_us=tuple(tuple(some(own.traffic.read_us) for _ in range(CYCLES)) for _ in range(own.traffic.nodes)),
+        host_us=tuple(some(own.traffic.host_us) for _ in range(CYCLES)),
         due_us=tuple(due for due, _ in each),
         queued_us=tuple(queued for _, queued in each),
         late_us=random.choice([0, 1]),
@@ -268,8 +360,8 @@ def moments(own: Scene, random: Random) -> Moments:
 
 def _instants(message: Message, own: Scene, random: Random) -> tuple[Whole, Whole]:
     """When instances of a message are due and queued: no more than b - 1 + ceil(t / T) of them are due in a time t."""
-    period_us, jitter_us = int(plain(message.period_us)), int(plain(message.jitter_us))
-    saved_us = (int(plain(message.burst)) - 1) * period_us
+    period_us, jitter_us = message.period_us, message.jitter_us
+    saved_us = (message.burst - 1) * period_us
     at_us, dues_us, queues_us = random.randint(-period_us - jitter_us, own.period_us), [], []
     # From one to the next it is a period; what was not sent is made up for later, up to a burst.
     regular_us = at_us
@@ -287,7 +379,7 @@ def varied(own: Scene, at: Moments, last: Run, random: Random) -> Moments:
     """The same moments, but for one message, one node or the host; messages go where the last run was on the verge."""
     fresh, what = moments(own, random), random.randrange(8)
     if what == 0:
-        place = random.randrange(own.nodes)
+        place = random.randrange(own.traffic.nodes)
         return at._replace(reads_us=_with(at.reads_us, place, fresh.reads_us[place]))
     if what == 1:
         return at._replace(host_us=fresh.host_us, late_us=fresh.late_us)
@@ -310,30 +402,29 @@ def _with(each: tuple[Whole, ...], place: int, new: Whole) -> tuple[Whole, ...]:
     return (*each[:place], new, *each[place + 1 :])
 
 
-def shares(own: Scene, found: Run) -> Iterator[tuple[str, float]]:
+def shares(own: Scene, found: Run, fewer_us: dict[int, float]) -> Iterator[tuple[str, float]]:
     """What a run took over the bounds of the model, by what it is of [1]."""
-    yield from (("cycle", (us - own.write_us) / own.lasts_us) for us in found.cycles_us)
+    yield from (("cycle", us / own.lasts_us) for us in found.cycles_us)
     for number, (us, sync_us) in enumerate(zip(found.cycles_us, found.syncs_us, strict=True)):
         if own.due(number) != own.due(FULL):
-            ends_us = us - own.write_us if own.due(number) else sync_us
-            yield "cycle with fewer PDOs", ends_us / own.own_us(number)
-    yield from ((SYNC, us / own.responses_us[SYNC]) for us in found.syncs_us)
-    for (message, _), each in zip(own.senders, found.responses_us, strict=True):
+            yield "cycle with fewer PDOs", (us if own.due(number) else sync_us) / fewer_us[number]
+    yield from (("SYNC", us / own.responses_us["SYNC"]) for us in found.syncs_us)
+    for (message, _), each in zip(own.traffic.senders, found.responses_us, strict=True):
         yield from (("message", us / own.responses_us[message.name]) for us in each)
 
 
 def climbed(own: Scene, random: Random, *, runs: int) -> dict[str, float]:
     """The largest share of each bound that any of some runs took, each a step up from the last, by what it is of."""
-    is_seldom = any(own.due(number) != own.due(FULL) for number in range(CYCLES))
-    aims = ["cycle", "cycle", "message", *["cycle with fewer PDOs"] * is_seldom]
+    fewer_us = {number: own.own_us(number) for number in range(CYCLES) if own.due(number) != own.due(FULL)}
+    aims = ["cycle", "cycle", "message", *["cycle with fewer PDOs"] * bool(fewer_us)]
     aim = random.choice(aims)
     at = moments(own, random)
-    last, best = run(own, at), dict.fromkeys((*aims, SYNC), 0.0)
+    last, best = run(own, at), dict.fromkeys((*aims, "SYNC"), 0.0)
     top = 0.0
     for _ in range(runs):
         fresh = varied(own, at, last, random)
         found = run(own, fresh)
-        each = [*shares(own, found)]
+        each = [*shares(own, found, fewer_us)]
         for name, share in each:
             best[name] = max(best[name], share)
         reached = max((share for name, share in each if name == aim), default=0.0)
@@ -372,14 +463,7 @@ def test_no_simulated_run_of_other_frames_takes_longer_than_the_model(kind: str)
         assert 0.99 < share <= 1 + ROUNDING, (name, seed)
 
 
-def drives(nodes: int, *low: Message, read_us: int = 150, host_us: int = 0) -> Traffic:
-    """Nodes with full PDOs, and messages of lower priorities."""
-    pdos = (Pdos("read", "", 0x181, nodes, 8), Pdos("write", "", 0x201, nodes, 8))
-    more = {"period_us": 1.0, "sync_identifier": 0x80, "read_us": read_us, "host_us": host_us}
-    return Traffic(bit_rate_kbit_s=1000, pdos=pdos, messages=low, **more)
-
-
-LOW: Final = tuple(Message(f"low{number}", 0x7F0 + number, 8, 50_000, 0, 50_000) for number in range(3))
+LOW: Final = tuple(Message(f"low{number}", 0x7F0 + number, 8, 50_000) for number in range(3))
 FRAME_US: Final = 135
 VERGE_US: Final = 1
 """How much earlier than what it blocks a frame starts."""
@@ -387,9 +471,9 @@ VERGE_US: Final = 1
 
 @pytest.mark.parametrize("host_us", [0, 1, 80])
 def test_three_frames_of_lower_priorities_block_one_cycle(host_us: int) -> None:
-    own = judged(drives(2, *LOW, host_us=host_us), nodes=2, write_us=0, slack_us=0)
+    own = judged(Traffic((Group(nodes=2),), LOW, read_us=150, host_us=host_us))
     assert own is not None
-    assert own.lasts_us == 55 + 150 + 4 * FRAME_US + host_us + 3 * FRAME_US
+    assert own.lasts_us == 55 + 150 + 4 * FRAME_US + host_us + 3 * FRAME_US + 150
     # One before SYNC, one before the feedback, one before the commands.
     start_us = own.period_us
     slow_us = start_us - VERGE_US + FRAME_US + 55 + 150
@@ -403,17 +487,16 @@ def test_three_frames_of_lower_priorities_block_one_cycle(host_us: int) -> None:
 
 
 def test_a_late_cycle_and_a_fast_one_behind_it_hold_a_message_up() -> None:
-    others = (*LOW, Message("bridge", 0x7F4, 8, 50_000, 0, 50_000))
-    last = Message("last", 0x7FF, 8, 50_000, 0, 50_000)
-    own = judged(drives(4, *others, last, host_us=1), nodes=4, write_us=0, slack_us=0)
+    # The bridge goes between the commands and the next SYNC, so that the last message never meets a free bus.
+    read_us, others, last = 100, (*LOW, Message("bridge", 0x7F4, 8, 50_000)), Message("last", 0x7FF, 8, 50_000)
+    own = judged(Traffic((Group(nodes=4),), (*others, last), read_us=read_us, host_us=1))
     assert own is not None
     start_us, period_us = own.period_us, own.period_us
-    slow_us = start_us - VERGE_US + FRAME_US + 55 + 150
+    slow_us = start_us - VERGE_US + FRAME_US + 55 + read_us
     fed_us = slow_us - VERGE_US + 5 * FRAME_US
-    # The bridge goes between the commands and the next SYNC, so that the last message never meets a free bus.
     moments_us = (start_us - VERGE_US, slow_us - VERGE_US, fed_us, fed_us + VERGE_US, fed_us + VERGE_US)
     each = tuple((us,) for us in moments_us)
-    reads_us, host_us = ((150, 150, 0, 0),) * 4, (1, 1, 0, 0)
+    reads_us, host_us = ((read_us, read_us, 0, 0),) * 4, (1, 1, 0, 0)
     found = run(own, Moments(reads_us=reads_us, host_us=host_us, due_us=each, queued_us=each, late_us=0))
     (response_us,) = found.responses_us[-1]
     assert response_us <= own.responses_us["last"]
@@ -423,14 +506,9 @@ def test_a_late_cycle_and_a_fast_one_behind_it_hold_a_message_up() -> None:
 
 
 def test_a_burst_of_messages_meets_slow_pdos_twice() -> None:
-    burst = tuple(Message(f"low{number:02}", 0x7E0 + number, 8, 50_000, 0, 50_000) for number in range(14))
-    pdos = tuple(
-        Pdos(kind, f"g{node}", base + node, 1, 8, every=1 if node == 0 else 2)
-        for kind, base in zip(TRANSACTION_KINDS, (0x181, 0x201), strict=True)
-        for node in range(4)
-    )
-    sent = replace(drives(4, *burst, read_us=0), pdos=pdos)
-    own = judged(sent, nodes=4, write_us=0, slack_us=0)
+    burst = tuple(Message(f"low{number:02}", 0x7E0 + number, 8, 50_000) for number in range(14))
+    groups = tuple(Group(identifiers=(0x181 + node, 0x201 + node), every=1 if node == 0 else 2) for node in range(4))
+    own = judged(Traffic(groups, burst))
     assert own is not None
     assert own.period_us == 55 + 8 * FRAME_US + 3 * FRAME_US
     # All come with the SYNC of a full cycle, and the last of them is sent behind the next full cycle.
@@ -443,16 +521,10 @@ def test_a_burst_of_messages_meets_slow_pdos_twice() -> None:
 
 
 def test_a_message_between_pdos_makes_no_cycle_longer_than_the_fullest() -> None:
-    pdos = (
-        Pdos("read", "fast", 0x181, 1, 1),
-        Pdos("read", "slow", 0x7F0, 1, 1, every=2),
-        Pdos("write", "fast", 0x201, 1, 1),
-        Pdos("write", "slow", 0x7F1, 1, 1, every=2),
-    )
-    between = Message("between", 0x300, 8, 2000, 0, 2000)
-    own = judged(replace(drives(2, between, host_us=20), pdos=pdos), nodes=2, write_us=0, slack_us=0)
+    groups = (Group((1, 1)), Group((1, 1), (0x7F0, 0x7F1), every=2))
+    own = judged(Traffic(groups, (Message("between", 0x300, 8, 2000, 0, 2000),), read_us=150, host_us=20))
     assert own is not None
-    assert own.lasts_us == 55 + 150 + 4 * 65 + 20 + FRAME_US
+    assert own.lasts_us == 55 + 150 + 4 * 65 + 20 + FRAME_US + 150
     longest_us = [0] * CYCLES
     for start_us in range(2000):
         each = (tuple(range(start_us, CYCLES * own.period_us, 2000)),)
@@ -465,25 +537,23 @@ def test_a_message_between_pdos_makes_no_cycle_longer_than_the_fullest() -> None
 def mixed(*, is_fd: bool) -> Traffic:
     """Messages of both formats behind the PDOs of a node, of CAN FD some with two bit rates, the first goes first."""
     bases = ((0x300, 11, 8), (0x300 << 18, 29, 8), (0x301, 11, 64), ((0x301 << 18) + 5, 29, 0), (0x302 << 18, 29, 12))
-    sent = [
-        Message(f"m{number}", identifier, size if is_fd else min(size, 8), 50_000, 0, 50_000)._replace(
-            identifier_bits=bits, data_bit_rate_kbit_s=1000 if is_fd and size > 8 else 0.0
+    messages = tuple(
+        Message(f"m{number}", identifier, size if is_fd else min(size, 8), 50_000, bits=bits)._replace(
+            data_bit_rate=1000 if is_fd and size > 8 else 0
         )
         for number, (identifier, bits, size) in enumerate((*bases, (0x303, 11, 1)))
-    ]
-    own = drives(1, *sent, read_us=0)
+    )
     if not is_fd:
-        return own
-    pdos = tuple(pdo._replace(frame_bytes=(64,), most_bytes=256, payload_bytes=20) for pdo in own.pdos)
-    return replace(own, bit_rate_kbit_s=500, data_bit_rate_kbit_s=1000, pdos=pdos)
+        return Traffic((Group(),), messages)
+    return Traffic((Group((20, 20)),), messages, bit_rate=500, data_bit_rate=1000)
 
 
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("is_fd", [False, True])
 def test_each_of_mixed_messages_reaches_its_response_time(place: int, *, is_fd: bool) -> None:
-    own = judged(mixed(is_fd=is_fd), nodes=1, write_us=0, slack_us=5000)
+    own = judged(mixed(is_fd=is_fd), slack_us=5000)
     assert own is not None
-    start_us, frames_us = own.period_us, [sent.us for _, sent in own.senders]
+    start_us, frames_us = own.period_us, [frame.us for _, frame in own.traffic.senders]
     # All that go before it come with SYNC, and the longest of those behind it has just started. Others come later.
     moments_us = [start_us] * (place + 1) + [3 * start_us] * (len(frames_us) - place - 1)
     blocking_us = max(frames_us[place + 1 :], default=0)

@@ -4,13 +4,11 @@ The simulation of arbitration, tests/oracles/can_simulation.py, knows nothing of
 tests/oracles/can_textbook.py, nothing of its short cuts.
 """
 
-import importlib.util
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from random import Random
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 from unittest import mock
 
 import pytest
@@ -18,25 +16,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.can.section import CanProfile
-from busplan.errors import BusplanError
+from tests.buses.can.machines import WORST, figures, loaded
+from tests.oracles import can_textbook as textbook
+from tests.oracles.can_simulation import Frame, SimulatedMessage, simulate
 
-if TYPE_CHECKING:
-    from tests.oracles import can_textbook as textbook
-    from tests.oracles.can_simulation import Frame, SimulatedMessage, simulate
-else:
-
-    def oracle(name: str) -> Any:
-        path = Path(__file__).parents[2] / "oracles" / f"{name}.py"
-        spec = importlib.util.spec_from_file_location(name, path)
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        return module
-
-    simulation, textbook = oracle("can_simulation"), oracle("can_textbook")
-    Frame, SimulatedMessage, simulate = simulation.Frame, simulation.SimulatedMessage, simulation.simulate
-
-WORST: Final = "worst-stuffing"
 KBIT_S: Final = 500
 BIT_US: Final = 2
 
@@ -54,14 +37,14 @@ def computed_by(form: str) -> Iterator[None]:
         yield
 
 
-def network(*messages: dict[str, Any], **bus: Any) -> CanProfile:
+def network(*messages: dict[str, Any], **bus: Any) -> busplan.Profile:
     """Messages alone, the first goes first."""
     each = [
         {"name": f"m{place}", "identifier": 16 * place, "payload_bytes": 8, **keys}
         for place, keys in enumerate(messages)
     ]
     bus = {"kind": "can", "bit_rate_kbit_s": KBIT_S, **bus}
-    return CanProfile.model_validate({"schema_version": 1, "name": "bursts", "bus": bus, "message": each})
+    return loaded({"schema_version": 1, "name": "bursts", "bus": bus, "message": each})
 
 
 class Sent(NamedTuple):
@@ -89,18 +72,18 @@ def simulated_us(each: Sequence[Sent], place: int, until_us: int) -> tuple[int, 
     return found.responses_us[place]
 
 
-def latencies(own: CanProfile, *, form: str = "compiled") -> list[Mapping[str, Any]]:
+def latencies(own: busplan.Profile, *, form: str = "compiled") -> list[Mapping[str, Any]]:
     """Figures of each message in the worst case."""
     with computed_by(form):
         return [one.phases for one in busplan.latency(own, timing_model=[WORST]).transactions]
 
 
-def frames_us(own: CanProfile) -> list[float]:
+def frames_us(own: busplan.Profile) -> list[float]:
     """Frame of each message [us]."""
     return [float(one["frame_us"]) for one in latencies(own)]
 
 
-def responses_us(own: CanProfile) -> list[float | None]:
+def responses_us(own: busplan.Profile) -> list[float | None]:
     """Worst-case response of each message [us]."""
     return [one["worst_response_us"] for one in latencies(own)]
 
@@ -162,7 +145,7 @@ def test_no_other_start_takes_longer(messages: list[dict[str, Any]], random: Ran
         assert one["worst_response_us"] is None or max(us) <= one["worst_response_us"] + 1e-6
 
 
-def random_network(random: Random, *, count: int, load: float) -> CanProfile:
+def random_network(random: Random, *, count: int, load: float) -> Any:
     """Messages of all sorts that together make a load, with few periods between them or many."""
     periods_us = [random.uniform(3000, 200_000) for _ in range(random.choice([2, 9, count]))]
     messages = []
@@ -222,15 +205,14 @@ def test_a_burst_waits_for_itself_and_others_wait_for_all_of_it() -> None:
         first["backlog_us"],
     ) == (270, 0, 4, 4 * 270)
     # Its period is the mean: the load is that of a frame in each of them.
-    (found,) = busplan.capacity(own, timing_model=[WORST]).results
-    assert found.own["bus_load"] == pytest.approx(270 / 100_000 + 270 / 10_000 + 270 / 50_000)
+    assert figures(own).own["bus_load"] == pytest.approx(270 / 100_000 + 270 / 10_000 + 270 / 50_000)
 
 
 def test_the_deadline_of_a_burst_counts_from_when_it_is_queued() -> None:
     burst = {"period_us": 100_000, "burst": 5}
     for deadline_us, is_kept in [(270 * 5, True), (270 * 5 - 1, False)]:
-        (found,) = busplan.capacity(network({**burst, "deadline_us": deadline_us}), timing_model=[WORST]).results
-        assert ("deadline" in found.exceeded) is not is_kept
+        late = figures(network({**burst, "deadline_us": deadline_us})).exceeded
+        assert ("deadline" in late) is not is_kept
 
 
 def test_a_load_of_one_or_more_has_no_response_time() -> None:
@@ -257,12 +239,12 @@ def test_an_fd_frame_without_a_switch_has_the_bit_rate_of_the_bus_in_all_parts(s
 
 def test_brs_needs_no_data_bit_rate_and_is_of_fd_alone() -> None:
     message = {"period_us": 100_000, "payload_bytes": 64}
-    with pytest.raises(ValueError, match="brs = false says a frame without a switch"):
+    with pytest.raises(busplan.BusplanError, match="brs = false says a frame without a switch"):
         network({**message, "fd": True})
-    with pytest.raises(ValueError, match="write fd = true"):
+    with pytest.raises(busplan.BusplanError, match="write fd = true"):
         network({"period_us": 100_000, "brs": False})
     own = network({**message, "fd": True, "brs": False})
-    with pytest.raises(BusplanError, match=r"asks for bus\.data_bit_rate_kbit_s"):
+    with pytest.raises(busplan.BusplanError, match=r"asks for bus\.data_bit_rate_kbit_s"):
         busplan.load_profile(own, changes={"message.m0.brs": True})
 
 
@@ -275,10 +257,8 @@ def test_a_sweep_has_at_each_point_what_the_point_has(key: str) -> None:
     values = {"burst": [1, 2, 8], "jitter_us": [0, 400, 12_000], "period_us": [300, 5000, 90_000]}[key]
     swept = busplan.sweep(own, vary={f"message.m0.{key}": values}, timing_model=[WORST])
     for value, load, fits in zip(values, swept["bus_load"], swept["fits"], strict=True):
-        (found,) = busplan.capacity(
-            busplan.load_profile(own, changes={f"message.m0.{key}": value}), timing_model=[WORST]
-        ).results
-        assert (load, fits) == (pytest.approx(found.own["bus_load"]), found.fits)
+        alone = figures(busplan.load_profile(own, changes={f"message.m0.{key}": value}))
+        assert (load, fits) == (pytest.approx(alone.own["bus_load"]), alone.fits)
     assert len(set(swept["fits"])) > 1
 
 

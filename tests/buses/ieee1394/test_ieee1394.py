@@ -1,6 +1,6 @@
 """The standard's figures against their public sources."""
 
-from math import ceil
+from math import ceil, sqrt
 
 import pytest
 from hypothesis import given
@@ -80,3 +80,16 @@ def test_a_command_that_is_executed_beside_the_bus_counts_as_it_is_executed() ->
     assert slower_us - delay_us("on_arrival", node__write_response="unified") == pytest.approx(100 + 100, abs=1e-9)
     extra: dict[str, object] = {"node__execution__worst_extra_us": 900.0}
     assert delay_us("next_sync", node__read_response="concatenated", node__write_response="unified", **extra) == 2000
+
+
+def test_the_doubt_of_the_gap_term_is_as_large_at_a_larger_gap_count_as_at_a_smaller() -> None:
+    def doubt_us(measured: int, gap_count: int) -> float:
+        fitted = {"node.execution.residual": "standard", "node.execution.measured_gap_count": measured}
+        bench = busplan.load_profile("paper-two-node", changes={**fitted, "bus.gap_count": gap_count})
+        (figures,) = busplan.capacity(bench, timing_model="standard").results
+        (us,) = (doubt.us for doubt in figures.doubts if doubt.key == "gap_term")
+        return us
+
+    # Four halves of split transactions, each with half of the 4 / 98.304 us that a gap count adds to equation (4).
+    by_hand_us = 4 * 2 * 58 / 98.304 / sqrt(3)
+    assert doubt_us(63, 5) == doubt_us(5, 63) == pytest.approx(by_hand_us)

@@ -1,45 +1,55 @@
 """A SERCOS I or II ring: its cycle by hand, the gap that must be given, and what it breaks."""
 
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
 
 import busplan
-from busplan.buses import kind_named
-from busplan.buses.published import parts_tested
-from busplan.buses.sercos.sercos2_section import Sercos2Profile
-from busplan.elementwise import plain
-from busplan.errors import BusplanError
-from busplan.profile.edit import profile_text
-from busplan.questions.evidence import sections_of
-from busplan.questions.fit.inputs import given
-from busplan.sections.profile import Profile
+from busplan import BusplanError, Profile
 
-DATA: dict[str, Any] = {
-    "schema_version": 1,
-    "name": "press",
-    "bus": {"kind": "sercos2", "data_rate_mbit_s": 4, "at_gap_us": 7.0, "nodes": 3, "recovery_us": 9.0},
-    "cycle": {"period_us": 1000.0},
-    "payload": {"read_bytes": 9, "write_bytes": 4},
-    "node": {"axes": 1, "execution": {"kind": "linear", "grade": "measured", "base_us": 40.0, "per_byte_us": 1.0}},
-}
+TEXT = """\
+schema_version = 1
+name = "press"
+[bus]
+kind = "sercos2"
+data_rate_mbit_s = 4
+at_gap_us = 7.0
+nodes = 3
+recovery_us = 9.0
+[cycle]
+period_us = 1000.0
+[payload]
+read_bytes = 9
+write_bytes = 4
+[node]
+axes = 1
+execution = {kind = "linear", grade = "measured", base_us = 40.0, per_byte_us = 1.0}
+"""
 # Ten bytes of data in whole words; flags 16, stuff bits a fifth.
 MST_BITS = 16 + 8 * 4 + 8 * 4 // 5
 AT_BITS = 16 + 8 * (3 + 4 + 10) + 8 * (3 + 4 + 10) // 5
 MDT_BITS = 16 + 8 * (3 + 3 * 8) + 8 * (3 + 3 * 8) // 5
 
 
+@cache
+def press() -> Profile:
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "press.toml")
+        path.write_text(TEXT, encoding="utf-8")
+        return busplan.load_profile(path)
+
+
 def profile(**changes: Any) -> Profile:
     """That profile with other values by dotted key, __ for the dot."""
-    return busplan.load_profile(
-        Sercos2Profile.model_validate(DATA), changes={key.replace("__", "."): one for key, one in changes.items()}
-    )
+    return busplan.load_profile(press(), changes={key.replace("__", "."): one for key, one in changes.items()})
 
 
 def terms(one: Profile, model: str = "worst-stuffing") -> dict[str, float]:
     (found,) = busplan.capacity(one, timing_model=[model]).results
-    return {term.name: plain(term.us) for term in found.terms}
+    return {term.name: float(term.us) for term in found.terms}
 
 
 def test_its_cycle_is_that_by_hand() -> None:
@@ -71,7 +81,7 @@ def test_delays_are_those_by_hand() -> None:
 
 def test_a_gap_must_be_given_and_the_message_says_why(tmp_path: Path) -> None:
     path = tmp_path / "press.toml"
-    path.write_text(profile_text(profile()).replace("at_gap_us = 7.0\n", ""), encoding="utf-8")
+    path.write_text(TEXT.replace("at_gap_us = 7.0\n", ""), encoding="utf-8")
     with pytest.raises(BusplanError) as caught:
         busplan.load_profile(path)
     assert "bus.at_gap_us: missing key" in str(caught.value)
@@ -79,8 +89,9 @@ def test_a_gap_must_be_given_and_the_message_says_why(tmp_path: Path) -> None:
 
 
 def test_a_gap_is_assumed_whoever_gives_it() -> None:
-    assert given(profile(), "bus.at_gap_us").grade == "assumed"
-    assert given(profile(), "bus.data_rate_mbit_s").grade == "given"
+    (derivation,) = busplan.explain(profile(), "required_us", timing_model="worst-stuffing").derivations
+    grades = {one.name: one.grade for one in derivation.inputs}
+    assert (grades["bus.at_gap_us"], grades["bus.data_rate_mbit_s"]) == ("assumed", "given")
 
 
 @pytest.mark.parametrize(
@@ -102,16 +113,16 @@ def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[st
 
 
 def test_no_published_figure_tests_it_and_evidence_says_so() -> None:
-    bus = kind_named("sercos2")
-    (section,) = sections_of(bus, "sercos2")
-    assert parts_tested(bus.evidence_data).parts == {}
+    (evidence,) = busplan.evidence("sercos2").kinds
+    (section,) = evidence.sections
+    assert evidence.tested.parts == {}
     assert "0.0448 mm" in section.note
     assert "validates no schedule" in section.note
     assert all(one.published is None for one in section.comparisons)
 
 
 def test_the_gap_of_the_evidence_fills_the_period() -> None:
-    (section,) = sections_of(kind_named("sercos2"), "sercos2")
+    ((section,),) = (kind.sections for kind in busplan.evidence("sercos2").kinds)
     base = busplan.load_profile("sercos2-servo-8")
     changes = {"bus.nodes": 6, "payload.read_bytes": 4, "payload.write_bytes": 4, "cycle.period_us": 500.0}
     assert len(section.comparisons) == 3

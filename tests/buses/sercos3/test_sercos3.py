@@ -1,25 +1,34 @@
 """A SERCOS III network: its window by hand, by each timing method, and what it breaks."""
 
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
 
 import busplan
-from busplan.buses import kind_named
-from busplan.buses.sercos.sercos3_section import Sercos3Profile
-from busplan.elementwise import plain
-from busplan.questions.fit.circle_refusal import loop_delays_us
-from busplan.questions.fit.network import network_of
-from busplan.sections.profile import Profile
+from busplan import Profile
 
-DATA: dict[str, Any] = {
-    "schema_version": 1,
-    "name": "press",
-    "bus": {"kind": "sercos3", "nodes": 40, "version": "V1.0", "hot_plug_field": "first", "gap_bytes": 25},
-    "cycle": {"period_us": 500.0, "nonperiodic_us": 125.0},
-    "payload": {"read_bytes": 10, "write_bytes": 6},
-    "node": {"axes": 1, "execution": {"kind": "linear", "grade": "measured", "base_us": 40.0, "per_byte_us": 1.0}},
-}
+TEXT = """\
+schema_version = 1
+name = "press"
+[bus]
+kind = "sercos3"
+nodes = 40
+version = "V1.0"
+hot_plug_field = "first"
+gap_bytes = 25
+[cycle]
+period_us = 500.0
+nonperiodic_us = 125.0
+[payload]
+read_bytes = 10
+write_bytes = 6
+[node]
+axes = 1
+execution = {kind = "linear", grade = "measured", base_us = 40.0, per_byte_us = 1.0}
+"""
 MDT_US = (12 + 40 * (6 + 2 + 6) + 32 + 25) * 0.08
 AT_US = (8 + 40 * (6 + 2 + 10) + 32 + 25) * 0.08
 JITTER_US = (1 + 25 * 0.08) / 2
@@ -27,16 +36,22 @@ RING_US = 2 * 40 * 0.9 + 1 + 1.8
 HEADER_US, MASTER_US, CHANNELS_US = 28 * 0.08, 2.56, 32 * 0.4
 
 
+@cache
+def press() -> Profile:
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "press.toml")
+        path.write_text(TEXT, encoding="utf-8")
+        return busplan.load_profile(path)
+
+
 def profile(**changes: Any) -> Profile:
     """That profile with other values by dotted key, __ for the dot."""
-    return busplan.load_profile(
-        Sercos3Profile.model_validate(DATA), changes={key.replace("__", "."): one for key, one in changes.items()}
-    )
+    return busplan.load_profile(press(), changes={key.replace("__", "."): one for key, one in changes.items()})
 
 
 def terms(one: Profile, model: str = "window") -> dict[str, float]:
     (found,) = busplan.capacity(one, timing_model=[model]).results
-    return {term.name: plain(term.us) for term in found.terms}
+    return {term.name: float(term.us) for term in found.terms}
 
 
 @pytest.mark.parametrize(
@@ -90,12 +105,9 @@ def test_each_method_is_what_the_library_asks() -> None:
 
 
 def test_a_least_time_that_nobody_has_said_is_not_in_it() -> None:
-    def left_out(**changes: Any) -> list[str]:
-        cycle = kind_named("sercos3").cycle(network_of(profile(**changes)), model="window")
-        return [one.key for one in cycle.left_out()]
-
-    assert left_out() == ["bus.at_start_us"]
-    assert left_out(bus__at_start_us=0.0) == []
+    least = "the devices' least time before the AT, S-0-1006"
+    assert least in str(busplan.capacity(profile()))
+    assert least not in str(busplan.capacity(profile(bus__at_start_us=0.0)))
 
 
 @pytest.mark.parametrize("method", ["mdt-at-ucc", "mdt-ucc-at", "at-last"])
@@ -183,9 +195,9 @@ def delay_us(update: str, **changes: Any) -> float:
         "sercos3-servo-8",
         changes={**own, **{key.replace("__", "."): to for key, to in changes.items()}},
     )
-    x_us, y_us = loop_delays_us(network_of(one))
-    assert x_us == y_us
-    return x_us
+    (found,) = busplan.circle_test(one).to_dict()["results"]
+    assert found["delay_x_us"] == found["delay_y_us"]
+    return float(found["delay_x_us"])
 
 
 def test_a_loop_on_the_host_rests_on_the_feedback_of_the_cycle_before() -> None:
@@ -202,8 +214,6 @@ def test_a_loop_on_the_host_rests_on_the_feedback_of_the_cycle_before() -> None:
     last_us = 1000 - at_us - ring_us - max(2.56, 8 * 0.4 - jitter_us) - jitter_us - 60
     assert delay_us("on_arrival", bus__timing_method="at-last") == pytest.approx(1000 + effect_us - last_us)
     assert delay_us("next_sync", bus__timing_method="at-last") == 1000
-    # A node that is slower than a period acts a cycle later.
-    assert delay_us("next_sync", node__execution__base_us=600) == 3000
 
 
 def test_the_order_of_the_cycle_is_that_of_the_method() -> None:
@@ -218,5 +228,5 @@ def test_the_order_of_the_cycle_is_that_of_the_method() -> None:
 
 @pytest.mark.parametrize(("given_us", "warned"), [(0.0, False), (100.0, True), (125.0, False)])
 def test_a_channel_that_the_master_does_not_open_is_warned_of(given_us: float, warned: bool) -> None:
-    network = network_of(profile(cycle__nonperiodic_us=given_us))
-    assert bool(kind_named("sercos3").warnings(network, nodes=[8])) == warned
+    answer = str(busplan.capacity(profile(cycle__nonperiodic_us=given_us)))
+    assert ("the master opens no channel for other frames of less than 125 us" in answer) == warned

@@ -1,19 +1,16 @@
 """Filling of the telegrams against telegrams that are written byte by byte, and against published numbers of drives."""
 
 from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from busplan.buses import kind_named
+import busplan
 from busplan.buses.sercos.sercos3 import PERIODS
-from busplan.buses.sercos.sercos3_cycle import TELEGRAMS, Sercos3Cycle
-from busplan.buses.sercos.sercos3_section import Sercos3Profile
-from busplan.elementwise import plain
-from busplan.questions.evidence import sections_of
-from busplan.questions.fit.network import network_of
 
 BYTE_NS = 80
 
@@ -61,7 +58,7 @@ def written(data: Sequence[int], *, is_mdt: bool, version: str, hot_plug: str, g
     return Written(len(fields), len(wire))
 
 
-def profile_of(devices: Sequence[Device], *, version: str, hot_plug: str, gap: int) -> Sercos3Profile:
+def profile_of(devices: Sequence[Device], *, version: str, hot_plug: str, gap: int) -> busplan.Profile:
     """A profile with a group for each run of devices that are alike."""
     runs: list[tuple[Device, int]] = []
     for one in devices:
@@ -69,20 +66,17 @@ def profile_of(devices: Sequence[Device], *, version: str, hot_plug: str, gap: i
             runs[-1] = (one, runs[-1][1] + 1)
         else:
             runs.append((one, 1))
-    group = [
-        {
-            "name": f"g{place}",
-            "nodes": count,
-            "axes": 1,
-            "read_bytes": one.at,
-            "write_bytes": one.mdt,
-            "execution": {"kind": "linear", "base_us": 1.0, "per_byte_us": 0.0},
-        }
+    groups = "".join(
+        f'[[group]]\nname = "g{place}"\nnodes = {count}\naxes = 1\nread_bytes = {one.at}\nwrite_bytes = {one.mdt}\n'
+        'execution = {kind = "linear", base_us = 1, per_byte_us = 0}\n'
         for place, (one, count) in enumerate(runs)
-    ]
-    bus = {"kind": "sercos3", "version": version, "hot_plug_field": hot_plug, "gap_bytes": gap}
-    data = {"schema_version": 1, "name": "ring", "bus": bus, "cycle": {"period_us": 1000.0}, "group": group}
-    return Sercos3Profile.model_validate(data)
+    )
+    bus = f'kind = "sercos3"\nversion = "{version}"\nhot_plug_field = "{hot_plug}"\ngap_bytes = {gap}'
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "ring.toml")
+        text = f'schema_version = 1\nname = "ring"\n[bus]\n{bus}\n[cycle]\nperiod_us = 1000\n{groups}'
+        path.write_text(text, encoding="utf-8")
+        return busplan.load_profile(path)
 
 
 SIZES = st.one_of(st.integers(1, 40), st.sampled_from([200, 700, 1400]))
@@ -95,17 +89,17 @@ DEVICES = st.lists(st.tuples(st.builds(Device, SIZES, SIZES), st.integers(1, 60)
 @example([Device(1480, 1480)], "V1.0", "first", 12)  # behind a first telegram that is padded
 def test_telegrams_are_those_that_are_written(devices: list[Device], version: str, hot_plug: str, gap: int) -> None:
     profile = profile_of(devices, version=version, hot_plug=hot_plug, gap=gap)
-    cycle = Sercos3Cycle(network_of(profile), TELEGRAMS)
-    us = {term.key: plain(term.us) for term in cycle.terms}
-    for sort, kind in (("mdt", "write"), ("at", "read")):
+    (figures,) = busplan.capacity(profile, timing_model="telegrams").results
+    found = figures.by_key()
+    for sort in ("mdt", "at"):
         sizes = [getattr(one, sort) for one in devices]
         expected = written(sizes, is_mdt=sort == "mdt", version=version, hot_plug=hot_plug, gap=gap)
-        assert plain(cycle.fillings[kind].telegrams) == expected.telegrams  # type: ignore[index]
-        assert us[f"cycle_{sort}_us"] == pytest.approx(expected.bytes_with_gaps * BYTE_NS / 1000, rel=1e-12)
+        assert found[f"{sort}_telegrams"] == expected.telegrams
+        assert found[f"cycle_{sort}_us"] == pytest.approx(expected.bytes_with_gaps * BYTE_NS / 1000, rel=1e-12)
 
 
 def test_evidence_has_the_residual_of_each() -> None:
-    (section,) = sections_of(kind_named("sercos3"), "sercos3")
+    ((section,),) = (kind.sections for kind in busplan.evidence("sercos3").kinds)
     found = {(one.quantity, one.method): one.residual for one in section.comparisons}
     assert found["drives, 8 bytes at 31.25 us", "telegrams, gap 12"] == 0
     assert found["drives, 8 bytes at 31.25 us", "telegrams, gap 37"] == -1

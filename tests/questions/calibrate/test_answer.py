@@ -49,9 +49,9 @@ def test_all_ways_to_give_measurements_are_the_same(given: Any, tmp_path: Path) 
     file = tmp_path / "bench.csv"
     file.write_text(TEXT, encoding="utf-8")
     wanted = busplan.calibrate("paper-two-node", file)
-    found = busplan.calibrate("paper-two-node", given)
-    assert (found.execution, found.changes, found.payloads) == (wanted.execution, wanted.changes, wanted.payloads)
-    assert (wanted.source, found.source) == (str(file), "measurements")
+    answer = busplan.calibrate("paper-two-node", given)
+    assert (answer.execution, answer.changes, answer.payloads) == (wanted.execution, wanted.changes, wanted.payloads)
+    assert (wanted.source, answer.source) == (str(file), "measurements")
     assert busplan.calibrate("paper-two-node", str(file)) == wanted
     read = busplan.calibrate("paper-two-node", TEXT.encode(), source="bench 7")
     assert (read.execution, read.source, read.to_dict()["source"]) == (wanted.execution, "bench 7", "bench 7")
@@ -77,8 +77,8 @@ def test_the_changes_are_those_that_apply_writes(tmp_path: Path) -> None:
 def test_an_outlier_is_named_by_its_row() -> None:
     rows = [(4, 48.7 + number / 100) for number in range(12)]
     rows[7] = (4, 148.7)
-    (found,) = busplan.calibrate("paper-two-node", rows).outliers
-    assert (found.line, found.latency_us) == (8, 148.7)
+    (outlier,) = busplan.calibrate("paper-two-node", rows).outliers
+    assert (outlier.line, outlier.latency_us) == (8, 148.7)
 
 
 REFUSED: dict[str, tuple[Any, str]] = {

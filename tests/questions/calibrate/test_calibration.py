@@ -13,43 +13,41 @@ from hypothesis import strategies as st
 import busplan
 from busplan import BusplanError, CalibrateAnswer
 from busplan.buses.ieee1394.constants import MAX_PAYLOAD_BYTES
-from busplan.profile.document import override
-from busplan.sections.profile import Profile
 
-Make = Callable[..., Profile]
+Make = Callable[..., busplan.Profile]
 Rows = list[tuple[int, float]]
 MODELS = ("paper", "standard")
 IDLE: dict[str, object] = {"node.execution": {"kind": "linear", "base_us": 0, "per_byte_us": 0}}
 
 
-def latency_us(profile: Profile, kind: str, size: int, model: str = "standard") -> float:
+def latency_us(profile: busplan.Profile, kind: str, size: int, model: str = "standard") -> float:
     """Latency of one transaction of the farthest node."""
     rows = busplan.latency(profile, payload_bytes=size, timing_model=model).transactions
-    (found,) = (one.phases["latency_us"] for one in rows if one.transaction == kind)
-    assert found is not None
-    return found
+    (latency,) = (row.phases["latency_us"] for row in rows if row.transaction == kind)
+    assert latency is not None
+    return latency
 
 
-def of_execution(profile: Profile, rows: Rows, model: str = "standard") -> list[tuple[Any, ...]]:
+def of_execution(profile: busplan.Profile, rows: Rows, model: str = "standard") -> list[tuple[Any, ...]]:
     """Measurements whose T_exec is known."""
-    idle = override(profile, IDLE)
+    idle = busplan.load_profile(profile, changes=IDLE)
     packets_us = {size: latency_us(idle, "write", size, model) for size in {size for size, _ in rows}}
     return [(size, value + packets_us[size]) for size, value in rows]
 
 
-def run(profile: Profile, rows: Any, **options: Any) -> CalibrateAnswer:
+def run(profile: busplan.Profile, rows: Any, **options: Any) -> CalibrateAnswer:
     return busplan.calibrate(profile, rows, source="m.csv", **options)
 
 
 def outlying(answer: CalibrateAnswer) -> set[int]:
     """Rows that are not in the fit, from 1."""
-    return {one.line for one in answer.outliers}
+    return {outlier.line for outlier in answer.outliers}
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_table_1_is_its_latency_less_its_packets(model: str) -> None:
     bench = busplan.load_profile("paper-two-node")
-    idle = override(bench, {"node.execution": {"kind": "linear", "base_us": 0, "per_byte_us": 0}})
+    idle = busplan.load_profile(bench, changes={"node.execution": {"kind": "linear", "base_us": 0, "per_byte_us": 0}})
     answer = busplan.calibrate(bench, "table-1.csv", timing_model=model)
     assert answer.execution.grade == "derived"
     printed = {4: 48.7, 16: 48.9, 32: 57.9, 64: 68.1, 128: 99.9, 256: 158.5, 512: 246.0, 1024: 460.0}
@@ -63,29 +61,29 @@ def test_table_1_is_its_latency_less_its_packets(model: str) -> None:
 
 @given(data=st.data())
 def test_latencies_of_a_profile_give_its_own_execution_time(
-    any_profile: st.SearchStrategy[Profile], data: st.DataObject
+    any_profile: st.SearchStrategy[busplan.Profile], data: st.DataObject
 ) -> None:
     split: dict[str, object] = {
         "node.read_response": "split",
         "node.write_response": "split",
         "cycle.schedule": "individual",
     }
-    profile = override(data.draw(any_profile), split)
+    profile = busplan.load_profile(data.draw(any_profile), changes=split)
     model = data.draw(st.sampled_from([model for model in MODELS if _has(profile, model)]))
     most = int(MAX_PAYLOAD_BYTES[profile.bus.speed])
     sizes = data.draw(st.lists(st.integers(1, most), min_size=2, max_size=8, unique=True))
-    plain = override(profile, {"node.execution.worst_extra_us": 0.0})
+    plain = busplan.load_profile(profile, changes={"node.execution.worst_extra_us": 0.0})
     rows = [(size, latency_us(plain, kind, size, model), kind) for size in sizes for kind in ("read", "write")]
-    own = profile.node_groups[0].node.execution
+    execution = profile.node_groups[0].node.execution
     answer = run(profile, rows, timing_model=model)
     assert answer.execution.payload_bytes == tuple(sorted(sizes))
-    assert answer.execution.time_us == pytest.approx([own.execution_us(size) for size in sorted(sizes)], abs=1e-3)
+    assert answer.execution.time_us == pytest.approx([execution.execution_us(size) for size in sorted(sizes)], abs=1e-3)
     assert not answer.outliers
 
 
-def _has(profile: Profile, model: str) -> bool:
+def _has(profile: busplan.Profile, model: str) -> bool:
     """Whether a timing model can express a profile."""
-    return model in {one.timing_model for one in busplan.capacity(profile).results}
+    return model in {result.timing_model for result in busplan.capacity(profile).results}
 
 
 points = st.lists(st.tuples(st.integers(1, 2048), st.floats(0, 500)), min_size=2, max_size=30)
@@ -98,11 +96,11 @@ def test_figures_by_payload_and_the_uncertainty_agree_with_numpy(make: Make, poi
     assert [fit.payload_bytes for fit in answer.payloads] == sorted({size for size, _ in points})
     residuals = []
     for fit in answer.payloads:
-        own = np.array([value for size, value in left if size == fit.payload_bytes])
-        assert fit.measurements == len(own) + fit.left_out
-        assert fit.execution_us == pytest.approx(np.median(own), abs=1e-5)
-        assert fit.deviation_us == (pytest.approx(own.std(ddof=1), abs=1e-5) if len(own) > 1 else None)
-        residuals += [*(own - np.median(own))]
+        kept = np.array([value for size, value in left if size == fit.payload_bytes])
+        assert fit.measurements == len(kept) + fit.left_out
+        assert fit.execution_us == pytest.approx(np.median(kept), abs=1e-5)
+        assert fit.deviation_us == (pytest.approx(kept.std(ddof=1), abs=1e-5) if len(kept) > 1 else None)
+        residuals += [*(kept - np.median(kept))]
     free = len(left) - len(answer.payloads)
     spread_us = np.sqrt(np.square(residuals).sum() / free) if free else 0.0
     # Nothing is better known than its last digit of 0.1 us.
@@ -119,14 +117,14 @@ def test_outliers_are_named_and_do_not_pull_the_fit(make: Make) -> None:
     bad = {3: 900.0, 17: 1.0, 35: 700.0}
     spoilt = [(size, bad.get(index, value)) for index, (size, value) in enumerate(rows)]
     profile = make()
-    found, clean = (run(profile, of_execution(profile, data)) for data in (spoilt, rows))
-    assert (outlying(found), outlying(clean)) == ({4, 18, 36}, set())
+    answer, clean = (run(profile, of_execution(profile, data)) for data in (spoilt, rows))
+    assert (outlying(answer), outlying(clean)) == ({4, 18, 36}, set())
     # Two are slow executions, the slowest at 4 bytes; the third is fast, and the others contradict it.
-    assert [one.off_us > 0 for one in found.outliers] == [True, False, True]
-    assert found.worst_extra_us == pytest.approx(900 - 30 - 0.35 * 4, abs=0.5)
-    assert (clean.worst_extra_us, found.execution.grade) == (None, "measured")
+    assert [outlier.off_us > 0 for outlier in answer.outliers] == [True, False, True]
+    assert answer.worst_extra_us == pytest.approx(900 - 30 - 0.35 * 4, abs=0.5)
+    assert (clean.worst_extra_us, answer.execution.grade) == (None, "measured")
     for size in (4, 64, 256, 1024):
-        assert found.execution.execution_us(size) == pytest.approx(clean.execution.execution_us(size), abs=0.5)
+        assert answer.execution.execution_us(size) == pytest.approx(clean.execution.execution_us(size), abs=0.5)
 
 
 @pytest.mark.parametrize(
@@ -170,7 +168,7 @@ def test_a_tail_of_slow_executions_loses_none_of_them(make: Make) -> None:
         random = Random(seed)
         rows = [(size, 40 + 0.1 * size + random.expovariate(1 / 2.0)) for size in (4, 16, 64, 256) for _ in range(10)]
         answer = run(make(), of_execution(make(), rows))
-        assert [one for one in answer.outliers if one.off_us < 0] == []
+        assert [outlier for outlier in answer.outliers if outlier.off_us < 0] == []
         assert (answer.worst_extra_us is None) == (not answer.outliers)
         if answer.worst_extra_us is not None:
             most_us = {
@@ -199,7 +197,7 @@ def test_one_value_far_off_is_found_and_nothing_in_smooth_ones(
 
 
 def test_a_latency_below_its_packets_is_refused_each_with_its_line(make: Make) -> None:
-    need_us = latency_us(override(make(), IDLE), "write", 4)
+    need_us = latency_us(busplan.load_profile(make(), changes=IDLE), "write", 4)
     with pytest.raises(BusplanError) as raised:
         run(make(), [(4, 50.0), (4, 0.05), (4, need_us - 1e-6), (4, need_us)])
     needed = f"is below the {need_us:.3f} us that the packets alone take in the standard model"

@@ -1,17 +1,17 @@
 """What `busplan calibrate` says."""
 
+import re
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
 import busplan
-from busplan import CalibrateAnswer
-from busplan.forms.blocks import Report, Sentence, Snippet
 
 Rows = list[tuple[int, float, str]]
 
 
-def run(rows: Rows) -> CalibrateAnswer:
+def run(rows: Rows) -> busplan.CalibrateAnswer:
     return busplan.calibrate("paper-two-node", rows, source="m.csv")
 
 
@@ -19,12 +19,12 @@ def rows(*values: tuple[int, float], kind: str = "write") -> Rows:
     return [(size, value, kind) for size, value in values]
 
 
-def warnings(answer: CalibrateAnswer) -> list[str]:
-    found: list[str] = answer.to_dict()["warnings"]
-    return found
+def warnings(answer: busplan.CalibrateAnswer) -> list[str]:
+    words: list[str] = answer.to_dict()["warnings"]
+    return words
 
 
-def example() -> CalibrateAnswer:
+def example() -> busplan.CalibrateAnswer:
     return busplan.calibrate("paper-two-node", "table-1.csv")
 
 
@@ -52,11 +52,10 @@ def test_warnings() -> None:
         "off the median) and 5 more; left out: the slowest execution takes 96.001 us more, worst_extra_us."
     )
     assert f"Warning: {warning}\n" in str(many)
-    (said,) = (block for block in many.report().blocks if isinstance(block, Sentence) and block.state == "warns")
     # Ten lines are named.
-    assert len([part for part in said.parts if getattr(part, "key", "") == "line"]) == 10
+    assert len(re.findall(r"line \d+ \(", warning)) == 10
     quick = warnings(run(rows((4, 50.0), (4, 50.1), (4, 30.0), (4, 50.2), (4, 120.0))))
-    assert [one.split(":")[0] for one in quick] == ["1 slow measurement", "1 fast measurement"]
+    assert [words.split(":")[0] for words in quick] == ["1 slow measurement", "1 fast measurement"]
     assert quick[1].endswith("; left out: measure again.")
 
 
@@ -85,7 +84,7 @@ def test_no_figure_of_the_table_is_rounding_dust() -> None:
     assert "-0.000" not in text
 
 
-def test_every_figure_stands_at_its_place(values_of_the_document: Callable[[Report], int]) -> None:
+def test_every_figure_stands_at_its_place(values_of_the_document: Callable[[Any], int]) -> None:
     assert values_of_the_document(example().report()) > 8 * 4
     repeated = run([*rows((4, 50.0), (4, 52.0), (64, 80.0)), *rows((4, 54.0), kind="read")])
     assert values_of_the_document(repeated.report()) > 2 * 5
@@ -94,14 +93,12 @@ def test_every_figure_stands_at_its_place(values_of_the_document: Callable[[Repo
 
 
 def test_the_section_of_the_profile_is_toml_to_copy() -> None:
-    (section,) = (block for block in example().report().blocks if isinstance(block, Snippet))
-    assert section.language == "toml"
-    assert section.lines == (
-        "[node.execution]",
-        'grade = "derived"',
-        'kind = "table"',
-        "payload_bytes = [4, 16, 32, 64, 128, 256, 512, 1024]",
-        "time_us = [38.088, 37.881, 46.556, 56.105, 86.603, 142.598, 224.89, 428.473]",
-        'residual = "standard"',
-        "measured_gap_count = 63",
-    )
+    section = """
+[node.execution]
+grade = "derived"
+kind = "table"
+payload_bytes = [4, 16, 32, 64, 128, 256, 512, 1024]
+time_us = [38.088, 37.881, 46.556, 56.105, 86.603, 142.598, 224.89, 428.473]
+residual = "standard"
+measured_gap_count = 63"""
+    assert str(example()).endswith(section)

@@ -29,14 +29,14 @@ def with_longer_execution(profile: busplan.Profile) -> dict[str, Any]:
 
 WRITTEN: dict[str, Callable[[busplan.Profile], dict[str, Any]]] = {
     "execution time +10%": with_longer_execution,
-    "one node more": lambda one: {"bus.nodes": one.node_groups[0].nodes + 1},
-    "one axis more per node": lambda one: {"node.axes": one.node_groups[0].node.axes + 1},
-    "payload +4 bytes": lambda one: {
-        f"payload.{kind}_bytes": 4 + (getattr(one.payload, f"{kind}_bytes") or 0) for kind in ("read", "write")
+    "one node more": lambda profile: {"bus.nodes": profile.node_groups[0].nodes + 1},
+    "one axis more per node": lambda profile: {"node.axes": profile.node_groups[0].node.axes + 1},
+    "payload +4 bytes": lambda profile: {
+        f"payload.{kind}_bytes": 4 + (getattr(profile.payload, f"{kind}_bytes") or 0) for kind in ("read", "write")
     },
-    "one hop more": lambda one: {"bus.max_hops": one.bus.max_hops + 1},
-    "one busy retry more": lambda one: {"cycle.retries": one.cycle.retries + 1},
-    "host time +10 us": lambda one: {"host.transaction_us": one.host.transaction_us + 10},  # type: ignore[attr-defined]
+    "one hop more": lambda profile: {"bus.max_hops": profile.bus.max_hops + 1},
+    "one busy retry more": lambda profile: {"cycle.retries": profile.cycle.retries + 1},
+    "host time +10 us": lambda profile: {"host.transaction_us": profile.host.transaction_us + 10},  # type: ignore[attr-defined]
     "a bus reset": lambda _one: {"bus.gap_count": 63},
 }
 """Each change as a user would write it into the file."""
@@ -66,49 +66,53 @@ def test_each_row_is_the_capacity_of_the_profile_with_that_change(
 ) -> None:
     changes = {"payload.read_bytes_per_axis": per_axis, "limits.reserve": reserve}
     profile = changed(data.draw(any_profile), changes)
-    before, found = figures(profile), effects(profile)
-    assert set(found) == set(WRITTEN)
-    for change, one in found.items():
+    before, by_change = figures(profile), effects(profile)
+    assert set(by_change) == set(WRITTEN)
+    for change, effect in by_change.items():
         if change == "one hop more" and profile.bus.max_hops is None:
-            assert (one.margin_change_us, one.then) == (None, None)
+            assert (effect.margin_change_us, effect.then) == (None, None)
             continue
         after = figures(changed(profile, WRITTEN[change](profile)))
-        assert one.then is not None
-        assert one.then.margin_corrected_us == pytest.approx(after.margin_corrected_us, rel=1e-9, abs=1e-6)
-        assert one.then.uncertainty_us == pytest.approx(after.uncertainty_us, rel=1e-9, abs=1e-6)
-        assert one.margin_change_us == pytest.approx(
+        assert effect.then is not None
+        assert effect.then.margin_corrected_us == pytest.approx(after.margin_corrected_us, rel=1e-9, abs=1e-6)
+        assert effect.then.uncertainty_us == pytest.approx(after.uncertainty_us, rel=1e-9, abs=1e-6)
+        assert effect.margin_change_us == pytest.approx(
             (after.margin_corrected_us or 0) - (before.margin_corrected_us or 0), rel=1e-9, abs=1e-6
         )
-        assert (one.then.verdict, one.then.safe, one.then.exceeded) == (after.verdict, after.safe, after.exceeded)
+        assert (effect.then.verdict, effect.then.safe, effect.then.exceeded) == (
+            after.verdict,
+            after.safe,
+            after.exceeded,
+        )
 
 
 @given(data=st.data())
 def test_the_largest_effect_comes_first_and_what_cannot_be_made_last(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
-    found = [*effects(data.draw(any_profile)).values()]
-    sizes = [-1.0 if one.margin_change_us is None else abs(one.margin_change_us) for one in found]
+    ranked = [*effects(data.draw(any_profile)).values()]
+    sizes = [-1.0 if effect.margin_change_us is None else abs(effect.margin_change_us) for effect in ranked]
     assert sizes == sorted(sizes, reverse=True)
-    assert all(one.note for one in found if one.then is None)
+    assert all(effect.note for effect in ranked if effect.then is None)
 
 
 def test_what_adds_to_the_margin_has_its_place_by_its_size(make: Maker) -> None:
     # Table I has such a fall between 4 and 16 bytes, of 0.1 us.
     falling = {"kind": "table", "payload_bytes": [4, 8], "time_us": [200.0, 100.0]}
-    found = [*effects(make(node__execution=falling, payload__read_bytes=4, payload__write_bytes=4)).values()]
-    assert [one.change for one in found[:3]] == ["one node more", "payload +4 bytes", "execution time +10%"]
-    assert [(one.margin_change_us or 0) > 0 for one in found[:3]] == [False, True, False]
+    ranked = [*effects(make(node__execution=falling, payload__read_bytes=4, payload__write_bytes=4)).values()]
+    assert [effect.change for effect in ranked[:3]] == ["one node more", "payload +4 bytes", "execution time +10%"]
+    assert [(effect.margin_change_us or 0) > 0 for effect in ranked[:3]] == [False, True, False]
 
 
 def test_a_change_that_changes_nothing_gives_0_and_says_why(make: Maker) -> None:
-    found = effects(make())
+    by_change = effects(make())
     for change, note in (
         ("a bus reset", "it is set so already"),
         ("one axis more per node", "no payload follows the axes"),
         ("host time +10 us", "the gaps after the transactions hide it"),
     ):
-        assert (found[change].margin_change_us, found[change].note) == (0.0, note)
-    assert (found["a bus reset"].before, found["a bus reset"].after) == (63, 63)
+        assert (by_change[change].margin_change_us, by_change[change].note) == (0.0, note)
+    assert (by_change["a bus reset"].before, by_change["a bus reset"].after) == (63, 63)
     off = effects(make(node__read_response="concatenated", node__write_response="unified"))
     execution = off["execution time +10%"]
     assert (execution.margin_change_us, execution.note) == (0.0, "no execution time is on the bus")
@@ -117,17 +121,17 @@ def test_a_change_that_changes_nothing_gives_0_and_says_why(make: Maker) -> None
 
 
 def test_a_payload_outside_the_table_is_not_known(make: Maker) -> None:
-    found = effects(make(node__execution=TABLE, payload__read_bytes_per_axis=None))
-    one = found["payload +4 bytes"]
-    assert (one.margin_change_us, one.then, one.before, one.after) == (None, None, 12, 16)
-    assert one.note == "not known: 16 bytes is outside the execution table, 4 to 14 bytes"
+    by_change = effects(make(node__execution=TABLE, payload__read_bytes_per_axis=None))
+    effect = by_change["payload +4 bytes"]
+    assert (effect.margin_change_us, effect.then, effect.before, effect.after) == (None, None, 12, 16)
+    assert effect.note == "not known: 16 bytes is outside the execution table, 4 to 14 bytes"
     data = {"node__execution": TABLE, "payload__write_bytes": 4, "payload__read_bytes": 2}
     axis = effects(make(**data, payload__read_bytes_per_axis=3))["one axis more per node"]
     assert (axis.then, axis.note) == (None, "not known: 17 bytes is outside the execution table, 4 to 14 bytes")
     # Between its points it is as known as before.
-    known = changed(make(node__execution=TABLE), {"payload.read_bytes": 4, "payload.write_bytes": 8})
-    after = figures(changed(known, {"payload.read_bytes": 8, "payload.write_bytes": 12}))
-    then = effects(known)["payload +4 bytes"].then
+    profile = changed(make(node__execution=TABLE), {"payload.read_bytes": 4, "payload.write_bytes": 8})
+    after = figures(changed(profile, {"payload.read_bytes": 8, "payload.write_bytes": 12}))
+    then = effects(profile)["payload +4 bytes"].then
     assert then is not None
     assert then.margin_corrected_us == after.margin_corrected_us
 
@@ -144,48 +148,48 @@ def test_hops_follow_the_nodes_in_a_chain_and_not_in_a_tree(make: Maker) -> None
 
 
 def test_what_changes_has_its_values_where_they_are_one(make: Maker) -> None:
-    same, other = effects(make()), effects(make(payload__write_bytes=16))
+    same, unlike = effects(make()), effects(make(payload__write_bytes=16))
     assert (same["execution time +10%"].before, same["execution time +10%"].key) == (
         pytest.approx(34.2),
         "execution_us",
     )
     assert (same["payload +4 bytes"].before, same["payload +4 bytes"].after) == (12, 16)
     for change in ("execution time +10%", "payload +4 bytes"):
-        assert (other[change].before, other[change].after) == (None, None)
-        assert other[change].margin_change_us
+        assert (unlike[change].before, unlike[change].after) == (None, None)
+        assert unlike[change].margin_change_us
 
 
 def test_a_change_that_the_profile_refuses_is_said_so(make: Maker) -> None:
-    one = effects(make(cycle__retries=1_000_000))["one busy retry more"]
-    assert one.then is None
-    assert one.note == "cycle.retries 1000001: must be 1,000,000 or less"
+    effect = effects(make(cycle__retries=1_000_000))["one busy retry more"]
+    assert effect.then is None
+    assert effect.note == "cycle.retries 1000001: must be 1,000,000 or less"
 
 
 def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
     gantry = busplan.load_profile("gantry-24")
     rows, now = effects(gantry), figures(gantry)
-    for one in gantry.group:
+    for group in gantry.group:
         for change, key, more in (
-            (f"one node more in {one.name}", "nodes", one.nodes + 1),
-            (f"one axis more per node in {one.name}", "axes", one.axes + 1),
+            (f"one node more in {group.name}", "nodes", group.nodes + 1),
+            (f"one axis more per node in {group.name}", "axes", group.axes + 1),
         ):
             row = rows[change]
-            assert (row.key, row.before, row.after) == (f"group.{one.name}.{key}", more - 1, more)
+            assert (row.key, row.before, row.after) == (f"group.{group.name}.{key}", more - 1, more)
             then = figures(changed(gantry, {row.key: more}))
             assert row.then is not None
             assert row.then.margin_corrected_us == then.margin_corrected_us
             moved_us = (row.then.margin_corrected_us or 0) - (now.margin_corrected_us or 0)
             assert row.margin_change_us == moved_us
     assert rows["one axis more per node in io"].note == "no payload follows the axes"
-    assert [one.group for one in next_bottleneck(gantry).limits] == ["drives", "tool", "io"]
+    assert [limit.group for limit in next_bottleneck(gantry).limits] == ["drives", "tool", "io"]
 
 
 def test_each_period_has_its_margins_and_the_same_changes_of_them(make: Maker) -> None:
-    one, other = busplan.capacity(make(bus__nodes=9), period_us=[4000.0, 2000.0], sensitivity=True).sensitivities
-    changes = [[effect.margin_change_us for effect in found.effects] for found in (one, other)]
+    long, short = busplan.capacity(make(bus__nodes=9), period_us=[4000.0, 2000.0], sensitivity=True).sensitivities
+    changes = [[effect.margin_change_us for effect in sensitivity.effects] for sensitivity in (long, short)]
     assert changes[0] == pytest.approx(changes[1], nan_ok=False, abs=1e-9)
-    assert one.now.margin_corrected_us == pytest.approx((other.now.margin_corrected_us or 0) + 1000)
-    assert (one.now.verdict, other.now.verdict) == ("fits", "does not fit")
+    assert long.now.margin_corrected_us == pytest.approx((short.now.margin_corrected_us or 0) + 1000)
+    assert (long.now.verdict, short.now.verdict) == ("fits", "does not fit")
 
 
 # --- the next bottleneck ------------------------------------------------------------------------------
@@ -194,26 +198,26 @@ def test_each_period_has_its_margins_and_the_same_changes_of_them(make: Maker) -
 @pytest.mark.parametrize("name", shipped_names())
 def test_without_execution_the_cycle_is_that_of_nodes_that_need_no_time(name: str) -> None:
     profile = busplan.load_profile(name)
-    found = next_bottleneck(profile)
+    bottleneck = next_bottleneck(profile)
     execution = {"kind": "linear", "base_us": 0, "per_byte_us": 0, "grade": "derived"}
-    idle = {one.node_key("execution"): execution for one in profile.node_groups}
+    idle = {nodes.node_key("execution"): execution for nodes in profile.node_groups}
     without = figures(changed(profile, idle))
-    if found.binding_term.name == "execution":
-        assert found.next_binding_term.name == without.binding_term
-        assert found.next_margin_corrected_us == without.margin_corrected_us
-    elif found.next_margin_corrected_us is not None:
+    if bottleneck.binding_term.name == "execution":
+        assert bottleneck.next_binding_term.name == without.binding_term
+        assert bottleneck.next_margin_corrected_us == without.margin_corrected_us
+    elif bottleneck.next_margin_corrected_us is not None:
         # A key takes the term away: of every kind the first, of this kind the others.
         removals = ({"cycle.nonperiodic_us": 0}, *kind_named(profile.bus.kind).term_removals)
         margins = [figures(changed(profile, removal)).margin_corrected_us for removal in removals]
-        assert found.next_margin_corrected_us in margins
+        assert bottleneck.next_margin_corrected_us in margins
 
 
 def test_less_execution_leaves_the_bus_idle_for_longer() -> None:
     # The bench of Table I: 73.6 us of execution gone make 10.5 us of margin.
     profile = busplan.load_profile("paper-two-node")
-    found, now_us = next_bottleneck(profile), figures(profile).margin_corrected_us
-    assert found.binding_term.us == pytest.approx(73.6)
-    assert (found.next_margin_corrected_us or 0) - (now_us or 0) == pytest.approx(10.51, abs=0.005)
+    bottleneck, now_us = next_bottleneck(profile), figures(profile).margin_corrected_us
+    assert bottleneck.binding_term.us == pytest.approx(73.6)
+    assert (bottleneck.next_margin_corrected_us or 0) - (now_us or 0) == pytest.approx(10.51, abs=0.005)
 
 
 @pytest.mark.parametrize(
@@ -227,9 +231,9 @@ def test_less_execution_leaves_the_bus_idle_for_longer() -> None:
     ],
 )
 def test_a_term_goes_with_its_cause(make: Maker, changes: dict[str, Any], binding: str, is_gone: bool) -> None:
-    found = next_bottleneck(make(**changes))
-    assert (found.binding_term.key, found.next_margin_corrected_us is not None) == (binding, is_gone)
-    assert found.next_binding_term.key != binding
+    bottleneck = next_bottleneck(make(**changes))
+    assert (bottleneck.binding_term.key, bottleneck.next_margin_corrected_us is not None) == (binding, is_gone)
+    assert bottleneck.next_binding_term.key != binding
 
 
 @given(data=st.data())
@@ -237,18 +241,18 @@ def test_without_the_limit_the_next_one_keeps_one_node_more_off(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
-    (found,) = next_bottleneck(profile).limits
+    (limit,) = next_bottleneck(profile).limits
 
     def is_kept(nodes: int) -> bool:
         then = figures(changed(profile, {"bus.nodes": nodes}))
         broken = {*then.exceeded, *(then.not_shown or ()), *(() if then.safe else ("gap table",))}
         late = (then.safe_required_us or 0) > then.available_us * (1 + 1e-12)
-        return not broken - {"time", found.limited_by} and not (late and found.limited_by != "time")
+        return not broken - {"time", limit.limited_by} and not (late and limit.limited_by != "time")
 
-    assert found.next_safe_nodes == 0 or is_kept(found.next_safe_nodes)
-    assert not is_kept(found.next_safe_nodes + 1)
-    assert found.next_safe_nodes >= found.safe_nodes
-    assert found.next_limited_by != found.limited_by
+    assert limit.next_safe_nodes == 0 or is_kept(limit.next_safe_nodes)
+    assert not is_kept(limit.next_safe_nodes + 1)
+    assert limit.next_safe_nodes >= limit.safe_nodes
+    assert limit.next_limited_by != limit.limited_by
 
 
 def test_a_change_that_moves_no_margin_says_what_it_takes_from_other_limits() -> None:

@@ -18,7 +18,7 @@ def paper(**changes: object) -> busplan.Profile:
     return busplan.load_profile("paper-1ms", changes={key.replace("__", "."): value for key, value in changes.items()})
 
 
-def said(profile: busplan.Profile) -> str:
+def text_of(profile: busplan.Profile) -> str:
     text = str(busplan.capacity(profile, sensitivity=True))
     return text[text.index("What moves the margin") :]
 
@@ -46,11 +46,11 @@ def test_the_document_is_that_of_capacity_with_two_keys_more() -> None:
     plain = busplan.capacity("paper-1ms", period_us=[1000.0, 500.0])
     answer = busplan.capacity("paper-1ms", period_us=[1000.0, 500.0], sensitivity=True)
     whole = json.loads(answer.to_json())
-    for verdict, found in zip(whole["verdicts"], answer.sensitivities, strict=True):
+    for verdict, sensitivity in zip(whole["verdicts"], answer.sensitivities, strict=True):
         rows, following = verdict.pop("sensitivity"), verdict.pop("next_bottleneck")
-        assert [row["margin_change_us"] for row in rows] == [effect.margin_change_us for effect in found.effects]
-        assert [row["note"] for row in rows] == [effect.note or None for effect in found.effects]
-        assert following["next_safe_nodes"] == found.next_bottleneck.limits[0].next_safe_nodes
+        assert [row["margin_change_us"] for row in rows] == [effect.margin_change_us for effect in sensitivity.effects]
+        assert [row["note"] for row in rows] == [effect.note or None for effect in sensitivity.effects]
+        assert following["next_safe_nodes"] == sensitivity.next_bottleneck.limits[0].next_safe_nodes
         assert following["text"].startswith("Next bottleneck: without execution, now 146.933 us, the largest term is ")
     assert whole == json.loads(plain.to_json())
 
@@ -68,36 +68,38 @@ def test_a_csv_row_is_a_change_at_a_period() -> None:
 
 
 def test_it_says_what_moves_the_margin_most_and_what_is_lost() -> None:
-    text = said(paper())
+    text = text_of(paper())
     assert "One node more moves the margin most, by -128.100 us to 101.964 us. The cycle is shown to fit after" in text
     assert "A bus reset: it is set so already." in text
     assert "One hop more: in a chain the hops follow the nodes." in text
-    assert "The cycle is no longer shown to fit after one node more." in said(paper(cycle__period_us=700))
-    over = said(paper(cycle__period_us=400))
+    assert "The cycle is no longer shown to fit after one node more." in text_of(paper(cycle__period_us=700))
+    over = text_of(paper(cycle__period_us=400))
     assert "no longer" not in over
     assert "is shown to fit after" not in over
     # A gap count that is safe for two hops is not for three.
-    tight = said(paper(bus__gap_count=7))
+    tight = text_of(paper(bus__gap_count=7))
     assert "Its gap count is unsafe after one node more." in tight
     assert "fits, unsafe gap count" in tight
-    assert "does not fit, hops" in said(paper(bus__nodes=16, cycle__period_us=10000))
+    assert "does not fit, hops" in text_of(paper(bus__nodes=16, cycle__period_us=10000))
 
 
 def test_where_nothing_takes_the_largest_term_away_it_says_what_comes_behind() -> None:
-    text = said(busplan.load_profile("paper-dma"))
+    text = text_of(busplan.load_profile("paper-dma"))
     assert "Next bottleneck: after idle, 84.188 us, which no key takes away, comes execution, 42.400 us;" in text
 
 
 def test_the_table_is_no_wider_than_a_terminal() -> None:
-    table = said(paper(bus__gap_count="optimal")).splitlines()
+    table = text_of(paper(bus__gap_count="optimal")).splitlines()
     assert max(len(line) for line in table if "->" in line or "---" in line) <= 80
 
 
 @pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "ethercat-servo-8", "sercos2-servo-8"])
 def test_a_bar_reaches_from_zero_to_its_figure_on_one_scale(name: str) -> None:
     profile = busplan.load_profile(name)
-    (found,) = busplan.capacity(profile, sensitivity=True).sensitivities
-    made = {effect.change: effect.margin_change_us for effect in found.effects if effect.margin_change_us is not None}
+    (sensitivity,) = busplan.capacity(profile, sensitivity=True).sensitivities
+    made = {
+        effect.change: effect.margin_change_us for effect in sensitivity.effects if effect.margin_change_us is not None
+    }
     plot = bars(profile)
     assert plot is not None
     assert [lane.label for lane in plot.lanes] == list(made)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import busplan
-from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS
+from busplan.questions.fit.certainty import VERDICTS
 from busplan.questions.fit.figures import CapacityFigures
 from busplan.questions.fit.network import network_of
 
@@ -48,10 +48,10 @@ def test_six_nodes_by_hand(make: Maker, gap_count: int, required_us: float, bias
         44.7,
         grade="derived",
     )
-    one = of(profile)
-    assert one.required_us == pytest.approx(required_us, abs=0.05)
-    assert one.bias_us == pytest.approx(bias_us, abs=0.05)
-    assert one.margin_corrected_us == pytest.approx(2000 - one.required_us - (one.bias_us or 0), rel=1e-12)
+    figures = of(profile)
+    assert figures.required_us == pytest.approx(required_us, abs=0.05)
+    assert figures.bias_us == pytest.approx(bias_us, abs=0.05)
+    assert figures.margin_corrected_us == pytest.approx(2000 - figures.required_us - (figures.bias_us or 0), rel=1e-12)
     gap_term_us = 2 * (63 - gap_count) / 98.304
     parts_us = {
         "residual": 24 * HALF_U_US,
@@ -63,8 +63,8 @@ def test_six_nodes_by_hand(make: Maker, gap_count: int, required_us: float, bias
         "host.transaction_us": 0.0,
     }
     # At gap count 63, T_exec lies between T_reset and twice T_reset less T_sub in neither case.
-    assert {doubt.key: float(doubt.us) for doubt in one.doubts} == pytest.approx(parts_us, rel=1e-4)
-    assert one.uncertainty_us == pytest.approx(2 * sqrt(sum(us**2 for us in parts_us.values())), rel=1e-4)
+    assert {doubt.key: float(doubt.us) for doubt in figures.doubts} == pytest.approx(parts_us, rel=1e-4)
+    assert figures.uncertainty_us == pytest.approx(2 * sqrt(sum(us**2 for us in parts_us.values())), rel=1e-4)
 
 
 @given(data=st.data(), nodes=st.integers(1, 62), reserve=st.floats(0.0, 0.9))
@@ -108,9 +108,9 @@ def test_half_a_transaction_for_a_unified_write(make: Maker) -> None:
 
 def test_an_execution_fitted_against_the_model_holds_its_residual(make: Maker) -> None:
     fitted = {"node__execution__residual": "standard", "node__execution__measured_gap_count": 16}
-    one = of(make(bus__gap_count=16, **fitted))
-    assert one.bias_us == pytest.approx(0.0, abs=1e-9)
-    assert {doubt.key for doubt in one.doubts if doubt.us} == {"node.execution", "bus.phy_delay_us"}
+    figures = of(make(bus__gap_count=16, **fitted))
+    assert figures.bias_us == pytest.approx(0.0, abs=1e-9)
+    assert {doubt.key for doubt in figures.doubts if doubt.us} == {"node.execution", "bus.phy_delay_us"}
     # From the gap count that was measured to another the gap term counts again.
     assert of(make(bus__gap_count=10, **fitted)).bias_us == pytest.approx(8 * 2 * 6 / 98.304, rel=1e-9)
 
@@ -121,11 +121,11 @@ def test_an_execution_fitted_against_the_model_holds_its_residual(make: Maker) -
 )
 def test_an_execution_is_as_uncertain_as_its_grade(make: Maker, grade: str | None, uncertainty_us: float) -> None:
     profile = with_fixed_execution(make(), 40.0, **({} if grade is None else {"grade": grade}))
-    (found,) = (doubt.us for doubt in of(profile).doubts if doubt.key == "node.execution")
-    assert found == pytest.approx(4 * uncertainty_us, rel=1e-9)
-    said = with_fixed_execution(make(), 40.0, uncertainty_us=0.25)
-    (found,) = (doubt.us for doubt in of(said).doubts if doubt.key == "node.execution")
-    assert found == pytest.approx(1.0, rel=1e-9)
+    (doubt_us,) = (doubt.us for doubt in of(profile).doubts if doubt.key == "node.execution")
+    assert doubt_us == pytest.approx(4 * uncertainty_us, rel=1e-9)
+    given_u = with_fixed_execution(make(), 40.0, uncertainty_us=0.25)
+    (doubt_us,) = (doubt.us for doubt in of(given_u).doubts if doubt.key == "node.execution")
+    assert doubt_us == pytest.approx(1.0, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -153,8 +153,8 @@ def test_the_uncertainty_is_that_of_a_monte_carlo_of_the_inputs(make: Maker, cha
 def test_where_the_cycle_has_a_kink_it_still_covers_95_percent_on_one_side(make: Maker, execution_us: float) -> None:
     # T_exec near T_sub, T_reset and 2 T_reset - T_sub: a central difference would cover 84 % at the last one.
     profile = make(node__execution__base_us=execution_us, node__execution__per_byte_us=0.0)
-    one = of(profile)
-    assert np.mean(_drawn_us(profile) <= one.required_us + (one.uncertainty_us or 0)) >= 0.95
+    figures = of(profile)
+    assert np.mean(_drawn_us(profile) <= figures.required_us + (figures.uncertainty_us or 0)) >= 0.95
 
 
 def _drawn_us(profile: busplan.Profile) -> NDArray[np.float64]:
@@ -196,15 +196,15 @@ def test_more_bias_or_reserve_never_improves_and_more_uncertainty_never_shows(
     assert _rank(with_reserve) >= _rank(before)
     assert (with_reserve.safe_nodes or 0) <= (before.safe_nodes or 0)
     doubtful = of(changed(profile, {"node.execution.uncertainty_us": 1e3}))
-    assert doubtful.verdict != FITS or before.verdict == FITS
+    assert doubtful.verdict != "fits" or before.verdict == "fits"
     fitted = changed(profile, {"node.execution.residual": "standard", "node.execution.measured_gap_count": 63})
     biased = changed(profile, {"node.execution.residual": "none"})
     assert _rank(of(biased)) >= _rank(of(fitted))
 
 
-def _rank(one: CapacityFigures) -> int:
-    assert one.verdict is not None
-    return VERDICTS.index(one.verdict)
+def _rank(figures: CapacityFigures) -> int:
+    assert figures.verdict is not None
+    return VERDICTS.index(figures.verdict)
 
 
 @given(data=st.data())
@@ -224,9 +224,9 @@ def test_no_faster_node_and_no_shorter_cable_makes_a_verdict_worse(
 
 
 def test_the_three_verdicts_lie_where_the_margin_crosses_the_uncertainty(make: Maker) -> None:
-    one = of(make())
-    assert one.uncertainty_us is not None
-    needed_us, doubt_us = one.required_us + (one.bias_us or 0), one.uncertainty_us
+    figures = of(make())
+    assert figures.uncertainty_us is not None
+    needed_us, doubt_us = figures.required_us + (figures.bias_us or 0), figures.uncertainty_us
     verdicts = {
         period_us: of(make(cycle__period_us=period_us, cycle__slice_ratio=1.0)).verdict
         for period_us in (
@@ -236,18 +236,18 @@ def test_the_three_verdicts_lie_where_the_margin_crosses_the_uncertainty(make: M
             needed_us - doubt_us - 1e-6,
         )
     }
-    assert list(verdicts.values()) == [FITS, NOT_SHOWN, NOT_SHOWN, DOES_NOT_FIT]
+    assert list(verdicts.values()) == ["fits", "not shown to fit", "not shown to fit", "does not fit"]
 
 
 def test_a_reserve_is_a_share_of_the_slice(make: Maker) -> None:
-    one = of(make())
-    assert one.safe_required_us is not None
-    period_us = one.safe_required_us / 0.85
-    for step_us, verdict in ((1e-6, FITS), (-1e-6, NOT_SHOWN)):
+    figures = of(make())
+    assert figures.safe_required_us is not None
+    period_us = figures.safe_required_us / 0.85
+    for step_us, verdict in ((1e-6, "fits"), (-1e-6, "not shown to fit")):
         reserved = make(cycle__period_us=period_us + step_us, cycle__slice_ratio=1.0, limits={"reserve": 0.15})
         assert of(reserved).verdict == verdict
 
 
 def test_a_broken_limit_does_not_fit_whatever_the_time(make: Maker) -> None:
-    one = of(make(bus__nodes=17, cycle__period_us=1e6))
-    assert (one.verdict, one.exceeded) == (DOES_NOT_FIT, ("hops",))
+    figures = of(make(bus__nodes=17, cycle__period_us=1e6))
+    assert (figures.verdict, figures.exceeded) == ("does not fit", ("hops",))

@@ -21,7 +21,7 @@ def changed(changes: dict[str, object]) -> busplan.Profile:
 def refused_keys(profile: busplan.Profile) -> list[str]:
     """Keys that a check names, without running a circle."""
     (file,) = busplan.check(profile, circle=False).files
-    return sorted(one.message.partition(": ")[0] for one in file.findings if one.code == "BP203")
+    return sorted(finding.message.partition(": ")[0] for finding in file.findings if finding.code == "BP203")
 
 
 @pytest.mark.parametrize(("key", "changes"), CAUSES.items())
@@ -32,7 +32,7 @@ def test_every_answer_about_the_circle_names_the_key(key: str, changes: dict[str
     (problem,) = caught.value.problems
     assert problem.startswith(f"{key} = ")
     (file,) = busplan.check(profile, circle=False).files
-    (finding,) = (one for one in file.findings if one.code == "BP203")
+    (finding,) = (finding for finding in file.findings if finding.code == "BP203")
     cause = problem.removeprefix(f"{key} = ").partition("; ")[0]
     assert key in finding.message
     assert cause in finding.message

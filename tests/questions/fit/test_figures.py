@@ -87,36 +87,41 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
-    found = data.draw(st.sampled_from(busplan.capacity(profile).results))
-    assert fsum(term.us for term in found.terms) == pytest.approx(found.required_us, rel=1e-12)
-    assert {term.key: found.own[term.key] for term in found.terms} == {term.key: term.us for term in found.terms}
-    assert found.required_time_slice_us * found.nodes == pytest.approx(found.required_us, rel=1e-13)
-    values = found.values()
-    assert found.max_nodes is not None
-    assert found.fits == (found.nodes <= found.max_nodes) == (not found.exceeded)
-    assert ("time" in found.exceeded) == (found.margin_us < 0)
-    assert found.margin_us == pytest.approx(found.available_us - found.required_us, abs=1e-9 * found.required_us)
-    assert found.utilisation == pytest.approx(found.required_us / found.available_us)
-    assert found.max_axes == profile.node_groups[0].node.axes * found.max_nodes
-    assert found.axes == profile.node_groups[0].node.axes * found.nodes
-    assert found.time_slice_us * found.nodes == pytest.approx(found.available_us)
+    figures = data.draw(st.sampled_from(busplan.capacity(profile).results))
+    assert fsum(term.us for term in figures.terms) == pytest.approx(figures.required_us, rel=1e-12)
+    assert {term.key: figures.own[term.key] for term in figures.terms} == {term.key: term.us for term in figures.terms}
+    assert figures.required_time_slice_us * figures.nodes == pytest.approx(figures.required_us, rel=1e-13)
+    values = figures.values()
+    assert figures.max_nodes is not None
+    assert figures.fits == (figures.nodes <= figures.max_nodes) == (not figures.exceeded)
+    assert ("time" in figures.exceeded) == (figures.margin_us < 0)
+    assert figures.margin_us == pytest.approx(
+        figures.available_us - figures.required_us, abs=1e-9 * figures.required_us
+    )
+    assert figures.utilisation == pytest.approx(figures.required_us / figures.available_us)
+    assert figures.max_axes == profile.node_groups[0].node.axes * figures.max_nodes
+    assert figures.axes == profile.node_groups[0].node.axes * figures.nodes
+    assert figures.time_slice_us * figures.nodes == pytest.approx(figures.available_us)
     assert values["gaps_us"] == pytest.approx(values["subaction_gap_us"] + values["arbitration_reset_gap_us"])
-    assert found.min_period_us is not None
-    assert found.min_period_us * profile.cycle.slice_ratio == pytest.approx(found.required_us)
-    assert found.min_slice_ratio * profile.cycle.period_us == pytest.approx(found.required_us)
-    if found.timing_model == "paper":
-        assert {found.bias_us, found.safe_required_us, found.safe_nodes, found.verdict, found.doubts} == {None, ()}
+    assert figures.min_period_us is not None
+    assert figures.min_period_us * profile.cycle.slice_ratio == pytest.approx(figures.required_us)
+    assert figures.min_slice_ratio * profile.cycle.period_us == pytest.approx(figures.required_us)
+    if figures.timing_model == "paper":
+        assert {figures.bias_us, figures.safe_required_us, figures.safe_nodes, figures.verdict, figures.doubts} == {
+            None,
+            (),
+        }
         return
-    assert found.bias_us is not None
-    assert found.safe_required_us is not None
-    assert found.safe_nodes is not None
-    corrected_us = found.available_us - found.required_us - found.bias_us
-    assert found.margin_corrected_us == pytest.approx(corrected_us, abs=1e-9 * found.required_us)
-    shown_us = found.required_us + found.bias_us + (found.uncertainty_us or 0)
-    assert found.safe_required_us == pytest.approx(shown_us)
-    assert found.safe_min_period_us == pytest.approx(found.safe_required_us / profile.cycle.slice_ratio)
-    assert found.safe_axes == profile.node_groups[0].node.axes * found.safe_nodes
-    assert (found.verdict == "fits" and found.safe) == (found.nodes <= found.safe_nodes)
+    assert figures.bias_us is not None
+    assert figures.safe_required_us is not None
+    assert figures.safe_nodes is not None
+    corrected_us = figures.available_us - figures.required_us - figures.bias_us
+    assert figures.margin_corrected_us == pytest.approx(corrected_us, abs=1e-9 * figures.required_us)
+    shown_us = figures.required_us + figures.bias_us + (figures.uncertainty_us or 0)
+    assert figures.safe_required_us == pytest.approx(shown_us)
+    assert figures.safe_min_period_us == pytest.approx(figures.safe_required_us / profile.cycle.slice_ratio)
+    assert figures.safe_axes == profile.node_groups[0].node.axes * figures.safe_nodes
+    assert (figures.verdict == "fits" and figures.safe) == (figures.nodes <= figures.safe_nodes)
 
 
 @given(data=st.data())
@@ -206,18 +211,18 @@ def test_a_tree_ends_at_62_nodes(make: Make) -> None:
 
 
 def test_a_tree_of_more_than_16_hops_carries_no_node(make: Make) -> None:
-    found = only(make(bus__max_hops=17, cycle__period_us=1e6))
-    assert (found.max_nodes, found.limited_by, found.exceeded) == (0, "hops", ("hops",))
+    figures = only(make(bus__max_hops=17, cycle__period_us=1e6))
+    assert (figures.max_nodes, figures.limited_by, figures.exceeded) == (0, "hops", ("hops",))
 
 
 def test_every_broken_limit_is_named(make: Make) -> None:
-    found = only(make(bus__nodes=70, payload__read_bytes=3000))
-    assert found.exceeded == ("payload", "nodes", "hops", "time")
+    figures = only(make(bus__nodes=70, payload__read_bytes=3000))
+    assert figures.exceeded == ("payload", "nodes", "hops", "time")
 
 
 def test_a_period_too_short_for_anything_carries_no_node(make: Make) -> None:
-    found = only(make(cycle__period_us=1e-3))
-    assert (found.max_nodes, found.limited_by, found.fits) == (0, "time", False)
+    figures = only(make(cycle__period_us=1e-3))
+    assert (figures.max_nodes, figures.limited_by, figures.fits) == (0, "time", False)
 
 
 def test_optimal_gap_count_follows_the_chain(make: Make) -> None:
@@ -235,7 +240,7 @@ def test_the_paper_promises_half_as_many_nodes_again(make: Make) -> None:
 
 def test_results_nest_periods_then_models_as_asked(make: Make) -> None:
     result = busplan.capacity(make(), period_us=[1000.0, 500.0, 1000.0], timing_model=["standard", "paper"])
-    assert [(one.period_us, one.timing_model) for one in result.results] == [
+    assert [(figures.period_us, figures.timing_model) for figures in result.results] == [
         (1000.0, "standard"),
         (1000.0, "paper"),
         (500.0, "standard"),
@@ -253,7 +258,7 @@ def test_the_binding_term_is_the_largest(make: Make) -> None:
 
 
 def test_equation_11_as_published_at_the_profiles_own_nodes(make: Make) -> None:
-    found = only(make(), "paper").values()
-    by_hand = (found["available_us"] - 0.4) / (2 * (found["read_latency_us"] + found["gaps_us"]))
-    assert found["read_latency_us"] == found["write_latency_us"]
-    assert found["nodes_eq11"] == pytest.approx(by_hand, rel=1e-14)
+    figures = only(make(), "paper").values()
+    by_hand = (figures["available_us"] - 0.4) / (2 * (figures["read_latency_us"] + figures["gaps_us"]))
+    assert figures["read_latency_us"] == figures["write_latency_us"]
+    assert figures["nodes_eq11"] == pytest.approx(by_hand, rel=1e-14)

@@ -12,7 +12,7 @@ Make = Callable[..., busplan.Profile]
 
 def test_without_payloads_the_profiles_own_are_taken(make: Make) -> None:
     result = busplan.latency(make(payload__read_bytes=8, payload__write_bytes=16))
-    assert [(one.transaction, one.payload_bytes, one.timing_model) for one in result.transactions] == [
+    assert [(row.transaction, row.payload_bytes, row.timing_model) for row in result.transactions] == [
         ("read", 8, "paper"),
         ("read", 8, "standard"),
         ("write", 16, "paper"),
@@ -22,7 +22,7 @@ def test_without_payloads_the_profiles_own_are_taken(make: Make) -> None:
 
 def test_payloads_go_to_read_and_write_alike(make: Make) -> None:
     result = busplan.latency(make(), payload_bytes=[4, 32], timing_model="standard")
-    assert [(one.transaction, one.payload_bytes) for one in result.transactions] == [
+    assert [(row.transaction, row.payload_bytes) for row in result.transactions] == [
         ("read", 4),
         ("write", 4),
         ("read", 32),
@@ -37,8 +37,8 @@ def test_the_farthest_node_of_a_chain_is_as_many_hops_away_as_there_are_nodes(ma
 
 
 def test_execution_comes_from_the_profile(make: Make) -> None:
-    own = make(node__execution__base_us=10.0, node__execution__per_byte_us=2.0)
-    assert {one.phases["execution_us"] for one in busplan.latency(own, payload_bytes=7).transactions} == {24.0}
+    profile = make(node__execution__base_us=10.0, node__execution__per_byte_us=2.0)
+    assert {row.phases["execution_us"] for row in busplan.latency(profile, payload_bytes=7).transactions} == {24.0}
 
 
 def test_a_payload_outside_the_table_is_refused_with_its_range(make: Make) -> None:

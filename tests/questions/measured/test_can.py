@@ -13,10 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.rule import RecordedFigure
 from busplan.errors import BusplanError
-from busplan.questions.measured import MeasuredAnswer
-from busplan.recordings.can import read_can, written_bits
+from busplan.recordings.can import written_bits
 from tests.oracles.can_recording import Logged, Queued, arbitrated, bits_of, candump, servo_8
 
 if TYPE_CHECKING:
@@ -27,15 +25,15 @@ PLAN = "can-servo-8"
 LOGGED = arbitrated(servo_8(300))
 
 
-def of_log(text: str, tmp_path: Path, *, plan: Any = PLAN, **options: Any) -> MeasuredAnswer:
+def of_log(text: str, tmp_path: Path, *, plan: Any = PLAN, **options: Any) -> busplan.MeasuredAnswer:
     path = tmp_path / "bus.log"
     path.write_text(text)
     return busplan.measured(plan, path, **options)
 
 
-def figure(answer: MeasuredAnswer, start: str) -> RecordedFigure:
-    (found,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
-    return found
+def figure(answer: busplan.MeasuredAnswer, start: str) -> Any:
+    (recorded,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
+    return recorded
 
 
 frames = st.builds(
@@ -49,23 +47,25 @@ frames = st.builds(
 
 
 @given(st.lists(frames, min_size=1, max_size=50), st.integers(0, 0x3FFFF))
-def test_the_bits_of_a_frame_are_those_written_one_by_one(each: list[Queued], lower: int) -> None:
-    each = [frame._replace(identifier=frame.identifier << 18 | lower) if frame.extended else frame for frame in each]
-    found = written_bits(
-        np.array([frame.identifier for frame in each]),
-        np.array([frame.extended for frame in each]),
-        np.zeros(len(each), dtype=np.bool_),
-        np.array([len(frame.data) for frame in each]),
-        np.array([int.from_bytes(frame.data.ljust(8, b"\0"), "big") for frame in each], dtype=np.uint64),
+def test_the_bits_of_a_frame_are_those_written_one_by_one(frames: list[Queued], lower: int) -> None:
+    frames = [
+        frame._replace(identifier=frame.identifier << 18 | lower) if frame.extended else frame for frame in frames
+    ]
+    bits = written_bits(
+        np.array([frame.identifier for frame in frames]),
+        np.array([frame.extended for frame in frames]),
+        np.zeros(len(frames), dtype=np.bool_),
+        np.array([len(frame.data) for frame in frames]),
+        np.array([int.from_bytes(frame.data.ljust(8, b"\0"), "big") for frame in frames], dtype=np.uint64),
     )
-    assert found.tolist() == [bits_of(frame) for frame in each]
+    assert bits.tolist() == [bits_of(frame) for frame in frames]
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_machine_within_its_plan_is_found_to_be(tmp_path: Path, seed: int) -> None:
     logged = arbitrated(servo_8(300, seed=seed))
     answer = of_log(candump(logged), tmp_path)
-    assert [found.quantity for found in answer.outside] == []
+    assert [figure.quantity for figure in answer.outside] == []
     assert answer.edits == {}
     assert answer.day == "2023-11-14"
     # Every bit is counted: the load is that of the simulation.
@@ -82,6 +82,7 @@ def test_a_machine_within_its_plan_is_found_to_be(tmp_path: Path, seed: int) -> 
 
 def test_every_format_has_the_same_frames(tmp_path: Path) -> None:
     logged = [*LOGGED[:400], Logged(LOGGED[400].us, 0x18FF0102, b"\1\2\3", True, 0)]
+    exact: busplan.MeasuredAnswer | None = None
     for ending in ("log", "asc", "blf", "trc"):
         path = tmp_path / f"bus.{ending}"
         with can.Logger(str(path)) as writer:
@@ -95,13 +96,15 @@ def test_every_format_has_the_same_frames(tmp_path: Path) -> None:
                         channel=0,
                     )
                 )
-        found = read_can(path, progress=lambda _done, _total: None)
-        assert found.identifiers.tolist() == [frame.identifier for frame in logged], ending
-        assert found.extended.tolist() == [frame.extended for frame in logged]
-        assert found.bits.tolist() == [bits_of(frame) for frame in logged]
-        step_us = 100 if ending == "trc" else 2
-        assert found.times_us == pytest.approx([frame.us - logged[0].us for frame in logged], abs=step_us)
-        assert found.broken == ""
+        answer = busplan.measured(PLAN, path)
+        exact = exact or answer
+        step_us = 200 if ending == "trc" else 4
+        assert [figure.quantity for figure in answer.figures] == [figure.quantity for figure in exact.figures]
+        for row, of_log in zip(answer.figures, exact.figures, strict=True):
+            allowed = {"us": step_us, "share": 0.001, "kbit/s": 1000}.get(row.unit, 0)
+            assert row.recorded == pytest.approx(of_log.recorded, abs=allowed), (ending, row.quantity)
+        assert figure(answer, "frames of no message").note == "0x18ff0102"
+        assert not any("damaged" in remark for remark in answer.remarks)
 
 
 def test_what_is_planned_and_not_seen_and_seen_and_not_planned_is_said(tmp_path: Path) -> None:
@@ -122,7 +125,7 @@ def test_a_message_that_comes_more_often_or_longer_is_outside_and_measured(tmp_p
     plan = busplan.load_profile(PLAN, changes={"message.heartbeats.period_us": 70_000})
     logged = [frame._replace(data=b"\5\6") if frame.identifier == 0x708 else frame for frame in LOGGED]
     answer = of_log(candump(logged), tmp_path, plan=plan)
-    assert [found.quantity for found in answer.outside] == ["heartbeats: period", "heartbeats: data"]
+    assert [figure.quantity for figure in answer.outside] == ["heartbeats: period", "heartbeats: data"]
     assert answer.edits["message.heartbeats.payload_bytes"] == 2
     assert answer.edits["message.heartbeats.period_us"] == pytest.approx(50_000, rel=2e-3)
 
@@ -133,7 +136,7 @@ def test_jitter_and_late_cycles_are_outside(tmp_path: Path) -> None:
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").recorded == pytest.approx(900, abs=150)
     assert figure(of_log(candump(shaken), tmp_path), "SYNC: jitter").verdict == "outside"
     answer = of_log(candump(arbitrated(late)), tmp_path)
-    assert [found.quantity for found in answer.outside] == ["last PDO after SYNC"]
+    assert [figure.quantity for figure in answer.outside] == ["last PDO after SYNC"]
 
 
 def test_every_frame_of_a_pdo_has_a_name_of_its_own(tmp_path: Path) -> None:
@@ -154,7 +157,7 @@ def test_stamps_that_are_late_are_said_and_doubted(tmp_path: Path) -> None:
     frame = Queued(0.0, 0x300, b"\xaa" * 8, False, False)
     bits = bits_of(frame)  # at 1000 kbit/s a microsecond each
 
-    def answer(late_us: float) -> MeasuredAnswer:
+    def answer(late_us: float) -> busplan.MeasuredAnswer:
         """Frames directly after each other, of which each fourth is stamped late."""
         stamps_us = (bits * place + (late_us if place % 4 == 1 else 0.0) for place in range(400))
         return of_log(candump([Logged(us, 0x300, frame.data, False, bits) for us in stamps_us]), tmp_path)
@@ -181,8 +184,8 @@ def test_errors_remote_frames_and_can_fd_are_said(tmp_path: Path) -> None:
     more = "(1700000000.000001) can0 123#R\n(1700000000.000002) can0 20000080#0000000000000000\n"
     fd = "(1700000000.000003) can0 124##1" + "AA" * 16 + "\n"
     answer = of_log(more + fd + candump(LOGGED), tmp_path)
-    said = "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 in no load, for the plan has no "
-    assert f"{said}data bit rate." in answer.remarks
+    words = "1 frame of CAN FD: in the load with half of the possible stuff bits, 1 in no load, for the plan has no "
+    assert f"{words}data bit rate." in answer.remarks
     assert "1 remote frame: the length code is shown as data." in answer.remarks
     assert figure(answer, "error frames").recorded == 1
 
@@ -210,14 +213,19 @@ def test_stuffing_is_that_of_classical_frames(tmp_path: Path) -> None:
 
 def test_a_long_length_code_of_a_classical_frame_is_one_of_8_bytes(tmp_path: Path) -> None:
     head = "date Sam Sep 30 15:06:13.191 2017\nbase hex  timestamps absolute\ninternal events logged\n"
-    each = [f"{number}.000000 1  7F0  Tx   d {code} 00 11 22 33 44 55 66 77\n" for number, code in enumerate("8AF")]
-    (tmp_path / "bus.asc").write_text(head + "".join(each))
-    log = read_can(tmp_path / "bus.asc", progress=lambda _done, _total: None)
-    assert log.sizes.tolist() == [8, 8, 8]
-    assert not log.is_fd.any()
+    frames = [f"{k / 100:.6f} 1  181  Tx   d {'8AF'[k % 3]} 00 11 22 33 44 55 66 77\n" for k in range(60)]
+    (tmp_path / "bus.asc").write_text(head + "".join(frames))
+    answer = busplan.measured(PLAN, tmp_path / "bus.asc")
+    assert figure(answer, "feedback: data").recorded == 8
+    assert not any("CAN FD" in remark for remark in answer.remarks)
+    codes = np.array([8, 10, 15])
+    data = np.full(3, 0x0011223344556677, dtype=np.uint64)
+    written = written_bits(np.full(3, 0x181), np.zeros(3, bool), np.zeros(3, bool), codes, data)
+    load = sum(written[k % 3] for k in range(1, 60)) / 590_000
+    assert figure(answer, "load ").recorded == pytest.approx(load, rel=1e-6)
     # Counted one by one, each with the other code in its length field and CRC.
-    words = [f"{0x7F0:012b}000{code:04b}{0x0011223344556677:064b}" for code in (8, 10, 15)]
-    for word, bits in zip(words, log.bits, strict=True):
+    words = [f"{0x181:012b}000{code:04b}{0x0011223344556677:064b}" for code in codes]
+    for word, bits in zip(words, written, strict=True):
         crc = 0
         for bit in word:
             crc = (crc << 1 & 0x7FFF) ^ (0x4599 if (crc >> 14) != int(bit) else 0)
@@ -232,7 +240,7 @@ def test_a_long_length_code_of_a_classical_frame_is_one_of_8_bytes(tmp_path: Pat
 def test_a_load_without_its_can_fd_frames_is_not_judged(tmp_path: Path) -> None:
     fd = "".join(f"(17000000{second}.000000) can0 080##1{'5A' * 64}\n" for second in range(10, 20))
     answer = of_log(fd, tmp_path)
-    assert not [found for found in answer.figures if found.quantity.startswith("load")]
+    assert not [figure for figure in answer.figures if figure.quantity.startswith("load")]
     mixed = of_log(candump(LOGGED) + fd, tmp_path)
     assert figure(mixed, "load ").verdict is None
     assert figure(mixed, "load ").note.endswith("without frames of CAN FD that switch")
@@ -259,7 +267,7 @@ def test_a_damaged_log_says_where(tmp_path: Path) -> None:
             end = random.randrange(200 if ending == "blf" else 4, len(content))
             path.write_bytes(content[:end] + random.choice((b"", b"\xff\0\n", b"nonsense\n")))
             try:
-                read_can(path, progress=lambda _done, _total: None)
+                busplan.measured(PLAN, path)
             except BusplanError:
                 continue
 

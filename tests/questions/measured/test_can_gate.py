@@ -1,16 +1,15 @@
 """What a machine on CAN does wrong is an error of `check --recording`, and what a log cannot show is said."""
 
 from collections.abc import Callable
+from itertools import accumulate
 from pathlib import Path
 from random import Random
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.can.recorded import due_pdos
 from tests.oracles.can_recording import Queued, arbitrated, candump
 
 CYCLE = """schema_version = 1
@@ -67,9 +66,9 @@ def errors(queued: list[Queued], folder: Path, *, more: str = "", plan: str = CY
     (folder / "plan.toml").write_text(plan)
     (folder / "bus.log").write_text(candump(arbitrated(queued)) + more)
     answer = busplan.check(folder / "plan.toml", recording=folder / "bus.log")
-    found = [finding for finding in answer.files[0].findings if finding.code.startswith("BP40")]
-    assert answer.passed == (not any(finding.severity == "error" for finding in found))
-    return {finding.problem.partition(": ")[2]: finding.code for finding in found}
+    findings = [finding for finding in answer.files[0].findings if finding.code.startswith("BP40")]
+    assert answer.passed == (not any(finding.severity == "error" for finding in findings))
+    return {finding.problem.partition(": ")[2]: finding.code for finding in findings}
 
 
 def test_a_machine_within_its_plan_has_no_finding(tmp_path: Path) -> None:
@@ -99,17 +98,17 @@ def test_commands_late_in_one_of_ten_due_cycles_are_told(tmp_path: Path) -> None
         (machine(sends=lambda cycle, frame: frame < 0x200 or cycle % 20 != 8), {"PDOs missing"}),
         (machine(sends=lambda _cycle, frame: frame != 0x202), {"PDOs missing", "not shown"}),
         (
-            [*machine(), *(each._replace(us=each.us + 50) for each in machine(3) if each.identifier == 0x201)],
+            [*machine(), *(frame._replace(us=frame.us + 50) for frame in machine(3) if frame.identifier == 0x201)],
             {"PDOs twice: 2 recorded"},
         ),
     ],
     ids=["half the rate", "no cycle", "no SYNC", "no commands", "a command never", "twice"],
 )
 def test_what_should_be_there_and_is_not_is_an_error(queued: list[Queued], figures: set[str], tmp_path: Path) -> None:
-    found = errors(queued, tmp_path)
-    assert len(found) == len(figures), found
+    words = errors(queued, tmp_path)
+    assert len(words) == len(figures), words
     for figure in figures:
-        assert any(words.startswith(figure) for words in found), found
+        assert any(text.startswith(figure) for text in words), words
 
 
 def test_error_frames_and_a_limit_of_what_may_be_missed(tmp_path: Path) -> None:
@@ -124,32 +123,33 @@ def test_error_frames_and_a_limit_of_what_may_be_missed(tmp_path: Path) -> None:
 
 
 def test_a_log_that_shows_nothing_fails_the_gate(tmp_path: Path) -> None:
-    found = errors(machine(3), tmp_path)
-    assert set(found.values()) == {"BP403"}
-    seconds = [each._replace(us=each.us // 1e6 * 1e6) for each in arbitrated(machine(2000))]
+    codes = errors(machine(3), tmp_path)
+    assert set(codes.values()) == {"BP403"}
+    seconds = [frame._replace(us=frame.us // 1e6 * 1e6) for frame in arbitrated(machine(2000))]
     (tmp_path / "bus.log").write_text(candump(seconds))
     answer = busplan.check(tmp_path / "plan.toml", recording=tmp_path / "bus.log")
     codes = {finding.code: finding.message for finding in answer.files[0].findings}
     assert "its stamps have steps of 1,000,000 us, and a cycle lasts 4,000" in codes["BP403"]
 
 
-@given(
-    st.integers(1, 4),
-    st.lists(st.floats(0, 3.4), min_size=3, max_size=40),
-    st.sets(st.integers(5, 36), max_size=1),
-)
-def test_pdos_that_come_in_their_order_are_those_of_their_syncs(every: int, late: list[float], lost: set[int]) -> None:
-    """Each PDO is late by so many due periods, never before the one before it, the first and the last in time."""
-    late = [0.1, 0.1, *late, 0.1, 0.1, 0.1, 0.1]
-    sync_us = np.arange(0.0, len(late) * every + 1) * 1000.0
-    due_us = np.arange(0.0, len(late)) * every * 1000.0
-    times_us = np.maximum.accumulate(due_us + np.array(late) * every * 1000.0) + np.arange(len(late)) * 1e-3
-    found = due_pdos(sync_us, times_us, every=every)
-    if every == 1:
-        assert (found.missing, found.twice) == (0, 0)
-        assert found.late_us == pytest.approx(times_us - due_us)
-    kept = [number for number in range(len(late)) if number not in lost]
-    in_time = due_us + 100.0
-    found = due_pdos(sync_us, in_time[kept], every=every)
-    assert (found.missing, found.twice) == (len(late) - len(kept), 0)
-    assert found.late_us == pytest.approx(np.full(len(kept), 100.0))
+@given(st.lists(st.floats(0, 3.4), min_size=3, max_size=40), st.sets(st.integers(5, 9), max_size=1))
+def test_pdos_that_come_in_their_order_are_those_of_their_syncs(
+    tmp_path_factory: pytest.TempPathFactory, late: list[float], lost: set[int]
+) -> None:
+    """Each PDO of a node is late by so many periods, and never before the PDO before it."""
+    periods = [0.1, 0.1, *late, *(0.1 for _ in range(10))]
+    queued_us = list(accumulate(((cycle + after) * 4000.0 for cycle, after in enumerate(periods)), max))
+    late_us = [us - cycle * 4000.0 for cycle, us in enumerate(queued_us)]
+
+    def recorded(queued: list[Queued]) -> dict[str, float | None]:
+        folder = tmp_path_factory.mktemp("late")
+        (folder / "plan.toml").write_text(CYCLE)
+        (folder / "bus.log").write_text(candump(arbitrated(queued)))
+        answer = busplan.measured(folder / "plan.toml", folder / "bus.log")
+        return {figure.quantity: figure.recorded for figure in answer.figures}
+
+    of_late = recorded(machine(len(late_us), late_us=lambda cycle, frame: late_us[cycle] * (frame == 0x201)))
+    assert (of_late["PDOs missing"], of_late["PDOs twice"]) == (0, 0)
+    assert of_late["last PDO after SYNC"] == pytest.approx(max(1300, 700 + max(late_us)), abs=700)
+    sent = recorded(machine(sends=lambda cycle, frame: frame != 0x203 or cycle // 4 not in lost))
+    assert (sent["PDOs missing"], sent["PDOs twice"]) == (len(lost), 0)

@@ -13,9 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.rule import RecordedFigure
 from busplan.errors import BusplanError
-from busplan.questions.measured import MeasuredAnswer
 from tests.oracles.ethercat_recording import (
     APRD,
     FPRD,
@@ -45,7 +43,7 @@ PLAN = busplan.load_profile(
 
 def of_packets(
     packets: list[tuple[float, bytes]], tmp_path: Path, *, plan: Any = PLAN, **options: Any
-) -> MeasuredAnswer:
+) -> busplan.MeasuredAnswer:
     path = tmp_path / "capture.pcapng"
     path.write_bytes(pcapng(packets))
     return busplan.measured(plan, path, **options)
@@ -53,13 +51,13 @@ def of_packets(
 
 def of_machine(
     machine: Machine, tmp_path: Path, *, cycles: int = 1200, seed: int = 1, **options: Any
-) -> MeasuredAnswer:
+) -> busplan.MeasuredAnswer:
     return of_packets(simulated(machine, cycles, seed=seed), tmp_path, **options)
 
 
-def figure(answer: MeasuredAnswer, start: str) -> RecordedFigure:
-    (found,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
-    return found
+def figure(answer: busplan.MeasuredAnswer, start: str) -> Any:
+    (recorded,) = (figure for figure in answer.figures if f"{figure.quantity} ".startswith(start))
+    return recorded
 
 
 def test_the_shipped_recording_is_what_the_simulation_writes() -> None:
@@ -104,7 +102,7 @@ def test_an_applied_profile_takes_as_long_as_the_machine_did(tmp_path: Path) -> 
     trip = figure(answer, "round trip ").recorded
     keys = {key: value for key, value in answer.edits.items() if value is not None}
     applied = busplan.load_profile(PLAN, changes={**keys, "bus.mailbox_polls": 0})
-    (deciding,) = (found for found in busplan.capacity(applied).results if found.timing_model == "last-byte")
+    (deciding,) = (result for result in busplan.capacity(applied).results if result.timing_model == "last-byte")
     assert deciding.bias_us is not None
     assert trip == pytest.approx(deciding.required_us + deciding.bias_us, abs=0.01)
 
@@ -131,7 +129,7 @@ def test_what_is_lost_wrong_or_not_sent_is_counted(tmp_path: Path) -> None:
         assert figure(answer, "cycles without a frame").recorded == 3
         assert figure(answer, "master's time").recorded == pytest.approx(40, abs=0.2)
         missed = ["cycles without a frame", "lost frames", "wrong working counters"]
-        assert [found.quantity for found in answer.outside] == missed
+        assert [figure.quantity for figure in answer.outside] == missed
 
 
 def test_the_frame_that_is_still_on_its_way_is_not_lost(tmp_path: Path) -> None:
@@ -206,9 +204,9 @@ def test_the_time_of_a_byte_is_found_from_frames_of_several_sizes(tmp_path: Path
             (back, ethernet(datagrams, index=number % 256, counters=(1,), returned=True)),
         ]
     answer = of_packets(packets, tmp_path)
-    found = figure(answer, "time of a byte")
-    assert found.recorded == pytest.approx(0.0841, abs=0.0003)
-    assert found.planned == pytest.approx(0.0835, abs=0.0002)
+    of_byte = figure(answer, "time of a byte")
+    assert of_byte.recorded == pytest.approx(0.0841, abs=0.0003)
+    assert of_byte.planned == pytest.approx(0.0835, abs=0.0002)
     assert "no frame of process data" in answer.shows_nothing[0]
     assert answer.edits == {}
 
@@ -221,7 +219,7 @@ def test_a_frame_that_waits_for_another_says_no_time_of_a_byte(tmp_path: Path) -
         for time, packet in simulated(Machine(datagrams=small, counters=(3,)), 100)
     ]
     answer = of_packets(sorted(packets), tmp_path)
-    assert not [found for found in answer.figures if found.quantity == "time of a byte"]
+    assert not [figure for figure in answer.figures if figure.quantity == "time of a byte"]
 
 
 HOPS_NS = (700, 690, 820)
@@ -234,10 +232,10 @@ def test_port_times_say_the_delay_of_each_device_of_a_line(tmp_path: Path, read:
     machine = Machine(host_spread_us=0.001, hop_us=0.7367)
     started = start_up(HOPS_NS, clocks_ns=CLOCKS_NS, ports=port, read=read, width=width)
     answer = of_packets(started + simulated(machine, 100), tmp_path)
-    *delays, mean = (found for found in answer.figures if "delay of device" in found.quantity)
-    assert [found.recorded for found in delays] == [0.7, 0.69, 0.82]
-    assert [found.quantity for found in delays] == [f"delay of device {number}" for number in (2, 3, 4)]
-    assert [found.planned for found in delays] == pytest.approx([0.698] * 3, abs=0.001)
+    *delays, mean = (figure for figure in answer.figures if "delay of device" in figure.quantity)
+    assert [figure.recorded for figure in delays] == [0.7, 0.69, 0.82]
+    assert [figure.quantity for figure in delays] == [f"delay of device {number}" for number in (2, 3, 4)]
+    assert [figure.planned for figure in delays] == pytest.approx([0.698] * 3, abs=0.001)
     assert (mean.quantity, mean.verdict) == ("mean delay of devices 2 to 4", "within")
     assert mean.recorded == pytest.approx(0.736667)
     assert answer.edits["node.delay_us"] == pytest.approx(0.736667)
@@ -246,7 +244,7 @@ def test_port_times_say_the_delay_of_each_device_of_a_line(tmp_path: Path, read:
     exact = busplan.load_profile(PLAN, changes={"node.delay_us": 0.6, "node.cable_m": 10})
     beside = of_packets(started + simulated(machine, 100), tmp_path, plan=exact)
     assert figure(beside, "delay of device 2").planned == pytest.approx(0.65)
-    assert "mean delay of devices 2 to 4" in [found.quantity for found in beside.outside]
+    assert "mean delay of devices 2 to 4" in [figure.quantity for figure in beside.outside]
     assert beside.edits["node.delay_us"] == pytest.approx(0.736667 - 0.05)
     # A plan that a recording was written into holds it, though no device has its mean.
     applied = busplan.load_profile(PLAN, changes={"node.delay_us": answer.edits["node.delay_us"]})
@@ -351,7 +349,7 @@ def test_every_form_has_the_same_figures(run: Run) -> None:
     document = json.loads(run(*words, "--format", "json").stdout)
     assert document == busplan.measured("ethercat-servo-8", FILES / "capture.pcapng", quantile=0.9).to_dict()
     rows = list(csv.DictReader(run(*words, "--format", "csv").stdout.splitlines()))
-    assert [row["quantity"] for row in rows] == [found["quantity"] for found in document["figures"]]
+    assert [row["quantity"] for row in rows] == [figure["quantity"] for figure in document["figures"]]
     assert document["day"] == "2023-11-14"
     assert document["outside"] == []
     text = run(*words).stdout

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.questions.measured import MeasuredAnswer
 from tests.oracles.ethercat_recording import (
     FRMW,
     LRW,
@@ -78,39 +77,39 @@ MACHINE = Machine(
 SHORT_LINE = replace(MACHINE, devices=4)
 
 
-def asked(
+def judged(
     packets: Packets, folder: Path, *, plan: str = FOUR, more: bytes = b"", **options: Any
-) -> tuple[MeasuredAnswer, dict[str, str]]:
+) -> tuple[busplan.MeasuredAnswer, dict[str, str]]:
     """The answer, and the code of each BP40x of `check --recording` by its first words."""
     profile, capture = folder / "plan.toml", folder / "capture.pcapng"
     profile.write_text(plan)
     capture.write_bytes(pcapng(packets, **options) + more)
     answer = busplan.check(profile, recording=capture)
-    found = [finding for finding in answer.files[0].findings if finding.code.startswith("BP40")]
-    assert answer.passed == (not any(finding.severity == "error" for finding in found))
-    words = {finding.problem.partition(": ")[2].removeprefix("not shown: "): finding.code for finding in found}
+    findings = [finding for finding in answer.files[0].findings if finding.code.startswith("BP40")]
+    assert answer.passed == (not any(finding.severity == "error" for finding in findings))
+    words = {finding.problem.partition(": ")[2].removeprefix("not shown: "): finding.code for finding in findings}
     return busplan.measured(profile, capture), {text.partition(": ")[0]: code for text, code in words.items()}
 
 
-def recorded(answer: MeasuredAnswer, quantity: str) -> float | None:
+def recorded(answer: busplan.MeasuredAnswer, quantity: str) -> float | None:
     return next(figure.recorded for figure in answer.figures if figure.quantity == quantity)
 
 
 def test_a_machine_within_its_plan_has_no_finding(tmp_path: Path) -> None:
-    assert asked(simulated(MACHINE, 1000), tmp_path)[1] == {}
+    assert judged(simulated(MACHINE, 1000), tmp_path)[1] == {}
 
 
 def test_cycles_without_a_frame_are_an_error_and_the_longest_run_is_said(tmp_path: Path) -> None:
     seldom = replace(MACHINE, skipped=frozenset(range(50, 2000, 100)))
-    assert asked(simulated(seldom, 2000), tmp_path)[1] == {"cycles without a frame": "BP401"}
+    assert judged(simulated(seldom, 2000), tmp_path)[1] == {"cycles without a frame": "BP401"}
     allowed = FOUR + "[limits]\nmissed_cycles = 20\n"
-    assert asked(simulated(seldom, 2000), tmp_path, plan=allowed)[1] == {}
+    assert judged(simulated(seldom, 2000), tmp_path, plan=allowed)[1] == {}
     row = replace(MACHINE, skipped=frozenset(range(700, 1300)))
-    answer, found = asked(simulated(row, 2000), tmp_path)
+    answer, codes = judged(simulated(row, 2000), tmp_path)
     (figure,) = answer.outside
     assert (figure.recorded, figure.events) == (600, 2000)
     assert figure.note == "600 in a row, 0.601 s without set-points"
-    assert found == {"cycles without a frame": "BP401"}
+    assert codes == {"cycles without a frame": "BP401"}
 
 
 def test_a_cycle_that_lacks_a_frame_or_data_of_most_lacks_one(tmp_path: Path) -> None:
@@ -121,23 +120,23 @@ def test_a_cycle_that_lacks_a_frame_or_data_of_most_lacks_one(tmp_path: Path) ->
     )
     packets = [packet for packet in simulated(fuller, 1200) if packet[0] // 1000 not in lean]
     packets += [packet for packet in simulated(leaner, 1200) if packet[0] // 1000 in lean]
-    answer, found = asked(sorted(packets, key=lambda packet: packet[0]), tmp_path, plan=QUARTERS)
-    assert found == {"cycles without a frame": "BP401"}
+    answer, codes = judged(sorted(packets, key=lambda packet: packet[0]), tmp_path, plan=QUARTERS)
+    assert codes == {"cycles without a frame": "BP401"}
     assert answer.outside[0].note == "3 with less than most have"
 
 
 def test_lost_frames_and_wrong_counters_count_against_the_same_limit(tmp_path: Path) -> None:
     machine = replace(MACHINE, lost=frozenset({100, 200}), wrong=frozenset({300, 400}))
     lost = {"lost frames": "BP401", "wrong working counters": "BP401"}
-    assert asked(simulated(machine, 1000), tmp_path)[1] == lost
-    assert asked(simulated(machine, 1000), tmp_path, plan=FOUR + "[limits]\nmissed_cycles = 2\n")[1] == {}
+    assert judged(simulated(machine, 1000), tmp_path)[1] == lost
+    assert judged(simulated(machine, 1000), tmp_path, plan=FOUR + "[limits]\nmissed_cycles = 2\n")[1] == {}
 
 
 @pytest.mark.parametrize("first", [0, 1])
 def test_two_units_in_turn_are_one_frame_a_cycle(tmp_path: Path, first: int) -> None:
     machine = replace(MACHINE, host_us=23.0, host_spread_us=0.5, schedule=(cycle(64),))
-    answer, found = asked(simulated(machine, 1001)[2 * first :], tmp_path, plan=TWO)
-    assert found == {}
+    answer, codes = judged(simulated(machine, 1001)[2 * first :], tmp_path, plan=TWO)
+    assert codes == {}
     assert recorded(answer, "period") == pytest.approx(1000, abs=0.01)
     assert recorded(answer, "frames in a cycle with g0") == 1
     assert answer.edits["bus.master_us"] == pytest.approx(23.5, abs=0.05)
@@ -152,8 +151,8 @@ def test_each_cycle_is_held_against_the_one_of_its_number(tmp_path: Path, first:
     packets = [
         (time + 200 * (len(frame) > 100 and bool(frame[6] & 2)), frame) for time, frame in simulated(machine, 1000)
     ]
-    answer, found = asked(packets, tmp_path, plan=QUARTERS)
-    assert found == {"round trip with g0 and g1": "BP401", "master's time": "BP401"}
+    answer, codes = judged(packets, tmp_path, plan=QUARTERS)
+    assert codes == {"round trip with g0 and g1": "BP401", "master's time": "BP401"}
     trips = [figure for figure in answer.figures if figure.quantity.startswith("round trip with")]
     assert [(figure.quantity, figure.events) for figure in trips] == [
         ("round trip with g0 and g1", 250),
@@ -167,12 +166,12 @@ def test_each_cycle_is_held_against_the_one_of_its_number(tmp_path: Path, first:
 
 def test_a_cycle_without_process_data_has_no_frame_to_miss(tmp_path: Path) -> None:
     plan, machine = plan_of((4, 8, 3)), replace(SHORT_LINE, schedule=(cycle(0), cycle(64), cycle(0)))
-    answer, found = asked(simulated(machine, 1000), tmp_path, plan=plan)
-    assert found == {}
+    answer, codes = judged(simulated(machine, 1000), tmp_path, plan=plan)
+    assert codes == {}
     assert recorded(answer, "period") == pytest.approx(1000, abs=0.01)
     lacks = replace(machine, skipped=frozenset({301, 601}))
-    answer, found = asked(simulated(lacks, 1000), tmp_path, plan=plan)
-    assert found == {"cycles without a frame": "BP401"}
+    answer, codes = judged(simulated(lacks, 1000), tmp_path, plan=plan)
+    assert codes == {"cycles without a frame": "BP401"}
     assert recorded(answer, "cycles without a frame") == 2
 
 
@@ -181,19 +180,35 @@ def test_a_master_that_goes_on_with_its_own_count_misses_a_cycle_and_no_more(tmp
     before, behind = (replace(SHORT_LINE, schedule=schedule[shift:] + schedule[:shift]) for shift in (0, 3))
     packets = [packet for packet in simulated(before, 600) if packet[0] < 299_500]
     packets += [packet for packet in simulated(behind, 600) if packet[0] > 300_500]
-    answer, found = asked(packets, tmp_path, plan=QUARTERS)
-    assert found == {"cycles without a frame": "BP401"}
+    answer, codes = judged(packets, tmp_path, plan=QUARTERS)
+    assert codes == {"cycles without a frame": "BP401"}
     assert recorded(answer, "cycles without a frame") == 1
+
+
+def test_a_new_count_begins_with_the_first_cycle_behind_a_gap(tmp_path: Path) -> None:
+    # The fullest cycles are the last before the gap and the first behind it.
+    before, behind = (
+        replace(SHORT_LINE, schedule=tuple(cycle(136 if place == fullest else 16) for place in range(4)))
+        for fullest in (3, 1)
+    )
+    packets = [packet for packet in simulated(before, 600) if packet[0] < 299_900]
+    packets += [packet for packet in simulated(behind, 600) if packet[0] > 300_900]
+    answer, codes = judged(packets, tmp_path, plan=QUARTERS)
+    assert codes == {"cycles without a frame": "BP401"}
+    assert recorded(answer, "cycles without a frame") == 1
+    events = {figure.quantity: figure.events for figure in answer.figures}
+    assert events["datagrams of a cycle with g0 and g1"] == 150
+    assert events["datagrams of a cycle with g0"] == 599 - 150
 
 
 def test_a_machine_of_another_plan_is_outside_it(tmp_path: Path) -> None:
     machine = replace(MACHINE, schedule=(cycle(124),))
-    assert asked(simulated(machine, 600), tmp_path)[1]["datagrams of a cycle with g0 and g1"] == "BP401"
+    assert judged(simulated(machine, 600), tmp_path)[1]["datagrams of a cycle with g0 and g1"] == "BP401"
     slow = replace(MACHINE, period_us=2000)
-    assert asked(simulated(slow, 600), tmp_path)[1] == {"period": "BP401"}
+    assert judged(simulated(slow, 600), tmp_path)[1] == {"period": "BP401"}
     never = replace(MACHINE, schedule=(cycle(16),))
-    assert "frames in a cycle with g0 and g1" not in asked(simulated(never, 600), tmp_path, plan=QUARTERS)[1]
-    rates, _ = asked(simulated(MACHINE, 600), tmp_path, plan=PLAIN)
+    assert "frames in a cycle with g0 and g1" not in judged(simulated(never, 600), tmp_path, plan=QUARTERS)[1]
+    rates, _ = judged(simulated(MACHINE, 600), tmp_path, plan=PLAIN)
     assert recorded(rates, "period") == pytest.approx(1000, abs=0.01)
     assert recorded(rates, "frames in a cycle") == 1
     assert rates.edits["bus.master_us"] == pytest.approx(24.9, abs=0.1)
@@ -202,9 +217,20 @@ def test_a_machine_of_another_plan_is_outside_it(tmp_path: Path) -> None:
 def test_the_start_of_a_master_is_no_missing_cycle(tmp_path: Path) -> None:
     packets = simulated(MACHINE, 1200)
     started = [packet for packet in packets if packet[0] < 1500 or 40_000 < packet[0] < 41_500 or packet[0] > 199_500]
-    answer, found = asked(started, tmp_path)
-    assert found == {}
+    answer, codes = judged(started, tmp_path)
+    assert codes == {}
     assert any("4 frames of process data at its ends are left out" in remark for remark in answer.remarks)
+
+
+def test_the_end_of_a_master_is_no_missing_cycle(tmp_path: Path) -> None:
+    packets = simulated(MACHINE, 1200)
+    ended = [
+        packet for packet in packets if packet[0] < 399_500 or 449_900 < packet[0] < 450_900 or packet[0] > 1.1985e6
+    ]
+    answer, codes = judged(ended, tmp_path)
+    assert codes == {}
+    assert any("2 frames of process data at its ends are left out" in remark for remark in answer.remarks)
+    assert next(figure.events for figure in answer.figures if figure.quantity == "period") == 400
 
 
 @settings(max_examples=40)
@@ -222,8 +248,8 @@ def test_a_machine_exactly_on_its_plan_is_never_outside(
     late_us, host_us = zip(*starts_and_hosts(machine, cycles, seed=seed), strict=True)
     plan = FOUR.replace("master_jitter_us = 10", f"master_jitter_us = {max(late_us) - min(late_us) + 1e-3}")
     plan = plan.replace("master_us = 25", f"master_us = {max(host_us) + 1e-3}")
-    answer, found = asked(simulated(machine, cycles, seed=seed), tmp_path_factory.mktemp("plan"), plan=plan)
-    assert "BP401" not in found.values()
+    answer, codes = judged(simulated(machine, cycles, seed=seed), tmp_path_factory.mktemp("plan"), plan=plan)
+    assert "BP401" not in codes.values()
     assert not answer.shows_nothing
 
 
@@ -232,7 +258,7 @@ def test_the_worst_start_is_within_its_u(tmp_path: Path) -> None:
     for seed, cycles in enumerate((30, 100, 300, 1000, 3000)):
         machine = replace(MACHINE, clock_ppm=40.0)
         late_us, _ = zip(*starts_and_hosts(machine, cycles, seed=seed), strict=True)
-        answer, _ = asked(simulated(machine, cycles, seed=seed), tmp_path)
+        answer, _ = judged(simulated(machine, cycles, seed=seed), tmp_path)
         (latest,) = (figure for figure in answer.figures if figure.quantity == "latest start")
         assert latest.verdict == "within"
         assert latest.recorded == pytest.approx(max(late_us) - min(late_us), abs=latest.uncertainty)
@@ -250,8 +276,8 @@ def test_stamps_of_no_port_say_no_time(tmp_path: Path) -> None:
         (in_bursts, "stamped in bursts"),
         (at_one_time, "stamped in bursts"),
     ):
-        answer, found = asked(stamped, tmp_path)
-        assert set(found.values()) == {"BP403"}
+        answer, codes = judged(stamped, tmp_path)
+        assert set(codes.values()) == {"BP403"}
         assert words in " ".join(answer.shows_nothing)
         assert answer.edits == {}
         hidden = [figure for figure in answer.figures if figure.hidden]
@@ -269,14 +295,14 @@ def test_a_byte_faster_than_the_wire_is_no_figure(tmp_path: Path) -> None:
         (time if not frame[6] & 2 else time // 1000 * 1000 + 100 + time % 1, frame)
         for time, frame in simulated(replace(MACHINE, jitter_us=0.5, schedule=schedule), 1000)
     ]
-    answer, _ = asked(packets, tmp_path, plan=plan)
+    answer, _ = judged(packets, tmp_path, plan=plan)
     (byte,) = (figure for figure in answer.figures if figure.quantity == "time of a byte")
     assert (byte.verdict, byte.hidden) == ("not shown", "less than on the wire: the host waits for more than the frame")
 
 
 def test_steps_that_hide_the_jitter_are_said(tmp_path: Path) -> None:
-    answer, found = asked([(time // 20 * 20, frame) for time, frame in simulated(MACHINE, 1000)], tmp_path)
-    assert found["latest start"] == "BP402"
+    answer, codes = judged([(time // 20 * 20, frame) for time, frame in simulated(MACHINE, 1000)], tmp_path)
+    assert codes["latest start"] == "BP402"
     assert "bus.master_jitter_us" not in answer.edits
 
 
@@ -289,33 +315,33 @@ def test_what_the_recorder_dropped_is_not_missing(tmp_path: Path) -> None:
         (b"", {"dropped_before": {200: 2, 603: 1}}),
     )
     for more, options in ways:
-        answer, found = asked(less, tmp_path, more=more, **options)
-        assert set(found.values()) == {"BP403"}
+        answer, codes = judged(less, tmp_path, more=more, **options)
+        assert set(codes.values()) == {"BP403"}
         assert answer.shows_nothing == ("the recorder dropped or cut 3 packets",)
         hidden = {figure.quantity: figure.recorded for figure in answer.figures if figure.hidden}
         assert hidden == {"cycles without a frame": 1, "lost frames": 1}
     # What is more than was dropped is missing.
     gone = [packet for packet in packets if not 300_000 < packet[0] < 400_000]
-    assert asked(gone, tmp_path, more=statistics(5, 3))[1]["cycles without a frame"] == "BP401"
+    assert judged(gone, tmp_path, more=statistics(5, 3))[1]["cycles without a frame"] == "BP401"
 
 
 def test_few_cycles_show_nothing(tmp_path: Path) -> None:
-    answer, found = asked(simulated(MACHINE, 9), tmp_path)
+    answer, codes = judged(simulated(MACHINE, 9), tmp_path)
     assert answer.shows_nothing == ("it has 9 cycles, and a period takes 10",)
-    assert set(found.values()) == {"BP403"}
+    assert set(codes.values()) == {"BP403"}
     assert answer.edits == {}
     enough = replace(MACHINE, schedule=(cycle(128),))
-    assert asked(simulated(enough, 10), tmp_path, plan=PLAIN)[1] == {}
+    assert judged(simulated(enough, 10), tmp_path, plan=PLAIN)[1] == {}
     # Of two sorts of cycle each is too few.
-    few = asked(simulated(MACHINE, 18), tmp_path)[1]
+    few = judged(simulated(MACHINE, 18), tmp_path)[1]
     assert few == {"round trip with g0 and g2": "BP402", "master's time": "BP402", "round trip with g0 and g1": "BP402"}
 
 
 def test_a_plan_that_a_recording_was_written_into_holds_it(tmp_path: Path) -> None:
     # The host takes longest in a cycle that is not the fullest.
     packets = simulated(replace(MACHINE, jitter_us=33.3, host_us=91.7), 1001)
-    answer, found = asked(packets, tmp_path)
-    assert set(found.values()) == {"BP401"}
+    answer, codes = judged(packets, tmp_path)
+    assert set(codes.values()) == {"BP401"}
     keys = {key: value for key, value in answer.edits.items() if value is not None}
     again = busplan.measured(busplan.load_profile(tmp_path / "plan.toml", changes=keys), tmp_path / "capture.pcapng")
     assert {figure.verdict for figure in again.figures} == {None, "within"}

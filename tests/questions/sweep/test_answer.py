@@ -33,12 +33,15 @@ def test_columns_are_the_rows_of_the_document(models: list[Any]) -> None:
         expected = [row[name] for row in document["rows"]]
         if column.dtype.kind == "U":
             # A word that is missing, as the verdict of the paper is, is no word.
-            expected = [" ".join(one) if isinstance(one, list) else "" if one is None else str(one) for one in expected]
+            expected = [
+                " ".join(value) if isinstance(value, list) else "" if value is None else str(value)
+                for value in expected
+            ]
             assert column.tolist() == expected
         else:
-            wanted = [float("nan") if one is None else one for one in expected]
+            wanted = [float("nan") if value is None else value for value in expected]
             np.testing.assert_array_equal(column, wanted)
-            assert {type(one) for one in column.tolist()} <= {float, *map(type, expected)}
+            assert {type(value) for value in column.tolist()} <= {float, *map(type, expected)}
         assert column.shape == (len(document["rows"]),)
 
 
@@ -69,9 +72,9 @@ def test_figures_of_the_verdict_are_the_deciding_models_alone() -> None:
 def test_a_point_is_what_capacity_says_of_it() -> None:
     periods = range(250, 4001, 750)
     answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": periods}, timing_model=["standard"])
-    found = busplan.capacity("paper-4ms", period_us=periods, timing_model=["standard"]).results
+    results = busplan.capacity("paper-4ms", period_us=periods, timing_model=["standard"]).results
     for name in ("max_axes", "margin_us", "limited_by", "fits", "safe_axes", "safe_required_us", "verdict"):
-        assert answer[name].tolist() == [getattr(one, name) for one in found]
+        assert answer[name].tolist() == [getattr(result, name) for result in results]
 
 
 @pytest.mark.parametrize(
@@ -128,15 +131,15 @@ def test_pandas_needs_no_pyarrow(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_xarray_has_a_dimension_for_each_key() -> None:
     xarray = pytest.importorskip("xarray")
     answer = busplan.sweep("paper-4ms", vary=GRID)
-    found = answer.to_xarray()
-    assert isinstance(found, xarray.Dataset)
-    assert dict(found.sizes) == {"bus.gap_count": 2, "cycle.period_us": 4, "bus.nodes": 2, "timing_model": 2}
+    dataset = answer.to_xarray()
+    assert isinstance(dataset, xarray.Dataset)
+    assert dict(dataset.sizes) == {"bus.gap_count": 2, "cycle.period_us": 4, "bus.nodes": 2, "timing_model": 2}
     for row in answer.to_dict()["rows"]:
-        one = found.sel({name: row[name] for name in found.dims})
+        point = dataset.sel({name: row[name] for name in dataset.dims})
         for name in ("margin_us", "safe_axes", "fits", "limited_by"):
-            assert one[name].item() == row[name] or (row[name] is None and np.isnan(one[name].item()))
-    assert found["margin_us"].attrs["units"] == found["cycle.period_us"].attrs["units"] == "us"
-    assert found["margin_us"].attrs["long_name"]
+            assert point[name].item() == row[name] or (row[name] is None and np.isnan(point[name].item()))
+    assert dataset["margin_us"].attrs["units"] == dataset["cycle.period_us"].attrs["units"] == "us"
+    assert dataset["margin_us"].attrs["long_name"]
 
 
 @pytest.mark.parametrize(
@@ -174,9 +177,9 @@ def test_circles_without_a_contour_tolerance_are_not_judged() -> None:
     both = str(busplan.sweep("paper-two-node", vary=vary, circle=True))
     assert "The circle is not judged at 1: no contour tolerance is asked for, or no error source matters." in both
     assert "The circle holds every tolerance at 0 " in both
-    one = str(busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, circle=True))
-    assert "not judged" in one
-    assert "holds every tolerance" not in one
+    unjudged = str(busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, circle=True))
+    assert "not judged" in unjudged
+    assert "holds every tolerance" not in unjudged
     judged = str(busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0]}, circle=True))
     assert "not judged" not in judged
 

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 import busplan
-from busplan.forms.charts import ChartGrid, Curves, Drawing, legend
-from busplan.forms.inks import INKS
 
 MODELS = ("paper", "standard")
 TOO_FAST_AND_NOT = {"cycle.period_us": [100.0, 2000.0, 4000.0], "circle.radius_mm": [10.0]}
@@ -20,25 +18,32 @@ def swept(**vary: Any) -> busplan.SweepAnswer:
     return busplan.sweep("paper-4ms", vary=values, timing_model=MODELS)
 
 
-def drawn(figure: str | None, **vary: Any) -> Drawing:
+def drawn(figure: str | None, **vary: Any) -> Any:
     return swept(**vary).drawing(figure=figure)
 
 
-def curves(drawing: Drawing) -> Curves:
+def curves(drawing: Any) -> Any:
     (panel,) = drawing.panels
-    assert isinstance(panel.plot, Curves)
     return panel.plot
 
 
-def grids(drawing: Drawing) -> list[ChartGrid]:
-    return [panel.plot for panel in drawing.panels if isinstance(panel.plot, ChartGrid)]
+def grids(drawing: Any) -> list[Any]:
+    """The map of each timing model."""
+    return [panel.plot for panel in drawing.panels if panel.plot is not None]
 
 
-def words(drawing: Drawing) -> list[str]:
-    return [entry.words for entry in legend(drawing.panels)]
+def words(drawing: Any) -> list[str]:
+    """Words of the legend."""
+    entries = []
+    for panel in drawing.panels:
+        if hasattr(panel.plot, "legend"):
+            entries += panel.plot.legend
+        elif panel.plot is not None:
+            entries += [part.entry for part in (*panel.plot.curves, *panel.plot.guides, *panel.plot.shades)]
+    return [entry.words for entry in dict.fromkeys(entries)]
 
 
-def labels(plot: Curves) -> list[str]:
+def labels(plot: Any) -> list[str]:
     return [tick.label for tick in plot.across.ticks]
 
 
@@ -126,9 +131,11 @@ def test_each_colour_is_explained_by_the_values_that_it_stands_for(figure: str, 
     ranges = {
         entry.ink: tuple(map(float, entry.words.removesuffix(" us").removesuffix("%").split(" to ")))
         for entry in grid.legend
-        if entry.ink in INKS
+        if entry.ink.startswith(("above", "below"))
     }
     assert len(ranges) > 3
+    # A count or a share has no other side of zero.
+    assert figure == "margin_us" or all(ink.startswith("above") for ink in ranges)
     ends = sorted(ranges.values())
     for (_, end), (start, _) in pairwise(ends):
         assert start - end in ((1.0,) if figure == "max_axes" else (0.0,))
@@ -205,7 +212,7 @@ def test_another_design_is_not_marked_as_this_one() -> None:
         ("gantry-24", "group.tool.nodes", "group tool nodes"),
     ],
 )
-def test_keys_are_said_in_words_with_their_unit(name: str, key: str, label: str) -> None:
+def test_keys_are_named_in_words_with_their_unit(name: str, key: str, label: str) -> None:
     answer = busplan.sweep(name, vary={key: [8, 9]})
     assert curves(answer.drawing(figure="margin_us")).across.label == label
 
@@ -221,7 +228,7 @@ def test_figures_are_drawn_in_the_unit_of_their_label() -> None:
 
 
 @pytest.mark.parametrize(
-    ("figure", "vary", "said"),
+    ("figure", "vary", "caption"),
     [
         (
             "margin_us",
@@ -256,8 +263,8 @@ def test_figures_are_drawn_in_the_unit_of_their_label() -> None:
         ),
     ],
 )
-def test_the_caption_says_what_to_see(figure: str, vary: dict[str, Any], said: str) -> None:
-    assert drawn(figure, **vary).words == (said,)
+def test_the_caption_says_what_to_see(figure: str, vary: dict[str, Any], caption: str) -> None:
+    assert drawn(figure, **vary).words == (caption,)
 
 
 def test_a_figure_that_no_model_has_is_said() -> None:

@@ -1,17 +1,18 @@
 """A sweep is capacity, point by point: what switches a part on or off does so at each point for itself."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
+import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses import kind_named, kind_names
+from busplan.buses import kind_names
 from busplan.profile.kinds import cycle_keys
 from busplan.sections.base import value_at
-from busplan.sections.profile import Profile
 
 COUNTS = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
 GROUPS: Mapping[str, Any] = {
@@ -34,7 +35,13 @@ GROUPS: Mapping[str, Any] = {
 }
 
 
-def with_values(profile: Profile, key: str, values: list[float]) -> list[float]:
+def loaded(data: Mapping[str, Any], folder: Path) -> busplan.Profile:
+    path = folder / "test.toml"
+    path.write_text(tomli_w.dumps(data), encoding="utf-8")
+    return busplan.load_profile(path)
+
+
+def with_values(profile: busplan.Profile, key: str, values: list[float]) -> list[float]:
     """Those of some values that a profile may have, each once."""
     taken = []
     for value in dict.fromkeys(values):
@@ -46,15 +53,15 @@ def with_values(profile: Profile, key: str, values: list[float]) -> list[float]:
     return taken
 
 
-def require_points(profile: Profile, vary: Mapping[str, list[float]]) -> None:
+def require_points(profile: busplan.Profile, vary: Mapping[str, list[float]]) -> None:
     for row in busplan.sweep(profile, vary=vary).to_dict()["rows"]:
         point = busplan.load_profile(profile, changes={key: row[key] for key in vary})
-        (found,) = busplan.capacity(point, timing_model=row["timing_model"]).results
-        figures = found.by_key()
-        if found.groups:
+        (result,) = busplan.capacity(point, timing_model=row["timing_model"]).results
+        figures = result.by_key()
+        if result.groups:
             # Counts of the whole are those of the group that varies, beside the others.
             figures = {key: value for key, value in figures.items() if key not in COUNTS}
-            figures |= {f"group.{group.name}.{key}": getattr(group, key) for group in found.groups for key in COUNTS}
+            figures |= {f"group.{group.name}.{key}": getattr(group, key) for group in result.groups for key in COUNTS}
         for key, value in figures.items():
             assert row[key] == (pytest.approx(value, rel=1e-9, abs=1e-9) if isinstance(value, float) else value), key
 
@@ -62,7 +69,7 @@ def require_points(profile: Profile, vary: Mapping[str, list[float]]) -> None:
 @pytest.mark.parametrize("kind", kind_names())
 @given(data=st.data())
 def test_every_figure_of_a_row_is_that_of_its_point(
-    kind: str, data: st.DataObject, profiles_by_kind: Mapping[str, st.SearchStrategy[Profile]]
+    kind: str, data: st.DataObject, profiles_by_kind: Mapping[str, st.SearchStrategy[busplan.Profile]]
 ) -> None:
     profile = data.draw(profiles_by_kind[kind])
     values = {key: value_at(profile, key) for key in cycle_keys(profile)}
@@ -75,13 +82,13 @@ def test_every_figure_of_a_row_is_that_of_its_point(
 
 @pytest.mark.parametrize("polls", [[0, 1], [2, 0]])
 @pytest.mark.parametrize("model", [None, "TwinCAT"])
-def test_the_last_frame_comes_again_where_no_mailbox_is_asked(polls: list[float], model: str | None) -> None:
+def test_the_last_frame_comes_again_where_no_mailbox_is_asked(
+    tmp_path: Path, polls: list[float], model: str | None
+) -> None:
     data = {**GROUPS, "bus": {**GROUPS["bus"], **({"master": model} if model else {})}}
-    profile = kind_named("ethercat").profile_model().model_validate(data)
-    require_points(profile, {"bus.mailbox_polls": polls})
+    require_points(loaded(data, tmp_path), {"bus.mailbox_polls": polls})
 
 
 @pytest.mark.parametrize("sizes", [[0, 8], [0, 1480, 3]])
-def test_the_first_device_with_data_shares_the_first_frame(sizes: list[float]) -> None:
-    profile = kind_named("ethercat").profile_model().model_validate(GROUPS)
-    require_points(profile, {"group.first.read_bytes": sizes, "group.third.every": [1, 8]})
+def test_the_first_device_with_data_shares_the_first_frame(tmp_path: Path, sizes: list[float]) -> None:
+    require_points(loaded(GROUPS, tmp_path), {"group.first.read_bytes": sizes, "group.third.every": [1, 8]})

@@ -34,13 +34,13 @@ def test_csv_and_json_are_what_capacity_writes_for_each_point(name: str, tmp_pat
     rows, document = list(csv.reader(io.StringIO(text))), json.loads(saved(answer, tmp_path / "rows.json"))
     wanted_rows, wanted = [list(answer.columns)], []
     for changes in answer.sweep.grid.each_point():
-        own_profile = busplan.load_profile(shipped, changes=changes)
-        one = busplan.capacity(own_profile, timing_model=answer.sweep.timing_models)
-        own = list(csv.reader(io.StringIO(saved(one, tmp_path / "one.csv").decode())))
-        assert own[0][1:] == list(answer.columns[len(changes) :])
+        point = busplan.load_profile(shipped, changes=changes)
+        capacity = busplan.capacity(point, timing_model=answer.sweep.timing_models)
+        lines = list(csv.reader(io.StringIO(saved(capacity, tmp_path / "one.csv").decode())))
+        assert lines[0][1:] == list(answer.columns[len(changes) :])
         start = [str(value).lower() if isinstance(value, bool) else str(value) for value in changes.values()]
-        wanted_rows += [start + row[1:] for row in own[1:]]
-        wanted += [{**changes, **{key: row[key] for key in own[0][1:]}} for row in one.to_dict()["results"]]
+        wanted_rows += [start + row[1:] for row in lines[1:]]
+        wanted += [{**changes, **{key: row[key] for key in lines[0][1:]}} for row in capacity.to_dict()["results"]]
     assert rows == wanted_rows
     # Not only equal: 4.0 stays 4.0.
     assert list(map(repr, document.pop("rows"))) == list(map(repr, wanted))
@@ -52,9 +52,9 @@ def test_csv_and_json_are_what_capacity_writes_for_each_point(name: str, tmp_pat
 
 
 def test_what_does_not_exist_is_null_and_empty(tmp_path: Path) -> None:
-    own = busplan.load_profile("paper-two-node", changes={"circle.radius_mm": 5.0, "circle.ramp_periods": 5})
+    small = busplan.load_profile("paper-two-node", changes={"circle.radius_mm": 5.0, "circle.ramp_periods": 5})
     # At 100 us the cycle does not fit, which fails; at 2 ms nothing is asked of the circle.
-    answer = busplan.sweep(own, vary={"cycle.period_us": [100, 2000]}, timing_model="standard", circle=True)
+    answer = busplan.sweep(small, vary={"cycle.period_us": [100, 2000]}, timing_model="standard", circle=True)
     first, second = csv.DictReader(io.StringIO(saved(answer, tmp_path / "rows.csv").decode()))
     assert (first["max_contour_error_mm"], first["passed"], second["passed"]) == ("", "false", "")
     rows = answer.to_dict()["rows"]
@@ -88,11 +88,11 @@ def parquet(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 def expected() -> dict[str, list[object]]:
     """The columns of the document in JSON; lists as words, and empty ones as nothing, as in CSV."""
     rows = busplan.sweep("paper-4ms", vary=VARY).to_dict()["rows"]
-    found = {name: [row[name] for row in rows] for name in rows[0]}
+    columns = {name: [row[name] for row in rows] for name in rows[0]}
     for name in ("exceeded", "not_shown"):
-        found[name] = [" ".join(one or ()) or None for one in found[name]]
-    found["bus.gap_count"] = [str(one) for one in found["bus.gap_count"]]
-    return found
+        columns[name] = [" ".join(words or ()) or None for words in columns[name]]
+    columns["bus.gap_count"] = [str(count) for count in columns["bus.gap_count"]]
+    return columns
 
 
 def test_pandas_reads_the_figures_of_the_document(parquet: bytes) -> None:
@@ -101,7 +101,7 @@ def test_pandas_reads_the_figures_of_the_document(parquet: bytes) -> None:
     wanted = expected()
     assert list(frame) == list(wanted)
     for name, values in wanted.items():
-        got = [None if pandas.isna(one) else one for one in frame[name].tolist()]
+        got = [None if pandas.isna(value) else value for value in frame[name].tolist()]
         assert got == values, name
     kinds = {name: str(frame[name].dtype) for name in frame}
     assert {kinds[name] for name in ("timing_model", "limited_by", "verdict", "bus.gap_count")} == {"category"}
@@ -152,10 +152,10 @@ def test_truths_that_vary_are_truths() -> None:
 
 def test_counts_of_groups_and_figures_of_circles_are_typed() -> None:
     pa = pytest.importorskip("pyarrow")
-    found = busplan.sweep("gantry-24", vary={"cycle.period_us": (500, 1000)}).to_arrow()
-    counts = [name for name in found.column_names if name.endswith("safe_nodes")]
+    table = busplan.sweep("gantry-24", vary={"cycle.period_us": (500, 1000)}).to_arrow()
+    counts = [name for name in table.column_names if name.endswith("safe_nodes")]
     assert len(counts) == 4
-    assert {found.schema.field(name).type for name in counts} == {pa.int64()}
+    assert {table.schema.field(name).type for name in counts} == {pa.int64()}
     answer = busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, circle=True)
     row, wanted = answer.to_arrow().to_pylist()[0], answer.to_dict()["rows"][0]
     assert row["mean_contour_error_mm"] > 0

@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.sections.profile import Profile
 
-Make = Callable[..., Profile]
+Make = Callable[..., busplan.Profile]
 
 TABLE = {"kind": "table", "payload_bytes": (4, 16, 33, 2500), "time_us": (36.7, 36.3, 44.7, 900.1)}
 
@@ -53,23 +52,25 @@ WORDS = {
 
 
 def assert_rows_are_those_of_capacity(
-    profile: Profile, vary: Mapping[str, Any], *, timing_model: str | None = None
+    profile: busplan.Profile, vary: Mapping[str, Any], *, timing_model: str | None = None
 ) -> None:
     answer = busplan.sweep(profile, vary=vary, timing_model=timing_model)
     models = answer.to_dict()["timing_models"]
     rows = iter(answer.to_dict()["rows"])
     for changes in answer.sweep.grid.each_point():
         point = busplan.load_profile(profile, changes=changes)
-        for found in busplan.capacity(point, timing_model=models).results:
-            expected, row = {**changes, **found.by_key()}, next(rows)
+        for result in busplan.capacity(point, timing_model=models).results:
+            expected, row = {**changes, **result.by_key()}, next(rows)
             # Bit for bit: they are the same operations in the same order. As text, so that 4 is not 4.0.
-            assert {key: repr(row[key]) for key in expected} == {key: repr(one) for key, one in expected.items()}
+            assert {key: repr(row[key]) for key in expected} == {key: repr(value) for key, value in expected.items()}
     assert not list(rows)
 
 
 @settings(max_examples=12)
 @given(data=st.data())
-def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
+def test_every_row_equals_capacity_of_its_point(
+    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
+) -> None:
     profile = data.draw(any_profile)
     strategies = {**FLOATS, **COUNTS, **WORDS}
     if profile.bus.isochronous_us:
@@ -77,7 +78,7 @@ def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile
     if data.draw(st.booleans()):
         changes = {"node.execution": TABLE, "payload.read_bytes": 4, "payload.write_bytes": 40}
         profile = busplan.load_profile(profile, changes=changes)
-        strategies = {key: one for key, one in strategies.items() if not key.startswith("node.execution")}
+        strategies = {key: strategy for key, strategy in strategies.items() if not key.startswith("node.execution")}
     keys = data.draw(st.lists(st.sampled_from(sorted(strategies)), min_size=1, max_size=4, unique=True))
     vary = {key: data.draw(st.lists(strategies[key], min_size=1, max_size=4, unique=True)) for key in keys}
     assert_rows_are_those_of_capacity(profile, vary)
@@ -85,12 +86,12 @@ def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile
 
 @given(data=st.data(), nodes=st.integers(1, 20))
 def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
-    data: st.DataObject, nodes: int, any_profile: st.SearchStrategy[Profile]
+    data: st.DataObject, nodes: int, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
     figures = busplan.capacity(busplan.load_profile(profile, changes={"bus.nodes": nodes})).results
-    one = data.draw(st.sampled_from(figures))
-    exact_us, model = one.required_us / profile.cycle.slice_ratio, one.timing_model
+    drawn = data.draw(st.sampled_from(figures))
+    exact_us, model = drawn.required_us / profile.cycle.slice_ratio, drawn.timing_model
     around = (
         exact_us,
         exact_us * (1 + 1e-12),
@@ -99,7 +100,7 @@ def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
         np.nextafter(exact_us, 0),
     )
     vary = {
-        "cycle.period_us": list(dict.fromkeys(float(one) for one in around)),
+        "cycle.period_us": list(dict.fromkeys(float(us) for us in around)),
         "bus.nodes": [nodes],
         "bus.gap_count": [profile.bus.gap_count],
     }
@@ -116,8 +117,8 @@ def test_a_grid_that_is_computed_in_pieces_is_one_table() -> None:
     for gap in gaps:
         for number in nodes:
             here = whole[(whole["bus.gap_count"] == str(gap)) & (whole["bus.nodes"] == number)]
-            own = busplan.load_profile("paper-4ms", changes={"bus.gap_count": gap, "bus.nodes": number})
-            alone = busplan.sweep(own, vary=lines, timing_model="standard").to_pandas()
+            point = busplan.load_profile("paper-4ms", changes={"bus.gap_count": gap, "bus.nodes": number})
+            alone = busplan.sweep(point, vary=lines, timing_model="standard").to_pandas()
             for name in alone:
                 assert here[name].tolist() == alone[name].tolist(), name
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, Literal
 
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.elementwise import Number, choose, is_off, larger, next_entry, rounded_down, rounded_up, smaller
 from busplan.sourced import Sourced, constants
 
@@ -411,13 +411,13 @@ LATENCY_TABLE: Final = (
 """In the order in which they add up."""
 FIGURES: Final = BusFigures(
     TERMS,
-    capacity_figures(TERMS, setup=(BIT_RATE,), own=LOADS),
     setup=(BIT_RATE,),
     headings=(BIT_RATE.key,),
+    added=LOADS,
     table=LOADS,
     compared=LOADS,
     planned=(BUS_LOAD.key,),
-    phases=LATENCY_TABLE,
+    latency_rows=LATENCY_TABLE,
     has_many_transactions=True,
     deadlines=("worst_response_us", "deadline_us"),
 )

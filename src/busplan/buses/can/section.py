@@ -274,15 +274,15 @@ class CanProfile(Profile):
         return bool(self.group) or self.node is not None
 
     @classmethod
-    def nodes_problems(cls, said: Collection[str]) -> Iterator[Problem]:
-        """Tell what is wrong with the way a profile says its nodes: all alike, in groups, or none beside messages."""
-        if "message" in said and not any(key in said for key in _OF_NODES):
-            if "cycle" in said:
+    def nodes_problems(cls, given: Collection[str]) -> Iterator[Problem]:
+        """Tell what is wrong with the way a profile gives its nodes: all alike, in groups, or none beside messages."""
+        if "message" in given and not any(key in given for key in _OF_NODES):
+            if "cycle" in given:
                 why = "has no nodes; add bus.nodes, [node] and [payload], or remove it: messages alone have no cycle"
                 yield Problem(why, key="cycle", kind="inconsistent")
             return
-        yield from super().nodes_problems(said)
-        if "cycle" not in said:
+        yield from super().nodes_problems(given)
+        if "cycle" not in given:
             yield Problem(MISSING, key="cycle", kind="missing-key")
 
     @model_validator(mode="after")

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, Literal
 
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.published import Spread, published, rows_of
 from busplan.elementwise import Number, choose, larger, plain, traced_with
 from busplan.sourced import Grade, Sourced, constants
@@ -366,10 +366,10 @@ LATENCY_TABLE: Final = (
 """In the order in which they add up."""
 FIGURES: Final = BusFigures(
     TERMS,
-    capacity_figures(TERMS, own=OWN),
+    added=OWN,
     table=OWN[:-1],
     compared=OWN[:-1],
     planned=(FRAMES.key,),
-    phases=LATENCY_TABLE,
+    latency_rows=LATENCY_TABLE,
     has_many_transactions=True,
 )

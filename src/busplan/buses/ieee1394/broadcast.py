@@ -13,7 +13,6 @@ mechatronics-firmware and mechatronics-software.
 
 from collections.abc import Iterator
 from functools import cached_property, partial
-from typing import NamedTuple
 
 from busplan.buses.cycle import BUT_FIRST, FIRST, BusEvent, BusLatency, Doubt, Run
 from busplan.buses.ieee1394 import doubts, equations
@@ -31,7 +30,7 @@ from busplan.buses.ieee1394.constants import (
     padded_bytes,
 )
 from busplan.buses.ieee1394.cycle import CycleWithStarts
-from busplan.buses.ieee1394.timing import Phases, Responder, transaction
+from busplan.buses.ieee1394.timing import IdleTime, Phases, Responder, idle_time, transaction
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, is_off, larger, named, total, traced_with
 from busplan.sections.base import TransactionKind
@@ -61,20 +60,6 @@ def write_block_bytes(network: Network) -> Number:
 
 def _with_quadlet(payload_bytes: Number) -> Number:
     return padded_bytes(payload_bytes) + BROADCAST_NODE_BYTES
-
-
-class Idle(NamedTuple):
-    """Idle bus before a request of the host, or after the last request [us]."""
-
-    gap_us: Number
-    """Arbitration reset gap."""
-    host_us: Number
-    """Host's own time beyond the gap."""
-
-    @property
-    def us(self) -> Number:
-        """Gap and host's time together."""
-        return self.gap_us + self.host_us
 
 
 class BroadcastCycle(CycleWithStarts):
@@ -181,37 +166,29 @@ class BroadcastCycle(CycleWithStarts):
         return transaction(kind, model=self.model, delays=self.delays, payload_bytes=payload_bytes, responder=responder)
 
     @cached_property
-    def hub_wait(self) -> Idle:
-        """From the last broadcast to the read of the hub.
-
-        The host waits 10 + 5 N us after the query, and knows nothing of the broadcasts. Its own time follows that, or
-        the last broadcast if it is later.
-        """
-        return self._idle(self.host_us, late_us=self.late_us)
-
-    @cached_property
     def late_us(self) -> Number:
         """Rest of the host's wait when the last broadcast ends [us]."""
         wait_us = traced_with(HUB_WAIT_US, self.network.nodes) + HUB_WAIT_PER_NODE_US * self.network.nodes
         return named(larger(wait_us - self.boards_us, 0.0), "late_us", "late")
 
     @cached_property
-    def idle(self) -> Idle:
-        """After the read of the hub, and after the write."""
-        return self._idle(self.host_us)
+    def hub_wait(self) -> IdleTime:
+        """From the last broadcast to the read of the hub.
+
+        The host waits 10 + 5 N us after the query, and knows nothing of the broadcasts. Its own time follows that, or
+        the last broadcast if it is later.
+        """
+        return self._idle(self.late_us + self.host_us)
+
+    def _idle(self, host_us: Number) -> IdleTime:
+        """Idle bus before a request of the host, whose own time overlaps the gap."""
+        return idle_time("unified", gaps=self.delays.gaps, execution_us=0.0, host_us=host_us)
 
     @property
     def host_us(self) -> Number:
         """The host's own time before each of its requests [us]."""
         host_us: Number = self.network.profile.host.transaction_us
         return host_us
-
-    def _idle(self, host_us: Number, *, late_us: Number = 0.0) -> Idle:
-        """Idle bus before a request of the host, whose own time overlaps the gap."""
-        gap_us = self.delays.gaps.arbitration_reset_us
-        if is_off(host_us) and is_off(late_us):
-            return Idle(gap_us, 0.0)
-        return Idle(gap_us, larger(late_us + host_us - gap_us, 0.0))
 
     def schedule(self) -> Iterator[BusEvent | Run]:
         """The query, at which the nodes sample, each broadcast, the read of the hub, and the write."""
@@ -243,9 +220,10 @@ class BroadcastCycle(CycleWithStarts):
             write("request_data", "data", self.write.request_data_us, "commands to all nodes"),
             write("acknowledge", "acknowledge", delays.acknowledge_us, "hub acknowledge"),
         )
+        after = IdleTime(hub.idle_us, hub.host_us)
         yield Run((*_waits(self.hub_wait, "before the hub is read"), *read_hub))
-        yield Run((*_waits(self.idle, "after the hub's block"), *write_hub))
-        yield Run(_waits(self.idle, "after the write"))
+        yield Run((*_waits(after, "after the hub's block"), *write_hub))
+        yield Run(_waits(after, "after the write"))
 
     @cached_property
     def read(self) -> Phases:
@@ -254,9 +232,9 @@ class BroadcastCycle(CycleWithStarts):
         return self.hub._replace(
             latency_us=latency_us,
             latency_with_gaps_us=latency_us + self.hub.gaps_us,
-            idle_us=self.node_waits_us + self.hub_wait.gap_us + self.hub.idle_us,
+            idle_us=self.node_waits_us + self.hub_wait.idle_us + self.hub.idle_us,
             host_us=self.hub_wait.host_us + self.hub.host_us,
-            transaction_us=latency_us + self.idle.us,
+            transaction_us=latency_us + (self.hub.idle_us + self.hub.host_us),
         )
 
     def longest(self, kind: TransactionKind) -> Phases:
@@ -313,8 +291,8 @@ class BroadcastCycle(CycleWithStarts):
             return 0.0
 
         def waits_us(steps: int) -> Number:
-            host_us = self.host_us + steps * step_us
-            return self._idle(host_us, late_us=self.late_us).us + 2 * self._idle(host_us).us
+            host_us, reset_us = self.host_us + steps * step_us, self.delays.gaps.arbitration_reset_us
+            return larger(reset_us, self.late_us + host_us) + 2 * larger(reset_us, host_us)
 
         return doubts.swing_us(waits_us)
 
@@ -323,10 +301,10 @@ def _part(transaction: str, packet: str, kind: str, term: str, us: Number, label
     return BusEvent(kind, f"cycle_{term}_us", us, label, transaction=transaction, packet=packet)
 
 
-def _waits(idle: Idle, where: str) -> tuple[BusEvent, BusEvent]:
+def _waits(idle: IdleTime, where: str) -> tuple[BusEvent, BusEvent]:
     """Idle bus before a request, as events."""
     host = f"host's own time {where}"
     return (
-        BusEvent("arbitration_reset_gap", "cycle_idle_us", idle.gap_us, f"arbitration reset gap {where}"),
+        BusEvent("arbitration_reset_gap", "cycle_idle_us", idle.idle_us, f"arbitration reset gap {where}"),
         BusEvent("host", "cycle_host_us", idle.host_us, host, rests_on="host.transaction_us"),
     )

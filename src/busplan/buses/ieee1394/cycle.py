@@ -23,6 +23,7 @@ from busplan.buses.ieee1394.timing import Delays, Phases, TimingModelName, delay
 from busplan.buses.ieee1394.transactions import (
     Exchange,
     GroupHops,
+    answers_split,
     charges_own_hops,
     events,
     exchange,
@@ -112,36 +113,36 @@ class CycleWithStarts(BusCycle):
         isochronous_us: Number = self.network.profile.bus.isochronous_us
         return delays.gaps.arbitration_reset_us + delays.arbitration_us + data_us + isochronous_us
 
-    def starts(self, others_us: Number) -> Number:
+    def starts(self, terms_us: Number) -> Number:
         """Number of cycle starts in a cycle whose other terms take some time [1].
 
-        The smallest whole n with n > (others + n start) / 125 us. Starts that leave less than 1 us to each other are
-        counted as if they left that: the number is finite, and the limit of cycle starts is broken.
+        The smallest whole n with n > (other terms + n start) / 125 us. Starts with less than 1 us between them are
+        counted as if there were that: the number is finite, and the limit of cycle starts is broken.
 
         Parameters
         ----------
-        others_us
+        terms_us
             All other terms [us]; of any sort.
         """
         left_us = CYCLE_US - self.cycle_start_us
-        return rounded_down(others_us / larger(left_us, LEAST_ASYNCHRONOUS_US)) + 1
+        return rounded_down(terms_us / larger(left_us, LEAST_ASYNCHRONOUS_US)) + 1
 
     @property
     def _has_starts(self) -> bool:
         return self.model != "paper" and bool(self.network.profile.bus.cycle_master)
 
     @cached_property
-    def _others_by_term(self) -> dict[str, Number]:
+    def _terms_without_starts(self) -> dict[str, Number]:
         return summed(self.runs, (figure.key for figure in TERMS))
 
     @cached_property
-    def _others_us(self) -> Number:
-        return total(self._others_by_term.values())
+    def _without_starts_us(self) -> Number:
+        return total(self._terms_without_starts.values())
 
     @cached_property
     def number_of_starts(self) -> Number:
         """Cycle starts in the cycle [1]."""
-        return self.starts(self._others_us) if self._has_starts else 0
+        return self.starts(self._without_starts_us) if self._has_starts else 0
 
     def written(self) -> Iterator[BusEvent | Run]:
         """All events but the cycle starts, whose number depends on them and which go between the rounds."""
@@ -162,13 +163,13 @@ class CycleWithStarts(BusCycle):
     def by_term(self) -> Mapping[str, Number]:
         """Time of each term, by its key [us]."""
         starts = (Run((self._start,), self.number_of_starts),) if self._has_starts else ()
-        return self._others_by_term | summed(starts, (self._start.term,))
+        return self._terms_without_starts | summed(starts, (self._start.term,))
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """Growth of the cycle if its transactions take longer: there may be more cycle starts, too [us]."""
         if not self._has_starts:
             return extra_us
-        before_us = self._others_us + after_us
+        before_us = self._without_starts_us + after_us
         more = self.starts(before_us + extra_us) - self.starts(before_us)
         return extra_us + more * self.cycle_start_us
 
@@ -209,11 +210,6 @@ class CycleWithStarts(BusCycle):
     def published_nodes(self) -> Number | None:
         """Number of nodes by equation (11) [1]; None where the paper has none for this schedule or these nodes."""
         return None
-
-    @property
-    def is_known(self) -> bool:
-        """Whether bias and doubts of the model are known: only those of `standard`, which decides."""
-        return self.model == "standard"
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """The host's time, if the profile does not give it."""
@@ -318,7 +314,9 @@ class Ieee1394Cycle(CycleWithStarts):
         yield BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")
         for kind in TRANSACTION_KINDS:
             for place, transaction in enumerate(sent for sent in self.exchanges if sent.kind == kind):
-                yield Run(transaction.parts, transaction.nodes, place, partial(self._laid_out, transaction, place))
+                yield Run(
+                    transaction.parts, transaction.group.nodes, place, partial(self._laid_out, transaction, place)
+                )
 
     def _laid_out(self, transaction: Exchange, place: int, number: Number) -> Iterator[BusEvent]:
         """The transaction with a node of a group, by the node's number in it from 0."""
@@ -328,13 +326,13 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def bias_us(self) -> Number | None:
         """Mean time that the transactions take beyond the model [us]; None under the paper model."""
-        if not self.is_known:
+        if self.model == "paper":
             return None
         return doubts.bias_us(self.exchanges, self.network, gap_count=self.link.gap_count)
 
     def doubts(self) -> tuple[Doubt, ...]:
         """Inputs that are not known exactly."""
-        if not self.is_known:
+        if self.model == "paper":
             return ()
         # Hops of the synchronous packet, of retries and of cycle starts; `of_cycle` adds those of transactions.
         hop_delays = 2 + 3 * self.network.profile.cycle.retries + 2 * self.number_of_starts
@@ -347,9 +345,10 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def published_nodes(self) -> Number | None:
         """Number of nodes by equation (11), where all nodes are alike [1]."""
-        network, read, write = self.network, self.longest("read"), self.longest("write")
+        network = self.network
         if not network.is_uniform:
             return None
+        read, write = self.longest("read"), self.longest("write")
         given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
         return equations.published_nodes(
             named(given_us, AVAILABLE.key, AVAILABLE.symbol),
@@ -370,12 +369,9 @@ class Ieee1394Cycle(CycleWithStarts):
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """Parts of the cycle that the profile does not give."""
-        split = {id(transaction.group) for transaction in self.exchanges if transaction.responder.answer == "split"}
-        return (
-            *super().left_out(),
-            *(
-                LeftOut("the slowest execution", group.key("execution.worst_extra_us"))
-                for group in self.network.groups
-                if id(group) in split and not group.worst_extra_us
-            ),
+        slowest = (
+            LeftOut("the slowest execution", group.key("execution.worst_extra_us"))
+            for group in self.network.groups
+            if answers_split(group) and not group.worst_extra_us
         )
+        return (*super().left_out(), *slowest)

@@ -1,4 +1,4 @@
-"""Equations (3)-(15) of the paper, a function each; (1) and (2) stand in `busplan.buses.network`.
+"""Equations (3)-(15) of the paper, a function each; (1) and (2) stand in `busplan.buses.time_slice`.
 
 The functions are operators only: a float in gives a float, NumPy arrays broadcast. Times are in us, rates in
 Mbit/s (which is bit/us, so that bits / rate is in us), lengths in m, sizes in bytes. Nothing is checked here:

@@ -13,7 +13,6 @@ from busplan.buses.figure import (
     Figure,
     Ink,
     by,
-    capacity_figures,
 )
 from busplan.buses.ieee1394 import equations as eq
 
@@ -176,14 +175,11 @@ LATENCY: Final = (TIMING_MODEL, TRANSACTION, PAYLOAD_BYTES, NODES, HOPS, GAP_COU
 
 FIGURES: Final = BusFigures(
     TERMS,
-    capacity_figures(
-        (*_FIRST, *(figure for figure in TERMS if figure not in _FIRST)),
-        setup=_SETUP,
-        own=(*_LATENCIES, *_TRANSACTIONS, _BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
-        counted=(_NODES_EQ11,),
-    ),
+    document_terms=(*_FIRST, *(figure for figure in TERMS if figure not in _FIRST)),
     setup=_SETUP,
     headings=(HOPS.key, GAP_COUNT.key),
+    added=(*_LATENCIES, *_TRANSACTIONS, _BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
+    counts=(_NODES_EQ11,),
     table=(
         *_LATENCIES,
         *_TRANSACTIONS,
@@ -193,6 +189,6 @@ FIGURES: Final = BusFigures(
     ),
     compared=tuple(chain(*zip(_LATENCIES, _LATENCIES_WITH_GAPS, _TRANSACTIONS, strict=True))),
     planned=(GAP_COUNT.key, GAP_COUNT_SAFE.key),
-    phases=_PHASES,
+    latency_rows=_PHASES,
     latency_document=LATENCY,
 )

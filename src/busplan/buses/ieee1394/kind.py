@@ -21,7 +21,7 @@ from busplan.buses.ieee1394.cycle import EVENTS, STRETCHES, CycleWithStarts, Iee
 from busplan.buses.ieee1394.figures import FIGURES, GAP_COUNT_SAFE
 from busplan.buses.ieee1394.rules import LIMITS, RULES, unsafe_words
 from busplan.buses.ieee1394.timing import Responder, transaction
-from busplan.buses.ieee1394.transactions import charges_own_hops, gap_count_of, hops_of, is_broadcast
+from busplan.buses.ieee1394.transactions import answers_split, charges_own_hops, gap_count_of, hops_of, is_broadcast
 from busplan.buses.limits import (
     Cost,
     Key,
@@ -195,9 +195,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - latencies, too
         """Whether any transaction is split: other answers, and broadcasts, keep the execution off the bus."""
-        return not is_broadcast(network) and any(
-            "split" in (group.node.read_response, group.node.write_response) for group in network.groups
-        )
+        return not is_broadcast(network) and any(map(answers_split, network.groups))
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The gap count, one register in each node, how the nodes answer, and the other schedule."""

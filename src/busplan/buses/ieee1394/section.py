@@ -33,14 +33,10 @@ from busplan.sections.cycle import (
 from busplan.sections.profile import Profile
 
 
-def _known_speed(value: object) -> object:
-    if isinstance(value, str) and value in ("S800", "S1600", "S3200"):
-        raise refused(
-            Problem(
-                f"{value} arbitrates by BOSS, which has no gaps: equations (4) and (10) do not hold. "
-                'Expected "S100", "S200" or "S400"'
-            )
-        )
+def _gap_arbitrated(value: object) -> object:
+    if value in ("S800", "S1600", "S3200"):
+        message = f"{value} arbitrates by BOSS, which has no gaps: equations (4) and (10) do not hold. "
+        raise refused(Problem(f'{message}Expected "S100", "S200" or "S400"'))
     return value
 
 
@@ -59,7 +55,7 @@ class Ieee1394Bus(BusSection):
     """Section [bus]: an IEEE 1394 (FireWire) bus up to S400."""
 
     kind: Literal["ieee1394"] = Field(description="Kind of bus", examples=["ieee1394"])
-    speed: Annotated[Speed, BeforeValidator(_known_speed)] = Field(
+    speed: Annotated[Speed, BeforeValidator(_gap_arbitrated)] = Field(
         description="Speed code of all packets: S100, S200 or S400", examples=["S400"]
     )
     gap_count: GapCount = Field(
@@ -115,26 +111,18 @@ class Ieee1394Bus(BusSection):
     @model_validator(mode="after")
     def _table_holds_for_the_cable(self) -> Self:
         if self.gap_count == "optimal" and not self.cable_is_standard:
-            raise refused(
-                Problem(
-                    f"the table behind it holds for cables of up to {REFERENCE_CABLE_M:g} m, "
-                    f"and cable_length_m is {self.cable_length_m:g}: give the gap count as a number",
-                    key="gap_count",
-                    kind="inconsistent",
-                )
+            message = (
+                f"the table behind it holds for cables of up to {REFERENCE_CABLE_M:g} m, "
+                f"and cable_length_m is {self.cable_length_m:g}: give the gap count as a number"
             )
+            raise refused(Problem(message, "gap_count", "inconsistent"))
         return self
 
     @model_validator(mode="after")
     def _isochronous_needs_a_master(self) -> Self:
         if self.isochronous_us and not self.cycle_master:
-            raise refused(
-                Problem(
-                    "isochronous traffic follows cycle starts, and cycle_master is false: set bus.cycle_master = true",
-                    key="isochronous_us",
-                    kind="inconsistent",
-                )
-            )
+            message = "isochronous traffic follows cycle starts, and cycle_master is false: set bus.cycle_master = true"
+            raise refused(Problem(message, "isochronous_us", "inconsistent"))
         return self
 
     @property
@@ -287,25 +275,22 @@ class Ieee1394Profile(Profile):
     payload: Ieee1394Payload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
 
     @model_validator(mode="after")
-    def _hops_are_known(self) -> Self:
+    def _hops_fit_the_wiring(self) -> Self:
+        most, is_charged = self.bus.max_hops, self.bus.charge_hops == "own"
         problems: list[Problem] = []
-        most, given = self.bus.max_hops, [(place, group.hops) for place, group in enumerate(self.group)]
-        for place, hops in given:
+        for place, group in enumerate(self.group):
             key = f"group.{place}.hops"
-            if most is None and hops is not None:
-                problems.append(
-                    Problem(
-                        "the order of the groups says it in a chain; set bus.max_hops for a tree", key, "inconsistent"
-                    )
-                )
-            elif most is not None and hops is not None and hops > most:
+            if group.hops is None and most is not None and is_charged:
+                message = 'missing key: bus.charge_hops = "own" needs the hops of each group of a tree'
+                problems.append(Problem(message, key, "missing-key"))
+            if group.hops is not None and most is None:
+                message = "the order of the groups says it in a chain; set bus.max_hops for a tree"
+                problems.append(Problem(message, key, "inconsistent"))
+            if group.hops is not None and most is not None and group.hops > most:
                 problems.append(Problem(f"is over the {most} hops of bus.max_hops", key, "inconsistent"))
-            elif most is not None and hops is None and self.bus.charge_hops == "own":
-                why = 'missing key: bus.charge_hops = "own" needs the hops of each group of a tree'
-                problems.append(Problem(why, key, "missing-key"))
-        if most is not None and not given and self.bus.charge_hops == "own":
-            why = "needs the hops of each node of a tree: describe them as groups, [[group]] with hops"
-            problems.append(Problem(why, "bus.charge_hops", "inconsistent"))
+        if most is not None and is_charged and not self.group:
+            message = "needs the hops of each node of a tree: describe them as groups, [[group]] with hops"
+            problems.append(Problem(message, "bus.charge_hops", "inconsistent"))
         if problems:
             raise refused(*problems)
         return self

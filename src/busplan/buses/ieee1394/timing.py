@@ -165,6 +165,11 @@ class IdleTime(NamedTuple):
     host_us: Number
     """Idle bus while the host takes longer than the gaps."""
 
+    @property
+    def us(self) -> Number:
+        """Both together."""
+        return self.idle_us + self.host_us
+
 
 def idle_time(answer: Answer, *, gaps: Gaps, execution_us: Number, host_us: Number) -> IdleTime:
     """Idle bus of a transaction as the bus runs it: its gaps are thresholds of idle periods.

@@ -80,6 +80,11 @@ def group_hops(network: Network) -> tuple[GroupHops, ...]:
     return tuple(chain)
 
 
+def answers_split(group: Group) -> bool:
+    """Whether nodes of a group answer reads or writes split: only then is their execution on the bus."""
+    return "split" in (group.node.read_response, group.node.write_response)
+
+
 class Exchange(NamedTuple):
     """The same transaction with each node of a group."""
 
@@ -97,11 +102,6 @@ class Exchange(NamedTuple):
 
     The idle bus of the gaps is a single part here; `events` divides it.
     """
-
-    @property
-    def nodes(self) -> Number:
-        """Nodes of the group [1]."""
-        return self.group.nodes
 
 
 def exchange(

@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Final, Literal
 
 from busplan.buses.cycle import ALL, BUT_FIRST, BusEvent, BusLatency, Doubt, LeftOut, Run
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind, Periods
 from busplan.buses.network import Network
 from busplan.buses.sercos import shared as sercos
@@ -153,12 +153,12 @@ TERMS: Final = (
 )
 FIGURES: Final = BusFigures(
     TERMS,
-    capacity_figures(TERMS, setup=(DATA_RATE,), own=(MDT_BYTES,)),
     setup=(DATA_RATE,),
     headings=(DATA_RATE.key,),
+    added=(MDT_BYTES,),
     table=(MDT_BYTES,),
     compared=(MDT_BYTES,),
-    phases=DELAYS,
+    latency_rows=DELAYS,
 )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from math import sqrt
 from typing import Final, Literal, NamedTuple
 
-from busplan.buses.figure import NONPERIODIC, BusFigures, Figure, capacity_figures
+from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import Periods
 from busplan.buses.network import Network
 from busplan.buses.sercos import shared as sercos
@@ -270,11 +270,11 @@ TERMS: Final = (
 COUNTS: Final = (MDT_TELEGRAMS, AT_TELEGRAMS)
 FIGURES: Final = BusFigures(
     TERMS,
-    capacity_figures(TERMS, own=COUNTS),
+    added=COUNTS,
     table=COUNTS,
     compared=COUNTS,
     planned=tuple(figure.key for figure in COUNTS),
-    phases=DELAYS,
+    latency_rows=DELAYS,
 )
 
 

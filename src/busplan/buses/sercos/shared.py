@@ -63,7 +63,7 @@ DELAYS: Final = (
 Sent: TypeAlias = tuple[Number, Number]
 """What the cycle sends before feedback or a command, and the telegrams that carry it [us]."""
 KEYS: Final[Mapping[str, Key]] = {
-    "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES),
+    "bus.pipeline_cycles": Key("n", PIPELINE_CYCLES, role="pipeline"),
     "node.execution.worst_extra_us": Key("T_extra"),
 }
 

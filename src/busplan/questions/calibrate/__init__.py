@@ -25,11 +25,11 @@ from busplan.sections.cycle import MEASURED_UNCERTAINTY_US, LinearExecution, Tab
 from busplan.sections.machine import ProfileGroup
 from busplan.sections.profile import Profile
 
-FAR: Final = 3.5
+_FAR: Final = 3.5
 """Robust standard deviations from which on a measurement is far from the others (Iglewicz and Hoaglin)."""
-OUTLIER_SHARE: Final = 0.01
+_OUTLIER_SHARE: Final = 0.01
 """Least distance of an outlier, as a share of its latency: the steps of a timer are no outliers."""
-DEVIATION_PER_MAD: Final = 1.4826
+_DEVIATION_PER_MAD: Final = 1.4826
 """Standard deviation of a normal distribution whose median absolute deviation is 1."""
 REPETITIONS_TO_COMPARE: Final = 3
 """Fewest measurements of one payload of which one can be told to be far off."""
@@ -80,7 +80,7 @@ class PayloadFit(NamedTuple):
     """Standard deviation of T_exec over the repetitions; None for a single measurement."""
 
 
-def timed(
+def _timed(
     network: Network,
     measurements: Sequence[Measurement],
     packets: Mapping[tuple[TransactionKind, int], PacketTime],
@@ -88,34 +88,19 @@ def timed(
     source: str,
     model: str,
 ) -> list[Timed]:
-    """T_exec of each measurement: its latency less the time of its packets.
-
-    Parameters
-    ----------
-    network
-        The network that was measured.
-    measurements
-        At least one.
-    packets
-        Time of the packets by transaction and payload.
-    source, model
-        Names of the measurements and of the timing model, in messages.
+    """T_exec of each measurement by equation (3): its latency less the time of its packets.
 
     Raises
     ------
     BusplanError
         Payloads over the limit of the bus, and latencies shorter than their packets, all in one error.
-
-    References
-    ----------
-    Paper, equation (3).
     """
     payloads = network.bus.payloads(network)
-    found, problems = [], []
+    samples, problems = [], []
     for measurement in measurements:
         line, transaction, size, latency_us = measurement
         packets_us = packets[transaction, size].us
-        found.append(Timed(*measurement, packets_us, round(latency_us - packets_us, _DECIMALS)))
+        samples.append(Timed(*measurement, packets_us, round(latency_us - packets_us, _DECIMALS)))
         if size > payloads.most_bytes:
             problems.append(
                 f"{source}:{line}: payload {size} bytes is over the {payloads.most_bytes} bytes of {payloads.carrier}"
@@ -125,86 +110,63 @@ def timed(
                 f"{source}:{line}: latency {latency_us:g} us at {size} bytes is below the {packets_us:.3f} us that the "
                 f"packets alone take in the {model} model"
             )
-    if all(sample.execution_us < 0 for sample in found):
+    if all(sample.execution_us < 0 for sample in samples):
         problems.insert(0, f"{source}: every latency is too short: is latency_us in us?")
     more = len(problems) - _MOST_PROBLEMS
     if problems:
         raise BusplanError(*problems[:_MOST_PROBLEMS], *([f"{source}: and {more} more problems"] if more > 0 else []))
-    return found
+    return samples
 
 
-def outliers(samples: Sequence[Timed]) -> dict[int, Outlier]:
-    """Find the measurements that are far from the median of three or more of the same transaction and payload.
-
-    Parameters
-    ----------
-    samples
-        Any number of them, in any order.
-
-    Returns
-    -------
-    dict
-        Outliers by their place among the samples.
+def _outliers(samples: Sequence[Timed]) -> dict[int, Outlier]:
+    """Measurements far from the median of three or more of the same transaction and payload, by their place.
 
     References
     ----------
     B. Iglewicz, D. Hoaglin, "How to Detect and Handle Outliers" (1993): the median absolute deviation, and 3.5 of it.
-
-    Examples
-    --------
-    >>> times_us = (52.1, 200.0, 52.0, 51.9)
-    >>> found = outliers([Timed(line, "write", 4, 60.0, 8.0, us) for line, us in enumerate(times_us)])
-    >>> {place: round(outlier.off_us, 2) for place, outlier in found.items()}
-    {1: 147.95}
     """
     places: defaultdict[tuple[str, int], list[int]] = defaultdict(list)
     for place, sample in enumerate(samples):
         places[sample.transaction, sample.payload_bytes].append(place)
-    off_us = []
-    for own in places.values():
-        middle_us = median(samples[place].execution_us for place in own)
-        if len(own) >= REPETITIONS_TO_COMPARE:
-            off_us.append({place: samples[place].execution_us - middle_us for place in own})
-    # Long executions may scatter more than short ones, and three of a kind may be alike by chance.
-    all_us = _middle_distance_us(us for group in off_us for us in group.values())
-    found = {}
-    for group in off_us:
-        deviation_us = DEVIATION_PER_MAD * max(all_us, _middle_distance_us(group.values()))
-        for place, us in group.items():
-            if abs(us) > max(OUTLIER_SHARE * samples[place].latency_us, FAR * deviation_us):
+    repeated_us = []
+    for group in places.values():
+        if len(group) >= REPETITIONS_TO_COMPARE:
+            middle_us = median(samples[place].execution_us for place in group)
+            repeated_us.append({place: samples[place].execution_us - middle_us for place in group})
+    # Long executions may scatter more than short ones, and three of a kind may be equal by chance.
+    all_us = _middle_distance_us(us for group in repeated_us for us in group.values())
+    outliers = {}
+    for off_us in repeated_us:
+        deviation_us = _DEVIATION_PER_MAD * max(all_us, _middle_distance_us(off_us.values()))
+        for place, us in off_us.items():
+            if abs(us) > max(_OUTLIER_SHARE * samples[place].latency_us, _FAR * deviation_us):
                 line, transaction, size, latency_us, _, execution_us = samples[place]
-                found[place] = Outlier(line, transaction, size, latency_us, execution_us, round(us, _DECIMALS))
-    return dict(sorted(found.items()))
+                outliers[place] = Outlier(line, transaction, size, latency_us, execution_us, round(us, _DECIMALS))
+    return dict(sorted(outliers.items()))
 
 
 def _middle_distance_us(off_us: Iterable[float]) -> float:
     return median([abs(us) for us in off_us] or [0.0])
 
 
-def payload_fits(samples: Sequence[Timed], left_out: Mapping[int, Outlier]) -> tuple[PayloadFit, ...]:
+def _payload_fits(samples: Sequence[Timed], left_out: Mapping[int, Outlier]) -> tuple[PayloadFit, ...]:
     """The measurements of each payload, payloads ascending."""
     fits = []
     for size in sorted({sample.payload_bytes for sample in samples}):
         places = [place for place, sample in enumerate(samples) if sample.payload_bytes == size]
-        own = [samples[place] for place in places if place not in left_out]
+        kept = [samples[place] for place in places if place not in left_out]
         fits.append(
             PayloadFit(
                 payload_bytes=size,
                 measurements=len(places),
-                left_out=len(places) - len(own),
-                latency_us=median(sample.latency_us for sample in own),
-                packets_us=median(sample.packets_us for sample in own),
-                execution_us=median(sample.execution_us for sample in own),
-                deviation_us=stdev(sample.execution_us for sample in own) if len(own) > 1 else None,
+                left_out=len(places) - len(kept),
+                latency_us=median(sample.latency_us for sample in kept),
+                packets_us=median(sample.packets_us for sample in kept),
+                execution_us=median(sample.execution_us for sample in kept),
+                deviation_us=stdev(sample.execution_us for sample in kept) if len(kept) > 1 else None,
             )
         )
     return tuple(fits)
-
-
-def spread_us(off_us: Sequence[float], *, payloads: int) -> float | None:
-    """Standard deviation of measurements about the medians of some payloads [us]; None where none is left over."""
-    free = len(off_us) - payloads
-    return sqrt(sum(us**2 for us in off_us) / free) if free > 0 else None
 
 
 _IN_MEMORY: Final = "measurements"
@@ -384,21 +346,23 @@ def calibrate(
     'measured'
     """
     network = load_network(profile)
-    of_bus = _latencies_of(network)  # refuses a kind without, before a recording of it is read as text
+    latencies = _latencies_of(network)  # refuses a kind without, before a recording of it is read as text
     read, name, shipped = _measured(measurements, name=source or _IN_MEMORY)
     nodes = _nodes(network.profile, group)
     model = network.bus.deciding_model if timing_model is None else checked_models(timing_model, network)[0]
     sizes = dict.fromkeys((measurement.transaction, measurement.payload_bytes) for measurement in read)
-    packets = {(kind, size): of_bus.packets(network, nodes.name, model, kind, size) for kind, size in sizes}
-    samples = timed(network, read, packets, source=name, model=model)
-    left_out = outliers(samples)
-    payloads = payload_fits(samples, left_out)
+    packets = {(kind, size): latencies.packets(network, nodes.name, model, kind, size) for kind, size in sizes}
+    samples = _timed(network, read, packets, source=name, model=model)
+    left_out = _outliers(samples)
+    payloads = _payload_fits(samples, left_out)
     times_us = {fit.payload_bytes: round(fit.execution_us, _TIME_DECIMALS) for fit in payloads}
     off_us = [sample.execution_us - times_us[sample.payload_bytes] for sample in samples]
     kept_us = [us for place, us in enumerate(off_us) if place not in left_out]
-    doubt_us = spread_us(kept_us, payloads=len(payloads))
-    if doubt_us is not None:
-        doubt_us = round(max(doubt_us, float(MEASURED_UNCERTAINTY_US)), _TIME_DECIMALS)
+    free = len(kept_us) - len(payloads)
+    uncertainty_us = None
+    if free > 0:
+        spread_us = sqrt(sum(us**2 for us in kept_us) / free)
+        uncertainty_us = round(max(spread_us, float(MEASURED_UNCERTAINTY_US)), _TIME_DECIMALS)
     is_slow = any(outlier.off_us > 0 for outlier in left_out.values())
     worst_extra_us = ceil(1000 * max(off_us) - _PICOSECOND) / 1000 if is_slow else None
     execution = TableExecution(
@@ -420,10 +384,10 @@ def calibrate(
         payloads=payloads,
         outliers=tuple(left_out.values()),
         unchecked_bytes=tuple(sorted(few)),
-        uncertainty_us=doubt_us,
+        uncertainty_us=uncertainty_us,
         worst_extra_us=worst_extra_us,
-        at_most_us=max(each.shortest_us for each in packets.values()),
-        section=_section(nodes, execution, of_bus.fit_keys(network, model), doubt_us, worst_extra_us),
+        at_most_us=max(packet.shortest_us for packet in packets.values()),
+        section=_section(nodes, execution, latencies.fit_keys(network, model), uncertainty_us, worst_extra_us),
     )
 
 
@@ -431,13 +395,13 @@ def _section(
     nodes: ProfileGroup,
     execution: TableExecution,
     fit_keys: Mapping[str, object],
-    doubt_us: float | None,
+    uncertainty_us: float | None,
     worst_extra_us: float | None,
 ) -> dict[str, object]:
     """Keys and values of an execution time, as in a profile."""
     keys = {**execution.model_dump(exclude_none=True, exclude={_WORST}), **fit_keys}
-    if doubt_us is not None:
-        keys["uncertainty_us"] = doubt_us
+    if uncertainty_us is not None:
+        keys["uncertainty_us"] = uncertainty_us
     if worst_extra_us is not None:
         # The profile may know of a slower one.
         keys[_WORST] = max(worst_extra_us, nodes.node.execution.worst_extra_us)
@@ -446,7 +410,7 @@ def _section(
 
 def _nodes(profile: Profile, group: str | None) -> ProfileGroup:
     """The nodes that were measured."""
-    by_name = {alike.name: alike for alike in profile.node_groups}
+    by_name = {nodes.name: nodes for nodes in profile.node_groups}
     if group is None and len(by_name) == 1:
         return profile.node_groups[0]
     if group in by_name:

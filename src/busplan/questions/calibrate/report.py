@@ -91,9 +91,9 @@ def _blocks(answer: CalibrateAnswer, warned: list[Sentence]) -> Iterator[Block]:
     where = ", ".join((network.bus.payloads(network).carrier, *network.bus.setup_words(network)))
     yield sentence(f"T_exec = T_lant - packets, eq (3): by the {answer.timing_model} timing model for {where}.")
     if answer.unchecked_bytes:
-        sizes_said = ", ".join(map(str, answer.unchecked_bytes))
+        sizes = ", ".join(map(str, answer.unchecked_bytes))
         words = f"it takes {REPETITIONS_TO_COMPARE} measurements of a payload"
-        yield sentence(f"No outlier can be told at {sizes_said} bytes: {words}.")
+        yield sentence(f"No outlier can be told at {sizes} bytes: {words}.")
     yield from (joined(sentence("Warning: ", state="warns"), warning, by="") for warning in warned)
     absent = {"left_out"} if not answer.outliers else set()
     if all(fit.deviation_us is None for fit in answer.payloads):
@@ -114,7 +114,7 @@ def _cell(value: float | None, key: str) -> Cell:
 
 
 def fit_sentence(answer: CalibrateAnswer) -> Sentence:
-    """Say what the execution time was found from."""
+    """What the execution time is the median of."""
     number, sizes = answer.measurements, len(answer.payloads)
     without = ", without the outliers" if answer.outliers else ""
     return sentence(
@@ -128,7 +128,7 @@ def fit_sentence(answer: CalibrateAnswer) -> Sentence:
 
 
 def _warnings(answer: CalibrateAnswer) -> Iterator[Sentence]:
-    """Say what to check before using these figures."""
+    """What to check before using these figures."""
     for word, outliers in (
         ("slow", [outlier for outlier in answer.outliers if outlier.off_us > 0]),
         ("fast", [outlier for outlier in answer.outliers if outlier.off_us <= 0]),
@@ -159,7 +159,7 @@ def _warnings(answer: CalibrateAnswer) -> Iterator[Sentence]:
 
 
 def _outliers(outliers: list[Outlier], word: str, worst_us: float) -> Sentence:
-    """Name the slow executions, or the measurements that the others contradict."""
+    """The slow executions, or the measurements that the others contradict, by their lines."""
     count, more = len(outliers), len(outliers) - _MOST_LINES
     lines = joined(*(_outlier(outlier) for outlier in outliers[:_MOST_LINES]), by=", ")
     parts = [

@@ -200,9 +200,9 @@ def error_range(low_um: float, high_um: float) -> ErrorRange:
     >>> error_range(502.456, 502.458)
     ErrorRange(bottom_um=502.456, top_um=502.458)
     """
-    spread_um, largest_um = high_um - low_um, max(abs(low_um), abs(high_um))
-    if low_um * high_um > 0 and ROUNDING_UM <= spread_um < _FLAT * largest_um:
-        return ErrorRange(low_um, high_um)
+    errors = ErrorRange(low_um, high_um)
+    if errors.zero_outside and ROUNDING_UM <= high_um - low_um < _FLAT * errors.largest_um:
+        return errors
     return ErrorRange(min(0.0, low_um), max(0.0, high_um))
 
 
@@ -234,7 +234,7 @@ _MAX_POINTS: Final = 2000
 """Most points of one curve: more would not be visible."""
 
 
-class Stretch(NamedTuple):
+class _Stretch(NamedTuple):
     """A part of the move. Of many points, the smallest and the largest error of each stretch are kept."""
 
     time_s: Floats
@@ -242,21 +242,16 @@ class Stretch(NamedTuple):
     measured: bool
 
 
-class CircleRow(NamedTuple):
+class _Row(NamedTuple):
     """One simulated period."""
 
     result: CircleFigures
     run: CircleRun
-    curves: tuple[Stretch, ...]
-
-    @property
-    def judged(self) -> tuple[Stretch, ...]:
-        """Curves that mean and largest error are taken from: the whole move on a trapezoid."""
-        return tuple(curve for curve in self.curves if curve.measured or self.result.path == "trapezoid")
+    curves: tuple[_Stretch, ...]
 
 
-class Scales(NamedTuple):
-    """Scales and limits that all rows share, so that they compare."""
+class _Scales(NamedTuple):
+    """_Scales and limits that all rows share, so that they compare."""
 
     circle: Magnified | None
     """None if there is no error to show."""
@@ -265,17 +260,14 @@ class Scales(NamedTuple):
     tolerance: ToleranceSection
 
 
-def _circle_rows(test: CircleTestAnswer) -> list[CircleRow]:
-    """Rows of the periods that were simulated."""
-    pairs = zip(test.results, test.runs, strict=True)
-    return [CircleRow(result, run, _curves(run)) for result, run in pairs if run is not None]
-
-
-def _common_scales(rows: Sequence[CircleRow], tolerance: ToleranceSection) -> Scales:
-    """Scales of all rows. A row whose table left the circle counts only if there is no other."""
+def _common_scales(rows: Sequence[_Row], tolerance: ToleranceSection) -> _Scales:
+    """_Scales of all rows. A row whose table left the circle counts only if there is no other."""
     shown = [row for row in rows if not row.run.diverged] or rows
     measured = [curve.error_um for row in shown for curve in row.curves if curve.measured]
-    judged = [curve.error_um for row in shown for curve in row.judged]
+    # Mean and largest error of a trapezoid are those of the whole move.
+    judged = measured
+    if rows[0].result.path == "trapezoid":
+        judged = [curve.error_um for row in shown for curve in row.curves]
     radius_um = rows[0].result.radius_mm * 1e3
     low_um, high_um = (float(np.clip(end, -radius_um, radius_um)) for end in _ends(judged))
     largest_mm = min(max(map(abs, _ends(measured))), radius_um) / 1e3
@@ -284,14 +276,14 @@ def _common_scales(rows: Sequence[CircleRow], tolerance: ToleranceSection) -> Sc
     if circle is not None and circle.tolerance_mm is not None and not errors.zero_outside:
         limit_um = circle.tolerance_mm * 1e3
         errors = ErrorRange(min(errors.bottom_um, -limit_um), max(errors.top_um, limit_um))
-    return Scales(circle, errors, length_unit(errors.largest_um), tolerance)
+    return _Scales(circle, errors, length_unit(errors.largest_um), tolerance)
 
 
 def _ends(errors: Sequence[Floats]) -> tuple[float, float]:
     return min(float(error_um.min()) for error_um in errors), max(float(error_um.max()) for error_um in errors)
 
 
-def _curves(run: CircleRun) -> tuple[Stretch, ...]:
+def _curves(run: CircleRun) -> tuple[_Stretch, ...]:
     """The measured part, and what lies before and after it; neighbours share a point."""
     error_um = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm) * 1e3
     start, stop = run.measured.start, min(run.measured.stop, run.steps)
@@ -300,7 +292,7 @@ def _curves(run: CircleRun) -> tuple[Stretch, ...]:
     for first, end, measured in parts:
         kept = first + extremes(error_um[first:end], most=_MAX_POINTS)
         time_s = (kept + 1).astype(np.float64) * (run.timing.step_us / 1e6)
-        curves.append(Stretch(time_s, error_um[kept], measured))
+        curves.append(_Stretch(time_s, error_um[kept], measured))
     return tuple(curves)
 
 
@@ -349,7 +341,8 @@ def circle_drawing(test: CircleTestAnswer) -> Drawing:
     test
         The circle test, with at least one simulated period.
     """
-    rows = _circle_rows(test)
+    pairs = zip(test.results, test.runs, strict=True)
+    rows = [_Row(result, run, _curves(run)) for result, run in pairs if run is not None]
     scales = _common_scales(rows, test.profile.tolerance)
     servo = "ideal drive" if test.results[0].ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(result.period_us) for result, run in zip(test.results, test.runs, strict=True) if run is None]
@@ -363,7 +356,7 @@ def circle_drawing(test: CircleTestAnswer) -> Drawing:
     return Drawing(test.profile.name, tuple(panel for panel in panels if panel), tuple(words), description)
 
 
-def _circle(row: CircleRow, scales: Scales) -> Panel:
+def _circle(row: _Row, scales: _Scales) -> Panel:
     """The setup, the verdict, and the circle on the scale of all periods."""
     result, scale = row.result, scales.circle
     setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
@@ -376,7 +369,7 @@ def _circle(row: CircleRow, scales: Scales) -> Panel:
     return Panel(plot, f"{result.verdict_word}: {setup}", words, _TONES[result.passed])
 
 
-def _shown(row: CircleRow, scales: Scales) -> str:
+def _shown(row: _Row, scales: _Scales) -> str:
     """What the circle shows, or why it is not drawn."""
     if row.run.diverged:
         return f"circle not drawn: the {'table left the circle' if row.result.stable else 'loop is unstable'}"
@@ -386,14 +379,14 @@ def _shown(row: CircleRow, scales: Scales) -> str:
     return f"{scales.circle.ring_text} a ring, {times} times magnified"
 
 
-def _measure_text(value_mm: float | None, limit_mm: float | None, scales: Scales) -> str:
+def _measure_text(value_mm: float | None, limit_mm: float | None, scales: _Scales) -> str:
     """A measure with its unit, and its tolerance where there is one."""
     unit = scales.unit
     value = "-" if value_mm is None else f"{decimals_of(value_mm * 1e3 * unit.per_um, 3)} {unit.name}"
     return value if limit_mm is None else f"{value} (limit {unit.text(limit_mm * 1e3)})"
 
 
-def _errors(row: CircleRow, scales: Scales) -> Panel:
+def _errors(row: _Row, scales: _Scales) -> Panel:
     """The contour error over time, with its mean and maximum above: the measured part strong and shaded."""
     errors, per_um, tolerance = scales.errors, scales.unit.per_um, scales.tolerance
     result, limit_mm = row.result, tolerance.max_contour_error_mm
@@ -410,7 +403,7 @@ def _errors(row: CircleRow, scales: Scales) -> Panel:
     return Panel(Curves(across, up, curves, tuple(guides), tuple(during)), f"mean {mean}, max {largest}")
 
 
-def _curve(curve: Stretch, up: Ruler, row: CircleRow, *, per_um: float) -> Curve:
+def _curve(curve: _Stretch, up: Ruler, row: _Row, *, per_um: float) -> Curve:
     """A part of the move; far outside, where no huge coordinate can be drawn, the place does not matter."""
     spread, is_turn = up.high - up.low, row.result.path != "trapezoid"
     errors = np.clip(curve.error_um * per_um, up.low - spread, up.high + spread)
@@ -424,7 +417,7 @@ def _curve(curve: Stretch, up: Ruler, row: CircleRow, *, per_um: float) -> Curve
     return Curve(entry, tuple(zip(curve.time_s.tolist(), errors.tolist(), strict=True)))
 
 
-def _ranking(row: CircleRow, rows: Sequence[CircleRow], scales: Scales) -> Panel | None:
+def _ranking(row: _Row, rows: Sequence[_Row], scales: _Scales) -> Panel | None:
     """Part of the largest error that each source takes, the largest part first.
 
     Periods whose table followed the circle share a scale; the others share a second.

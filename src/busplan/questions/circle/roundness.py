@@ -109,43 +109,6 @@ def sources(whole: Setup) -> dict[str, Setup]:
     return {source: setup for source, setup in without.items() if setup != whole}
 
 
-def contributions(
-    without: Mapping[str, Setup], *, max_contour_error_mm: float, simulate: Callable[[Setup], CircleRun]
-) -> tuple[Contribution, ...]:
-    """Rank the error sources of a circle test.
-
-    Parameters
-    ----------
-    without
-        The test without each source (`sources`).
-    max_contour_error_mm
-        Its largest contour error [mm].
-    simulate
-        Runs a setup.
-
-    Returns
-    -------
-    tuple
-        The sources, largest `removed_mm` first.
-
-    Notes
-    -----
-    Sources interact: their single contributions need not add up to the whole error.
-    """
-    contours = {source: simulate(setup).contour for source, setup in without.items()}
-    ranked = (
-        Contribution(
-            source,
-            left.max_contour_error_mm,
-            max_contour_error_mm - left.max_contour_error_mm,
-            left.mean_contour_error_mm,
-            left.circular_deviation_mm,
-        )
-        for source, left in contours.items()
-    )
-    return tuple(sorted(ranked, key=lambda contribution: -contribution.removed_mm))
-
-
 def setup(network: Network) -> Setup:
     """Input of the circle simulation of a network, whose circle can be run."""
     profile, settling_us = network.profile, path_settling_us(network)
@@ -187,18 +150,6 @@ class Estimate(NamedTuple):
     time_s: float
     memory_bytes: float
 
-    @property
-    def is_long(self) -> bool:
-        """Whether it takes long enough to be announced."""
-        return self.time_s > _LONG_S
-
-    @property
-    def text(self) -> str:
-        """The estimate in words."""
-        engine = "" if compiled_kernel("auto") else ", in plain Python"
-        memory = f"{self.memory_bytes / 1e9:.2g} GB"
-        return f"circle test: {self.steps:,} steps, about {self.time_s:.0f} s and {memory}{engine}"
-
 
 def estimate(kept: Sequence[Setup], passing: Iterable[Setup] = ()) -> Estimate:
     """Estimate what simulations cost.
@@ -222,15 +173,11 @@ def estimate(kept: Sequence[Setup], passing: Iterable[Setup] = ()) -> Estimate:
 
 
 def announce(cost: Estimate) -> None:
-    """Say what a long run costs; without a handler of its own, `logging` writes it to standard error.
-
-    Parameters
-    ----------
-    cost
-        The estimate; a short run is not announced.
-    """
-    if cost.is_long:
-        logging.getLogger("busplan").warning(cost.text)
+    """Say what a long run costs; without a handler of its own, `logging` writes it to standard error."""
+    if cost.time_s > _LONG_S:
+        engine = "" if compiled_kernel("auto") else ", in plain Python"
+        words = f"about {cost.time_s:.0f} s and {cost.memory_bytes / 1e9:.2g} GB{engine}"
+        logging.getLogger("busplan").warning("circle test: %s steps, %s", f"{cost.steps:,}", words)
 
 
 _LEAST_ARC_DEG: Final = 270.0
@@ -343,9 +290,29 @@ def _test(
         counter.expect(*without.values())
         announce(estimate((), tuple(without.values())))
     if without is not None:
-        ranked = contributions(without, max_contour_error_mm=run.contour.max_contour_error_mm, simulate=counter.run)
-        result = result._replace(contributions=ranked)
+        result = result._replace(contributions=_ranked(run, without, counter=counter))
     return result, run
+
+
+def _ranked(run: CircleRun, without: Mapping[str, Setup], *, counter: _Counter) -> tuple[Contribution, ...]:
+    """The error sources of a circle, the largest part first.
+
+    Sources interact: their single contributions need not add up to the whole error.
+    """
+    contributions = []
+    for source, setup in without.items():
+        left = counter.run(setup).contour
+        removed_mm = run.contour.max_contour_error_mm - left.max_contour_error_mm
+        contributions.append(
+            Contribution(
+                source,
+                left.max_contour_error_mm,
+                removed_mm,
+                left.mean_contour_error_mm,
+                left.circular_deviation_mm,
+            )
+        )
+    return tuple(sorted(contributions, key=lambda contribution: -contribution.removed_mm))
 
 
 def _figures(network: Network, capacity: FitFigures, run: CircleRun | None, *, settled: bool) -> CircleFigures:

@@ -1,10 +1,12 @@
 """`busplan.compare`."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from math import ceil, floor, log2
 from typing import Final, NamedTuple
 
-from busplan.buses import kind_names
+from busplan.buses import kind_named, kind_names
+from busplan.buses.bus import Bus
 from busplan.buses.network import Network
 from busplan.english import did_you_mean
 from busplan.errors import BusplanError
@@ -64,9 +66,19 @@ class MachineOnKind(NamedTuple):
         return profile
 
     @property
+    def bus(self) -> Bus:
+        """The kind of bus."""
+        return self.network.bus
+
+    @property
+    def fits(self) -> bool:
+        """Whether it is shown to fit its period, on a bus that is set safely."""
+        return self.figures.verdict == FITS and self.figures.safe
+
+    @property
     def assumed_host(self) -> tuple[AssumedKey, ...]:
         """Assumptions about the host's own time, those of the profile included; a machine with any has no rank."""
-        key = self.network.bus.key_of("host")
+        key = self.bus.key_of("host")
         inputs = [given(self.profile, key)] if self.is_own and key else []
         of_profile = (
             AssumedKey(host.name, host.value, "profile") for host in inputs if host.grade == "assumed" and host.value
@@ -77,16 +89,25 @@ class MachineOnKind(NamedTuple):
 class NotOnKind(NamedTuple):
     """A kind of bus that cannot have the machine."""
 
-    kind: str
+    bus: Bus
     why: tuple[str, ...]
 
 
-class KindComparison(NamedTuple):
-    """Answer of `compare`."""
+@dataclass(frozen=True, slots=True, repr=False)
+class CompareAnswer(Answer):
+    """Answer of `compare`: a machine on several kinds of bus, whose most axes a notebook draws.
+
+    Parameters
+    ----------
+    network
+        The network of the profile.
+    kinds
+        The kinds in the order of the argument; of all, the profile's own first. Each has `figures` at the profile's
+        period, its `smallest` period and its most `safe` axes, or the reason why it has none.
+    """
 
     network: Network
     kinds: tuple[MachineOnKind | NotOnKind, ...]
-    """In the order asked for; of all, the profile's own first."""
 
     @property
     def profile(self) -> Profile:
@@ -104,137 +125,15 @@ class KindComparison(NamedTuple):
         """Name of the group whose nodes are counted for the most axes; empty where all nodes are alike."""
         return varied_nodes(self.profile).name
 
-
-def checked_kinds(names: Sequence[str], *, option: str) -> tuple[str, ...]:
-    """Check names of kinds of bus; each is taken once.
-
-    Parameters
-    ----------
-    names
-        The names.
-    option
-        Option or key that gives them, for messages.
-
-    Raises
-    ------
-    BusplanError
-        No kind of bus has the name, or there is no name.
-    """
-    kinds = kind_names()
-    for name in names or [""]:
-        if name not in kinds:
-            near = did_you_mean(name, kinds)
-            raise BusplanError(f"{option} {name}: no kind of bus; there are {', '.join(kinds)}{near and f'; {near}'}")
-    return tuple(dict.fromkeys(names))
-
-
-def compared_kinds(network: Network, *, kinds: Sequence[str] | None = None) -> KindComparison:
-    """Put the machine of a network on several kinds of bus.
-
-    Parameters
-    ----------
-    network
-        The network; on its own kind it stays as it is.
-    kinds
-        Names of kinds, from `checked_kinds`; all without it, the network's own first.
-    """
-    names = kinds if kinds is not None else dict.fromkeys((network.bus.kind, *kind_names()))
-    machines = [_on_kind(network, name) for name in names]
-    smallest = [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
-    periods_us = _curve_periods(network.profile.cycle.period_us, smallest)
-    return KindComparison(
-        network,
-        tuple(
-            machine
-            if isinstance(machine, NotOnKind)
-            else machine._replace(curve=tuple(most_safe_axes(at_period(machine.network, us)) for us in periods_us))
-            for machine in machines
-        ),
-    )
-
-
-def _on_kind(network: Network, kind: str) -> MachineOnKind | NotOnKind:
-    try:
-        conversion = converted(network.profile, kind)
-    except BusplanError as error:
-        return NotOnKind(kind, error.problems)
-    on_kind, assumed = network_of(conversion.profile), conversion.assumed
-    is_own = kind == network.bus.kind
-    needed = {} if is_own else settings_to_be_carried(on_kind)
-    if needed:
-        tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
-        assumed = (*tried, *(assumption for assumption in assumed if assumption.key not in needed))
-        on_kind = changed(on_kind, needed)
-    rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
-    capacity = figures(on_kind, model=on_kind.bus.deciding_model)
-    return MachineOnKind(
-        network=on_kind,
-        is_own=is_own,
-        assumed=tuple(rates) if is_own else assumed,
-        left_out=conversion.left_out,
-        figures=capacity,
-        after_reset=after_reset(on_kind, capacity),
-        safe=most_safe_axes(on_kind),
-        smallest=smallest_period(on_kind, with_limits=False),
-        curve=(),
-    )
-
-
-def most_safe_axes(network: Network) -> SafeAxes:
-    """Count the most axes that are shown to fit a network's period, on a bus that is set safely for them.
-
-    Where nodes are in groups, the one with the most axes gets more nodes and the others stay.
-
-    Parameters
-    ----------
-    network
-        The network.
-    """
-    profile = network.profile
-    varied = varied_nodes(profile)
-    nodes, limit = safe_nodes(network, group=varied.name)
-    node_axes = int(varied.node.axes)
-    axes_beside = sum(
-        int(group.nodes) * int(group.node.axes) for group in profile.node_groups if group.name != varied.name
-    )
-    axes = None if not node_axes else axes_beside + nodes * node_axes if nodes else 0
-    return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
-
-
-def _curve_periods(own_us: float, smallest_us: Sequence[float | None]) -> tuple[float, ...]:
-    """Periods about the smallest ones and the machine's own, which is among them [us]."""
-    marks_us = [own_us, *(us for us in smallest_us if us is not None)]
-    first, last = floor(log2(min(marks_us) / _ROUND_US)) - 1, ceil(log2(max(marks_us) / _ROUND_US)) + 1
-    every = ceil((last - first + 1) / _MOST_POINTS)
-    round_us = (_ROUND_US * 2.0**power for power in range(first, last + 1) if power % every == 0)
-    return tuple(sorted({own_us, *(us for us in round_us if MIN_STEP_US <= us <= MAX_TIME_US)}))
-
-
-def fitting(comparison: KindComparison) -> Iterator[MachineOnKind]:
-    """The kinds on which the machine is shown to fit its period, on a bus that is set safely."""
-    return (machine for machine in comparison.compared if machine.figures.verdict == FITS and machine.figures.safe)
-
-
-class CompareAnswer(Answer, KindComparison):
-    """Answer of `compare`: a machine on several kinds of bus, whose most axes a notebook draws.
-
-    Each of its `kinds` has `figures` at the profile's period, its `smallest` period and its most `safe` axes, or the
-    reason why it has none.
-    """
-
-    __slots__ = ()
-
     def on(self, kind: str) -> MachineOnKind | NotOnKind:
         """The machine on one kind of bus.
 
         Raises
         ------
         KeyError
-            The kind was not asked for.
+            The kind is not among those compared.
         """
-        return {
-            machine.kind if isinstance(machine, NotOnKind) else machine.figures.kind: machine for machine in self.kinds
-        }[kind]
+        return {machine.bus.kind: machine for machine in self.kinds}[kind]
 
     def drawing(self) -> Drawing:
         """The most axes over the period, a curve for each kind of bus.
@@ -246,7 +145,8 @@ class CompareAnswer(Answer, KindComparison):
         """
         if not self.compared:
             raise BusplanError("there is nothing to draw: no kind of bus that was asked for can have this machine")
-        return super().drawing()
+        # The slots of a dataclass make a new class, of which super() without arguments knows nothing.
+        return Answer.drawing(self)
 
     def report(self) -> Report:
         """The answer in blocks."""
@@ -289,7 +189,69 @@ def compare(
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
     network = network_of(with_cycle(load_profile(profile), question="compare"))
-    kinds = None
-    if buses is not None:
-        kinds = checked_kinds([str(kind) for kind in one_or_several(buses, name="buses")], option="buses")
-    return CompareAnswer(*compared_kinds(network, kinds=kinds))
+    kinds = kind_names()
+    names = (network.bus.kind, *kinds) if buses is None else [str(kind) for kind in one_or_several(buses, name="buses")]
+    for name in names:
+        if name not in kinds:
+            near = did_you_mean(name, kinds)
+            raise BusplanError(f"buses {name}: no kind of bus; there are {', '.join(kinds)}{near and f'; {near}'}")
+    machines = [_on_kind(network, name) for name in dict.fromkeys(names)]
+    smallest_us = [machine.smallest.us for machine in machines if isinstance(machine, MachineOnKind)]
+    periods_us = _curve_periods(network.profile.cycle.period_us, smallest_us)
+    with_curves = (
+        machine
+        if isinstance(machine, NotOnKind)
+        else machine._replace(curve=tuple(_safe_axes(at_period(machine.network, us)) for us in periods_us))
+        for machine in machines
+    )
+    return CompareAnswer(network, tuple(with_curves))
+
+
+def _on_kind(network: Network, kind: str) -> MachineOnKind | NotOnKind:
+    try:
+        conversion = converted(network.profile, kind)
+    except BusplanError as error:
+        return NotOnKind(kind_named(kind), error.problems)
+    on_kind, assumed = network_of(conversion.profile), conversion.assumed
+    is_own = kind == network.bus.kind
+    needed = {} if is_own else settings_to_be_carried(on_kind)
+    if needed:
+        tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
+        assumed = (*tried, *(assumption for assumption in assumed if assumption.key not in needed))
+        on_kind = changed(on_kind, needed)
+    rates = (AssumedKey(key, value_at(network.profile, key), "profile") for key in assumed_rates(network))
+    capacity = figures(on_kind, model=on_kind.bus.deciding_model)
+    return MachineOnKind(
+        network=on_kind,
+        is_own=is_own,
+        assumed=tuple(rates) if is_own else assumed,
+        left_out=conversion.left_out,
+        figures=capacity,
+        after_reset=after_reset(on_kind, capacity),
+        safe=_safe_axes(on_kind),
+        smallest=smallest_period(on_kind, with_limits=False),
+        curve=(),
+    )
+
+
+def _safe_axes(network: Network) -> SafeAxes:
+    """Count the most axes that are shown to fit a network's period, on a bus that is set safely for them.
+
+    Where nodes are in groups, the one with the most axes gets more nodes and the others stay.
+    """
+    profile = network.profile
+    varied = varied_nodes(profile)
+    nodes, limit = safe_nodes(network, group=varied.name)
+    node_axes = int(varied.node.axes)
+    beside = sum(int(group.nodes) * int(group.node.axes) for group in profile.node_groups if group.name != varied.name)
+    axes = None if not node_axes else beside + nodes * node_axes if nodes else 0
+    return SafeAxes(profile.cycle.period_us, axes, nodes, limit)
+
+
+def _curve_periods(own_us: float, smallest_us: Sequence[float | None]) -> tuple[float, ...]:
+    """Periods about the smallest ones and the machine's own, which is among them [us]."""
+    marks_us = [own_us, *(us for us in smallest_us if us is not None)]
+    first, last = floor(log2(min(marks_us) / _ROUND_US)) - 1, ceil(log2(max(marks_us) / _ROUND_US)) + 1
+    every = ceil((last - first + 1) / _MOST_POINTS)
+    round_us = (_ROUND_US * 2.0**power for power in range(first, last + 1) if power % every == 0)
+    return tuple(sorted({own_us, *(us for us in round_us if MIN_STEP_US <= us <= MAX_TIME_US)}))

@@ -8,7 +8,6 @@ from typing import Any, Final, NamedTuple
 
 from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
-from busplan.buses.figure import BIAS, CERTAINTY, MARGIN_CORRECTED, SAFE_MIN_PERIOD, SAFE_REQUIRED, UNCERTAINTY
 from busplan.buses.limits import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.buses.network import Network
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
@@ -260,62 +259,48 @@ def node_counts(network: Network, *, model: str) -> tuple[GroupCapacity, ...]:
 
 
 def figures(network: Network, *, model: str) -> FitFigures:
-    """Whether a network fits its own period under one timing model.
-
-    Parameters
-    ----------
-    network
-        The network.
-    model
-        Timing model.
-    """
+    """Whether a network fits its own period under one timing model."""
     bus, has_cycle = network.bus, bool(network.groups)
     cycle = bus.cycle(network, model=model)
-    numbers: dict[str, Any] = {key: existing(number) for key, number in numeric_figures(cycle).items()}
     terms = cycle.terms if has_cycle else ()
-    own = {
-        **{key: None if number is None else existing(number) for key, number in cycle.figures().items()},
-        **dict.fromkeys(figure.key for figure in bus.figures.terms),
-        **{term.key: existing(term.us) for term in terms},
-    }
-    overruns = has_cycle and not fits_in(numbers["required_us"], available_us=numbers["available_us"])
+    numbers: dict[str, Number | None] = {**numeric_figures(cycle)}
+    late = has_cycle and not fits_in(cycle.required_us, available_us=available_us(network))
     codes = limit_codes(network)
-    broken = tuple(key for key, code in codes.items() if code == BROKEN)
-    exceeded = (*broken, *((TIME,) if overruns else ()))
-    decides = model == bus.deciding_model
+    exceeded = tuple(key for key, code in codes.items() if code == BROKEN) + ((TIME,) if late else ())
+    decided: dict[str, Any] = {"not_shown": None, "verdict": None, "doubts": ()}
+    if model == bus.deciding_model:
+        weighed = certainty(cycle)
+        codes[TIME] = time_code(weighed, network)
+        numbers |= certainty_numbers(weighed, cycle)
+        decided = {
+            "not_shown": tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
+            "verdict": VERDICTS[int(verdict_code(codes))],
+            "doubts": weighed.doubts,
+        }
+    else:
+        numbers |= dict.fromkeys(_OF_CERTAINTY)
+    own = {**cycle.figures(), **dict.fromkeys(figure.key for figure in bus.figures.terms)}
     return FitFigures(
         kind=bus.kind,
         timing_model=model,
-        **numbers,
+        **_existing(numbers),
+        **decided,
         terms=terms,
         binding_term=max(terms, key=lambda term: plain(term.us)).name if terms else None,
         exceeded=exceeded,
         fits=not exceeded,
-        **(_certainty_figures(cycle, codes) if decides else _UNDECIDED),
         safe=bus.is_safe(network),
-        own=own,
+        own=_existing(own | {term.key: term.us for term in terms}),
     )
 
 
-_UNDECIDED: Final[dict[str, Any]] = {
-    **{figure.key: None for figure in CERTAINTY if figure.key not in COUNTS},
-    "doubts": (),
-}
+def _existing(numbers: Mapping[str, Number | None]) -> dict[str, Any]:
+    """The numbers as plain ones; None for what does not exist."""
+    return {key: None if number is None else existing(number) for key, number in numbers.items()}
 
 
-def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Any]:
-    """Figures of how sure the verdict is, by the names of `CapacityFigures`, without counts."""
-    weighed = certainty(cycle)
-    codes = {**limits, TIME: time_code(weighed, cycle.network)}
-    return {
-        **{
-            key: None if number is None else existing(number)
-            for key, number in certainty_numbers(weighed, cycle).items()
-        },
-        "not_shown": tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
-        "verdict": VERDICTS[int(verdict_code(codes))],
-        "doubts": weighed.doubts,
-    }
+_OF_CERTAINTY: Final = ("bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us", "safe_min_period_us")
+"""Figures that only the timing model that decides has, and only of a cycle."""
 
 
 def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
@@ -329,7 +314,7 @@ def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number |
         The cycle under the timing model that decides.
     """
     if not cycle.network.groups:
-        return {figure.key: None for figure in (BIAS, MARGIN_CORRECTED, UNCERTAINTY, SAFE_REQUIRED, SAFE_MIN_PERIOD)}
+        return dict.fromkeys(_OF_CERTAINTY)
     uncertainty_us = weighed.uncertainty_us
     if weighed.bias_us is None:  # nothing is known where there is no doubt either
         uncertainty_us = choose(uncertainty_us > 0, uncertainty_us, inf)
@@ -343,15 +328,8 @@ def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number |
 
 
 _OF_CYCLE: Final = (
-    "period_us",
-    "available_us",
-    "required_us",
-    "time_slice_us",
-    "required_time_slice_us",
-    "utilisation",
-    "margin_us",
-    "min_period_us",
-    "min_slice_ratio",
+    *("period_us", "available_us", "required_us", "time_slice_us", "required_time_slice_us"),
+    *("utilisation", "margin_us", "min_period_us", "min_slice_ratio"),
 )
 """Figures that a network without a cycle does not have."""
 

@@ -20,6 +20,7 @@ from busplan.profile.edit import whole
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_network, with_cycle
+from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_refusal import refusals
 from busplan.questions.fit.figures import figures, limits_behind, safe_nodes, shortest_period_us
@@ -27,11 +28,9 @@ from busplan.questions.fit.network import PERIOD, at_period, changed, varied_nod
 from busplan.questions.sweep import axis_values
 from busplan.questions.sweep.circles import (
     MOST_CIRCLES_UNASKED,
-    CircleOutcome,
-    Mapper,
     Point,
-    circle_outcomes,
-    mapper_of,
+    require_executor,
+    run_points,
 )
 from busplan.questions.sweep.grid import require_keys
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, value_at
@@ -227,7 +226,7 @@ def map_(
     >>> [[cell.state for cell in row] for row in answer.rows]
     [['fits', 'does not fit', 'does not fit'], ['fits', 'fits', 'fits']]
     """
-    mapper = mapper_of(executor, circle=circle)
+    require_executor(executor, circle=circle)
     network = load_network(profile)
     if x is None or y is None:
         with_cycle(network.profile, question="a map of period and axes", instead="give x and y, each a key with values")
@@ -246,7 +245,7 @@ def map_(
     }
     if circle:
         fitting = {place: possible[place] for place, cell in cells.items() if cell.state == FITS}
-        cells |= _with_circles(network.profile, fitting, cells, mapper=mapper, progress=progress)
+        cells |= _with_circles(network.profile, fitting, cells, executor=executor, progress=progress)
     rows = tuple(
         tuple(
             cells[row, column] if (row, column) in cells else NotDrawn(value_x, value_y, str(settings[row, column]))
@@ -437,7 +436,7 @@ def _with_circles(
     settings: Mapping[_Place, _Setting],
     cells: Mapping[_Place, Cell],
     *,
-    mapper: Mapper,
+    executor: Executor | None,
     progress: Progress,
 ) -> dict[_Place, Cell]:
     """Cells of settings that fit, with what their circles say."""
@@ -452,15 +451,15 @@ def _with_circles(
         if (causes := refusals(setting.network))
     }
     run = [place for place in settings if place not in refused]
-    outcomes = circle_outcomes(profile, [settings[place].changes for place in run], mapper=mapper, progress=progress)
+    results = run_points(profile, [settings[place].changes for place in run], executor=executor, progress=progress)
     return {
         **{place: cells[place]._replace(state="circle cannot be run", limited_by=refused[place]) for place in refused},
-        **{place: _judged(cells[place], outcome) for place, outcome in zip(run, outcomes, strict=True)},
+        **{place: _judged(cells[place], result) for place, result in zip(run, results, strict=True)},
     }
 
 
-def _judged(cell: Cell, outcome: CircleOutcome) -> Cell:
-    cell = cell._replace(circle_passed=outcome.passed)
-    if outcome.passed is False:
-        return cell._replace(state="circle fails", limited_by=outcome.failures)
-    return cell if outcome.passed else cell._replace(state="circle not judged")
+def _judged(cell: Cell, result: CircleFigures) -> Cell:
+    cell = cell._replace(circle_passed=result.passed)
+    if result.passed is False:
+        return cell._replace(state="circle fails", limited_by=tuple(failure.name for failure in result.failures))
+    return cell if result.passed else cell._replace(state="circle not judged")

@@ -19,7 +19,7 @@ from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network
 from busplan.questions.circle import CIRCLE_BY_KEY
-from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, mapper_of, summaries
+from busplan.questions.sweep.circles import CIRCLE_COLUMNS, circle_results, require_executor, summaries
 from busplan.questions.sweep.digest import default_columns, sentences, top_rows
 from busplan.questions.sweep.grid import Array, Columns, axis_values
 from busplan.questions.sweep.plot import not_drawable, require_drawable, sweep_drawing
@@ -48,7 +48,7 @@ class SweepAnswer(Answer, Mapping[str, Array]):
     Parameters
     ----------
     sweep
-        The sweep as asked for.
+        Its grid, timing models and options.
     table
         Its columns.
     """
@@ -358,10 +358,10 @@ def computed(sweep: Sweep, *, executor: Executor | None = None, progress: Progre
     Exception
         Any error that `executor` raises.
     """
-    mapper = mapper_of(executor, circle=sweep.circle)
+    require_executor(executor, circle=sweep.circle)
     table = figure_table(sweep, progress=ignored if sweep.circle else progress)
     if sweep.circle:
-        results = circle_results(sweep.profile, sweep.grid, sweep.tests, mapper=mapper, progress=progress)
+        results = circle_results(sweep.profile, sweep.grid, sweep.tests, executor=executor, progress=progress)
         of_points = (
             {name: _typed(name, values) for name, values in zip(CIRCLE_COLUMNS, results, strict=True)}
             if sweep.seeds is None

@@ -3,11 +3,11 @@
 A summary has one row for many seeds: how the figures are spread, and how often the circle fails.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from statistics import NormalDist
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple, Protocol, TypeVar
+from typing import Final
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
 from busplan.profile.document import override
 from busplan.progress import Progress
-from busplan.questions.circle import CIRCLE_BY_KEY
+from busplan.questions.circle import CIRCLE_BY_KEY, CircleFigures
 from busplan.questions.circle.roundness import Estimate, announce, estimate, run_circles, setup
 from busplan.questions.fit.circle_refusal import refusals
 from busplan.questions.fit.figures import figures
@@ -23,8 +23,6 @@ from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Array, Columns, Grid
 from busplan.sections.profile import Profile
 
-Task = TypeVar("Task")
-Result = TypeVar("Result")
 Point = dict[str, object]
 """Values by dotted key."""
 
@@ -49,48 +47,22 @@ _FEWEST_CHUNKS: Final = 64
 """So many chunks, if there are tests enough, share out well."""
 
 
-class Mapper(Protocol):
-    """The built-in `map`, here or in other processes."""
-
-    def __call__(self, function: Callable[[Task], Result], tasks: Iterable[Task], /) -> Iterable[Result]:
-        """Return the results in the order of the tasks."""
-
-
-def mapper_of(executor: object, *, circle: bool) -> Mapper:
-    """The `map` of an executor; the built-in one without an executor.
+def require_executor(executor: object, *, circle: bool) -> None:
+    """Refuse what is no executor, and any without circle tests.
 
     Raises
     ------
     BusplanError
         Not a `concurrent.futures.Executor`, or given without circle tests.
     """
-    if executor is None:
-        return map
-    if not (circle and isinstance(executor, Executor)):
+    if executor is not None and not (circle and isinstance(executor, Executor)):
         wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": goes with circle=True"
         raise BusplanError(f"executor{wrong}")
-    mapper: Any = executor.map
-    return mapper  # type: ignore[no-any-return]
 
 
-class CircleOutcome(NamedTuple):
-    """Result of a circle test."""
-
-    figures: tuple[float | None, ...]
-    """`CIRCLE_COLUMNS`; None for what the circle lacks."""
-    failures: tuple[str, ...]
-    """Keys of the tolerances that it breaks."""
-
-    @property
-    def passed(self) -> bool | None:
-        """Whether it holds every tolerance; None where none judges it."""
-        passed = self.figures[-1]
-        return None if passed is None else bool(passed)
-
-
-def circle_outcomes(
-    profile: Profile, points: Sequence[Point], *, mapper: Mapper, progress: Progress
-) -> Iterator[CircleOutcome]:
+def run_points(
+    profile: Profile, points: Sequence[Point], *, executor: Executor | None, progress: Progress
+) -> Iterator[CircleFigures]:
     """Run the circle tests of some points; a long run is announced first.
 
     Parameters
@@ -99,14 +71,14 @@ def circle_outcomes(
         The network.
     points
         The points; each has a circle that can be run, or a cycle that does not fit.
-    mapper
-        How tests are run.
+    executor
+        Where tests run; None for this thread.
     progress
         Called with the tests that are done, and all of them.
 
     Yields
     ------
-    CircleOutcome
+    CircleFigures
         In the order of the points.
     """
     if not points:
@@ -116,21 +88,17 @@ def circle_outcomes(
     done, size = 0, chunk_tests(len(points), time_s=cost.time_s)
     # A list, for Dask takes no iterator.
     chunks = [(profile, points[start : start + size]) for start in range(0, len(points), size)]
-    for outcomes in mapper(_run_chunk, chunks):
-        done += len(outcomes)
+    for results in map(_run_chunk, chunks) if executor is None else executor.map(_run_chunk, chunks):
+        done += len(results)
         progress(done, len(points))
-        yield from outcomes
+        yield from results
 
 
-def _run_chunk(chunk: tuple[Profile, Sequence[Point]]) -> list[CircleOutcome]:
+def _run_chunk(chunk: tuple[Profile, Sequence[Point]]) -> list[CircleFigures]:
     """Run the circle tests of some points, perhaps in another process."""
     profile, points = chunk
-    outcomes = []
-    for point in points:
-        (result,) = run_circles(network_of(override(profile, point)), explain=False).results
-        figures = tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
-        outcomes.append(CircleOutcome(figures, tuple(failure.name for failure in result.failures)))
-    return outcomes
+    networks = (network_of(override(profile, point)) for point in points)
+    return [result for network in networks for result in run_circles(network, explain=False).results]
 
 
 def cost_of(profile: Profile, points: Sequence[Point]) -> Estimate:
@@ -162,7 +130,9 @@ def chunk_tests(number: int, *, time_s: float) -> int:
     return max(1, min(by_time, number // _FEWEST_CHUNKS))
 
 
-def circle_results(profile: Profile, grid: Grid, tests: Grid, *, mapper: Mapper, progress: Progress) -> Array:
+def circle_results(
+    profile: Profile, grid: Grid, tests: Grid, *, executor: Executor | None, progress: Progress
+) -> Array:
     """Run the circle tests of a sweep.
 
     Parameters
@@ -173,8 +143,8 @@ def circle_results(profile: Profile, grid: Grid, tests: Grid, *, mapper: Mapper,
         Points of its rows.
     tests
         The same with the seeds of each.
-    mapper, progress
-        As for `circle_outcomes`.
+    executor, progress
+        As for `run_points`.
 
     Returns
     -------
@@ -196,8 +166,8 @@ def circle_results(profile: Profile, grid: Grid, tests: Grid, *, mapper: Mapper,
                     for place, cause in zip(places, causes, strict=True)
                 )
             )
-    outcomes = circle_outcomes(profile, [*tests.each_point()], mapper=mapper, progress=progress)
-    return np.array([outcome.figures for outcome in outcomes], dtype=float).T
+    results = run_points(profile, [*tests.each_point()], executor=executor, progress=progress)
+    return np.array([[getattr(result, name) for name in CIRCLE_COLUMNS] for result in results], dtype=float).T
 
 
 def require_few(grid: Grid, *, seeds: int) -> None:

@@ -199,8 +199,8 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
         close = [f"{section}.{sibling}" for sibling in get_close_matches(last, siblings, n=1, cutoff=0.7)]
         read = cycle_keys(profile)
         close = close or get_close_matches(key, read, n=1, cutoff=0.8) * (not siblings)
-        known = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(read)}"
-        hint = f"did you mean {close[0]}?" if close else known
+        advice = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(read)}"
+        hint = f"did you mean {close[0]}?" if close else advice
         raise BusplanError(f"{name}: no such key of this profile; {hint}")
     if isinstance(table[last], dict | list | tuple):
         what = "section" if isinstance(table[last], dict) else "list"
@@ -289,8 +289,8 @@ def _listed(values: Iterable[object], *, name: str, words: Collection[str]) -> A
     for given in values:
         value = _TRUTHS.get(given, given) if isinstance(given, str) and given in words else given
         if not _is_value(value, words):
-            known = f" and none of {', '.join(words)}" if words else ""
-            raise BusplanError(f"{name}: {value!r} is not a finite number{known}")
+            more = f" and none of {', '.join(words)}" if words else ""
+            raise BusplanError(f"{name}: {value!r} is not a finite number{more}")
         if value in unique:
             raise BusplanError(f"{name}: {value} is given twice")
         unique[int(value) if isinstance(value, float) and _is_whole(value) else value] = None
@@ -383,8 +383,8 @@ def _even(name: str, first: Decimal, last: Decimal, count: str) -> Array:
 
 def _number(name: str, part: str, words: Collection[str] = ()) -> Decimal:
     if not _NUMBER.fullmatch(part):
-        known = f" and none of {', '.join(words)}" if words else ""
-        raise BusplanError(f"{name}: {part!r} is not a number{known}; {_FORMS}")
+        more = f" and none of {', '.join(words)}" if words else ""
+        raise BusplanError(f"{name}: {part!r} is not a number{more}; {_FORMS}")
     return Decimal(part)
 
 

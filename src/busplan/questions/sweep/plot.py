@@ -112,8 +112,8 @@ class SweptModel(NamedTuple):
 
 def is_constant(values: Array) -> bool:
     """Whether all values are the same number, or missing."""
-    known = values[np.isfinite(values)]
-    return bool((known == known[:1]).all()) and known.size in (0, values.size)
+    finite = values[np.isfinite(values)]
+    return bool((finite == finite[:1]).all()) and finite.size in (0, values.size)
 
 
 class Plotted(NamedTuple):
@@ -295,19 +295,19 @@ def caption(plotted: Plotted) -> str:
     panel = plotted.described
     if panel is None:
         return f"No timing model gives {plotted.figure.label or plotted.figure.key} here."
-    known = panel.values[np.isfinite(panel.values)]
+    finite = panel.values[np.isfinite(panel.values)]
     design_value = plotted.design_value(panel)
     by = f"by the {panel.model} model"
     design = "" if design_value is None else f"; this design has {value_text(plotted, design_value)}"
     name = plotted.figure.label or plotted.figure.key
-    if plotted.has_zero and panel.fits is None and known.min() < 0 <= known.max():
-        settings = f"{int((known >= 0).sum()):,} of {known.size:,} settings"
+    if plotted.has_zero and panel.fits is None and finite.min() < 0 <= finite.max():
+        settings = f"{int((finite >= 0).sum()):,} of {finite.size:,} settings"
         where = "in blue" if len(plotted.scales) > 1 else "above the dashed line"
         return f"A {name} of 0 or more in {settings} {by}, {where}{design}."
-    least, most = value_text(plotted, float(known.min())), value_text(plotted, float(known.max()))
+    least, most = value_text(plotted, float(finite.min())), value_text(plotted, float(finite.max()))
     spread = f"{least} to {most}"
     if least == most:
-        spread = f"{least} at every setting" if known.size > 1 else least
+        spread = f"{least} at every setting" if finite.size > 1 else least
     return f"{name[:1].upper()}{name[1:]} {by}: {spread}{design}.{_fitting(plotted, panel)}"
 
 
@@ -345,8 +345,8 @@ def _ruler(scale: PlotScale, *, as_cells: bool, most: int = 6) -> Ruler:
 
 def _ends(plotted: Plotted) -> tuple[float, float]:
     """Smallest and largest value."""
-    known = [panel.values[np.isfinite(panel.values)] for panel in plotted.panels] or [np.zeros(1)]
-    return float(min(values.min() for values in known)), float(max(values.max() for values in known))
+    finite = [panel.values[np.isfinite(panel.values)] for panel in plotted.panels] or [np.zeros(1)]
+    return float(min(values.min() for values in finite)), float(max(values.max() for values in finite))
 
 
 def _curves(plotted: Plotted) -> Panel:
@@ -366,7 +366,7 @@ def _curves(plotted: Plotted) -> Panel:
     curves = (
         Curve(
             Entry(ink, f"{panel.model} model", mark, "line"),
-            tuple(zip(scale.places.tolist(), _known(panel.values), strict=True)),
+            tuple(zip(scale.places.tolist(), _existing(panel.values), strict=True)),
             has_dots=bool(scale.labels) or scale.places.size <= _MOST_DOTS,
             has_line=not scale.labels,
         )
@@ -376,7 +376,7 @@ def _curves(plotted: Plotted) -> Panel:
     return Panel(Curves(across, up, tuple(curves), tuple(guides), tuple(shades)))
 
 
-def _known(values: Array) -> list[float | None]:
+def _existing(values: Array) -> list[float | None]:
     return [value if np.isfinite(value) else None for value in values.tolist()]
 
 
@@ -417,8 +417,8 @@ def _levels(plotted: Plotted, edges: list[float]) -> list[Entry]:
 def _map(plotted: Plotted, panel: SweptModel, inner: list[float], levels: list[Entry]) -> ChartGrid:
     """Cells in the colours of their values, with the edge of what is shown to fit, unsafe settings and this design."""
     up, across = plotted.scales
-    known = np.isfinite(panel.values)
-    numbers_ = np.searchsorted(inner, np.where(known, panel.values, 0.0), side="right")
+    exists = np.isfinite(panel.values)
+    levels_of = np.searchsorted(inner, np.where(exists, panel.values, 0.0), side="right")
     legend = list(levels)
     if panel.frontier is not None:
         legend.append(Entry("border", "edge of what is shown to fit", shape="line"))
@@ -426,7 +426,7 @@ def _map(plotted: Plotted, panel: SweptModel, inner: list[float], levels: list[E
         legend.append(Entry("blank", f"unsafe {plotted.safety}", "!"))
     if up.design is not None and across.design is not None:
         legend.append(Entry("frame", _DESIGN))
-    if not known.all():
+    if not exists.all():
         legend.append(Entry("blank", "blank: no value"))
     looks = {
         (number, is_unsafe, fits): ChartCell(entry.ink, "!" if is_unsafe else "", is_inside=fits)
@@ -437,10 +437,10 @@ def _map(plotted: Plotted, panel: SweptModel, inner: list[float], levels: list[E
     fits = np.full(panel.values.shape, None) if panel.fits is None else panel.fits
     rows = (
         tuple(
-            looks[level, is_unsafe, is_inside] if is_known else None
-            for is_known, level, is_unsafe, is_inside in zip(*(part.tolist() for part in parts), strict=True)
+            looks[level, is_unsafe, is_inside] if value_exists else None
+            for value_exists, level, is_unsafe, is_inside in zip(*(part.tolist() for part in parts), strict=True)
         )
-        for parts in zip(known, numbers_, panel.unsafe, fits, strict=True)
+        for parts in zip(exists, levels_of, panel.unsafe, fits, strict=True)
     )
     design = None if up.design is None or across.design is None else (across.design, up.design)
     return ChartGrid(

@@ -70,8 +70,8 @@ def _csv_cells(values: list[Any]) -> list[Any]:
     """Cells of a column; the csv module writes numbers, and nothing for None."""
     if _NUMBERS.issuperset(map(type, values)):
         return values
-    known = {value: csv_cell(value) for value in values}
-    return [known[value] for value in values]
+    cells = {value: csv_cell(value) for value in values}
+    return [cells[value] for value in values]
 
 
 def _json(sweep: Sweep, table: Columns) -> Iterator[str]:
@@ -102,8 +102,7 @@ def _plain(values: Array, *, is_count: bool) -> list[Any]:
     if values.dtype.kind != "f":
         return plain
     # Only NaN is not itself. Counts are floats where one of them is missing.
-    known = (None if value != value else value for value in plain)  # noqa: PLR0124
-    return [None if value is None else int(value) for value in known] if is_count else [*known]
+    return [None if value != value else int(value) if is_count else value for value in plain]  # noqa: PLR0124
 
 
 def plain_rows(sweep: Sweep, table: Columns, places: Array) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""A sweep as asked for, checked; and its table: the figures of `capacity` for many profiles at once.
+"""A sweep, checked, and its table: the figures of `capacity` for many profiles at once.
 
 The functions of `capacity` accept arrays, so a profile whose keys hold arrays gives arrays. The values of each key lie
 along an axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are
@@ -53,7 +53,7 @@ _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bo
 
 
 class Sweep(NamedTuple):
-    """A table with a row for each point of a grid and each timing model, as it is asked for."""
+    """What a sweep computes: a row for each point of a grid and each timing model."""
 
     network: Network
     """The network, with its changes."""
@@ -125,7 +125,7 @@ def checked_sweep(
     force: bool,
     changes: KeyChanges = NO_CHANGES,
 ) -> Sweep:
-    """Check what is asked of a sweep.
+    """Check the options of a sweep.
 
     Parameters
     ----------
@@ -145,15 +145,15 @@ def checked_sweep(
     Raises
     ------
     BusplanError
-        No such group; as `axis_values`, `checked_grid`, `without_seed`, `grid_models` and `require_few`.
+        No such group; and as `axis_values`, `checked_grid`, `without_seed`, `grid_models` and `require_few`.
     """
     if summary and not circle:
         raise BusplanError("summary: goes with circle")
     profile = network.profile
     names = [nodes.name for nodes in profile.group]
     if group is not None and group not in names:
-        known = f"the groups {', '.join(names)}" if names else "no groups"
-        raise BusplanError(f"group {group}: {profile.name} has {known}")
+        groups = f"the groups {', '.join(names)}" if names else "no groups"
+        raise BusplanError(f"group {group}: {profile.name} has {groups}")
     axes = {key: axis_values(profile, key, given, name="vary") for key, given in vary.items()}
     grid = checked_grid(profile, axes, with_circle=circle)
     grid, seeds = without_seed(grid) if summary else (grid, None)

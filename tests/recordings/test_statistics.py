@@ -1,0 +1,90 @@
+"""Periods, lateness and quantiles of stamps, against repetitions and known truth."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from busplan.recordings.statistics import grid, lateness, quantile
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=200), st.floats(0.5, 1))
+def test_a_quantile_is_not_exceeded_by_its_share(values: list[float], share: float) -> None:
+    result = quantile(np.array(values), share)
+    assert result.value in values
+    assert sum(value <= result.value for value in values) >= share * len(values) - 1e-6
+    assert sum(value < result.value for value in values) < share * len(values) + 1e-6
+
+
+def test_the_uncertainty_of_a_quantile_is_what_repetitions_scatter() -> None:
+    random = np.random.default_rng(2)
+    quantiles = [quantile(random.exponential(10, 2000), 0.95) for _ in range(300)]
+    scatter = float(np.std([sample.value for sample in quantiles]))
+    assert np.mean([sample.uncertainty for sample in quantiles]) == pytest.approx(scatter, rel=0.15)
+    medians = [quantile(random.normal(0, 3, 400), 0.5) for _ in range(300)]
+    assert np.mean([sample.uncertainty for sample in medians]) == pytest.approx(
+        np.std([sample.value for sample in medians]), rel=0.15
+    )
+
+
+@given(st.integers(1, 10**6), st.floats(0.01, 0.15), st.integers(50, 3000), st.integers(0, 5))
+def test_a_period_is_found_whatever_is_missing(seed: int, scatter: float, count: int, missing: int) -> None:
+    random = np.random.default_rng(seed)
+    places = np.arange(count + missing)
+    kept = np.sort(random.choice(places[1:-1], count - 2, replace=False))
+    kept = np.concatenate(([0], kept, [count + missing - 1]))
+    times = kept * 100.0 + random.uniform(0, 100 * scatter, count)
+    periodic = grid(times - times[0])
+    assert periodic is not None
+    assert periodic.missing == missing
+    assert periodic.period_us == pytest.approx(100, abs=8 * periodic.uncertainty_us + 1e-9)
+
+
+@pytest.mark.parametrize("shape", ["uniform", "normal", "exponential"])
+@pytest.mark.parametrize("count", [10, 40, 400, 4000])
+def test_the_latest_event_is_found_within_its_u(shape: str, count: int) -> None:
+    random, within, ever_more = np.random.default_rng(3), 0, 0.0
+    for _ in range(100):
+        late = getattr(random, shape)(size=count)
+        periodic = grid(np.arange(count) * 1000.04 + late - late[0])
+        assert periodic is not None
+        latest, spread = lateness(periodic, 1), float(late.max() - late.min())
+        assert latest.uncertainty is not None
+        within += abs(latest.value - spread) <= 2 * latest.uncertainty
+        ever_more = max(ever_more, latest.value / spread)
+    assert within >= 90
+    # By the kindest clock it is no more than there was.
+    assert ever_more <= 1 + 1e-3
+
+
+def test_clocks_that_drift_are_in_the_u_of_the_latest_event() -> None:
+    random, within = np.random.default_rng(4), 0
+    for _ in range(30):
+        late, count = random.uniform(0, 10, 20_000), 20_000
+        times = np.arange(count) * 1000.0 + late
+        periodic = grid(times + 20e-6 * times**2 / (2 * times[-1]) - times[0])
+        assert periodic is not None
+        latest = lateness(periodic, 1)
+        assert latest.uncertainty is not None
+        within += abs(latest.value - float(late.max() - late.min())) <= 2 * latest.uncertainty
+    assert within >= 27
+
+
+def test_a_clock_that_bends_is_followed() -> None:
+    # Three bends in eight blocks: fewer pieces would take 100 us of the clock for lateness.
+    random, count = np.random.default_rng(5), 4_000
+    late, places = random.uniform(0, 1, count), np.arange(count)
+    clock = np.interp(places, np.linspace(0, count, 5), [0, 100, 0, 100, 0])
+    periodic = grid(places * 1000.0 + clock + late)
+    assert periodic is not None
+    latest = lateness(periodic, 1)
+    assert latest.uncertainty is not None
+    assert latest.value == pytest.approx(1, abs=2 * latest.uncertainty)
+    assert latest.uncertainty < 30
+
+
+def test_an_even_clock_has_no_doubt_of_its_bends() -> None:
+    random, count = np.random.default_rng(6), 20_000
+    periodic = grid(np.arange(count) * 1000.0 + random.uniform(0, 10, count))
+    assert periodic is not None
+    assert periodic.doubt_us == pytest.approx(0, abs=0.2)
