@@ -57,7 +57,7 @@ class Bus(ABC):
     figures: ClassVar[BusFigures]
     safety: ClassVar[Safety] = Safety()
     limits: ClassVar[tuple[Limit, ...]]
-    """Limits in the order in which they are reported; at least one grows with the nodes."""
+    """Limits in the order of reports; at least one grows with the nodes."""
     periods: ClassVar[Periods] = ANY_PERIOD
     """Communication periods that it allows; if not all, it has the limit and the rule of `buses.limits`."""
     starter: ClassVar[Starter]
@@ -76,9 +76,9 @@ class Bus(ABC):
     calibration: ClassVar[MeasuredLatencies | None] = None
     """Calibration of execution times from latencies; None where no latency could be measured."""
     recordings: ClassVar[str] = ""
-    """A recording of it that can be compared with a plan, in words; empty where none is read."""
+    """Recordings that can be compared with a plan, in words; empty where none is read."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
-    """Changes that each take one term out of the cycle, as new values by dotted key."""
+    """Changes that each take a term out of the cycle: new values by dotted key."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
     """Data files, in busplan/data, with figures of it that others have published or measured."""
 

@@ -114,10 +114,10 @@ class Doubt(NamedTuple):
     """An input of a cycle that is not known exactly."""
 
     key: str
-    """Dotted key of the profile, or a name of its own."""
+    """Dotted key of the profile, or another name."""
     label: str
     us: Number
-    """Standard uncertainty of the cycle by this input: its own, times the sensitivity [us]."""
+    """Standard uncertainty of the cycle by this input: that of the input times the sensitivity [us]."""
 
 
 class LeftOut(NamedTuple):
@@ -134,7 +134,7 @@ class BusLatency(NamedTuple):
     name: str
     payload_bytes: Number | None
     phases: Mapping[str, Number]
-    """Figures by key, which are among the kind's `latency_figures`; infinite where the phase does not exist."""
+    """Figures by key, of the kind's `figures.latency_table`; infinite where the phase does not exist."""
     group: str = ""
     """Name of its group of nodes; empty where all nodes are alike."""
 
@@ -158,7 +158,7 @@ class BusCycle(ABC):
     """One for each term, in their order."""
     command_events: ClassVar[tuple[tuple[str | None, str], ...]] = ()
     """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
-    cycle. Events of no node of its own are the command of all."""
+    cycle. Events without a node are the command of all nodes."""
 
     @property
     def rates(self) -> tuple[Rate, ...]:
@@ -171,7 +171,7 @@ class BusCycle(ABC):
         return 1
 
     def at(self, number: int) -> "BusCycle":  # noqa: ARG002 - most kinds have a single rate
-        """The cycle of the common multiple with a number, from 1, by a bound of its own; of plain numbers."""
+        """The cycle with a number within the common multiple, from 1; of plain numbers."""
         return self
 
     @abstractmethod
@@ -224,7 +224,7 @@ class BusCycle(ABC):
         return None
 
     def sync_jitter_us(self) -> Number:
-        """Jitter of the synchronous packet that the cycle's own traffic makes, either way of its mean [us]."""
+        """Jitter of the synchronous packet by the traffic of the cycle, either way of its mean [us]."""
         return 0.0
 
     def taking_us(self, group: Group) -> float:
@@ -309,7 +309,7 @@ class BusCycle(ABC):
         return 0.0
 
     def figures(self) -> Mapping[str, Number | None]:
-        """The kind's own figures beside the terms, by key; None where these groups of nodes have no such figure."""
+        """Figures of the kind beside the terms, by key; None where these groups of nodes have no such figure."""
         return {}
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:

@@ -15,7 +15,7 @@ SET: Final = "--set"
 _KEY: Final = re.compile(r"[A-Za-z0-9_-]{1,100}(?:\.[A-Za-z0-9_-]{1,100}){0,9}")
 _WORD: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _VALUE: Final = "value"
-_MOST_SAID: Final = 100
+_MOST_SHOWN: Final = 100
 """Longest option repeated in full in a message."""
 
 
@@ -33,7 +33,7 @@ class KeyChange(NamedTuple):
     @property
     def typed(self) -> str:
         """The option with its value as typed, shortened if it is long."""
-        text = self.text if len(self.text) <= _MOST_SAID else f"{self.text[:_MOST_SAID]}..."
+        text = self.text if len(self.text) <= _MOST_SHOWN else f"{self.text[:_MOST_SHOWN]}..."
         return f"{self.option} {text}"
 
     @property

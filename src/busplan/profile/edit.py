@@ -2,7 +2,7 @@
 
 A value is replaced, or a line is added to or removed from a section. A layout that needs more is refused, with the
 lines to change by hand. As a check, the new text is parsed and compared with the wanted data. A comment that grades a
-value, as `# measured: by whom`, was said of the old one: it becomes `# was measured: by whom`. But a choice is known no
+value, as `# measured: by whom`, held for the old one: it becomes `# was measured: by whom`. But a choice is known no
 better than what was assumed before it: it stays assumed.
 """
 

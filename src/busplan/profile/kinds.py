@@ -14,7 +14,8 @@ from busplan.errors import BusplanError
 from busplan.sections.base import Section, value_at
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
-_Known: TypeAlias = dict[int, tuple[dict[str, dict[str, Any]], list[str]]]
+_Arrays: TypeAlias = dict[int, tuple[dict[str, dict[str, Any]], list[str]]]
+"""Tables of arrays by name, and their names, by the identity of the array: there may be thousands to look up in."""
 
 
 def default_of(profile: Profile, key: str) -> object:
@@ -101,7 +102,7 @@ def named_tables(value: object) -> dict[str, dict[str, Any]] | None:
     return tables if len(tables) == len(value) else None
 
 
-def path_of(data: Mapping[str, object], key: str, known: _Known | None = None) -> tuple[str | int, ...]:
+def path_of(data: Mapping[str, object], key: str, arrays: _Arrays | None = None) -> tuple[str | int, ...]:
     """Path of a dotted key, with the index of a table in its array instead of its name.
 
     Parameters
@@ -110,18 +111,18 @@ def path_of(data: Mapping[str, object], key: str, known: _Known | None = None) -
         The tables.
     key
         The key.
-    known
-        Remembers the names of arrays from one key of `data` to the next.
+    arrays
+        Remembers arrays from one key of `data` to the next.
 
     Examples
     --------
     >>> path_of({"group": [{"name": "drives", "nodes": 2}]}, "group.drives.nodes")
     ('group', 0, 'nodes')
     """
-    return tuple(step for step, _ in _steps(data, key.split("."), known))
+    return tuple(step for step, _ in _steps(data, key.split("."), arrays))
 
 
-def named_path(data: object, path: tuple[str | int, ...], known: _Known | None = None) -> tuple[str | int, ...]:
+def named_path(data: object, path: tuple[str | int, ...], arrays: _Arrays | None = None) -> tuple[str | int, ...]:
     """The path with the names of tables in arrays instead of their indexes, where they have names.
 
     Parameters
@@ -130,22 +131,22 @@ def named_path(data: object, path: tuple[str | int, ...], known: _Known | None =
         The tables.
     path
         The path.
-    known
-        Remembers the names of arrays from one path of `data` to the next.
+    arrays
+        Remembers arrays from one path of `data` to the next.
     """
-    return tuple(name for _, name in _steps(data, path, known))
+    return tuple(name for _, name in _steps(data, path, arrays))
 
 
 def _steps(
-    data: object, path: Iterable[str | int], known: _Known | None = None
+    data: object, path: Iterable[str | int], arrays: _Arrays | None = None
 ) -> Iterator[tuple[str | int, str | int]]:
     """Each part of a path; that of a table in an array as its index and as its name, whichever the path has."""
-    known = {} if known is None else known
+    arrays = {} if arrays is None else arrays
     for part in path:
-        if id(data) not in known:
+        if id(data) not in arrays:
             tables = named_tables(data) or {}
-            known[id(data)] = tables, list(tables)
-        tables, names = known[id(data)]
+            arrays[id(data)] = tables, list(tables)
+        tables, names = arrays[id(data)]
         if part in tables or (isinstance(part, int) and part < len(names)):
             name = names[part] if isinstance(part, int) else part
             yield part if isinstance(part, int) else names.index(name), name

@@ -119,7 +119,7 @@ class AxisKeys(Extended):
     """Keys that can differ between the axes: controller, drive, encoder."""
 
 
-# The same keys with the same ranges, none required and none with a default: what is not said is inherited.
+# The same keys with the same ranges, none required and none with a default: what is not given is inherited.
 @_with(
     {
         name: (field.rebuild_annotation() | None, Field(default=None, description=field.description))

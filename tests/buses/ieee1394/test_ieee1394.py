@@ -87,7 +87,7 @@ def test_the_doubt_of_the_gap_term_is_as_large_at_a_larger_gap_count_as_at_a_sma
         fitted = {"node.execution.residual": "standard", "node.execution.measured_gap_count": measured}
         bench = busplan.load_profile("paper-two-node", changes={**fitted, "bus.gap_count": gap_count})
         (figures,) = busplan.capacity(bench, timing_model="standard").results
-        (us,) = (doubt.us for doubt in figures.doubts if doubt.key == "gap_term")
+        (us,) = (float(doubt.us) for doubt in figures.doubts if doubt.key == "gap_term")
         return us
 
     # Four halves of split transactions, each with half of the 4 / 98.304 us that a gap count adds to equation (4).

@@ -85,6 +85,17 @@ def test_an_execution_that_no_answer_puts_on_the_bus_is_not_spoken_of() -> None:
     assert "The execution time behind these figures is derived." in str(busplan.latency(on))
 
 
+def test_a_bus_reset_is_spoken_of_where_the_cycle_no_longer_fits_after_it() -> None:
+    assert lines(paper(bus__gap_count=7, cycle__period_us=500))["bus reset"] == (
+        "does not fit while it leaves bus.gap_count = 63"
+    )
+    # After it the cycle fits, too; it is as after a reset already; it does not fit before either.
+    for changes in ({"bus__gap_count": 7}, {}, {"bus__gap_count": 7, "cycle__period_us": 300}):
+        profile = paper(**changes)
+        assert "bus reset" not in lines(profile)
+        assert busplan.capacity(profile).to_dict()["verdicts"][0]["verdict_after_reset"] is None
+
+
 def test_what_the_paper_cannot_express_is_not_applicable() -> None:
     own = paper(cycle__retries=1, host__transaction_us=5.0)
     said = lines(own)

@@ -55,7 +55,7 @@ cpdef object cycle_waits(
 
 
 @cython.locals(
-    first=double, second=double, third=double, us=double, each=double, message=Py_ssize_t, _=Py_ssize_t,
+    first=double, second=double, third=double, us=double, queued=double, message=Py_ssize_t, _=Py_ssize_t,
 )
 cpdef double blocking_us(
     double span, Py_ssize_t most, double[::1] lower_us, double[::1] identifiers, double[::1] burst,

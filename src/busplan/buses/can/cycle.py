@@ -1,6 +1,7 @@
 """The SYNC cycle: SYNC, feedback, the host, commands, and the waits for other messages."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property, partial, reduce
 from itertools import chain
 from math import inf
@@ -83,7 +84,6 @@ class CanCycle(BusCycle):
         self.network = network
         self.model = model
         self.number = number
-        self.is_stuffed = model == WORST
 
     @property
     def rates(self) -> tuple[Rate, ...]:
@@ -109,12 +109,13 @@ class CanCycle(BusCycle):
 
     @cached_property
     def traffic(self) -> Traffic:
-        """SYNC, PDOs and other messages."""
-        return traffic_of(self.network)
+        """SYNC, PDOs and other messages, their frames as long as in the timing model."""
+        traffic = traffic_of(self.network)
+        return traffic if self.model == WORST else replace(traffic, is_stuffed=False)
 
     def _frame_us(self, data_bytes: Number, form: Traffic | Message | None = None) -> Number:
         """Time of a frame of the cycle, or of a message [us]."""
-        return self.traffic.frame_us(data_bytes, form or self.traffic, is_stuffed=self.is_stuffed)
+        return self.traffic.frame_us(data_bytes, form or self.traffic)
 
     @cached_property
     def _pdos(self) -> tuple[tuple[Pdos, Number], ...]:
@@ -127,7 +128,7 @@ class CanCycle(BusCycle):
                 identifier_bits=self.traffic.identifier_bits,
                 bit_rate_kbit_s=self.traffic.bit_rate_kbit_s,
                 data_bit_rate_kbit_s=self.traffic.data_bit_rate_kbit_s,
-                is_stuffed=self.is_stuffed,
+                is_stuffed=self.traffic.is_stuffed,
             )
             return named(us, f"{pdos.name}_us", f"PDO,{pdos.name}{pdos.group and f',{pdos.group}'}")
 
@@ -203,7 +204,7 @@ class CanCycle(BusCycle):
 
     def _blocks(self, blocking: BusEvent, first: int, end: int | None) -> Iterator[BusEvent]:
         """Some of the frames of lower priorities: before SYNC, before the feedback, or behind it."""
-        waited = waits(self.traffic, plain(self._on_bus_us), self._due, is_stuffed=self.is_stuffed)
+        waited = waits(self.traffic, plain(self._on_bus_us), self._due)
         for message in waited.blocks()[first:end]:
             yield blocking._replace(us=message.frame_us, label=f"message {message.name} of a lower priority")
 
@@ -249,7 +250,7 @@ class CanCycle(BusCycle):
 
         def figure(key: str, words: str) -> Number:
             def of(traffic: Traffic, others_us: Number) -> Number:
-                number: Number = getattr(waits(traffic, others_us, self._due, is_stuffed=self.is_stuffed), key)
+                number: Number = getattr(waits(traffic, others_us, self._due), key)
                 return number
 
             return self.traffic.ask(of, others_us, words=words)
@@ -284,7 +285,7 @@ class CanCycle(BusCycle):
         """The largest identifier of SYNC and all PDOs."""
 
         def last(traffic: Traffic) -> Number:
-            cyclic = [stream for stream in streams(traffic, is_stuffed=True) if not stream.is_message]
+            cyclic = [stream for stream in streams(traffic) if not stream.is_message]
             identifier: Number = last_identifier(cyclic if self._due is None else sent_in(cyclic, self._due))
             return identifier
 
@@ -374,7 +375,7 @@ class CanCycle(BusCycle):
         load = ("load", words)
         if not self._messages:
             return (load,)
-        answers = message_responses(self.traffic, is_stuffed=self.is_stuffed)
+        answers = message_responses(self.traffic)
         latest, worst = max(answers, key=lambda pair: pair[1].us / pair[0].deadline_us)
         if worst.us == inf:
             return load, ("latest message", f"{latest.name}, without a worst-case response time")
@@ -421,7 +422,7 @@ class CanCycle(BusCycle):
         """Half of what messages may hold SYNC up; infinite where that has no end, 0 where no SYNC is sent [us]."""
 
         def held_up_us(traffic: Traffic) -> Number:
-            worst = sync_response(traffic, is_stuffed=self.is_stuffed)
+            worst = sync_response(traffic)
             return choose(worst.us < inf, worst.blocking_us + worst.interference_us, inf)
 
         if not self.traffic.has_cycle:
@@ -433,7 +434,7 @@ class CanCycle(BusCycle):
 
         def figure(key: str, words: str) -> Number:
             def of(traffic: Traffic) -> float:
-                stream, worst = responses(traffic, is_stuffed=self.is_stuffed)[place]
+                stream, worst = responses(traffic)[place]
                 if key in Stream._fields or key == "last":
                     number: float = getattr(stream, key)
                 else:
@@ -445,7 +446,7 @@ class CanCycle(BusCycle):
         # A derivation says which frames were counted.
         point, words = self.traffic.point, ("", "")
         if isinstance(point, Traced):
-            words = counted(self.traffic.at(point.value), place, is_stuffed=self.is_stuffed)
+            words = counted(self.traffic.at(point.value), place)
         blocks, before = (f": {frames}" if frames else "" for frames in words)
         frame_us = figure("frame_us", f"the last frame of {name}")
         instance = figure("instance", f"the worst instance of {name} in the busy period, from 0")

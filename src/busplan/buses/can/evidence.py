@@ -42,13 +42,13 @@ def response_us(
     _cycle: object, *, message: int, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]
 ) -> float | None:
     """Worst-case response time of a message, counted from 1 in the order of identifiers [us]; None without an end."""
-    _, worst = message_responses(_messages(bit_rate_kbit_s, payload_bytes, period_us), is_stuffed=True)[message - 1]
+    _, worst = message_responses(_messages(bit_rate_kbit_s, payload_bytes, period_us))[message - 1]
     return None if worst.us == inf else plain(worst.us)
 
 
 def load(_cycle: object, *, bit_rate_kbit_s: int, payload_bytes: Sequence[int], period_us: Sequence[float]) -> float:
     """Share of the bus that messages take [1]."""
-    traffic = streams(_messages(bit_rate_kbit_s, payload_bytes, period_us), is_stuffed=True)
+    traffic = streams(_messages(bit_rate_kbit_s, payload_bytes, period_us))
     return float(sum(stream.frame_us / stream.period_us for stream in traffic))
 
 

@@ -91,6 +91,8 @@ class Traffic:
     """From the last feedback to the queued commands [us]."""
     pdos: tuple[Pdos, ...] = ()
     messages: tuple[Message, ...] = ()
+    is_stuffed: bool = True
+    """Whether frames have the stuff bits of the worst case, or none."""
 
     @property
     def has_cycle(self) -> bool:
@@ -102,7 +104,7 @@ class Traffic:
         """Whether some PDOs are not in every cycle."""
         return not all(is_off(pdos.every - 1) for pdos in self.pdos)
 
-    def frame_us(self, data_bytes: Number, form: "Traffic | Message", *, is_stuffed: bool) -> Number:
+    def frame_us(self, data_bytes: Number, form: "Traffic | Message") -> Number:
         """Time of a frame [us].
 
         Parameters
@@ -111,15 +113,13 @@ class Traffic:
             Its data [bytes].
         form
             What gives its format: this traffic for SYNC and PDOs, or a message.
-        is_stuffed
-            Whether the stuff bits of the worst case are counted.
         """
         return frame_us(
             data_bytes,
             identifier_bits=form.identifier_bits,
             bit_rate_kbit_s=self.bit_rate_kbit_s,
             data_bit_rate_kbit_s=form.data_bit_rate_kbit_s,
-            is_stuffed=is_stuffed,
+            is_stuffed=self.is_stuffed,
         )
 
     def ask(self, function: Callable[..., Any], *arguments: Number, words: str) -> Number:
@@ -185,11 +185,11 @@ class Traffic:
         cycle = {key: next(left) for key in _OF_CYCLE}
         pdos = [pdos._replace(**{key: next(left) for key in _OF_PDOS}) for pdos in self.pdos]
         messages = [Message(name, *(next(left) for _ in rest)) for name, *rest in self.messages]
-        return Traffic(**cycle, pdos=tuple(pdos), messages=tuple(messages))
+        return replace(self, **cycle, pdos=tuple(pdos), messages=tuple(messages))
 
 
-_OF_CYCLE: Final = tuple(field.name for field in fields(Traffic))[:-2]
-"""Fields before the PDOs and the messages."""
+_OF_CYCLE: Final = tuple(field.name for field in fields(Traffic))[:-3]
+"""Its own numbers: fields before the PDOs and the messages."""
 _OF_PDOS: Final = ("identifier", "pdos", "payload_bytes", "every")
 
 
@@ -197,7 +197,7 @@ _last: tuple[Network, Traffic] | None = None
 
 
 def traffic_of(network: Network) -> Traffic:
-    """Traffic of a network. The last result is remembered, for every limit of a network asks for it."""
+    """Traffic of a network, stuffed. The last result is remembered, for every limit of a network asks for it."""
     global _last  # noqa: PLW0603 - a network may hold arrays, and is told apart by identity alone
     if _last is None or _last[0] is not network:
         _last = network, _traffic(network)
@@ -331,20 +331,18 @@ class Stream(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def streams(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
+def streams(traffic: Traffic) -> tuple[Stream, ...]:
     """Every stream of a network: SYNC, feedback, command, and other messages.
 
     Parameters
     ----------
     traffic
         What it sends, as `Traffic.ask` gives it.
-    is_stuffed
-        Whether the stuff bits of the worst case are counted.
     """
-    return (*_cyclic(traffic, is_stuffed), *(_of_message(message, traffic, is_stuffed) for message in traffic.messages))
+    return (*_cyclic(traffic), *(_of_message(message, traffic) for message in traffic.messages))
 
 
-def _of_message(message: Message, traffic: Traffic, is_stuffed: bool) -> Stream:
+def _of_message(message: Message, traffic: Traffic) -> Stream:
     first = int(message.identifier)
     return Stream(
         message.name,
@@ -353,7 +351,7 @@ def _of_message(message: Message, traffic: Traffic, is_stuffed: bool) -> Stream:
         first=first,
         identifiers=_whole(message.senders),
         data_bytes=_whole(message.payload_bytes),
-        frame_us=traffic.frame_us(message.payload_bytes, message, is_stuffed=is_stuffed),
+        frame_us=traffic.frame_us(message.payload_bytes, message),
         period_us=message.period_us,
         jitter_us=message.jitter_us,
         deadline_us=message.deadline_us,
@@ -363,7 +361,7 @@ def _of_message(message: Message, traffic: Traffic, is_stuffed: bool) -> Stream:
     )
 
 
-def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
+def _cyclic(traffic: Traffic) -> Iterator[Stream]:
     """SYNC and all PDOs; none of messages alone."""
     if not traffic.has_cycle:
         return
@@ -375,7 +373,7 @@ def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
         first=first,
         identifiers=1,
         data_bytes=size,
-        frame_us=traffic.frame_us(size, traffic, is_stuffed=is_stuffed),
+        frame_us=traffic.frame_us(size, traffic),
         period_us=traffic.period_us,
         jitter_us=0.0,
         deadline_us=traffic.period_us,
@@ -401,7 +399,7 @@ def _cyclic(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
                 first=first + step,
                 identifiers=choose(is_there, count, 0),
                 data_bytes=size,
-                frame_us=choose(is_there, traffic.frame_us(size, traffic, is_stuffed=is_stuffed), 0.0),
+                frame_us=choose(is_there, traffic.frame_us(size, traffic), 0.0),
                 period_us=traffic.period_us * pdos.every,
             )
             left_bytes = left_bytes - most_bytes

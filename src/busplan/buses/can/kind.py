@@ -55,9 +55,7 @@ def _higher(name: str, rate_kbit_s: float, rates_kbit_s: Sequence[float]) -> Set
 def _identifier_bits(network: Network) -> Setting:
     """Identifiers of 11 bits, where all are small enough."""
     key, traffic = "bus.identifier_bits", traffic_of(network)
-    last = [
-        stream.last for stream in streams(traffic, is_stuffed=True) if stream.identifier_bits == traffic.identifier_bits
-    ]
+    last = [stream.last for stream in streams(traffic) if stream.identifier_bits == traffic.identifier_bits]
     reason = ""
     if plain(traffic.identifier_bits) == BASE_BITS:
         reason = f"they have {BASE_BITS} bits"

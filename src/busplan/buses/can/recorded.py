@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -199,11 +200,11 @@ class _Log:
             )
         yield from self._load()
         yield self._missed("error frames", self.frames.errors, len(self.times_us) + self.frames.errors)
-        each = streams(self.traffic, is_stuffed=True)
-        yield from self._cycles(each)
+        sent = streams(self.traffic)
+        yield from self._cycles(sent)
         responses = {(answer.group, answer.name): answer.phases for answer in self.cycle.latencies()}
-        unstuffed = streams(self.traffic, is_stuffed=False)
-        for stream, shortest, label in zip(each, unstuffed, _labels(each), strict=True):
+        unstuffed = streams(replace(self.traffic, is_stuffed=False))
+        for stream, shortest, label in zip(sent, unstuffed, _labels(sent), strict=True):
             phases = responses.get((stream.group, stream.name))
             yield from self._stream(stream, label, self._spread_us(stream, shortest.frame_us, phases))
         count = len(self.taken)
@@ -280,11 +281,11 @@ class _Log:
             stuffing, number = float((wire_us - none_us)[classical].sum()) / possible_us, int(classical.sum())
             yield RecordedFigure("stuff bits of the possible ones", "share", None, stuffing, None, "shown", number)
 
-    def _cycles(self, each: Sequence[Stream]) -> Iterator[RecordedFigure]:
+    def _cycles(self, sent_streams: Sequence[Stream]) -> Iterator[RecordedFigure]:
         """SYNCs and PDOs that are missing, and the last PDO after its SYNC."""
         if not self.traffic.has_cycle:
             return
-        sync, *others = each
+        sync, *others = sent_streams
         is_extended = sync.identifier_bits > BASE_BITS
         sent = self.by_identifier.get((sync.first, is_extended))
         periods = None if sent is None else grid(sent.times_us)
@@ -358,10 +359,10 @@ class _Log:
         bytes_key = key and f"{key}.payload_bytes"
         yield RecordedFigure(f"{label}: data", "bytes", planned_bytes, most_bytes, None, "at most", count, bytes_key)
         formats = [(_format(sent.is_fd, sent.switches), len(sent.times_us)) for sent in recorded]
-        others = [(name, frames) for name, frames in formats if name != planned]
-        if others:
-            note = f"{others[0][0]} recorded, {planned} planned"
-            frames = sum(frames for _, frames in others)
+        unlike = [(name, frames) for name, frames in formats if name != planned]
+        if unlike:
+            note = f"{unlike[0][0]} recorded, {planned} planned"
+            frames = sum(frames for _, frames in unlike)
             yield _limited(f"{label}: frames of another format", 0, frames, count, key, note=note)
 
     def _sync(self, stream: Stream, sent: SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
@@ -487,9 +488,9 @@ def _format(is_fd: bool, switches: bool) -> str:
     return "CAN FD" if switches else "CAN FD without a switch of bit rate"
 
 
-def _labels(each: Sequence[Stream]) -> list[str]:
+def _labels(sent: Sequence[Stream]) -> list[str]:
     """Name of each stream; those of a PDO with several frames are numbered."""
-    labels = [stream.label for stream in each]
+    labels = [stream.label for stream in sent]
     return [
         f"{label} {labels[: place + 1].count(label)}" if labels.count(label) > 1 else label
         for place, label in enumerate(labels)

@@ -279,8 +279,8 @@ def blocking_us(
     for message in range(len(lower_us)):
         us = lower_us[message]
         if us > third:
-            each = math.ceil(min((span + deadline_us[message]) / period_us[message], 3.0)) + burst[message] - 1
-            for _ in range(int(min(identifiers[message] * each, 3.0))):
+            queued = math.ceil(min((span + deadline_us[message]) / period_us[message], 3.0)) + burst[message] - 1
+            for _ in range(int(min(identifiers[message] * queued, 3.0))):
                 if us > first:
                     first, second, third = us, first, second
                 elif us > second:

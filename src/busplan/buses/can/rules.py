@@ -21,7 +21,7 @@ from busplan.sections.base import MAX_TIME_US
 
 def _late_messages(traffic: Traffic) -> list[tuple[Stream, float]]:
     """Messages of plain numbers that miss their deadline, in the order of the profile, with their response [us]."""
-    answers = message_responses(traffic, is_stuffed=True, is_verdict=True)
+    answers = message_responses(traffic, is_verdict=True)
     return [(message, worst.us) for message, worst in answers if not within(worst.us, message.deadline_us)]
 
 
@@ -44,7 +44,7 @@ def _deadline(network: Network) -> Number:
     """The largest response over deadline of any message; 0 without messages [1]."""
 
     def slowest(traffic: Traffic) -> Number:
-        answers = message_responses(traffic, is_stuffed=True, is_verdict=True)
+        answers = message_responses(traffic, is_verdict=True)
         share: Number = reduce(larger, (worst.us / message.deadline_us for message, worst in answers))
         return share
 
@@ -100,7 +100,7 @@ def _identifiers_twice(network: Network) -> Number:
     """Number of identifiers that stand twice or more often [1]."""
 
     def twice(traffic: Traffic) -> Points:
-        sent = streams(traffic, is_stuffed=True)
+        sent = streams(traffic)
         fixed = [stream for stream in sent if isinstance(stream.last, int)]
         varied = [stream for stream in sent if not isinstance(stream.last, int)]
         number: Points = sum(shared for *_, shared in _collisions(fixed))
@@ -114,7 +114,7 @@ def _identifiers_twice(network: Network) -> Number:
 
 def _collision_words(network: Network) -> Iterator[tuple[str, str]]:
     """Each pair of streams that shares identifiers, in words, with the key of the second."""
-    for early, late, first, shared in _collisions(streams(traffic_of(network), is_stuffed=True)):
+    for early, late, first, shared in _collisions(streams(traffic_of(network))):
         pair = f"{early.label} and {late.label}" if early.label != late.label else f"frames of {early.label} PDOs"
         section = f"group.{late.group}" if late.group else "payload"
         key = f"message.{late.name}.identifier" if late.is_message else f"{section}.{late.name}_identifier"
@@ -125,7 +125,7 @@ def _largest_identifier(network: Network) -> Number:
     """The largest identifier of the bus's own length; the section checks messages of the other one [1]."""
 
     def largest(traffic: Traffic) -> Number:
-        sent = streams(traffic, is_stuffed=True)
+        sent = streams(traffic)
         last: Number = last_identifier(stream for stream in sent if _has_format(stream, traffic.identifier_bits))
         return last
 
@@ -262,7 +262,7 @@ def deadline_missed(subject: RuleSubject) -> Iterator[RuleProblem]:
         if us < inf:
             why = f"its worst-case response time is {us:g} us, over its {message.deadline_us:g} us"
         else:
-            before = (stream for stream in streams(traffic, is_stuffed=True) if stream.block <= message.last_place)
+            before = (stream for stream in streams(traffic) if stream.block <= message.last_place)
             load = sum(stream.frames_us / stream.period_us for stream in before)
             why = f"it has no worst-case response time, for with it the bus has a load of {load:.1%}"
             if load < SATURATED:

@@ -47,7 +47,7 @@ def sent_in(cyclic: Sequence[Stream], due: Container[str]) -> list[Stream]:
     return [stream for stream in cyclic if stream.name == SYNC or stream.group in due]
 
 
-def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None, *, is_stuffed: bool) -> Waits:
+def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None) -> Waits:
     """Find how long a cycle lasts with the frames of other messages.
 
     Parameters
@@ -58,8 +58,6 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
         SYNC, the wait for the slowest feedback, all PDOs and the host's own time [us].
     due
         Names of the groups whose PDOs are in the cycle; without it the fullest cycle, and no other lasts longer.
-    is_stuffed
-        Whether the stuff bits of the worst case are counted.
 
     Notes
     -----
@@ -74,7 +72,7 @@ def waits(traffic: Traffic, others_us: Points, due: frozenset[str] | None = None
     PDOs that are not in every cycle are all due in the fullest, and no other cycle lasts longer: it has fewer PDOs, and
     no more of the messages before the last PDO of the fullest. These may block its own PDOs, but each goes once.
     """
-    sent = streams(traffic, is_stuffed=is_stuffed)
+    sent = streams(traffic)
     cyclic = [stream for stream in sent if not stream.is_message]
     messages = [stream for stream in sent if stream.is_message]
     bit, fullest = bit_us(traffic.bit_rate_kbit_s), last_place(cyclic)
@@ -129,45 +127,41 @@ class Response(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def message_responses(
-    traffic: Traffic, *, is_stuffed: bool, is_verdict: bool = False
-) -> tuple[tuple[Stream, Response], ...]:
+def message_responses(traffic: Traffic, *, is_verdict: bool = False) -> tuple[tuple[Stream, Response], ...]:
     """Every message in the order of the profile, with its worst-case response.
 
     Parameters
     ----------
     traffic
         What is sent, as `Traffic.ask` gives it.
-    is_stuffed
-        Whether the stuff bits of the worst case are counted.
     is_verdict
         Whether a bound, without parts, is enough where it shows that a deadline is kept.
     """
-    sent = streams(traffic, is_stuffed=is_stuffed)
+    sent = streams(traffic)
     messages = [number for number, stream in enumerate(sent) if stream.is_message]
     enough_us = [stream.deadline_us for stream in sent] if is_verdict else None
-    starts, bit = _starts(traffic, is_stuffed=is_stuffed), bit_us(traffic.bit_rate_kbit_s)
+    starts, bit = _starts(traffic), bit_us(traffic.bit_rate_kbit_s)
     return tuple((sent[number], worst) for number, worst in _worst(sent, messages, starts, bit, enough_us=enough_us))
 
 
-def sync_response(traffic: Traffic, *, is_stuffed: bool) -> Response:
+def sync_response(traffic: Traffic) -> Response:
     """Worst-case response of SYNC, with arguments as `message_responses` has them.
 
     SYNC is blocked by messages alone: where the cycle fits, its PDOs have gone before the next SYNC.
     """
-    sent, bit = streams(traffic, is_stuffed=is_stuffed), bit_us(traffic.bit_rate_kbit_s)
+    sent, bit = streams(traffic), bit_us(traffic.bit_rate_kbit_s)
     ((_, worst),) = _worst(sent, [0], [_Start()], bit, blocks=[stream.is_message for stream in sent])
     return worst
 
 
 @lru_cache(maxsize=4)
-def responses(traffic: Traffic, *, is_stuffed: bool) -> tuple[tuple[Stream, Response], ...]:
+def responses(traffic: Traffic) -> tuple[tuple[Stream, Response], ...]:
     """SYNC, the last stream of each PDO, and every message, with the worst-case response of its last frame.
 
     Arguments are as `message_responses` has them, in plain numbers.
     """
-    sent, bit = streams(traffic, is_stuffed=is_stuffed), bit_us(traffic.bit_rate_kbit_s)
-    sync = [(sent[0], sync_response(traffic, is_stuffed=is_stuffed))] if traffic.has_cycle else []
+    sent, bit = streams(traffic), bit_us(traffic.bit_rate_kbit_s)
+    sync = [(sent[0], sync_response(traffic))] if traffic.has_cycle else []
     # The last frame of each PDO.
     ends = {
         (stream.name, stream.group): number for number, stream in enumerate(sent) if number and not stream.is_message
@@ -175,10 +169,10 @@ def responses(traffic: Traffic, *, is_stuffed: bool) -> tuple[tuple[Stream, Resp
     # Each PDO is behind those of smaller identifiers; a message, behind the whole block before it.
     by_place = [stream._replace(block=stream.first_place) for stream in sent]
     pdos = [(sent[number], worst) for number, worst in _worst(by_place, [*ends.values()], [_Start()], bit)]
-    return (*sync, *pdos, *message_responses(traffic, is_stuffed=is_stuffed))
+    return (*sync, *pdos, *message_responses(traffic))
 
 
-def counted(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[str, str]:
+def counted(traffic: Traffic, place: int) -> tuple[str, str]:
     """Frames in a response of `responses`, in words: the one that blocks, and those that go before it, by number.
 
     Parameters
@@ -187,19 +181,17 @@ def counted(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[str, str
         What is sent, in plain numbers.
     place
         Place of the response.
-    is_stuffed
-        Whether the stuff bits of the worst case are counted.
     """
-    answered, worst = responses(traffic, is_stuffed=is_stuffed)[place]
+    answered, worst = responses(traffic)[place]
     higher, blocking = [], ""
-    for stream in streams(traffic, is_stuffed=is_stuffed):
+    for stream in streams(traffic):
         if (stream.block if answered.is_message else stream.first_place) <= answered.last_place:
             higher.append(stream)
         elif not blocking and stream.frame_us == worst.blocking_us and (stream.is_message or answered.name != SYNC):
             blocking = stream.label
     waited_us = worst.blocking_us + worst.interference_us + worst.instance * answered.frame_us
     window_us = waited_us + bit_us(traffic.bit_rate_kbit_s)
-    for start in _starts(traffic, is_stuffed=is_stuffed) if answered.is_message else [_Start()]:
+    for start in _starts(traffic) if answered.is_message else [_Start()]:
         numbers = [
             (stream.identifiers - (stream == answered))
             * (
@@ -241,7 +233,7 @@ class _Start(NamedTuple):
         return smaller(self.late_us - again_us, 0.0)
 
 
-def _starts(traffic: Traffic, *, is_stuffed: bool) -> list[_Start]:
+def _starts(traffic: Traffic) -> list[_Start]:
     """Where a busy period of a message may begin: it has the worst of these.
 
     SYNC comes once a period, and feedback and commands behind it. So a busy period that begins with SYNC meets each
@@ -251,11 +243,11 @@ def _starts(traffic: Traffic, *, is_stuffed: bool) -> list[_Start]:
     if not traffic.has_cycle:
         return [_Start()]
     us = dict.fromkeys((SYNC, _FEEDBACK, _COMMAND), 0.0)
-    for stream in streams(traffic, is_stuffed=is_stuffed):
+    for stream in streams(traffic):
         if not stream.is_message:
             us[stream.name] = us[stream.name] + stream.frames_us
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
-    commands_us = waits(traffic, others_us, is_stuffed=is_stuffed).lasts_us - us[_COMMAND]
+    commands_us = waits(traffic, others_us).lasts_us - us[_COMMAND]
     feedback_us = commands_us - traffic.host_us - us[_FEEDBACK]
     return [
         _Start(),

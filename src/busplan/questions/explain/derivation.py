@@ -337,8 +337,9 @@ def assumptions(network: Network) -> tuple[Input, ...]:
         traced = numbers_of(network, "capacity", model=model)[""]
         numbers += [traced[key] for key in ("required_us", "available_us", "safe_required_us") if key in traced]
     for limit in bus.limits:
-        if limit.role != "safety":
-            numbers += (limit.value(limited), limit.most(limited), limit.uncertainty(limited))
+        # A value that depends on nothing, as that of a schedule which the profile does not have, breaks no limit.
+        if limit.role != "safety" and isinstance(value := limit.value(limited), Traced):
+            numbers += (value, limit.most(limited), limit.uncertainty(limited))
     by_name: dict[str, Input] = {}
     for given in inputs(Traced(None, parts=tuple(numbers))):
         by_name.setdefault(given.name, given)

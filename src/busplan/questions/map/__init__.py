@@ -267,7 +267,8 @@ def _directions(
         Not one key and its values, or both directions vary one key.
     """
     profile = network.profile
-    nodes_key = varied_nodes(profile).nodes_key
+    # Messages alone have no nodes whose number could vary.
+    nodes_key = varied_nodes(profile).nodes_key if network.groups else AXES
     across, up = (
         None if along is None else _direction(profile, along, name=name, with_circle=with_circle)
         for name, along in (("x", x), ("y", y))
