@@ -38,7 +38,7 @@ settings.register_profile("thorough", EASY, max_examples=500)
 settings.load_profile("quick")
 
 
-collect_ignore = ["oracles", "attacks/fuzz.py", "readme/refresh.py"]
+collect_ignore = ["oracles", "readme/refresh.py"]
 """Modules without a test or a doctest, which would load their libraries in every worker."""
 
 

@@ -45,25 +45,6 @@ def circle_test(busplan: Run) -> Run:
     return call
 
 
-def test_json_holds_the_contract(circle_test: Run, profile: Path) -> None:
-    run = circle_test(
-        profile, "--format", "json", "--contributions", "--period", "2ms", "--period", "4ms", cwd=profile.parent
-    )
-    assert (run.returncode, run.stderr) == (0, "")
-    document = json.loads(run.stdout)
-    assert (document["schema"], document["command"], document["profile"]) == (1, "circle-test", "quick")
-    assert [result["period_us"] for result in document["results"]] == [2000, 4000]
-    for result in document["results"]:
-        numbers = [key for key in result if key.endswith(("_us", "_mm", "_s", "_deg", "_db", "_hz"))]
-        absent = {"circular_deviation_mm", "centre_offset_mm"}
-        assert all(math.isfinite(result[key]) for key in numbers if key not in absent)
-        assert len(result["centre_offset_mm"]) == 2
-        assert (result["bus_fits"], result["passed"], result["failures"]) == (True, None, [])
-        assert (result["path"], result["circular_deviation_mm"], result["settled"]) == ("trapezoid", None, None)
-        assert {one["source"] for one in result["contributions"]} == {"velocity_feedforward", "period"}
-        assert all(set(one) >= {"source", "max_contour_error_mm", "removed_mm"} for one in result["contributions"])
-
-
 def test_a_missed_tolerance_is_exit_1_with_its_size_and_what_to_attack(circle_test: Run, profile: Path) -> None:
     profile.write_text(QUICK + "[tolerance]\nmax_contour_error_mm = 0.001\n", encoding="utf-8")
     run = circle_test(profile, cwd=profile.parent)

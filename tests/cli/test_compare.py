@@ -4,25 +4,8 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-import pytest
-
-import busplan
-from busplan.buses import kind_names
-
 Run = Callable[..., Any]
 Refused = Callable[..., str]
-
-
-@pytest.mark.parametrize("name", ["gantry-24", "can-servo-8", "paper-1ms", "dvrk"])
-def test_a_report_exits_0_and_has_every_kind(run: Run, name: str) -> None:
-    done = run("compare", name, "--format", "json")
-    assert (done.returncode, done.stderr) == (0, "")
-    document = json.loads(done.stdout, parse_constant=pytest.fail)
-    assert {one["kind"] for one in document["buses"]} == set(kind_names())
-    assert document["buses"][0]["kind"] == document["kind"] == busplan.load_profile(name).bus.kind
-    for one in document["buses"]:
-        if one["smallest_period_us"] is None:
-            assert one["no_period"] or one["why_not"]
 
 
 def test_options_change_the_profile_before_it_is_put_on_other_kinds(run: Run) -> None:

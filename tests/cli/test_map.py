@@ -60,11 +60,3 @@ def test_what_cannot_be_done_is_said_and_leaves_nothing(
 ) -> None:
     assert message in refused("map", "paper-4ms", *arguments, cwd=tmp_path)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_on_a_terminal_states_have_colours_unless_no_color_is_set(run: Run) -> None:
-    colours = run("map", "paper-4ms", *FEW, inside={"variables": {"FORCE_COLOR": "1"}}).stdout
-    plain = run("map", "paper-4ms", *FEW, inside={"variables": {"FORCE_COLOR": "1", "NO_COLOR": "1"}}).stdout
-    assert "\x1b[1;32m" in colours
-    assert "\x1b[1;32m" not in plain
-    assert "[#]" in plain.replace("\x1b[1m", "").replace("\x1b[0m", "")

@@ -16,11 +16,6 @@ from busplan import __version__
 Run = Callable[..., Any]
 Refused = Callable[..., str]
 
-TRANSACTION = {
-    *("arbitration_us", "request_us", "response_us", "acknowledge_us", "execution_us", "latency_us", "gaps_us", "hops"),
-    *("request_and_acknowledge_us", "response_and_acknowledge_us", "payload_bytes"),
-}
-"""Numbers of the JSON contract, of a transaction and of the figures under one timing model."""
 FIGURES = {
     *(
         "period_us",
@@ -75,20 +70,6 @@ def cell(value: object) -> str:
 # --- latency ----------------------------------------------------------------------------------------------
 
 
-def test_latency_as_json_holds_the_contract(run: Run) -> None:
-    found = document(run, "latency", "paper-4ms")
-    assert (found["schema"], found["command"], found["profile"]) == (1, "latency", "paper-4ms")
-    assert [(one["transaction"], one["timing_model"]) for one in found["transactions"]] == [
-        ("read", "paper"),
-        ("read", "standard"),
-        ("write", "paper"),
-        ("write", "standard"),
-    ]
-    for one in found["transactions"]:
-        check_numbers(one, TRANSACTION)
-        assert (one["payload_bytes"], one["hops"]) == (12, 2)
-
-
 def test_phases_add_up_to_the_latency(run: Run) -> None:
     for one in document(run, "latency", "paper-dma", "--payload", "4,5,2048")["transactions"]:
         halves = one["request_and_acknowledge_us"], one["response_and_acknowledge_us"]
@@ -131,16 +112,6 @@ def test_a_payload_over_the_speeds_limit_is_warned_of_and_computed(run: Run) -> 
 
 
 # --- capacity ---------------------------------------------------------------------------------------------
-
-
-def test_capacity_as_json_holds_the_contract(run: Run) -> None:
-    found = document(run, "capacity", "paper-4ms")
-    assert (found["schema"], found["command"], found["profile"]) == (1, "capacity", "paper-4ms")
-    assert [one["timing_model"] for one in found["results"]] == ["paper", "standard"]
-    for one in found["results"]:
-        check_numbers(one, FIGURES)
-        assert one["limited_by"] in ("time", "hops", "nodes", "payload")
-        assert one["fits"] is True
 
 
 @pytest.mark.parametrize(
@@ -218,13 +189,6 @@ def test_the_papers_equations_are_said_to_disagree_and_decide_nothing(run: Run) 
 
 def verdicts(run: Run, *arguments: str) -> Any:
     return document(run, "capacity", *arguments)["verdicts"]
-
-
-@pytest.mark.parametrize("form", ["table", "json", "csv"])
-def test_the_smallest_and_the_largest_of_periods_are_reported(run: Run, form: str) -> None:
-    done = run("capacity", "paper-4ms", "--period", "0.001us,1000s", "--format", form)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert not re.search(r"\b(inf|nan)\b", done.stdout, re.IGNORECASE)
 
 
 # --- the other commands -----------------------------------------------------------------------------------

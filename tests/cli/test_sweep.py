@@ -12,17 +12,6 @@ import pytest
 Run = Callable[..., Any]
 
 
-def test_csv_has_the_columns_of_the_contract_and_the_rows_of_capacity(busplan: Run, tmp_path: Path) -> None:
-    run = busplan("sweep", "paper-4ms", "--vary", "bus.nodes=2:3", "--format", "csv", cwd=tmp_path)
-    assert (run.returncode, run.stderr.count("\n")) == (0, 1)
-    rows = list(csv.reader(run.stdout.splitlines()))
-    three = busplan("capacity", "paper-4ms", "--set", "bus.nodes=3", "--format", "csv", cwd=tmp_path)
-    own = list(csv.reader(three.stdout.splitlines()))
-    assert rows[0] == ["bus.nodes", *own[0][1:]]
-    assert rows[0][1] == "timing_model"
-    assert rows[3:] == [["3", *row[1:]] for row in own[1:]]
-
-
 def test_the_ending_of_the_file_chooses_the_form_and_every_form_has_the_same_rows(busplan: Run, tmp_path: Path) -> None:
     grid = ["--vary", "bus.gap_count=7,optimal", "--vary", "cycle.period_us=300:400:#3"]
     for name in ("rows.csv", "rows.json"):
@@ -37,20 +26,6 @@ def test_the_ending_of_the_file_chooses_the_form_and_every_form_has_the_same_row
             written = " ".join(value) if isinstance(value, list) else "" if value is None else value
             assert row[name] == (str(written).lower() if isinstance(value, bool) else str(written)), name
     assert sorted(path.name for path in tmp_path.iterdir()) == ["rows.csv", "rows.json"]
-
-
-def test_the_table_shows_the_top_rows_and_how_many_fit(busplan: Run, tmp_path: Path) -> None:
-    run = busplan(
-        "sweep", "paper-4ms", "--vary", "bus.nodes=1:16", "--sort", "margin_us:asc", "--top", "2", "--timing-model",
-        "standard", cwd=tmp_path,
-    )  # fmt: skip
-    assert (run.returncode, run.stderr) == (0, "")
-    lines = run.stdout.splitlines()
-    assert lines[:2] == [
-        "paper-4ms: 16 points; 13 shown to fit (standard model).",
-        "2 of 16 rows, smallest margin_us first.",
-    ]
-    assert [line.split()[0] for line in lines[-2:]] == ["16", "15"]
 
 
 def test_the_top_rows_have_the_forms_for_people(busplan: Run, tmp_path: Path) -> None:

@@ -1,20 +1,17 @@
 """Any drawing as SVG, PNG and characters: everything is there once, in its place, in words that fit."""
 
 import re
-from functools import cache, partial
+from functools import cache
 from io import BytesIO
 from itertools import pairwise
 from typing import Any
 from xml.etree.ElementTree import Element, fromstring
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from PIL import Image
 
 import busplan
 from busplan.forms.charts import (
-    ChartCell,
     ChartGrid,
     Curve,
     Curves,
@@ -26,18 +23,13 @@ from busplan.forms.charts import (
     Lanes,
     Panel,
     Span,
-    choices,
     legend,
-    letters,
-    logarithmic,
     numbers,
 )
 from busplan.forms.svg import content, inline
-from busplan.forms.terminal import drawing_lines
 
 SVG = "{http://www.w3.org/2000/svg}"
 HOSTILE = '<b>$x_1$ & "q" ]]> </svg>機械'
-FITS, LATE = Entry("fits", "fits", "#"), Entry("short", "does not fit", ".")
 
 
 @cache
@@ -60,13 +52,6 @@ def shown() -> dict[str, Drawing]:
 EACH = pytest.mark.parametrize(
     "name", ["map", "compare", "timeline", "transaction", "sensitivity", "curves", "colours", "circle"]
 )
-
-
-def grid(*rows: str, **more: Any) -> ChartGrid:
-    look = {"#": ChartCell("fits", "#", tone="passes"), ".": ChartCell("short", "."), " ": None}
-    cells = tuple(tuple(look[mark] for mark in row) for row in rows)
-    across, up = choices("across", map(str, range(len(rows[0])))), choices("up", map(str, range(len(rows))))
-    return ChartGrid(across, up, cells, (FITS, LATE))._replace(**more)
 
 
 def svg_of(plot: ChartGrid | Curves | Lanes | Dial) -> Element:
@@ -112,12 +97,6 @@ def test_words_are_no_wider_than_a_phone_and_those_of_a_png_use_its_width(name: 
 
 
 @EACH
-def test_the_same_drawing_gives_the_same_bytes(name: str) -> None:
-    assert content(shown()[name], "svg") == content(shown()[name], "svg")
-    assert content(shown()[name], "png") == content(shown()[name], "png")
-
-
-@EACH
 def test_hostile_names_are_text(name: str) -> None:
     root = fromstring(str(content(shown()[name]._replace(title=HOSTILE, words=(HOSTILE,)), "svg")))
     assert root.findtext(f"{SVG}title") == HOSTILE
@@ -127,31 +106,6 @@ def test_hostile_names_are_text(name: str) -> None:
 
 
 # --- cells
-
-
-def test_cells_stand_in_their_rows_and_columns_with_their_marks() -> None:
-    root = svg_of(grid("##.", "# ."))
-    cells = [rect for rect in root.iter(f"{SVG}rect") if (rect.get("class") or "").startswith("cell ")]
-    # Neighbours that are alike are one box; nothing is drawn where nothing is known.
-    places = [(round(percent(one, "x")), round(percent(one, "width")), one.get("class")) for one in cells]
-    assert places == [(0, 67, "cell fits"), (67, 33, "cell short"), (0, 33, "cell fits"), (67, 33, "cell short")]
-    # The first row is at the bottom.
-    assert float(cells[0].get("y") or 0) == float(cells[2].get("y") or 0) + 20
-    marks = [text for text in root.iter(f"{SVG}text") if len((text.get("x") or "").split()) > 1]
-    assert [text.text for text in marks] == ["##.", "#."]
-
-
-def test_the_largest_grid_is_a_small_picture() -> None:
-    rows = ["#" * number + "." * (500 - number) for number in range(500)]
-    assert len(inline(Drawing("t", (Panel(grid(*rows)),)))) < 500_000
-
-
-def test_a_grid_in_characters_has_its_marks_this_design_and_its_colours() -> None:
-    lines = drawing_lines(Drawing("t", (Panel(grid("##.", "# .", own=(1, 0))),)), 80)
-    assert [line.text for line in lines] == [
-        *("  1 | #     . |", "> 0 | # [#] . |", "         ^", "      0  1  2", "", "Legend: # fits, . does not fit"),
-    ]
-    assert [(lines[1].text[mark.start : mark.end], mark.tone) for mark in lines[1].marks] == [(" # [#]", "passes")]
 
 
 # --- curves
@@ -187,13 +141,6 @@ def test_a_curve_goes_through_its_points_with_gaps_and_has_a_mark_on_each() -> N
     assert sum((dot.get("cx") or "").endswith("%") for dot in svg_of(curves(curves=(last,))).iter(f"{SVG}circle")) == 1
 
 
-def test_a_logarithmic_scale_has_its_middle_at_the_geometric_mean() -> None:
-    across = logarithmic("x", 1, 100, lambda value: f"{value:g}")
-    root = svg_of(curves((1, 0), (10, 50), (100, 100), across=across))
-    assert [x for x, _ in points_of(root)[0]] == pytest.approx([0, 50, 100], abs=0.1)
-    assert {"1", "10", "100"} <= set(texts(root))
-
-
 # --- bars
 
 
@@ -214,29 +161,6 @@ def test_bars_are_to_scale_with_their_label_figure_and_tooltip() -> None:
     (edge,) = (line for line in root.iter(f"{SVG}line") if line.get("x1") == "50%" and line.get("class") == "line edge")
     assert edge.get("x2") == "50%"
     assert {"node 1", "7 us", "=", "~", "end"} <= set(texts(root))
-
-
-@given(start=st.floats(0, 99), size=st.floats(0.5, 60), width=st.integers(60, 200))
-def test_bars_in_characters_are_to_scale_and_fit(start: float, size: float, width: int) -> None:
-    end = min(100.0, start + size)
-    lines = [line.text for line in drawing_lines(Drawing("t", (Panel(lanes((WORK, start, end)), "A title"),)), width)]
-    row = next(line for line in lines if line.startswith("node 1"))
-    assert max(map(len, lines)) <= width
-    assert row.startswith("node 1  7 us |")
-    bar = row.partition("|")[2].removesuffix("|")
-    assert bar.count("=") == pytest.approx((end - start) / 100 * len(bar), abs=2)
-    assert lines[-1].split()[0] == "us"
-    assert lines[0].startswith("A title, ")
-
-
-def test_a_column_shows_what_takes_most_of_it() -> None:
-    plot = lanes((WAIT, 0, 0.4), (WORK, 0.4, 1.2), (WAIT, 1.2, 100))
-    _, row, _, explained = [line.text for line in drawing_lines(Drawing("t", (Panel(plot),)), 115)]
-    assert row.endswith(f"|={'~' * 99}|")
-    assert explained == "Legend: ~ idle, = work"
-    # What ends where a column begins takes nothing of it.
-    (_, row, *_) = [line.text for line in drawing_lines(Drawing("t", (Panel(lanes((WORK, 0, 50))),)), 115)]
-    assert row.endswith(f"|{'=' * 50}{' ' * 50}|")
 
 
 # --- circles
@@ -264,12 +188,6 @@ def test_a_band_is_as_far_out_as_its_radii_and_goes_counter_clockwise_from_the_x
     assert {"10 um", "a ring", "nominal circle", "X 0°", "Y 90°"} <= set(texts(root))
 
 
-def test_a_gap_in_a_circle_stays_a_gap() -> None:
-    assert [len(piece) for piece in band(svg_of(dial(None, 1.0, 1.0, None, 1.0, 1.0)))] == [4, 4]
-    # A part around the x axis is one.
-    assert [len(piece) for piece in band(svg_of(dial(1.0, None, 1.0)))] == [4]
-
-
 # --- scales
 
 
@@ -287,22 +205,3 @@ def test_no_two_labels_of_a_scale_touch_on_a_phone(name: str) -> None:
                 ends.setdefault(text.get("y") or "", []).append((start, start + size))
         for row in ends.values():
             assert all(end <= start + 0.1 for (_, end), (start, _) in pairwise(sorted(row)))
-
-
-@given(st.lists(st.text("abcXYZ19 ", max_size=6), max_size=30))
-def test_letters_are_all_different(names: list[str]) -> None:
-    found = letters(names)
-    assert len(set(found)) == len(names)
-    if names and any(letter.isalpha() for letter in names[0]):
-        assert found[0] in names[0]
-
-
-@pytest.mark.parametrize(("low", "high"), [(0.0, 0.0), (5.0, 5.0), (-3.0, 7.0), (0.0, 1e-6), (1e5, 1e6)])
-def test_a_scale_of_numbers_holds_its_ends_and_has_ticks_in_it(low: float, high: float) -> None:
-    for make in (numbers, partial(numbers, room=0.1), partial(numbers, most=8)):
-        ruler = make("x", low, high)
-        assert ruler.low <= low <= high <= ruler.high
-        assert ruler.low < ruler.high
-        assert ruler.ticks
-        assert all(ruler.low <= tick.at <= ruler.high for tick in ruler.ticks)
-    assert all(tick.label.lstrip("-").isdigit() for tick in numbers("x", 1, 2, whole=True).ticks)

@@ -13,7 +13,7 @@ from markdown_it import MarkdownIt
 
 import busplan
 from busplan.errors import BusplanError
-from busplan.forms import ENDINGS, Form, render
+from busplan.forms import Form, render
 from busplan.forms.blocks import (
     Bar,
     Block,
@@ -100,10 +100,6 @@ def test_every_form_writes_every_block_and_the_same_each_time(form: Form) -> Non
         assert "worse" in text
 
 
-def test_every_form_has_one_ending() -> None:
-    assert sorted(ENDINGS.values()) == sorted(get_args(Form))
-
-
 # --- terminal ---------------------------------------------------------------------------------------------------
 
 
@@ -143,20 +139,6 @@ def test_a_sentence_in_a_cell_keeps_its_units_and_its_state() -> None:
     assert row.marks == (Mark(0, 17, "fails"),)
     assert "| **3.969 us to spare** | 1 |" in render(answer(table), "markdown")
     assert '<span class="fails"><data value="3.96912"' in render(answer(table), "html")
-
-
-def test_how_a_drawing_is_read_stands_where_it_is_drawn_so() -> None:
-    chart = Chart(PICTURE, Sentence(("A picture",)), Sentence(("rings of 5 um.",)))
-    assert "<figcaption>A picture. rings of 5 um.</figcaption>" in render(answer(chart), "html")
-    assert "rings" not in render(answer(chart), "table")
-    assert "rings" not in render(answer(chart), "markdown")
-
-
-def test_sentences_stand_together_and_all_else_apart() -> None:
-    words = Sentence(("One.",)), Sentence(("Two.",), "warns")
-    lines = list(block_lines([*words, Snippet(("a",)), words[0]]))
-    assert [line.text for line in lines] == ["One.", "Two.", "", "a", "", "One."]
-    assert lines[1].tone == "warns"
 
 
 def test_nothing_in_lines_commands_a_terminal() -> None:
@@ -248,24 +230,9 @@ def test_the_row_that_is_sought_is_set_off_in_every_form_that_can() -> None:
     assert render(answer(table), "html").count('<tr class="highlighted">') == 1
 
 
-def test_columns_of_words_stand_to_the_left_wherever_they_are() -> None:
-    columns = (TableColumn("a", kind="words"), TableColumn("b"), TableColumn("c", kind="words"))
-    assert "| :--- | ---: | :--- |" in render(answer(Table(columns, (TableRow(("x", MARGIN, "y")),))), "markdown")
-
-
 def test_html_says_the_unit_of_the_exact_value_and_of_the_one_that_is_shown() -> None:
     html = render(answer(Sentence((ShownValue(0.0036, "mean_mm", "um", 3),))), "html")
     assert 'value="0.0036" data-unit="mm" data-shown-in="um">3.600</data> um' in html
-
-
-def test_facts_without_a_fact_are_no_line() -> None:
-    assert list(block_lines([Facts(())])) == []
-
-
-@pytest.mark.parametrize("parts", [(), (MARGIN, MARGIN)])
-def test_a_sentence_takes_as_many_parts_as_it_has_places(parts: tuple[ShownValue, ...]) -> None:
-    with pytest.raises(ValueError, match="zip"):
-        sentence("{} to spare", *parts)
 
 
 # --- JSON and CSV -------------------------------------------------------------------------------------------------
@@ -298,18 +265,6 @@ def test_json_refuses_what_is_not_finite() -> None:
 def test_periods_keep_their_digits(value_us: float, written: str) -> None:
     report = answer(Sentence((period_value(value_us),)))
     assert render(report, "table") == f"{written}\n"
-
-
-def test_a_figure_is_not_written_in_a_unit_that_it_does_not_convert_to() -> None:
-    with pytest.raises(KeyError):
-        render(answer(Sentence((ShownValue(1.0, "margin_us", "mm"),))), "table")
-
-
-@pytest.mark.parametrize("caption", ["Reads take <most>, 3 us", "Reads take <most>, 3 us."])
-def test_markdown_says_a_chart_that_it_cannot_draw(caption: str) -> None:
-    chart = Chart(PICTURE._replace(has_characters=False), Sentence((caption,)), Sentence(("The dot is the start.",)))
-    report = Report(Sentence(("x",)), (chart,), {})
-    assert render(report, "markdown") == "### x\n\nReads take \\<most\\>, 3 us.\n"
 
 
 def test_a_text_that_no_spreadsheet_takes_says_so_in_its_cell() -> None:

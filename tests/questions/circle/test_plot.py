@@ -87,23 +87,6 @@ def test_the_largest_error_is_drawn_however_many_points_there_are(changes: dict[
     assert all(len(curve.points) < 3000 for curve in plot.curves)
 
 
-def test_tiny_errors_are_in_nanometres() -> None:
-    test = run(*SMALL.items(), *PERFECT.items(), periods_us=(2000.0,))
-    drawing = test.drawing()
-    (plot,) = plots(drawing, Curves)
-    assert plot.up.label == "contour error [nm]"
-    lowest = min(error for _, error in values(plot, "first") + values(plot, "apart"))
-    assert lowest == pytest.approx((test.results[0].max_contour_error_mm or 0) * -1e6)
-    assert " nm a ring, " in heads(drawing)[0].words
-
-
-def test_errors_far_from_zero_are_drawn_without_it() -> None:
-    loop = {"servo.velocity_feedforward": 0.0, "servo.position_gain_per_s": 50.0}
-    (plot,) = plots(run(*TURN.items(), *PERFECT.items(), *loop.items()).drawing(), Curves)
-    assert plot.up.high < 0
-    assert plot.up.label == "contour error [um], 0 lies above"
-
-
 def test_no_error_is_a_picture_too() -> None:
     tiny = {"circle.feed_mm_per_min": 0.01, "circle.radius_mm": 0.001, "circle.ramp_periods": 1}
     test = run(*SMALL.items(), *PERFECT.items(), *tiny.items())
@@ -114,21 +97,6 @@ def test_no_error_is_a_picture_too() -> None:
 
 
 # --- what is told apart
-
-
-@pytest.mark.parametrize("changes", [SMALL, TURN])
-def test_the_measured_part_is_shaded_and_apart_from_the_rest(changes: dict[str, object]) -> None:
-    test = run(*changes.items())
-    (simulated,) = test.runs
-    assert simulated is not None
-    (plot,) = plots(test.drawing(), Curves)
-    part, step_s = simulated.measured, simulated.timing.step_us / 1e6
-    times = ((part.start + 1) * step_s, part.stop * step_s)
-    measured = values(plot, "first")
-    assert (measured[0][0], measured[-1][0]) == pytest.approx(times)
-    (shade,) = plot.shades
-    assert (shade.low, shade.high) == pytest.approx(times)
-    assert sum(curve.entry.ink == "apart" for curve in plot.curves) == 2
 
 
 @pytest.mark.parametrize(
@@ -160,13 +128,6 @@ def test_the_tolerance_is_drawn_unless_it_lies_far_outside(limit_mm: float, ring
     assert ("tolerance of the largest error" in [entry.words for entry in legend(drawing.panels)]) == bool(rings)
 
 
-@pytest.mark.parametrize(("direction", "words"), [("ccw", "counter-clockwise"), ("cw", "clockwise")])
-def test_the_direction_is_named_and_drawn(direction: str, words: str) -> None:
-    drawing = run(*TURN.items(), ("circle.direction", direction)).drawing()
-    assert heads(drawing)[0].words.endswith(f"; {words}")
-    assert plots(drawing, Dial)[0].is_clockwise == (direction == "cw")
-
-
 def test_error_sources_stand_below_the_circle_by_rank() -> None:
     test = run(*SMALL.items(), periods_us=(2000.0, 4000.0), ranked=True)
     both = plots(test.drawing(), Lanes)
@@ -177,13 +138,6 @@ def test_error_sources_stand_below_the_circle_by_rank() -> None:
         assert [lane.label for lane in plot.lanes] == [source.words for source in ranked]
         sizes = np.array([span.end + span.start for lane in plot.lanes for span in lane.spans])
         assert sizes == pytest.approx([source.removed_mm * 1e3 for source in ranked])
-
-
-def test_each_kind_of_line_is_explained_once() -> None:
-    words = [entry.words for entry in legend(run(*SMALL.items(), periods_us=(2000.0, 4000.0)).drawing().panels)]
-    assert sorted(text.split(":")[0] for text in words) == [
-        *("measured", "nominal circle", "the rest", "tolerance of the largest error"),
-    ]
 
 
 def test_the_words_name_grade_and_periods_that_are_not_drawn() -> None:

@@ -30,23 +30,6 @@ def test_every_point_that_carries_axes_is_drawn_and_says_its_figures(name: str) 
         assert all(f"{axes:,} ax" in words for (_, axes), words in zip(curve.points, curve.words, strict=True))
 
 
-@EACH
-def test_each_kind_has_a_letter_and_a_colour_of_its_own(name: str) -> None:
-    entries = [curve.entry for curve in plot_of(compared(name)).curves]
-    assert len({entry.mark for entry in entries}) == len({entry.ink for entry in entries}) == len(entries)
-    assert sum("(this profile)" in entry.words for entry in entries) == 1
-
-
-@EACH
-def test_both_scales_are_logarithmic_and_hold_everything(name: str) -> None:
-    plot = plot_of(compared(name))
-    assert plot.across.is_log
-    assert plot.up.is_log
-    assert plot.up.low == 1
-    places = [point for curve in plot.curves for point in curve.points]
-    assert all(plot.across.low <= x <= plot.across.high and 1 <= (y or 0) <= plot.up.high for x, y in places)
-
-
 def test_this_machine_is_a_line_across_and_one_up() -> None:
     across, up = plot_of(compared("paper-1ms")).guides
     assert (across.x, up.y) == (1000, 8)

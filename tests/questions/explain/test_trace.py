@@ -1,7 +1,6 @@
 """Traced numbers: what they write down is what was computed."""
 
 import inspect
-import math
 import re
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +11,7 @@ from hypothesis import strategies as st
 
 from busplan.buses import time_slice
 from busplan.buses.ieee1394 import equations
-from busplan.elementwise import Traced, choose, plain, total
+from busplan.elementwise import Traced, total
 from busplan.questions.explain.formula import formula_of, formula_text, inputs, lines
 from busplan.sourced import EQUATIONS, Input
 
@@ -102,52 +101,6 @@ def test_any_expression_reads_back_as_its_value_in_numbers_and_in_symbols(expres
         symbols = {f"x{value}": float(value) for value in range(1, 10)}
         in_symbols = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", formula_text(expression, in_numbers=False))
         assert eval(in_symbols, symbols) == pytest.approx(expression.value, rel=1e-5, abs=1e-9)
-
-
-@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
-def test_it_compares_as_its_value_does(one: float, other: float) -> None:
-    left, right = number(one), number(other)
-    found = [left < right, left <= right, left > right, left >= right, left == right, left < other, one < right]
-    expected = [one < other, one <= other, one > other, one >= other, one == other, one < other, one < other]
-    assert [(type(truth), truth.value) for truth in found] == [(Traced, truth) for truth in expected]
-    assert list(map(bool, found)) == expected
-
-
-def test_it_is_no_plain_number() -> None:
-    for taken in (plain, float, int, lambda one: -one, lambda one: one // 2):
-        with pytest.raises(TypeError):
-            taken(number(2.0))
-
-
-def test_a_choice_is_written_as_what_was_chosen_and_rests_on_what_decided() -> None:
-    x, y = number(3.0, "x"), number(2.0, "y")
-    for chosen in (choose(y > 1, x, 9.0), choose(y > 2, 9.0, x)):
-        assert isinstance(chosen, Traced)
-        assert (formula_text(chosen, in_numbers=False), chosen.value) == ("x", 3.0)
-        assert [one.symbol for one in inputs(chosen)] == ["x", "y"]
-    plain = choose(x > 2, 9.0, x)
-    assert isinstance(plain, Traced)
-    assert (formula_text(plain, in_numbers=False), plain.value) == ("9", 9.0)
-    assert [one.symbol for one in inputs(plain)] == ["x"]
-
-
-def test_switches_leave_no_trace() -> None:
-    x = number(3.0)
-    assert x * True is x
-    assert x * False == 0.0
-    assert x + 0 is x
-    assert x - 0 is x
-    assert 0 + x is x
-
-
-def test_lines_and_inputs_are_listed_once_and_in_order() -> None:
-    x, y = number(2.0, "x"), number(3.0, "y")
-    first = (x * y).named("first_us", "A")
-    second = (first + first * x).named("second_us", "B")
-    assert [one.key for one in lines(second)] == ["first_us", "second_us"]
-    assert [one.symbol for one in inputs(second)] == ["x", "y"]
-    assert formula_text(second, in_numbers=False) == "A + A x"
-    assert math.isclose(second.value, 18.0)
 
 
 def test_a_sum_of_thousands_is_short_and_has_all_its_inputs() -> None:

@@ -3,7 +3,6 @@
 import os
 import re
 import subprocess
-from collections.abc import Callable
 from functools import cache
 from html.parser import HTMLParser
 from importlib.resources import files
@@ -17,9 +16,8 @@ from markdown_it import MarkdownIt
 import busplan
 from busplan.buses import kind_named, kind_names
 from busplan.forms import render
-from busplan.forms.blocks import Chapter, Report, ShownValue, Table
+from busplan.forms.blocks import Chapter
 from busplan.forms.inks import INKS
-from busplan.forms.numbers import cell_text, sentence_text
 from busplan.profile.changes import NO_CHANGES
 from busplan.questions.base.answer import shell_word
 
@@ -138,45 +136,6 @@ def test_the_verdict_and_the_map_stand_before_all_that_is_folded() -> None:
     assert html.index('<p class="answer">FITS</p>') < html.index("fastest period") < first
     assert html.index("settings are shown to fit") < first
     assert html.count("<details") == len(parts())
-
-
-def test_every_figure_is_one_of_the_documents(values_of_the_document: Callable[[Report], int]) -> None:
-    assert values_of_the_document(whole().report()) > 200
-
-
-def test_a_column_holds_the_figures_of_its_timing_model_and_transaction() -> None:
-    found, seen = whole().to_dict()["profiles"][0]["answers"], 0
-    owners = [*found["capacity"]["results"], *found["latency"]["transactions"]]
-    for table in (block for part in parts().values() for block in part.blocks if isinstance(block, Table)):
-        for row in table.rows:
-            for column, cell in zip(table.columns, row.cells, strict=True):
-                model = next((one for one in (column.heading, column.group) if one in ("paper", "standard")), None)
-                if isinstance(cell, ShownValue) and model is not None:
-                    assert any(
-                        owner[cell.key] == cell.value
-                        for owner in owners
-                        if cell.key in owner
-                        and owner["timing_model"] == model
-                        and owner.get("transaction", "") in column.group
-                    ), cell
-                    seen += 1
-    assert seen > 100
-
-
-def test_all_forms_say_the_same() -> None:
-    markdown, lines = (render(whole().report(), form) for form in ("markdown", "table"))
-    rendered = Tags(MarkdownIt("commonmark").enable("table").render(markdown)).text
-    for part in parts().values():
-        assert sentence_text(part.title) in rendered
-        assert sentence_text(part.title) in lines
-        for table in (block for block in part.blocks if isinstance(block, Table)):
-            for row in table.rows:
-                for cell in row.cells:
-                    text = getattr(cell, "text", cell_text(cell))
-                    assert " ".join(text.split()) in rendered
-                    assert " ".join(text.split()) in lines
-    assert "```text\nThe period of " in markdown
-    assert "<svg" not in markdown
 
 
 # --- what cannot be shown is said -------------------------------------------------------------------------

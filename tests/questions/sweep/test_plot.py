@@ -1,6 +1,5 @@
 """The picture of a sweep: choices are categories, colours part at zero, units and words are there."""
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -43,19 +42,6 @@ def words(drawing: Any) -> list[str]:
     return [entry.words for entry in dict.fromkeys(entries)]
 
 
-def labels(plot: Any) -> list[str]:
-    return [tick.label for tick in plot.across.ticks]
-
-
-@pytest.mark.parametrize("given", [(63, "optimal"), ("optimal",), (63, 7), (5, 63, "optimal")])
-def test_no_line_joins_choices_and_a_line_joins_numbers(given: Any) -> None:
-    plot = curves(drawn("margin_us", bus__gap_count=given))
-    assert not any(curve.has_line for curve in plot.curves)
-    assert all(curve.has_dots for curve in plot.curves)
-    assert labels(plot) == list(map(str, given))
-    assert all(curve.has_line for curve in curves(drawn("margin_us", bus__nodes=range(1, 7))).curves)
-
-
 def test_points_stand_at_their_values_and_this_design_at_its_own() -> None:
     periods_us = (250, 500, 1000, 4000)
     answer = swept(cycle__period_us=periods_us)
@@ -83,27 +69,6 @@ def test_a_curve_has_a_gap_and_a_map_a_blank_where_a_value_is_missing() -> None:
     assert "blank: no value" in words(drawing)
 
 
-@pytest.mark.parametrize("nodes", [(2,), range(1, 4), range(1, 7), range(1, 40)])
-def test_whole_numbers_have_whole_ticks(nodes: Any) -> None:
-    plot = curves(drawn("max_nodes", bus__nodes=nodes))
-    assert all(tick.label.lstrip("-").isdigit() for tick in (*plot.up.ticks, *plot.across.ticks))
-
-
-def test_many_points_are_a_curve_without_marks() -> None:
-    (curve, _) = curves(drawn("margin_us", cycle__nonperiodic_us=range(250))).curves
-    assert (len(curve.points), curve.has_dots) == (250, False)
-
-
-def test_uneven_numbers_are_equal_cells_and_a_true_scale_of_a_curve() -> None:
-    periods_us = [250, 500, 1000, 4000]
-    (grid, _) = grids(drawn("margin_us", bus__nodes=(1, 2), cycle__period_us=periods_us))
-    assert [tick.label for tick in grid.across.ticks] == list(map(str, periods_us))
-    curve = curves(drawn("margin_us", cycle__period_us=periods_us))
-    assert (curve.across.low, curve.across.high) == (250, 4000)
-    # Values that do not ascend stand as they are given.
-    assert labels(curves(drawn("margin_us", cycle__period_us=[4000, 250]))) == ["4000", "250"]
-
-
 def test_colours_of_a_margin_are_red_below_zero_and_blue_from_it_on() -> None:
     answer = swept(bus__gap_count=(7, 63), cycle__period_us=range(250, 1001, 50))
     margins_us = answer["margin_us"].reshape(2, 16, 2)
@@ -124,28 +89,6 @@ def test_colours_of_a_margin_are_red_below_zero_and_blue_from_it_on() -> None:
     assert all(cell.ink.startswith("above") for row in grid.rows for cell in row if cell)
 
 
-@pytest.mark.parametrize(("figure", "factor"), [("margin_us", 1), ("max_axes", 1), ("utilisation", 100)])
-def test_each_colour_is_explained_by_the_values_that_it_stands_for(figure: str, factor: float) -> None:
-    answer = swept(bus__nodes=range(1, 9), cycle__period_us=range(250, 8001, 250))
-    (grid, *_) = grids(answer.drawing(figure=figure))
-    ranges = {
-        entry.ink: tuple(map(float, entry.words.removesuffix(" us").removesuffix("%").split(" to ")))
-        for entry in grid.legend
-        if entry.ink.startswith(("above", "below"))
-    }
-    assert len(ranges) > 3
-    # A count or a share has no other side of zero.
-    assert figure == "margin_us" or all(ink.startswith("above") for ink in ranges)
-    ends = sorted(ranges.values())
-    for (_, end), (start, _) in pairwise(ends):
-        assert start - end in ((1.0,) if figure == "max_axes" else (0.0,))
-    values = factor * answer[figure].reshape(8, 32, 2)[:, :, 0]
-    for value, cell in zip(values.ravel(), (cell for row in grid.rows for cell in row), strict=True):
-        assert cell is not None
-        low, high = ranges[cell.ink]
-        assert low - abs(low) * 1e-3 <= value <= high + abs(high) * 1e-3
-
-
 def test_the_line_and_the_grey_are_of_the_verdict() -> None:
     # At 540 us the margin is above zero, and less than its uncertainty.
     answer = swept(bus__nodes=(2, 3), cycle__period_us=(500, 540, 4000))
@@ -162,13 +105,6 @@ def test_a_figure_that_does_not_vary_gives_way_to_the_margin() -> None:
     # Whatever number of nodes there is, as many axes would fit.
     assert curves(drawn(None, bus__nodes=(1, 2))).up.label == "corrected margin, us"
     assert curves(drawn(None, cycle__period_us=(500, 4000))).up.label == "safe axes"
-
-
-def test_a_map_of_one_value_is_a_sentence() -> None:
-    drawing = drawn("max_nodes", bus__nodes=(1, 2), cycle__period_us=(500, 501))
-    assert grids(drawing) == []
-    assert [panel.title for panel in drawing.panels] == ["paper model: 2 at every setting"]
-    assert drawing.words[0].startswith("Most nodes by the standard model: 1 at every setting.")
 
 
 def test_unsafe_settings_and_this_design_are_marked() -> None:
@@ -192,13 +128,6 @@ def test_what_has_no_picture_says_why() -> None:
         assert answer._repr_svg_() is None
         with pytest.raises(busplan.BusplanError, match=message):
             answer.drawing()
-
-
-def test_another_design_is_not_marked_as_this_one() -> None:
-    drawing = drawn("margin_us", bus__nodes=range(1, 9), cycle__period_us=(1000,))
-    assert "this design" not in (*words(drawing), drawing.words[0])
-    assert "this design has" not in drawing.words[0]
-    assert drawing.title.endswith("; period T_s, us: 1000")
 
 
 @pytest.mark.parametrize(

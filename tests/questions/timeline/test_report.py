@@ -1,20 +1,15 @@
 """The drawings of a timeline: to scale, whole, and safe with any name."""
 
 import re
-from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
 import busplan
-from busplan.buses import kind_named
-from busplan.buses.limits import IDLE
 from busplan.forms import markdown, terminal
-from busplan.forms.blocks import Report, Sentence, ShownValue, Table
-from busplan.forms.charts import Lane, Lanes, legend
+from busplan.forms.blocks import Sentence, Table
+from busplan.forms.charts import Lane, Lanes
 from busplan.forms.numbers import sentence_text
-
-ValuesIn = Callable[[object], Iterator[ShownValue]]
 
 HOSTILE = '<b>$x_1$ & %%{init: {"theme":"dark"}}%%; ]]> "q" # end: </svg>機械'
 
@@ -55,16 +50,6 @@ def lane(one: busplan.TimelineAnswer, label: str, number: int = 0) -> Lane:
 
 def row(lines: list[str], label: str) -> str:
     return next(line.split("|")[1] for line in lines if line.split("|")[0].strip() == label)
-
-
-def test_every_kind_has_its_own_mark() -> None:
-    bus = kind_named("ieee1394")
-    kinds = (*bus.event_kinds, IDLE)
-    assert len({kind.mark for kind in kinds}) == len(kinds) == 17
-    # The strip of the whole slice has whole transactions, and what belongs to no node.
-    strip = (bus.event_kind("sync"), *bus.stretch_kinds, bus.event_kind("nonperiodic"), IDLE)
-    assert len({kind.mark for kind in strip}) == len(strip) == 5
-    assert all(kind.mark.isascii() for kind in (*kinds, *strip))
 
 
 def test_the_request_is_the_hosts_and_its_acknowledge_the_nodes() -> None:
@@ -109,11 +94,6 @@ def test_a_drawing_is_to_scale() -> None:
         assert lane.count("=") == pytest.approx(execution_us / column_us, abs=2.01)
 
 
-def test_a_column_shows_what_takes_most_of_it() -> None:
-    # 2.9 us a column: arbitration takes 2.4 us of the first, and execution most of the second behind 1.5 us of others.
-    assert row(drawn(plan()), "node 1").split() == ["a=============a.::", "aa============a.:::"]
-
-
 def test_an_overrun_is_said_and_seen() -> None:
     one = plan(cycle__period_us=300.0)
     lines = drawn(one)
@@ -135,30 +115,6 @@ def test_an_overrun_is_said_and_seen() -> None:
     assert "beyond" not in "\n".join(drawn(plan()))
 
 
-@pytest.mark.parametrize("period_us", [4000.0, 550.0, 500.0, 300.0, 250.0, 100.0])
-def test_the_period_is_whole_with_its_slice_and_both_margins(period_us: float) -> None:
-    one = plan(cycle__period_us=period_us)
-    found = {each.timing_model: each for each in busplan.capacity(one.profile).results}
-    assert [each["margin_us"] for each in one.to_dict()["margins"]] == [each.margin_us for each in found.values()]
-    lines = drawn(one)
-    end_us = max(period_us, *(each.required_us for each in found.values()))
-    assert lines[4].startswith(f"The period of {period_us:.3f} us")
-    assert (lanes(one, 0).across.low, lanes(one, 0).across.high) == (0, end_us)
-    for model, each in found.items():
-        margin = f"margin {each.margin_us:.3f} us" if each.margin_us >= 0 else f"{-each.margin_us:.3f} us short"
-        assert lane(one, model).note == f"{each.required_us:.3f} us needed, {margin}"
-        assert f"{each.margin_us:.3f} us by the {model} model" in lines[1]
-        bars = row(lines, model)
-        used_us = min(each.required_us, each.available_us)
-        assert bars.count("#") / len(bars) == pytest.approx(used_us / end_us, abs=0.03)
-        assert bars.count(".") / len(bars) == pytest.approx(max(0, each.margin_us) / end_us, abs=0.03)
-        needed = lane(one, model).spans[0]
-        assert (needed.entry.words, needed.start) == ("needed", 0)
-        assert needed.end == pytest.approx(used_us)
-    behind = [span for span in lane(one, "cycle").spans if span.entry.words == "rest of the period"]
-    assert [(span.start, span.end) for span in behind] == [(one.end_us, period_us)] * (period_us > one.end_us)
-
-
 def test_an_unsafe_gap_count_is_warned_of() -> None:
     one = plan(bus__gap_count=5)
     assert any("gap count 5 is unsafe" in line for line in drawn(one))
@@ -172,43 +128,6 @@ def test_a_single_transaction_is_drawn_event_by_event() -> None:
     assert row(lines, "window").strip() == "^^"
     short = drawn(window(from_us=10.0, to_us=10.001))
     assert row(short, "window").strip() == "^"
-
-
-@pytest.mark.parametrize(
-    "one",
-    [plan(), plan(cycle__period_us=300.0), window(from_us=100.0, to_us=180.0), plan(bus__nodes=16)],
-    ids=["whole", "overrun", "window", "many"],
-)
-def test_bars_are_the_events_in_the_lanes_of_their_nodes(one: busplan.TimelineAnswer) -> None:
-    bars = [span for each in lanes(one).lanes for span in each.spans if "execution" in span.words]
-    executions = [event for event in one.events if event.kind == "execution"]
-    assert sorted((bar.start, bar.end) for bar in bars) == [(event.start_us, event.end_us) for event in executions]
-    assert (lanes(one).across.low, lanes(one).across.high) == (one.from_us, one.used_us if one.is_whole else one.to_us)
-    explained = {entry.words for entry in legend(one.drawing().panels)}
-    assert {kind_named("ieee1394").event_kind(event.kind).label for event in one.events} - {"idle"} <= explained
-
-
-def test_documents_hold_the_schedules_own_numbers() -> None:
-    one = window(to_us=50.0)
-    document = one.to_dict()
-    assert [(row["start_us"], row["end_us"]) for row in document["events"]] == [one[1:] for one in spans(one)]
-    assert document["required_us"] == one.figures.required_us
-    assert [row["share"] for row in document["totals"]] == [part.share for part in one.totals]
-    assert {row["profile"] for row in one.report().records or ()} == {"paper-4ms"}
-
-
-@pytest.mark.parametrize(
-    "one",
-    [plan(), plan(cycle__period_us=300.0), window(from_us=100.0, to_us=180.0), plan(bus__gap_count=5)],
-    ids=["whole", "overrun", "window", "unsafe"],
-)
-def test_figures_of_the_answer_stand_in_its_document(
-    one: busplan.TimelineAnswer, values_of_the_document: Callable[[Report], int], values_in: ValuesIn
-) -> None:
-    short = not one.figures.fits
-    head = {"period_us", "required_us", "available_us"} if short else {"period_us", "margin_us", "available_us"}
-    assert values_of_the_document(one.report()) == 3 * len(one.totals)
-    assert head <= {value.key for value in values_in(headline(one))}
 
 
 def test_the_table_says_what_takes_how_much_of_what() -> None:
@@ -234,13 +153,6 @@ def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
     assert HOSTILE not in page
 
 
-def test_a_page_of_many_events_says_that_a_bar_is_a_transaction() -> None:
-    many = plan(bus__nodes=62, bus__max_hops=3)
-    assert "A bar is a whole transaction." in many.html
-    assert [span.words.split(",")[0] for span in lane(many, "node 9", 1).spans] == ["read of node 9", "write of node 9"]
-    assert "A bar is a whole transaction." not in plan().html
-
-
 @pytest.mark.parametrize("name", ["paper-4ms", "ethercat-servo-8"])
 def test_a_drawing_of_a_thousand_nodes_can_be_read(name: str) -> None:
     many = busplan.timeline(busplan.load_profile(name, changes={"bus.nodes": 1000, "cycle.period_us": 1e6}))
@@ -259,10 +171,3 @@ def test_a_drawing_of_a_thousand_nodes_can_be_read(name: str) -> None:
 
 def spans(one: busplan.TimelineAnswer) -> list[tuple[str, float, float]]:
     return [(event.kind, event.start_us, event.end_us) for event in one.events]
-
-
-def test_bus_lane_comes_first_and_nodes_in_their_turn() -> None:
-    one = plan(bus__nodes=12)
-    assert [each.label for each in lanes(one).lanes] == ["bus", *(f"node {number}" for number in range(1, 13))]
-    each = busplan.timeline(one.profile, transaction=("write", 11))
-    assert [span.words.split(":")[0] for lane in lanes(each).lanes for span in lane.spans] == ["write of node 11"] * 9
