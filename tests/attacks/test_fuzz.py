@@ -231,7 +231,7 @@ def require_forms(answer: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", kind_names())
-@settings(max_examples=settings.default.max_examples // 5)
+@settings(max_examples=settings().max_examples // 5)
 @given(seed=st.integers(0, 1 << 32))
 def test_every_question_answers_or_refuses_and_all_tell_one_story(
     kind: str, seed: int, tmp_path_factory: pytest.TempPathFactory

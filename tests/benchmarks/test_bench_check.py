@@ -14,12 +14,12 @@ from time import perf_counter
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from busplan.profile.sources import shipped_folder
+from tests.registers import SHIPPED_FOLDER
 
 FILES = 1000
 ROUNDS = 3
 SCHEMA = Path(__file__).resolve().parents[2] / "profiles" / "busplan.schema.json"
-SHIPPED = [path.read_text(encoding="utf-8") for path in sorted(shipped_folder().glob("*.toml"))]
+SHIPPED = [path.read_text(encoding="utf-8") for path in sorted(SHIPPED_FOLDER.glob("*.toml"))]
 
 pytestmark = pytest.mark.skipif(find_spec("check_jsonschema") is None, reason="check-jsonschema is not installed")
 

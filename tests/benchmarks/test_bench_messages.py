@@ -14,7 +14,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 import busplan
-from busplan.buses.can.section import CanProfile
+from busplan.buses import kind_named
 
 ROUNDS = 3
 HEAD = """\
@@ -25,14 +25,14 @@ kind = "can"
 bit_rate_kbit_s = 1000
 identifier_bits = 29
 """
-QUESTIONS: dict[str, Callable[[CanProfile], object]] = {
+QUESTIONS: dict[str, Callable[[busplan.Profile], object]] = {
     "capacity": lambda profile: str(busplan.capacity(profile)),
     "latency": lambda profile: busplan.latency(profile, timing_model="worst-stuffing"),
     "check": lambda profile: busplan.check(profile, circle=False),
 }
 
 
-def network(number: int, *, load: float) -> CanProfile:
+def network(number: int, *, load: float) -> busplan.Profile:
     """A network of messages alone, of unlike periods."""
     rng, period_us = random.Random(1), number * 130 / load
     text = HEAD + "".join(
@@ -40,7 +40,7 @@ def network(number: int, *, load: float) -> CanProfile:
         f"period_us = {int(period_us * rng.uniform(0.5, 3))}\njitter_us = {rng.choice((0, 500, 2000))}\n"
         for place in range(number)
     )
-    return CanProfile.model_validate(tomllib.loads(text))
+    return kind_named("can").profile_model().model_validate(tomllib.loads(text))
 
 
 @pytest.mark.parametrize("load", [0.3, 0.75])
@@ -51,7 +51,7 @@ def test_many_messages(
 ) -> None:
     number = size(count, 20)
 
-    def made() -> tuple[tuple[CanProfile], dict[str, object]]:
+    def made() -> tuple[tuple[busplan.Profile], dict[str, object]]:
         # A profile of its own for each round: nothing of the one before is remembered.
         return (network(number, load=load),), {}
 

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import busplan
+from busplan.buses import kind_named
 from busplan.buses.ieee1394.doubts import residual
-from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.profile.document import override
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
@@ -39,15 +39,19 @@ GRIDS: dict[str, Callable[[int], dict[str, Any]]] = {
 }
 SCALAR_POINTS = 300
 
-PROFILE = Ieee1394Profile.model_validate(
-    {
-        "schema_version": 1,
-        "name": "bench",
-        "bus": {"kind": "ieee1394", "speed": "S400", "nodes": 2, "timing_model": "standard"},
-        "cycle": {"period_us": 4000.0},
-        "payload": {"read_bytes": 12, "write_bytes": 12},
-        "node": {"axes": 4, "execution": {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}},
-    }
+PROFILE = (
+    kind_named("ieee1394")
+    .profile_model()
+    .model_validate(
+        {
+            "schema_version": 1,
+            "name": "bench",
+            "bus": {"kind": "ieee1394", "speed": "S400", "nodes": 2, "timing_model": "standard"},
+            "cycle": {"period_us": 4000.0},
+            "payload": {"read_bytes": 12, "write_bytes": 12},
+            "node": {"axes": 4, "execution": {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}},
+        }
+    )
 )
 
 

@@ -6,7 +6,7 @@ import sys
 
 import busplan
 from busplan.buses import kind_named, kind_names
-from busplan.profile.sources import shipped_names
+from tests.registers import shipped_names
 
 # One interpreter, from which each profile has a process of its own.
 PROGRAM = """

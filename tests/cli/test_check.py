@@ -177,7 +177,7 @@ def test_any_number_of_jobs_gives_the_same_bytes(busplan: Busplan, run: Busplan,
     busplan("check", "p/held.toml", "--baseline", "b.json", "--update-baseline", cwd=folder)
     (folder / "p" / "held.toml").write_text(CLEAN.replace("axes = 4", "axes = 3"), encoding="utf-8")
     given = ("check", "p/clean.toml", "gone.toml", "-", "p", "paper-1ms", "--baseline", "b.json", "--pass-on-unmatched")
-    for form, jobs in (("json", "2"), ("full", "50")):  # they show all that a worker tells of a file
+    for form, jobs in (("json", "2"), ("full", "3")):  # they show all that a worker tells of a file
         one = busplan(*given, "--format", form, "--jobs", 1, cwd=folder, stdin=FAILS)
         many = run(*given, "--format", form, "--jobs", jobs, cwd=folder, stdin=FAILS, env={})
         assert one.returncode == many.returncode == 2

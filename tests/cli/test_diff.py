@@ -76,18 +76,6 @@ def test_a_regression_under_the_model_that_does_not_decide_counts(run: Run, repo
     assert run(*arguments, "--tolerance", "0.1", cwd=repository).returncode == 1
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (("--tolerance", "5"), "--tolerance: goes with --fail-on-regression"),
-        ((GATE, "--tolerance", "-1"), "--tolerance -1: must be 0 or more, in percent"),
-        ((GATE, "--tolerance", "nan"), "--tolerance nan: must be 0 or more, in percent"),
-    ],
-)
-def test_a_tolerance_that_is_none_is_refused(refused: Refused, options: tuple[str, ...], said: str) -> None:
-    assert refused("diff", "paper-1ms", "paper-4ms", *options) == said
-
-
 # --- what A and B may be ----------------------------------------------------------------------------------
 
 
@@ -126,7 +114,3 @@ def test_what_is_wrong_with_either_side_is_said_together(refused: Refused, repos
     assert said[0].startswith("nope:bad.toml: no file of that name; of REV:path git says: fatal: ")
     assert said[1].startswith("none.toml: no such file")
     assert len(refused("diff", "none.toml", "none.toml", cwd=repository).splitlines()) == 1
-
-
-def cell(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

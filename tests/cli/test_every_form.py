@@ -1,4 +1,4 @@
-"""Each question in each form: what the form promises, the same document in a file, and names that stay text."""
+"""Each question in each form: what the form promises, and the same document in a file."""
 
 import csv
 import json
@@ -29,45 +29,30 @@ QUESTIONS = (
     ("rule", "bp110"),
 )
 
-PROFILE = """schema_version = 1
-name = "<script>alert(1)</script> | `x` [a](http://b) @team *c*"
-description = "<img src=x onerror=alert(1)> **bold**"
-bus = { kind = "ieee1394", speed = "S400", nodes = 2 }
-cycle.period_us = 1000
-payload = { read_bytes = 12, write_bytes = 12 }
-node = { axes = 4, execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 } }
-"""
-MEASUREMENTS = "<b>m `1` *c*.csv"
-
 
 class Page(HTMLParser):
-    """Tags of a page, its text, and the figures in cells of its tables."""
+    """Tags of a page, and the figures in cells of its tables."""
 
     def __init__(self, page: str) -> None:
         super().__init__()
         self.tags: list[str] = []
-        self.text = ""
         self._in_cell = False
         self.figures: list[Any] = []
         self.feed(page)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
-        found = dict(attrs)
         if tag in ("td", "li", "p"):
             self._in_cell = tag == "td"
         if tag == "data" and self._in_cell:
-            self.figures.append(json.loads(found["value"] or ""))
-
-    def handle_data(self, data: str) -> None:
-        self.text += data
+            self.figures.append(json.loads(dict(attrs)["value"] or ""))
 
 
 def leaves(document: Any) -> Iterator[Any]:
     yield document
     if isinstance(document, dict | list):
-        for one in document.values() if isinstance(document, dict) else document:
-            yield from leaves(one)
+        for value in document.values() if isinstance(document, dict) else document:
+            yield from leaves(value)
 
 
 def written(run: Run, question: tuple[str, ...], form: str, **options: Any) -> str:
@@ -134,14 +119,6 @@ def test_a_picture_goes_to_a_file_and_down_a_pipe(
     said = refused(command, "paper-4ms", "-o", "new.png", cwd=tmp_path)
     assert said == "--format png needs resvg_py: install it with the extra, as in pip install 'busplan[plot]'"
     assert {path.name for path in tmp_path.iterdir()} == {"pipe", "picture.svg", "picture.png"}
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("markup")
-    (folder / "hostile.toml").write_text(PROFILE, encoding="utf-8")
-    (folder / MEASUREMENTS).write_text("payload_bytes,latency_us\n4,48\n64,80\n", encoding="utf-8")
-    return folder
 
 
 def test_a_gate_that_fails_has_given_its_answer(run: Run, tmp_path: Path) -> None:

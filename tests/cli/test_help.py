@@ -14,7 +14,8 @@ import pytest
 from typer.main import get_command
 
 from busplan.cli import app
-from busplan.cli.lazy import COMMANDS, FAILURES
+from busplan.cli.lazy import FAILURES
+from tests.registers import COMMANDS
 
 Run = Callable[..., CompletedProcess[str]]
 

@@ -281,38 +281,6 @@ def changed(profile: Path, **values: object) -> Profile:
     return busplan.load_profile(profile, changes={key.replace("__", "."): value for key, value in values.items()})
 
 
-def test_it_is_swept(run: Run, ring: Path) -> None:
-    vary = ("--vary", "bus.nodes=1:45:4", "--vary", "cycle.period_us=100,700,1500,20000")
-    done = run("sweep", ring.name, *vary, "--format", "csv", cwd=ring.parent)
-    for row in csv.DictReader(StringIO(done.stdout)):
-        point = changed(ring, bus__nodes=int(row["bus.nodes"]), cycle__period_us=float(row["cycle.period_us"]))
-        (one,) = busplan.capacity(point).results
-        assert (float(row["required_us"]), int(row["max_nodes"]), row["limited_by"], row["fits"]) == (
-            one.required_us,
-            one.max_nodes,
-            one.limited_by,
-            str(one.fits).lower(),
-        )
-
-
-def test_it_is_compared_with_its_kind(run: Run, ring: Path) -> None:
-    other = TEXT.replace("nodes = 5", "nodes = 5\nrate_mbit_s = 2.0")
-    (ring.parent / "other.toml").write_text(other, encoding="utf-8")
-    done = run("diff", "ring.toml", "other.toml", "--format", "json", cwd=ring.parent)
-    found = {(one["part"], one["figure"]): one for one in json.loads(done.stdout)["figures"]}
-    assert (found["plain", "cycle_data_us"]["a"], found["plain", "cycle_data_us"]["b"]) == (640, 320)
-    assert found["plain", "required_us"]["judgement"] == "better"
-    done = run("diff", ring.name, "paper-1ms", "--timing-model", "plain", cwd=ring.parent)
-    assert done.returncode == 2
-    assert "have no timing model in common" in done.stderr
-
-
-@pytest.mark.parametrize("code", ["BP006", "BP101", "BP301"])
-def test_rules_of_any_bus_speak_of_no_other_kind(run: Run, ring: Path, code: str) -> None:
-    said = run("rule", code, cwd=ring.parent).stdout
-    assert not [word for word in ("gap", "hop", "cable", "synchronous", "both timing") if word in said]
-
-
 def test_its_figures_are_those_by_hand(ring: Path) -> None:
     (one,) = busplan.capacity(ring).results
     assert (one.required_us, one.own["rounds"], one.own["cycle_token_us"]) == (NEEDED_US, 2, 10)
@@ -353,43 +321,6 @@ def test_the_most_stations_are_those_that_a_count_finds(ring: Path, period_us: f
     assert one.limited_by == ("nodes" if one.max_nodes == MOST_STATIONS else "time")
 
 
-def ring_with(limits: tuple[Limit, ...]) -> Bus:
-    """The invented kind with other limits."""
-    found = Ring()
-    found.limits = limits  # type: ignore[assignment,misc]
-    return found
-
-
-def limit_of(value: Callable[[Network], Number], most: Callable[[Network], Number], key: str = "own") -> Limit:
-    """A limit of any form."""
-    return Limit(key, "{value} over {most}", value, most)
-
-
-@pytest.mark.parametrize(
-    ("limit", "most"),
-    [
-        pytest.param(limit_of(lambda one: one.nodes**2, lambda _one: 170), 13, id="a square"),
-        pytest.param(limit_of(lambda one: one.nodes**3, lambda _one: 170), 5, id="a cube"),
-        pytest.param(limit_of(lambda one: rounded_up(one.nodes / 2), lambda _one: 7), 14, id="steps"),
-        pytest.param(limit_of(lambda one: 10 * one.nodes, lambda one: 40 + 5 * one.nodes), 8, id="a bound that grows"),
-        pytest.param(limit_of(lambda one: one.period_us, lambda _one: 1e5), 0, id="without the stations"),
-        pytest.param(limit_of(lambda one: one.period_us, lambda _one: 1e7), 37, id="kept by any number"),
-    ],
-)
-def test_a_limit_of_any_form_is_searched_whatever_the_profiles_own_stations(
-    ring_file: Path, limit: Limit, most: int
-) -> None:
-    # 4833 us: 37 stations, which need 4801 us.
-    text = TEXT.replace("= 1500", "= 1e6").replace("slice_ratio = 0.5", "slice_ratio = 0.004833")
-    ring_file.write_text(text, encoding="utf-8")
-    with registered(ring_with((limit,))):
-        for nodes in (1, 30):
-            (one,) = busplan.capacity(changed(ring_file, bus__nodes=nodes)).results
-            assert one.max_nodes == most
-        if most == 5:  # a plan asks the same search, and looks long for what is not there
-            assert busplan.plan(changed(ring_file, bus__nodes=30)).recommended_changes is None
-
-
 def test_keys_of_a_section_of_its_own_and_of_a_shared_one_are_the_cycles(run: Run, ring: Path) -> None:
     for key in ("guard.guard_us", "delivery.late_us"):
         done = run("sweep", ring.name, "--vary", f"{key}=0,7", "--format", "csv", cwd=ring.parent)
@@ -423,17 +354,6 @@ def test_its_rule_and_its_limit_are_found_and_listed(run: Run, ring: Path) -> No
 
 
 # --- how sure its verdict is ------------------------------------------------------------------------------
-
-
-def test_its_verdict_says_that_no_figure_of_others_tests_it(run: Run, ring: Path) -> None:
-    words = "Token ring (kind ring): checked against no published figures."
-    assert run("evidence", "ring", cwd=ring.parent).stdout == f"{words}\n"
-    found = json.loads(run("evidence", "ring", "--format", "json", cwd=ring.parent).stdout)
-    assert (found["without"], found["figures"]) == (["ring"], [])
-    for command in ("capacity", "report"):
-        said = run(command, "ring.toml", "--format", "markdown", cwd=ring.parent).stdout
-        assert "\n| checked against | no published figures |\n" in said
-    assert "no published figures" not in run("capacity", "paper-4ms", cwd=ring.parent).stdout
 
 
 def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> None:
@@ -521,63 +441,6 @@ def test_its_safe_stations_are_those_that_a_count_finds(doubted: Path, period_us
     most = sum(safe_us(nodes) <= period_us / 2 for nodes in range(1, MOST_STATIONS + 1))
     (one,) = busplan.capacity(changed(doubted, cycle__period_us=period_us)).results
     assert (one.safe_nodes, one.safe_axes) == (most, 2 * most)
-
-
-def test_the_budget_of_its_uncertainty_is_explained(run: Run, doubted: Path) -> None:
-    done = run("explain", doubted.name, "uncertainty_us", cwd=doubted.parent)
-    assert "rate" in done.stdout
-    assert f"{DOUBT_US:.3f}" in done.stdout
-
-
-class HastyRing(DoubtedRing):
-    """The invented kind with a second timing model, which forgets the token and stands first in every report."""
-
-    timing_models = (TimingModel("hasty", "without the token"), TimingModel("plain", "as it is"))
-
-    def profile_model(self) -> type[Profile]:
-        return HastyProfile
-
-    def cycle(self, network: Network, *, model: str) -> RingCycle:
-        return HastyCycle(network, model)
-
-
-class HastySection(RingSection):
-    """Section [bus] with both timing models."""
-
-    timing_model: Literal["hasty", "plain"] = Field(default="hasty", description="Timing model", examples=["plain"])  # type: ignore[assignment]
-
-
-class HastyProfile(RingProfile):
-    """A profile with both timing models."""
-
-    bus: HastySection = Field(description="The bus")
-
-
-class HastyCycle(DoubtedCycle):
-    """The cycle of either timing model."""
-
-    @cached_property
-    def round_us(self) -> Number:
-        return 0.0 if self.model == "hasty" else super().round_us
-
-
-def test_one_of_its_timing_models_decides_whatever_leads_and_whatever_is_asked_for(run: Run, ring_file: Path) -> None:
-    # 640 us fit 645 us, 650 us do not, and 12.955 us are in doubt.
-    ring_file.write_text(TEXT.replace("period_us = 1500", "period_us = 1290"), encoding="utf-8")
-    with registered(HastyRing()):
-        hasty, plain = busplan.capacity(ring_file).results
-        assert [(one.timing_model, one.fits, one.verdict) for one in (hasty, plain)] == [
-            ("hasty", True, None),
-            ("plain", False, "not shown to fit"),
-        ]
-        assert (hasty.safe_nodes, hasty.bias_us, hasty.uncertainty_us) == (None, None, None)
-        for asked in ((), ("--timing-model", "hasty"), ("--timing-model", "plain")):
-            said = run("capacity", ring_file.name, *asked, cwd=ring_file.parent).stdout
-            assert said.splitlines()[0].endswith(" NOT SHOWN TO FIT")
-            assert "\n  short by        5 us, +/- 13\n" in said
-            other = "\n  hasty model     says otherwise, 640 us needed of 645, but does not decide\n"
-            assert (other in said) == (asked[1:] != ("plain",))
-        assert run("check", ring_file.name, "--no-circle", cwd=ring_file.parent).returncode == 1
 
 
 # --- its profile ------------------------------------------------------------------------------------------

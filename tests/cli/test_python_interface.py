@@ -5,13 +5,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import pytest
-from typer.main import get_command
 
 import busplan
-from busplan.cli import app
-from busplan.cli.lazy import COMMANDS
+from tests.registers import COMMAND_LINE, COMMANDS
 
-COMMAND_LINE: Any = get_command(app)
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "import": busplan.import_profile,
     "plan": busplan.plan,

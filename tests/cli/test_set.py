@@ -4,13 +4,12 @@ import json
 import re
 import tomllib
 from collections.abc import Callable
-from html import unescape
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from busplan.cli.lazy import COMMANDS
+from tests.registers import COMMANDS
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]
@@ -111,28 +110,6 @@ def without_changes(item: Any) -> Any:
     if isinstance(item, list):
         return [without_changes(one) for one in item]
     return item.removesuffix(f" ({SAID[0].lower()}{SAID[1:-1]})") if isinstance(item, str) else item
-
-
-@pytest.mark.parametrize("command", [name for name in EVERY if name not in ("report", "check")])
-def test_answers_for_people_name_the_changes_once_at_the_top(run: Run, folder: Path, command: str) -> None:
-    for form in ("table", "html") if command in {"capacity", "sweep"} else ("table",):
-        done = run(command, *EVERY[command], *SET, "--format", form, cwd=folder)
-        text = unescape(re.sub(r"<[^>]*>", "", done.stdout))
-        assert text.count(SAID) == 1
-        assert text.index(SAID) < 100 or form == "html"
-    assert "--set" not in run(command, *EVERY[command], cwd=folder).stdout
-
-
-@pytest.mark.parametrize("command", EVERY)
-def test_every_command_refuses_what_the_file_may_not_say(refused: Refused, folder: Path, command: str) -> None:
-    said = refused(command, *EVERY[command], "--set", "cycle.perod_us=1", "--set", "bus.nodes=0", cwd=folder).split(
-        "\n"
-    )[0]
-    if command == "check":
-        both = "--set bus.nodes=0: must be 1 or more; --set cycle.perod_us=1: unknown key; did you mean period_us?"
-        assert said == f"mine.toml: {both}"
-    else:
-        assert said == "--set bus.nodes=0: must be 1 or more"
 
 
 def test_a_short_form_is_the_key_it_stands_for(run: Run, folder: Path) -> None:
@@ -277,12 +254,3 @@ def test_a_picture_says_the_changes(run: Run, folder: Path) -> None:
     run("sweep", "mine.toml", "--vary", "bus.nodes=1:3", "--set", "bus.speed=S200", "--plot", "s.svg", cwd=folder)
     for name, said in (("c.svg", "--set bus.speed=S200"), ("s.svg", "mine, --set bus.speed=S200")):
         assert said in (folder / name).read_text(encoding="utf-8")
-
-
-def test_rows_of_a_sweep_keep_their_form_and_the_change_is_said_beside_them(run: Run, folder: Path) -> None:
-    asked = ("sweep", "mine.toml", "--vary", "bus.nodes=1:2", "--set", "bus.speed=S200")
-    rows = run(*asked, "--format", "csv", "--columns", "margin_us", cwd=folder)
-    assert rows.stdout.startswith("bus.nodes,timing_model,margin_us\n1,paper,")
-    assert rows.stderr.startswith("With --set bus.speed=S200.\nmine: 2 points;")
-    document = json.loads(run(*asked, "--format", "json", cwd=folder).stdout)
-    assert document["changes"] == {"bus.speed": "S200"}

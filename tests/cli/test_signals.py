@@ -136,7 +136,7 @@ def test_a_sweep_that_is_ended_leaves_what_was_there(
 
 def test_rows_in_the_making_are_no_file_either(running: Start, folder: Path) -> None:
     (folder / "c.csv").write_text("old", encoding="utf-8")
-    with running("sweep", "p.toml", "--vary", "cycle.nonperiodic_us=1:900000", "-o", "c.csv") as process:
+    with running("sweep", "p.toml", "--vary", "cycle.nonperiodic_us=1:200000", "-o", "c.csv") as process:
         assert until(lambda: is_written(process.pid, folder))
         os.kill(process.pid, signal.SIGINT)
         ended, _, said = process.end()

@@ -15,7 +15,7 @@ from typing import IO, Any
 
 import pytest
 
-from busplan.cli.lazy import COMMANDS
+from tests.registers import COMMANDS
 
 Run = Callable[..., Any]
 OnTerminal = Callable[..., tuple[int, str]]
@@ -64,13 +64,6 @@ def test_a_terminal_and_a_pipe_get_the_same_figures(run: Run, on_terminal: OnTer
             assert here == there
 
 
-def test_messages_on_a_terminal_break_at_words(run: Run, on_terminal: OnTerminal, tmp_path: Path) -> None:
-    code, shown = on_terminal("capacity", "nope", cwd=tmp_path, env={"COLUMNS": "40"})
-    assert code == 2
-    assert all(len(line) <= 40 for line in shown.splitlines())
-    assert shown.split() == run("capacity", "nope").stderr.split()
-
-
 def test_what_to_ask_next_is_of_the_period_that_was_asked_for(on_terminal: OnTerminal, tmp_path: Path) -> None:
     _, shown = on_terminal("capacity", "paper-4ms", "--period", "300us", cwd=tmp_path, env={"TERM": "dumb"})
     for words in ("capacity paper-4ms --period 300us --sensitivity", "plan paper-4ms --period 300us"):
@@ -79,27 +72,11 @@ def test_what_to_ask_next_is_of_the_period_that_was_asked_for(on_terminal: OnTer
     assert "busplan circle-test paper-4ms\n" in shown
 
 
-def test_the_card_of_a_new_profile_keeps_its_columns(on_terminal: OnTerminal, tmp_path: Path) -> None:
-    _, shown = on_terminal("init", "new", "--bus", "can", cwd=tmp_path, env={"COLUMNS": "80"})
-    lines = shown.splitlines()
-    tested = next(row for row, line in enumerate(lines) if line.startswith("  checked against"))
-    assert lines[tested + 1].startswith(" " * 18)
-    assert all(len(line) <= 80 for line in lines)
-
-
 def test_a_terminal_breaks_no_row_and_says_what_it_leaves_out(on_terminal: OnTerminal, tmp_path: Path) -> None:
     plan = ("plan", "paper-1ms", "--axes", "16")
     _, shown = on_terminal(*plan, cwd=tmp_path, env={"TERM": "dumb", "COLUMNS": "40"})
     assert max(map(len, shown.splitlines())) <= 40
     assert "Not shown: columns largest term, safe nodes, safe axes. --all shows all." in " ".join(shown.split())
-
-
-def test_a_pipe_is_as_wide_as_its_tables_whatever_columns_says(run: Run) -> None:
-    for arguments in (("compare", "paper-1ms", "--all"), ("explain", "paper-1ms"), ("latency", "gantry-24")):
-        shown = {run(*arguments, inside={"variables": {"COLUMNS": columns}}).stdout for columns in ("40", "200")}
-        assert len(shown) == 1
-        assert "Not shown: " not in (text := shown.pop())
-        assert max(map(len, text.splitlines())) > 120
 
 
 PROFILE = """\

@@ -1,32 +1,24 @@
 """Random machines that keep a random plan, and machines with a fault, held against their plans by busplan.
 
-    python -m tests.oracles.emulated --count 100 --seed 1 --kind can --fault "SYNC missing" --keep missed
-
-A recording of each machine is written by `can_recording` or `ethercat_recording`, which know its truth. The tables tell
-how many machines without a fault have an error of the gate; how many of the figures of `measured` lie within their U of
-the truth; and how often the gate names each fault. A fault is larger than U, and occurs three times or more.
+A recording of each machine is written by `can_recording` or `ethercat_recording`, which know its truth. A fault is
+larger than U, and occurs three times or more.
 """
 
-import argparse
 import re
-import sys
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import product
 from math import ceil
 from pathlib import Path
 from random import Random
-from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 import busplan
 from tests.oracles import can_recording as can
 from tests.oracles import ethercat_recording as ethercat
-from tests.oracles.random_plans import PLANS, Plan, fitting
+from tests.oracles.random_plans import Plan, fitting
 
 TRUTHS: Final = (
     # CAN
@@ -319,94 +311,7 @@ HIDDEN: Final = (
 """Recordings that do not show whether a machine keeps its plan."""
 
 
-# --- many machines ------------------------------------------------------------------------------------------
-
-
-class Tried(NamedTuple):
-    """What busplan says of a machine."""
-
-    recorder: str
-    errors: list[str]
-    """Of the machine without a fault."""
-    is_warned: bool
-    """Whether there is any word of it."""
-    judged: list[tuple[str, bool]]
-    faults: dict[str, tuple[float, ...]]
-    """Whether there is an error, whether the fault is named, and the share of figures within U of the truth."""
-
-
-def tried(kind: str, seed: int, options: argparse.Namespace) -> Tried:
-    """Emulate a machine, and it with each fault."""
-    with TemporaryDirectory() as name:
-        folder = options.keep / f"{kind}-{seed}" if options.keep else Path(name)
-        folder.mkdir(parents=True, exist_ok=True)
-        subject = Subject(kind, seed, folder, options.times, options.events)
-        faults: dict[str, tuple[float, ...]] = {}
-        for fault in (*FAULTS, *HIDDEN):
-            if fault.kind == kind and options.fault in fault.name and (recording := subject.with_fault(fault)):
-                within = [is_within for _, is_within in recording.judged()] or [False]
-                faults[fault.name] = bool(recording.errors), fault.is_named(recording), sum(within) / len(within)
-        clean, recorder = subject.clean, subject.recorder or subject.machine().form
-        return Tried(recorder, clean.errors, bool(clean.findings), list(clean.judged()), faults)
-
-
-def main() -> None:
-    """Try many machines, and print the tables."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--count", type=int, default=20, help="machines of each kind")
-    parser.add_argument("--seed", type=int, default=1, help="of the first of them")
-    parser.add_argument("--kind", choices=PLANS, action="append", help="kind of bus; without it both")
-    parser.add_argument("--fault", default="", help="only faults with this in their name")
-    parser.add_argument("--times", type=float, default=3, help="U that a fault is beyond its plan")
-    parser.add_argument("--events", type=int, default=5, help="times that a fault occurs at least")
-    parser.add_argument("--keep", type=Path, help="folder for all plans and recordings")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    options = parser.parse_args()
-    for kind in options.kind or PLANS:
-        seeds = range(options.seed, options.seed + options.count)
-        with ProcessPoolExecutor(options.jobs) as pool:
-            machines = list(pool.map(partial(tried, kind, options=options), seeds))
-        wrong = [seed for seed, machine in zip(seeds, machines, strict=True) if machine.errors]
-        write(f"\n{kind}: {len(machines)} machines; {len(wrong)} without a fault have an error: {wrong}")
-        table(
-            "stamps",
-            ("error", "any word"),
-            ((machine.recorder, (bool(machine.errors), machine.is_warned)) for machine in machines),
-        )
-        table(
-            "error without a fault", (), ((quantity_of(words), ()) for machine in machines for words in machine.errors)
-        )
-        table(
-            "figure",
-            ("within U",),
-            ((name, (is_within,)) for machine in machines for name, is_within in machine.judged),
-        )
-        table(
-            "fault", ("error", "named", "within U"), (pair for machine in machines for pair in machine.faults.items())
-        )
-
-
 def quantity_of(words: str) -> str:
     """A figure, or what a finding is about, without key, names and numbers."""
     words = re.sub(r"^\w+\.\S+: |^name: |[:,]? [\d.,]+ .*| with .*", "", words)
     return re.sub(r".+(?=: (period|jitter|data|shortest|sooner))", "…", words)
-
-
-def table(name: str, columns: tuple[str, ...], rows: Iterable[tuple[str, tuple[float, ...]]]) -> None:
-    """Write how many rows of each name there are, and the means of their values."""
-    by_name: dict[str, list[tuple[float, ...]]] = defaultdict(list)
-    for key, values in rows:
-        by_name[key].append(values)
-    write(f"\n{name:32}     n", *(f"{column:>9}" for column in columns))
-    for key, of_key in by_name.items():
-        means = (sum(column) / len(column) for column in zip(*of_key, strict=True))
-        write(f"{key:32} {len(of_key):5}", *(f"{mean:9.1%}" for mean in means))
-
-
-def write(*words: str) -> None:
-    """Write a line."""
-    sys.stdout.write(f"{' '.join(words)}\n")
-
-
-if __name__ == "__main__":
-    main()

@@ -585,8 +585,6 @@ def test_a_change_that_breaks_a_rule_of_another_key_names_that_key() -> None:
 
 # --- anything at all --------------------------------------------------------------------------------------
 
-SHIPPED = [path.read_bytes() for path in sorted((Path(__file__).parents[2] / "profiles").glob("*.toml"))]
-
 
 def check_outcome(content: bytes) -> None:
     """A profile, or messages whose places lie inside the file; anything else fails the test."""
@@ -607,56 +605,6 @@ def check_outcome(content: bytes) -> None:
         assert problem.isprintable(), ascii(problem)
 
 
-PIECES = st.sampled_from(
-    [
-        *(b"[", b"]", b"[[", b"]]", b"{", b"}", b'"', b"'", b'"""', b"'''", b"#", b"=", b".", b",", b" ", b"\t", b"-"),
-        *(b"\n", b"\r", b"\r\n", b"\\", b"\\u0000", b"\xc3\xa9", b"\xff", b"\xe2\x80\xa8", b"0x", b"nan", b"true"),
-        b"a.b = 1\n",
-    ]
-)
-VALUES = st.sampled_from(
-    [
-        *(b"nan", b"-1", b"0", b"1e999", b'""', b'"x"', b"true", b"[]", b"{}", b"[[1]]", b"[nan, -1]", b"[1, 1]"),
-        *(b"9" * 400, b"1979-05-27", b'"""\n"""', b"{kind = 1}", b'"S800"', b'"optimal"', b"'linear'"),
-    ]
-)
-
-
-@st.composite
-def mutations(draw: st.DrawFn) -> bytes:
-    """A shipped profile after some accidents."""
-    content = draw(st.sampled_from(SHIPPED))
-    for _ in range(draw(st.integers(1, 4))):
-        kind = draw(st.sampled_from(["flip", "delete", "insert", "double line", "delete line", "swap lines", "value"]))
-        if kind == "value":
-            at = draw(st.sampled_from([match.span() for match in re.finditer(rb"(?<== ).+", content)] or [(0, 0)]))
-            new = draw(VALUES)
-            content = content[: at[0]] + new + content[at[1] :]
-        elif "line" in kind:
-            lines = content.split(b"\n")
-            one, other = (draw(st.integers(0, len(lines) - 1)) for _ in range(2))
-            if kind == "double line":
-                lines.insert(other, lines[one])
-            elif kind == "delete line":
-                del lines[one]
-            else:
-                lines[one], lines[other] = lines[other], lines[one]
-            content = b"\n".join(lines)
-        else:
-            at_byte = draw(st.integers(0, len(content)))
-            cut = 0 if kind == "insert" else 1 if kind == "flip" else draw(st.integers(1, 40))
-            new = b"" if kind == "delete" else draw(st.one_of(st.binary(min_size=1, max_size=1), PIECES))
-            content = content[:at_byte] + new + content[at_byte + cut :]
-    if draw(st.integers(0, 5)) == 0:
-        content = content.replace(b"\n", b"\r\n")
-    return content
-
-
-@given(content=mutations())
-def test_a_shipped_profile_after_any_accident_loads_or_is_refused_with_places_inside_it(content: bytes) -> None:
-    check_outcome(content)
-
-
 @given(content=st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
 @example(content=b"\xef\xbb\xbf\xff")
 @example(content=b"\r\r\n")
@@ -668,11 +616,6 @@ def test_a_shipped_profile_after_any_accident_loads_or_is_refused_with_places_in
 @example(content=b"a=1\n\r\n\r\n x")
 def test_any_bytes_load_or_are_refused_with_places_inside_them(content: bytes) -> None:
     check_outcome(content)
-
-
-@given(pieces=st.lists(st.one_of(PIECES, st.sampled_from(TEXT.encode().splitlines(keepends=True))), max_size=30))
-def test_any_pieces_of_toml_load_or_are_refused_with_places_inside_them(pieces: list[bytes]) -> None:
-    check_outcome(b"".join(pieces))
 
 
 def test_an_error_travels_between_processes_as_what_it_is() -> None:

@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 
 import busplan
-from busplan.gate.baseline import MODELS, Baseline, Record, write_baseline
-from busplan.profile.changes import NO_CHANGES, KeyChanges, parse_set
-from busplan.profile.sources import load, shipped_folder
 
-TEXT = (shipped_folder() / "paper-4ms.toml").read_text(encoding="utf-8")
+SHIPPED = Path(__file__).parents[2] / "profiles" / "paper-4ms.toml"
+TEXT = SHIPPED.read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -28,7 +26,7 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_shipped_name_is_the_shipped_profile_and_a_path_the_file(own: Path) -> None:
-    assert busplan.load_profile("paper-4ms") == load("paper-4ms").profile
+    assert busplan.load_profile("paper-4ms") == busplan.load_profile(SHIPPED)
     for path in (own, own.absolute(), "./paper-4ms", str(own.absolute())):
         assert busplan.load_profile(path).bus.nodes == 5
         assert busplan.capacity(path).results[0].nodes == 5
@@ -37,7 +35,7 @@ def test_a_shipped_name_is_the_shipped_profile_and_a_path_the_file(own: Path) ->
 
 
 def test_a_profile_is_taken_as_it_is() -> None:
-    profile = load("paper-4ms").profile
+    profile = busplan.load_profile("paper-4ms")
     assert busplan.load_profile(profile) is profile
     assert busplan.capacity(profile).profile is profile
 
@@ -137,10 +135,6 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: busplan.map_("paper-4ms", executor=ThreadPoolExecutor()),
         "executor: goes with circle=True",
     ),
-    "an origin for another profile": (
-        lambda: busplan.report("paper-4ms", circle=False, origins=[("a", NO_CHANGES), ("b", NO_CHANGES)]),
-        "origins: 2 for 1 profile; expected one for each",
-    ),
     "a model of two kinds of bus": (
         lambda: busplan.diff("paper-4ms", "can-servo-8", timing_model="standard"),
         "timing_model standard: the kinds of bus, ieee1394 and can, have no timing model in common; leave it out",
@@ -184,10 +178,6 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "no baseline": (
         lambda: busplan.check("paper-4ms", baseline="nowhere.json"),
         "nowhere.json: no such file; record it with --update-baseline",
-    ),
-    "a baseline of other models": (
-        lambda: busplan.check("paper-4ms", baseline=Baseline({}, MODELS - 1)),
-        "baseline: recorded by other timing models",
     ),
     "no paths": (lambda: busplan.check([]), "paths: no values; give at least one"),
     "paths that are none": (lambda: busplan.check(5), "paths 5: expected several values, as a list"),  # type: ignore[arg-type]
@@ -287,30 +277,13 @@ def test_a_warning_passes_and_a_file_that_is_not_there_does_not(own: Path) -> No
 
 
 def test_every_file_is_checked_with_changes_which_the_answer_names(own: Path) -> None:
-    for changes in ({"cycle.period_us": np.int64(300)}, KeyChanges(parse_set(["cycle.period_us=300"]))):
-        answer = busplan.check([own, "paper-1ms"], circle=False, changes=changes)
-        assert {one.finding.code for one in answer.findings} >= {"BP101"}
-        assert answer.to_dict()["changes"] == {"cycle.period_us": 300}
-        assert answer.changes.words == "--set cycle.period_us=300"
+    answer = busplan.check([own, "paper-1ms"], circle=False, changes={"cycle.period_us": np.int64(300)})
+    assert {found.finding.code for found in answer.findings} >= {"BP101"}
+    assert answer.to_dict()["changes"] == {"cycle.period_us": 300}
+    assert answer.changes.words == "--set cycle.period_us=300"
     (refused,) = busplan.check("paper-1ms", changes={"bus.nodes": 0}).files
     assert refused.failure is not None
     assert "--set bus.nodes=0" in refused.failure
-
-
-def test_a_check_compares_with_a_baseline_and_gives_what_one_records(own: Path, tmp_path: Path) -> None:
-    (now,) = busplan.check(own, circle=False, record=True).files
-    assert now.figures
-    assert busplan.check(own, circle=False).files[0].figures == {}
-    better = {name: value + 1 for name, value in now.figures.items()}
-    file = tmp_path / "baseline.json"
-    file.write_text(write_baseline({now.path: Record(better, now.keys)}), encoding="utf-8")
-    for baseline in (file, str(file), Baseline({now.path: Record(better, now.keys)}, MODELS)):
-        (found,) = busplan.check(own, circle=False, baseline=baseline).findings
-        assert found.finding.code == "BP301"
-    in_memory = {"paper-4ms.toml": Record(better)}
-    fast = busplan.load_profile("paper-4ms")
-    codes = [one.finding.code for one in busplan.check(fast, baseline=Baseline(in_memory, MODELS)).findings]
-    assert "BP301" in codes
 
 
 def test_a_check_on_an_executor_is_the_same(own: Path) -> None:

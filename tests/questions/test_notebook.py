@@ -1,16 +1,11 @@
 """What a notebook and a file get: tables and charts of the HTML form, pictures, pages."""
 
-import json
 import re
-from collections.abc import Callable
-from pathlib import Path
-from xml.etree.ElementTree import fromstring
 
 import pytest
 
 import busplan
 from busplan.profile.changes import KeyChanges, parse_set
-from busplan.questions.base.answer import Answer
 
 
 def test_a_notebook_shows_tables_and_charts_and_no_name_is_markup() -> None:
@@ -33,29 +28,6 @@ def test_the_styles_of_a_notebook_reach_nothing_outside() -> None:
     assert "<script" not in shown
 
 
-PICTURES: dict[str, Callable[[], Answer]] = {
-    "circle_test": lambda: busplan.circle_test("paper-4ms"),
-    "timeline": lambda: busplan.timeline("paper-4ms"),
-    "map": lambda: busplan.map_("paper-4ms", x={"axes": range(4, 41, 4)}),
-    "capacity": lambda: busplan.capacity("paper-4ms", sensitivity=True),
-    "compare": lambda: busplan.compare("paper-4ms"),
-    "sweep": lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": "1:9", "cycle.period_us": "1000:4000:1000"}),
-}
-
-
-@pytest.mark.parametrize("name", PICTURES)
-def test_an_answer_with_a_picture_gives_it_with_its_colours(name: str, tmp_path: Path) -> None:
-    answer = PICTURES[name]()
-    drawn = answer._repr_svg_()
-    assert drawn is not None
-    root = fromstring(drawn)
-    assert root.tag == "{http://www.w3.org/2000/svg}svg"
-    assert root.findall("{http://www.w3.org/2000/svg}style")
-    assert "prefers-color-scheme" in drawn
-    answer.save(tmp_path / "x.svg")
-    assert (tmp_path / "x.svg").read_text(encoding="utf-8") == drawn
-
-
 def test_a_sweep_shows_its_table_and_its_picture_where_it_can_be_drawn() -> None:
     vary = {"bus.nodes": [1, 2], "cycle.period_us": [1000, 4000], "node.axes": [1, 2]}
     drawn, not_drawn = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]}), busplan.sweep("paper-4ms", vary=vary)
@@ -66,13 +38,6 @@ def test_a_sweep_shows_its_table_and_its_picture_where_it_can_be_drawn() -> None
             charts,
         )
     assert not_drawn._repr_svg_() is None
-
-
-def test_what_is_left_out_is_said_without_an_option() -> None:
-    answer = busplan.capacity("paper-4ms")
-    for shown in (str(answer), answer._repr_html_()):
-        assert "--all" not in shown
-        assert "to_dict() has all figures." in shown
 
 
 def test_a_notebooks_own_styles_of_lists_and_tables_are_undone() -> None:
@@ -103,25 +68,6 @@ def test_an_answer_without_a_picture_gives_none() -> None:
     assert busplan.diff("paper-4ms", "paper-1ms")._repr_svg_() is None
 
 
-def test_a_page_is_text_and_is_saved_in_the_form_of_its_ending(tmp_path: Path) -> None:
-    page = busplan.report(["sercos2-servo-8", "sercos3-servo-8"], circle=False, title="Two <lines>")
-    html = page.html
-    assert html.startswith("<!DOCTYPE html>")
-    assert "<h1>Two &lt;lines&gt;</h1>" in html
-    for ending, text in ((".html", html), (".txt", f"{page}\n"), (".json", page.to_json())):
-        page.save(tmp_path / f"page{ending}")
-        assert (tmp_path / f"page{ending}").read_text(encoding="utf-8") == text
-    assert [one.verdict.deciding.verdict for one in page.profiles] == ["fits", "fits"]
-
-
-def test_every_row_of_a_sweep_is_saved(tmp_path: Path) -> None:
-    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": "1:30"})
-    answer.save(tmp_path / "rows.csv")
-    assert len((tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines()) == 61
-    answer.save(str(tmp_path / "rows.json"))
-    assert json.loads((tmp_path / "rows.json").read_text(encoding="utf-8")) == answer.to_dict()
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -141,17 +87,3 @@ def test_the_commands_of_a_page_give_the_origin_that_is_said() -> None:
     page = str(busplan.report(profile, circle=False, origins=[("line 1.toml", changes)]))
     assert page.startswith("sercos2-servo-8\nWith --set bus.nodes=3.\n")
     assert "$ busplan latency 'line 1.toml' --set bus.nodes=3\n" in page
-
-
-def test_a_difference_calls_its_sides_as_it_is_told() -> None:
-    found = busplan.diff("paper-optimal-gap", "paper-1ms", arguments=("before", "after"))
-    assert [found.to_dict()[side]["argument"] for side in "ab"] == ["before", "after"]
-    assert found.regression_words(tolerance_percent=10).startswith("regression: B is worse by more than 10 % in ")
-
-
-def test_figures_that_are_worse_are_named_with_a_tolerance() -> None:
-    found = busplan.diff("paper-optimal-gap", "paper-1ms", timing_model="standard")
-    keys = [one.figure.key for one in found.regressions()]
-    assert "margin_us" in keys
-    assert "margin_us" not in [one.figure.key for one in found.regressions(tolerance_percent=50)]
-    assert busplan.diff("paper-1ms", "paper-1ms").same

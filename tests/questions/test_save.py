@@ -2,15 +2,15 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import busplan
 from busplan.forms import PICTURES
-from busplan.questions.base.answer import Answer
 
 Run = Callable[..., object]
-COMMANDS: Mapping[str, Callable[[], Answer]] = {
+COMMANDS: Mapping[str, Callable[[], Any]] = {
     "map paper-4ms --x axes=4:12:4 --y cycle.period_us=1000,4000": lambda: busplan.map_(
         "paper-4ms", x={"axes": "4:12:4"}, y={"cycle.period_us": [1000, 4000]}
     ),

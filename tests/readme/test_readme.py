@@ -15,19 +15,18 @@ from pydantic_core import PydanticUndefined
 from typer.testing import CliRunner
 
 from busplan.buses import kind_named, kind_names
-from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.cli import app
-from busplan.cli.lazy import COMMANDS
 from busplan.forms.markdown import code, table
 from busplan.manual import FOLDER, topics
 from busplan.profile.document import decode, validate
 from busplan.profile.kinds import models_of
-from busplan.profile.sources import load, shipped_names
+from busplan.profile.sources import load
 from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.explain.derivation import figures_of
 from busplan.questions.explain.report import constant_rows, equation_rows
 from busplan.sections.machine import AxisOverride
 from busplan.sourced import short
+from tests.registers import COMMANDS, shipped_names
 
 Run = Callable[..., CompletedProcess[str]]
 
@@ -166,7 +165,7 @@ SHOWN_FIRST = "ieee1394"
 
 def further_tables(kind: str) -> Iterator[list[str]]:
     """What a further kind of bus has of its own: keys, constants, and figures of `capacity` and `latency`."""
-    known = set(reference(Ieee1394Profile))
+    known = set(reference(kind_named("ieee1394").profile_model()))
     own = [row for row in dict.fromkeys(reference(kind_named(kind).profile_model())) if row not in known]
     yield [f"| key of `{kind}` | values | default | meaning |", "|---|---|---|---|", *own]
     names = ("name", "value", "unit", "grade", "source", "meaning")
@@ -188,7 +187,11 @@ def further_tables(kind: str) -> Iterator[list[str]]:
 
 def tables() -> Iterator[list[str]]:
     """Every table of the program's own data, by its lines; the first of them is in one page alone."""
-    yield ["| key | values | default | meaning |", "|---|---|---|---|", *dict.fromkeys(reference(Ieee1394Profile))]
+    yield [
+        "| key | values | default | meaning |",
+        "|---|---|---|---|",
+        *dict.fromkeys(reference(kind_named("ieee1394").profile_model())),
+    ]
     rows = equation_rows()
     yield table(
         list(rows[0]),

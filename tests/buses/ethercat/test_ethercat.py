@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import busplan
+from busplan.buses import kind_named
 from busplan.buses.ethercat.equations import CONSTANTS
-from busplan.buses.ethercat.section import EthercatProfile
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 
 Run = Callable[..., Any]
 
+MODEL = kind_named("ethercat").profile_model()
 DATA: dict[str, Any] = {
     "schema_version": 1,
     "name": "press",
@@ -45,7 +45,8 @@ BYTE_COSTS_US = (0.0839, 0.0841, 0.0826)
 def profile(**changes: Any) -> busplan.Profile:
     """That profile with other values by dotted key, __ for the dot."""
     return busplan.load_profile(
-        EthercatProfile.model_validate(DATA), changes={key.replace("__", "."): value for key, value in changes.items()}
+        MODEL.model_validate(DATA),
+        changes={key.replace("__", "."): value for key, value in changes.items()},
     )
 
 
@@ -54,12 +55,12 @@ def grouped(*groups: dict[str, Any], **bus: Any) -> busplan.Profile:
     node = {**DATA["node"], "axes": 1}
     data = {key: value for key, value in DATA.items() if key not in ("payload", "node")}
     data["bus"] = {**{key: value for key, value in DATA["bus"].items() if key != "nodes"}, **bus}
-    return EthercatProfile.model_validate({**data, "group": [{**node, **group} for group in groups]})
+    return MODEL.model_validate({**data, "group": [{**node, **group} for group in groups]})
 
 
 def terms(plan: busplan.Profile, model: str = "last-byte") -> dict[str, float]:
     (result,) = busplan.capacity(plan, timing_model=[model]).results
-    return {term.name: plain(term.us) for term in result.terms}
+    return {term.name: float(term.us) for term in result.terms}
 
 
 def loop_delays_us(plan: busplan.Profile, update: str) -> tuple[float, float]:
@@ -157,7 +158,7 @@ def of(plan: busplan.Profile) -> Any:
 
 
 def doubts(plan: busplan.Profile) -> dict[str, float]:
-    return {doubt.key: plain(doubt.us) for doubt in of(plan).doubts}
+    return {doubt.key: float(doubt.us) for doubt in of(plan).doubts}
 
 
 def test_all_devices_of_a_port_err_together_and_measured_ones_each_by_itself() -> None:
@@ -458,8 +459,8 @@ def test_devices_without_axes_need_no_execution_time() -> None:
     data = {key: value for key, value in DATA.items() if key not in ("payload", "node")}
     data["bus"] = {key: value for key, value in DATA["bus"].items() if key != "nodes"}
     execution = DATA["node"]["execution"]
-    short = EthercatProfile.model_validate({**data, "group": [{**drives, "execution": execution}, group]})
-    whole = EthercatProfile.model_validate(
+    short = MODEL.model_validate({**data, "group": [{**drives, "execution": execution}, group]})
+    whole = MODEL.model_validate(
         {**data, "group": [{**drives, "execution": execution}, {**group, "execution": at_once}]}
     )
     assert busplan.capacity(short).verdicts[0].deciding == busplan.capacity(whole).verdicts[0].deciding
@@ -474,7 +475,7 @@ def test_devices_without_axes_need_no_execution_time() -> None:
     with pytest.raises(BusplanError, match=r"group\.inputs\.execution: missing section"):
         busplan.load_profile(short, changes={"group.inputs.axes": 1})
     with pytest.raises(ValidationError, match="execution"):
-        EthercatProfile.model_validate({**data, "group": [drives, group]})
+        MODEL.model_validate({**data, "group": [drives, group]})
 
 
 def test_groups_are_answered_one_by_one() -> None:

@@ -9,9 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import busplan
+from busplan.buses import kind_named
 from busplan.buses.ethercat.equations import datagram_bytes, frame_bytes, room_bytes, sending_us
-from busplan.buses.ethercat.section import EthercatProfile
-from busplan.elementwise import plain
 
 MOST: Final = 1538
 BYTE_US: Final = 0.08
@@ -20,17 +19,21 @@ Sized = tuple[int, int, int]
 
 
 def profile(groups: Sequence[Sized], layout: str = "LRW-shared", *, clocks: bool = False) -> busplan.Profile:
-    return EthercatProfile.model_validate(
-        {
-            "schema_version": 1,
-            "name": "press",
-            "bus": {"kind": "ethercat", "master": "SOEM", "process_data": layout, "distributed_clocks": clocks},
-            "cycle": {"period_us": 5000.0},
-            "group": [
-                {"name": f"g{place}", "nodes": nodes, "read_bytes": read, "write_bytes": write, "axes": 0}
-                for place, (nodes, read, write) in enumerate(groups)
-            ],
-        }
+    return (
+        kind_named("ethercat")
+        .profile_model()
+        .model_validate(
+            {
+                "schema_version": 1,
+                "name": "press",
+                "bus": {"kind": "ethercat", "master": "SOEM", "process_data": layout, "distributed_clocks": clocks},
+                "cycle": {"period_us": 5000.0},
+                "group": [
+                    {"name": f"g{place}", "nodes": nodes, "read_bytes": read, "write_bytes": write, "axes": 0}
+                    for place, (nodes, read, write) in enumerate(groups)
+                ],
+            }
+        )
     )
 
 
@@ -57,7 +60,7 @@ def sent(plan: busplan.Profile) -> list[Frame]:
 def results(plan: busplan.Profile) -> tuple[Any, dict[str, float]]:
     """The result of the deciding model, and the terms of the vendors' [us]."""
     vendors, last_byte = sorted(busplan.capacity(plan).results, key=lambda result: result.timing_model == "last-byte")
-    return last_byte, {term.name: plain(term.us) for term in vendors.terms}
+    return last_byte, {term.name: float(term.us) for term in vendors.terms}
 
 
 # --- the writer -----------------------------------------------------------------------------------------

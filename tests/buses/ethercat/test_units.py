@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.buses.ethercat.section import EthercatProfile
+from busplan.buses import kind_named
 from busplan.errors import BusplanError
 from tests.oracles.ethercat_recording import first_cycles
 
@@ -23,26 +23,30 @@ Rated = tuple[int, int, int, int]
 
 
 def profile(groups: Sequence[Rated], *, units: str = "spread", axes: int = 0, **bus: Any) -> busplan.Profile:
-    return EthercatProfile.model_validate(
-        {
-            "schema_version": 1,
-            "name": "press",
-            "bus": {"kind": "ethercat", "master": "SOEM", "master_us": 20.0, "units": units, **bus},
-            "cycle": {"period_us": 500.0},
-            "group": [
-                {
-                    "name": f"g{place}",
-                    "nodes": nodes,
-                    "every": every,
-                    "read_bytes": read,
-                    "write_bytes": write,
-                    "axes": axes,
-                    "port": "E-bus",
-                    "execution": EXECUTION,
-                }
-                for place, (every, nodes, read, write) in enumerate(groups)
-            ],
-        }
+    return (
+        kind_named("ethercat")
+        .profile_model()
+        .model_validate(
+            {
+                "schema_version": 1,
+                "name": "press",
+                "bus": {"kind": "ethercat", "master": "SOEM", "master_us": 20.0, "units": units, **bus},
+                "cycle": {"period_us": 500.0},
+                "group": [
+                    {
+                        "name": f"g{place}",
+                        "nodes": nodes,
+                        "every": every,
+                        "read_bytes": read,
+                        "write_bytes": write,
+                        "axes": axes,
+                        "port": "E-bus",
+                        "execution": EXECUTION,
+                    }
+                    for place, (every, nodes, read, write) in enumerate(groups)
+                ],
+            }
+        )
     )
 
 
@@ -98,7 +102,7 @@ GROUPS = st.lists(
 )
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans())
 def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
     groups: list[Rated], units: str, clocks: bool
@@ -112,7 +116,7 @@ def test_the_verdict_is_that_of_the_fullest_cycle_and_the_load_that_of_the_mean(
     assert sum(event.duration_us for event in events if event.term) == pytest.approx(result.required_us, rel=1e-12)
 
 
-@settings(max_examples=40)
+@settings(max_examples=10)
 @given(GROUPS, st.sampled_from(["spread", "together"]), st.booleans())
 def test_a_timeline_draws_each_cycle_of_the_common_multiple(groups: list[Rated], units: str, clocks: bool) -> None:
     plan, first = profile(groups, units=units, distributed_clocks=clocks), placed(groups, units)
@@ -185,7 +189,7 @@ def test_a_rate_of_1_is_what_no_rate_is() -> None:
     for group in data["group"]:
         del group["every"]
     del data["bus"]["units"]
-    assert deciding(plan).by_key() == deciding(EthercatProfile.model_validate(data)).by_key()
+    assert deciding(plan).by_key() == deciding(kind_named("ethercat").profile_model().model_validate(data)).by_key()
     assert deciding(plan).own["mean_utilisation"] == deciding(plan).utilisation
 
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import busplan
 from busplan.cli import app
-from busplan.profile.sources import shipped_folder
+from tests.registers import SHIPPED_FOLDER
 
 ROWS = [(4, 48.7), (4, 48.9), (16, 55.2), (64, 80.9), (256, 184.4)]
 TEXT = "payload_bytes,latency_us\n" + "".join(f"{size},{us}\n" for size, us in ROWS)
@@ -60,7 +60,7 @@ def test_all_ways_to_give_measurements_are_the_same(given: Any, tmp_path: Path) 
 
 def test_the_changes_are_those_that_apply_writes(tmp_path: Path) -> None:
     own, bench = tmp_path / "own.toml", tmp_path / "bench.csv"
-    text = (shipped_folder() / "paper-two-node.toml").read_text(encoding="utf-8")
+    text = (SHIPPED_FOLDER / "paper-two-node.toml").read_text(encoding="utf-8")
     own.write_text(text.replace("[node.execution]", "[node.execution]\nworst_extra_us = 2.5"), encoding="utf-8")
     bench.write_text(TEXT, encoding="utf-8")
     before = busplan.load_profile(own)

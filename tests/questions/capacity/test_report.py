@@ -1,17 +1,11 @@
 """Capacity: from figures to the lines and tables of the answer."""
 
-import csv
-import io
-import json
 import re
-from collections.abc import Callable
 
 import pytest
 
 import busplan
 from busplan.forms import render
-from busplan.forms.blocks import Report
-from busplan.profile.sources import shipped_names
 
 
 def paper(**changes: object) -> busplan.Profile:
@@ -25,30 +19,6 @@ def lines(profile: busplan.Profile) -> dict[str, str]:
     for line in busplan.capacity(profile).to_dict()["verdicts"][0]["lines"]:
         said[line["label"]] = "; ".join(filter(None, (said.get(line["label"]), line["text"])))
     return said
-
-
-@pytest.mark.parametrize("name", shipped_names())
-def test_the_document_holds_the_figures_of_the_answer(name: str) -> None:
-    answer = busplan.capacity(name)
-    document = json.loads(answer.to_json())
-    for written, figures in zip(document["results"], answer.results, strict=True):
-        groups = written.pop("groups", [])
-        assert written == json.loads(json.dumps(figures.by_key()))
-        assert groups == [vars(group) for group in figures.groups]
-    deciding = answer.verdicts[0].deciding
-    assert {key: document["verdicts"][0][key] for key in ("verdict", "required_us", "safe_nodes")} == {
-        key: getattr(deciding, key) for key in ("verdict", "required_us", "safe_nodes")
-    }
-
-
-def test_csv_holds_the_same_numbers_to_the_last_digit() -> None:
-    answer = busplan.capacity("paper-1ms", period_us=[1000.0, 123.456])
-    read = list(csv.DictReader(io.StringIO(render(answer.report(), "csv"))))
-    assert len(read) == 4
-    for written, figures in zip(read, answer.results, strict=True):
-        assert float(written["required_us"]) == figures.required_us
-        assert float(written["cycle_idle_us"]) == figures.own["cycle_idle_us"]
-        assert written["fits"] == ("true" if figures.fits else "false")
 
 
 def test_the_verdict_names_margin_term_limit_and_change() -> None:
@@ -164,12 +134,3 @@ def test_what_fails_is_marked_where_it_stands_and_the_rest_is_detail() -> None:
     whole = render(report._replace(is_whole=True), "table")
     assert all(f"\n{name}  " in whole for name in ("  hold", "  host", "utilisation", "smallest period"))
     assert "Not shown" not in whole
-
-
-@pytest.mark.parametrize("period_us", [1000.0, 600.0, 100.0])
-def test_every_figure_of_the_blocks_stands_in_the_document(
-    period_us: float, values_of_the_document: Callable[[Report], int]
-) -> None:
-    # Tables of 44 figures, two periods under two models.
-    assert values_of_the_document(busplan.capacity("paper-1ms", period_us=[4000.0, period_us]).report()) > 100
-    assert values_of_the_document(busplan.latency("paper-1ms", payload_bytes=[4, 16]).report()) == 2 * 4 * 21

@@ -9,9 +9,7 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named
-from busplan.profile.sources import shipped_names
-from busplan.questions.capacity.sensitivity import Effect, NextBottleneck
-from busplan.questions.fit.figures import CapacityFigures
+from tests.registers import shipped_names
 
 Maker = Callable[..., busplan.Profile]
 TABLE = {"kind": "table", "payload_bytes": [4, 12, 14], "time_us": [30.0, 34.0, 40.0]}
@@ -46,17 +44,17 @@ def changed(profile: busplan.Profile, changes: Mapping[str, object]) -> busplan.
     return busplan.load_profile(profile, changes=changes)
 
 
-def figures(profile: busplan.Profile) -> CapacityFigures:
+def figures(profile: busplan.Profile) -> Any:
     """Figures under the timing model that decides."""
     return busplan.capacity(profile).verdicts[0].deciding
 
 
-def effects(profile: busplan.Profile) -> dict[str, Effect]:
+def effects(profile: busplan.Profile) -> dict[str, Any]:
     (sensitivity,) = busplan.capacity(profile, sensitivity=True).sensitivities
     return {effect.change: effect for effect in sensitivity.effects}
 
 
-def next_bottleneck(profile: busplan.Profile) -> NextBottleneck:
+def next_bottleneck(profile: busplan.Profile) -> Any:
     return busplan.capacity(profile, sensitivity=True).sensitivities[0].next_bottleneck
 
 
@@ -256,7 +254,7 @@ def test_without_the_limit_the_next_one_keeps_one_node_more_off(
 
 
 def test_a_change_that_moves_no_margin_says_what_it_takes_from_other_limits() -> None:
-    def of_execution(base_us: float) -> Effect:
+    def of_execution(base_us: float) -> Any:
         execution = {"base_us": base_us, "per_byte_us": 0.0, "uncertainty_us": 0.0, "worst_extra_us": 0.0}
         changes = {f"node.execution.{key}": value for key, value in execution.items()}
         profile = changed(busplan.load_profile("ethercat-servo-8"), changes)

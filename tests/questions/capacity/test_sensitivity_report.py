@@ -3,13 +3,11 @@
 import csv
 import io
 import json
-from collections.abc import Callable
 
 import pytest
 
 import busplan
 from busplan.forms import render
-from busplan.forms.blocks import Report
 from busplan.forms.charts import Lanes
 
 
@@ -29,17 +27,6 @@ def bars(profile: busplan.Profile) -> Lanes | None:
         return None
     assert isinstance(panels[0].plot, Lanes)
     return panels[0].plot
-
-
-@pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8"])
-def test_every_figure_of_the_blocks_stands_in_the_document(
-    name: str, values_of_the_document: Callable[[Report], int]
-) -> None:
-    own = busplan.load_profile(name)
-    assert values_of_the_document(busplan.capacity(own, period_us=[4000.0, 300.0], sensitivity=True).report()) > 100
-    tree = {"bus.max_hops": 3, "bus.charge_hops": "farthest"} if own.bus.kind == "ieee1394" else {}
-    other = busplan.load_profile(own, changes={**tree, own.node_groups[0].payload_key("write"): 16})
-    assert values_of_the_document(busplan.capacity(other, sensitivity=True).report()) > 60
 
 
 def test_the_document_is_that_of_capacity_with_two_keys_more() -> None:
@@ -88,11 +75,6 @@ def test_where_nothing_takes_the_largest_term_away_it_says_what_comes_behind() -
     assert "Next bottleneck: after idle, 84.188 us, which no key takes away, comes execution, 42.400 us;" in text
 
 
-def test_the_table_is_no_wider_than_a_terminal() -> None:
-    table = text_of(paper(bus__gap_count="optimal")).splitlines()
-    assert max(len(line) for line in table if "->" in line or "---" in line) <= 80
-
-
 @pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "ethercat-servo-8", "sercos2-servo-8"])
 def test_a_bar_reaches_from_zero_to_its_figure_on_one_scale(name: str) -> None:
     profile = busplan.load_profile(name)
@@ -108,12 +90,3 @@ def test_a_bar_reaches_from_zero_to_its_figure_on_one_scale(name: str) -> None:
         assert lane.note == f"{us:+.3f} us".replace("+0.000", "0.000")
     assert (plot.across.low, plot.across.high) == (min(0, *made.values()), max(0, *made.values()))
     assert plot.guides[0].x == 0
-
-
-@pytest.mark.parametrize(("period_us", "left_us"), [(1000, None), (700, 80.064), (500, None)])
-def test_the_end_of_the_margin_is_drawn_where_a_bar_reaches_it(period_us: float, left_us: float | None) -> None:
-    # One node more takes 128.100 us; at 500 us there is no margin.
-    plot = bars(paper(cycle__period_us=period_us))
-    assert plot is not None
-    ends = [guide.x for guide in plot.guides if guide.entry.words]
-    assert ends == ([] if left_us is None else [pytest.approx(-left_us, abs=1e-3)])

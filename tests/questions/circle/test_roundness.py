@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import busplan
-from busplan.profile.sources import shipped_names
+from tests.registers import shipped_names
 
 Make = Callable[..., busplan.Profile]
 
@@ -59,13 +59,6 @@ def test_every_shipped_profile_runs_and_passes_what_it_asks_for(name: str) -> No
     result = only(profile)
     assert result.failures == ()
     assert result.passed is (True if profile.asks_for_circle and result.sources_matter else None)
-
-
-def test_every_shipped_servo_is_the_calibrated_one_or_the_defaults() -> None:
-    servos = [busplan.load_profile(name).servo for name in shipped_names()]
-    calibrated = [servo for servo in servos if servo.grade == "calibrated"]
-    assert len(calibrated) == 4
-    assert len(set(map(repr, calibrated))) == 1
 
 
 def test_steady_radius_of_two_p_loops_is_the_closed_form(small: busplan.Profile) -> None:
@@ -340,18 +333,6 @@ def test_the_seed_decides_what_is_lost(small: busplan.Profile) -> None:
     first, again, second = (only(changed(lossy, {"delivery.seed": seed})) for seed in (1, 1, 2))
     assert first == again
     assert first.max_contour_error_mm != second.max_contour_error_mm
-
-
-def test_a_row_a_period(small: busplan.Profile) -> None:
-    test = busplan.circle_test(small, period_us=[2000.0, 4000.0])
-    assert [result.period_us for result in test.results] == [2000.0, 4000.0]
-    assert [result.steps for result in test.results] == [run.steps if run else 0 for run in test.runs]
-    assert test.passed is None
-    assert busplan.circle_test(
-        changed(small, {"tolerance.mean_contour_error_mm": 1.0}), period_us=[2000.0, 4000.0]
-    ).passed
-    # One period that fails fails the test, judged or not.
-    assert busplan.circle_test(small, period_us=[2000.0, 100.0]).passed is False
 
 
 def test_progress_never_runs_back_and_ends_at_its_total(small: busplan.Profile) -> None:

@@ -1,11 +1,11 @@
 """The picture of `busplan compare`: a curve with a letter for each kind of bus, and this machine."""
 
 from functools import cache
+from typing import Any
 
 import pytest
 
 import busplan
-from busplan.forms.charts import Curves
 
 EACH = pytest.mark.parametrize("name", ["can-servo-8", "dvrk", "gantry-24", "paper-1ms"])
 
@@ -15,9 +15,8 @@ def compared(name: str) -> busplan.CompareAnswer:
     return busplan.compare(name)
 
 
-def plot_of(found: busplan.CompareAnswer) -> Curves:
+def plot_of(found: busplan.CompareAnswer) -> Any:
     (panel,) = found.drawing().panels
-    assert isinstance(panel.plot, Curves)
     return panel.plot
 
 

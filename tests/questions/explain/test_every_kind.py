@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.buses import kind_named, kind_names
-from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
     from subprocess import CompletedProcess
@@ -21,7 +20,7 @@ Run = Callable[..., "CompletedProcess[str]"]
 @pytest.mark.parametrize("kind", kind_names())
 @given(data=st.data())
 def test_a_figure_is_explained_as_capacity_has_it(
-    kind: str, data: st.DataObject, profiles_by_kind: Mapping[str, st.SearchStrategy[Profile]]
+    kind: str, data: st.DataObject, profiles_by_kind: Mapping[str, st.SearchStrategy[busplan.Profile]]
 ) -> None:
     profile = data.draw(profiles_by_kind[kind])
     bus = kind_named(kind)

@@ -13,12 +13,11 @@ import busplan
 from busplan.buses.ieee1394.constants import CONSTANTS
 from busplan.forms import terminal
 from busplan.profile.kinds import cycle_keys
-from busplan.profile.sources import shipped_names
 from busplan.questions.fit.figures import capacity_figures
 from busplan.questions.fit.network import network_of
-from busplan.sections.profile import Profile
+from tests.registers import shipped_names
 
-Make = Callable[..., Profile]
+Make = Callable[..., busplan.Profile]
 GRADES = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 ARITHMETIC = re.compile(r"[-+*/^() .\de]+")
 SHOWN = ["paper-1ms", "gantry-24", "dvrk", "can-servo-8", "ethercat-servo-8", "sercos2-servo-8", "sercos3-servo-8"]
@@ -31,7 +30,7 @@ def derived(profile: Any, figure: str, **asked: Any) -> Any:
     return busplan.explain(profile, figure, **asked).derivations[0]
 
 
-def figures(profile: Profile, model: str) -> dict[str, Any]:
+def figures(profile: busplan.Profile, model: str) -> dict[str, Any]:
     """Figures under a timing model, also where it has no term for a key, which `capacity` refuses."""
     return capacity_figures(network_of(profile), model=model).values()
 
@@ -58,7 +57,7 @@ def test_every_figure_of_every_kind_ends_in_its_value_and_begins_at_graded_input
 
 @given(data=st.data())
 def test_every_line_in_numbers_reads_back_as_its_result(
-    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
     command, figure = data.draw(st.sampled_from(busplan.explain(profile).figures))
@@ -127,7 +126,7 @@ ALL_IN: dict[str, Any] = {"host": {"transaction_us": 25.0}, "cycle__retries": 1,
 EXACT = ("required_us", "margin_us", "min_slice_ratio", "utilisation", "sync_us", "read_latency_us")
 
 
-def another(profile: Profile, key: str) -> Profile | None:
+def another(profile: busplan.Profile, key: str) -> busplan.Profile | None:
     """The profile with another value of a key; None where nothing of it can differ alone."""
     value: Any = profile
     for part in key.split("."):
@@ -142,7 +141,7 @@ def another(profile: Profile, key: str) -> Profile | None:
     return busplan.load_profile(profile, changes={key: larger})
 
 
-def changing(profile: Profile, model: str, keys: Iterable[str]) -> set[tuple[str, str]]:
+def changing(profile: busplan.Profile, model: str, keys: Iterable[str]) -> set[tuple[str, str]]:
     """Figures with the keys that change them."""
     before = figures(profile, model)
     others = {key: other for key in keys if (other := another(profile, key)) is not None}

@@ -13,10 +13,10 @@ import busplan
 from busplan.buses import kind_named, kind_names
 from busplan.elementwise import Traced, plain
 from busplan.profile.kinds import cycle_keys
-from busplan.profile.sources import shipped_names
 from busplan.questions.fit.certainty import FITS, certainty, deciding_cycle, limits_to_be_safe, limits_with_time
 from busplan.questions.fit.figures import figures, node_counts
 from busplan.questions.fit.network import changed, model_names, network_of
+from tests.registers import shipped_names
 
 Profiles = Mapping[str, st.SearchStrategy[busplan.Profile]]
 KINDS = pytest.mark.parametrize("kind", kind_names())

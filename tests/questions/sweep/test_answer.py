@@ -69,14 +69,6 @@ def test_figures_of_the_verdict_are_the_deciding_models_alone() -> None:
     assert alone["safe_nodes"].dtype.kind == "i"  # where none is missing, counts are whole
 
 
-def test_a_point_is_what_capacity_says_of_it() -> None:
-    periods = range(250, 4001, 750)
-    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": periods}, timing_model=["standard"])
-    results = busplan.capacity("paper-4ms", period_us=periods, timing_model=["standard"]).results
-    for name in ("max_axes", "margin_us", "limited_by", "fits", "safe_axes", "safe_required_us", "verdict"):
-        assert answer[name].tolist() == [getattr(result, name) for result in results]
-
-
 @pytest.mark.parametrize(
     "values", [range(250, 1001, 250), [250, 500, 750, 1000], np.arange(250, 1001, 250), np.linspace(250, 1000, 4)]
 )
@@ -184,12 +176,6 @@ def test_circles_without_a_contour_tolerance_are_not_judged() -> None:
     assert "not judged" not in judged
 
 
-def test_a_figure_that_no_circle_has_is_a_column_of_nan() -> None:
-    answer = busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0, 20.0]}, circle=True)
-    assert np.isnan(answer["circular_deviation_mm"]).all()
-    assert answer.to_dict()["rows"][0]["circular_deviation_mm"] is None
-
-
 def test_a_column_that_is_not_there_is_a_key_error() -> None:
     answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})
     with pytest.raises(KeyError, match=r"no column 'axis'; there are bus\.nodes, timing_model"):
@@ -209,15 +195,6 @@ def test_columns_that_are_not_there_or_no_numbers_are_refused() -> None:
     for call, message in calls:
         with pytest.raises(busplan.BusplanError, match=f"^{re.escape(message)}"):
             call()
-
-
-def test_the_text_is_the_table_of_the_command() -> None:
-    lines = str(busplan.sweep("paper-4ms", vary={"bus.nodes": "1:16"})).splitlines()
-    assert lines[1] == "20 of 32 rows."
-    # Two of the heading, an empty one, the names with a rule below: every unit is in its name.
-    assert len(lines) == 2 + 1 + 2 + 20
-    assert lines[3].split()[-4:] == ["max_axes", "safe_axes", "safe_limited_by", "verdict"]
-    assert lines[5].split() == ["1", "paper", "102.955", "2000.000", "1897.045", "-", "-", "64", "-", "-", "-"]
 
 
 def test_what_makes_no_sweep_is_refused() -> None:

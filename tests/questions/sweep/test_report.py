@@ -91,13 +91,6 @@ def test_of_groups_it_is_said_which_one_varies() -> None:
     assert shown(swept.report(), "group.drives.safe_nodes") == [2, 5]
 
 
-def test_each_figure_of_a_row_stands_in_the_document(answer: busplan.SweepAnswer) -> None:
-    rows = answer.to_dict()["rows"][:7]
-    report = answer.report(columns=COLUMNS, top=7)
-    for name in {*GRID, *COLUMNS}:
-        assert shown(report, name) == [row[name] for row in rows], name
-
-
 def test_a_row_that_does_not_fit_says_so_and_columns_are_the_registers(answer: busplan.SweepAnswer) -> None:
     report: Any = answer.report(columns=COLUMNS, sort_by="margin_us", top=36)
     *_, table = report.blocks
@@ -107,21 +100,3 @@ def test_a_row_that_does_not_fit_says_so_and_columns_are_the_registers(answer: b
         *((name, "") for name in COLUMNS[4:]),
     ]
     assert {(row.cells[-2].value, row.cells[-2].state) for row in table.rows} == {(False, "fails"), (True, "neutral")}
-
-
-def test_the_rows_of_the_answer_are_a_table_in_every_form_for_people() -> None:
-    named = busplan.load_profile("paper-4ms").model_copy(update={"name": "<b>p|q"})
-    answer = busplan.sweep(named, vary=GRID, timing_model="standard")
-    report = answer.report(columns=COLUMNS, sort_by="margin_us", ascending=True, top=2)
-    lines = render(report, "table").splitlines()
-    assert lines[0].startswith("<b>p|q: 18 points; ")
-    assert "2 of 18 rows, smallest margin_us first." in lines
-    assert lines[-2].split()[-3:-1] == ["no", "!"]
-    assert lines[-1] == "! fails."
-    text = render(report, "markdown")
-    assert text.startswith("### Sweep of `<b>p|q`\n")
-    assert [line.count(" | ") for line in text.splitlines() if line.startswith("| ")] == [8] * 4
-    assert "**no**" in text
-    page = render(report, "html")
-    assert '<data value="false"' in page
-    assert "<b>p" not in page

@@ -8,7 +8,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import busplan
@@ -107,28 +106,6 @@ def test_pandas_reads_the_figures_of_the_document(parquet: bytes) -> None:
     assert {kinds[name] for name in ("timing_model", "limited_by", "verdict", "bus.gap_count")} == {"category"}
     assert (kinds["margin_us"], kinds["max_nodes"], kinds["fits"]) == ("float64", "int64", "bool")
     assert (kinds["bus.nodes"], kinds["cycle.period_us"]) == ("int64", "float64")
-
-
-def test_polars_reads_the_figures_of_the_document(parquet: bytes) -> None:
-    polars = pytest.importorskip("polars")
-    frame = polars.read_parquet(BytesIO(parquet))
-    assert frame.to_dict(as_series=False) == expected()
-    # A count that only one timing model has is whole all the same.
-    assert frame.schema["safe_nodes"] == polars.Int64
-    assert frame.schema["verdict"] == polars.Categorical
-
-
-def test_both_read_the_floats_of_csv(tmp_path: Path) -> None:
-    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
-    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": np.linspace(100, 4000, 300)}, timing_model="standard")
-    text = saved(answer, tmp_path / "rows.csv")
-    frames = (
-        pandas.read_csv(BytesIO(text), engine="python"),
-        polars.read_csv(BytesIO(text), infer_schema_length=None),
-    )
-    for name in ("cycle.period_us", "margin_us", "utilisation", "nodes_eq11", "uncertainty_us"):
-        for frame in frames:
-            np.testing.assert_array_equal(frame[name].to_numpy(), answer[name], strict=True)
 
 
 def test_the_schema_says_what_the_rows_are_of(parquet: bytes) -> None:

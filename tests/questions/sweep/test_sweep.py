@@ -180,8 +180,8 @@ def test_a_machine_of_groups_has_numbers_of_the_largest_group_or_of_the_one_that
     profile = busplan.load_profile(name)
     by_name = {group.name: group for group in profile.group}
     largest = max(by_name.values(), key=lambda group: group.nodes * group.axes)
-    vary = {f"group.{profile.group[-1].name}.nodes": (1, 2), "cycle.period_us": (100, 500, 1000, 2000)}
-    for named in (None, *by_name):
+    vary = {f"group.{profile.group[-1].name}.nodes": (1, 2), "cycle.period_us": (500, 2000)}
+    for named in (None, profile.group[0].name):
         varied = by_name[named or largest.name]
         answer = busplan.sweep(profile, vary=vary, group=named)
         assert answer.to_dict()["group"] == varied.name

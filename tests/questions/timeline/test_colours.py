@@ -6,7 +6,7 @@ import pytest
 
 import busplan
 from busplan.buses import kind_named, kind_names
-from busplan.profile.sources import shipped_names
+from tests.registers import shipped_names
 
 TO_NODES, FROM_NODES = {"request", "out"}, {"response", "in"}
 

@@ -8,7 +8,6 @@ import pytest
 import busplan
 from busplan.forms import markdown, terminal
 from busplan.forms.blocks import Sentence, Table
-from busplan.forms.charts import Lane, Lanes
 from busplan.forms.numbers import sentence_text
 
 HOSTILE = '<b>$x_1$ & %%{init: {"theme":"dark"}}%%; ]]> "q" # end: </svg>機械'
@@ -36,14 +35,12 @@ def headline(one: busplan.TimelineAnswer) -> Sentence:
     return said
 
 
-def lanes(one: busplan.TimelineAnswer, number: int = 1) -> Lanes:
+def lanes(one: busplan.TimelineAnswer, number: int = 1) -> Any:
     """Lanes of the period (0) or of the window (1)."""
-    plot = one.drawing().panels[number].plot
-    assert isinstance(plot, Lanes)
-    return plot
+    return one.drawing().panels[number].plot
 
 
-def lane(one: busplan.TimelineAnswer, label: str, number: int = 0) -> Lane:
+def lane(one: busplan.TimelineAnswer, label: str, number: int = 0) -> Any:
     (found,) = (lane for lane in lanes(one, number).lanes if lane.label == label)
     return found
 
@@ -153,9 +150,10 @@ def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
     assert HOSTILE not in page
 
 
-@pytest.mark.parametrize("name", ["paper-4ms", "ethercat-servo-8"])
-def test_a_drawing_of_a_thousand_nodes_can_be_read(name: str) -> None:
-    many = busplan.timeline(busplan.load_profile(name, changes={"bus.nodes": 1000, "cycle.period_us": 1e6}))
+def test_a_drawing_of_a_thousand_nodes_can_be_read() -> None:
+    many = busplan.timeline(
+        busplan.load_profile("ethercat-servo-8", changes={"bus.nodes": 1000, "cycle.period_us": 1e6})
+    )
     bus, *shared = [each for each in lanes(many).lanes if each.label != "over"]
     assert sum(len(each.spans) for number in (0, 1) for each in lanes(many, number).lanes) < 1500
     assert "A bar is what takes most of a 400th of the scale." in many.html

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.errors import BusplanError
-from busplan.profile.sources import shipped_names
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import model_names, network_of
+from tests.registers import shipped_names
 
 Maker = Callable[..., busplan.Profile]
 Exact = Callable[[busplan.Profile, str, int], Fraction]
