@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import tomli_w
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.profile.document import decode
@@ -144,6 +144,7 @@ g = "tab	inside\u0022\U00000022"
     "c = {d = 1979-05-27 07:32:00 , e = 1979-05-27 }",
     "spaces and tabs around everything": "\t a\t=\t1 \t\n \t[ b ]\t\n\tc\t=\t[\t1\t,\t2\t]\t\n",
     "blank lines at both ends": "\n\n \n\t\na = 1\n\n \n",
+    "awkward": "\"'\" . a . '\"' = 1 # '\n[[ 'x' ]]\n[ x . y ]\nz = [ # ]\n{ a.b = [ ], c = '''''' } , ]",
     "deep nesting": "a = " + "[" * 90 + "{b = 1}" + "]" * 90,
 }
 
@@ -277,171 +278,3 @@ TREES = st.dictionaries(
 def test_places_of_dumped_data_are_those_of_the_data(tree: dict[str, Any], multiline: bool) -> None:
     text = tomli_w.dumps(tree, multiline_strings=multiline).replace("\r\n", "\n")
     check(text)
-
-
-# --- random documents, written as nobody would ------------------------------------------------------------
-
-Tree = dict[str, Any]
-"""A table by key: a str is a value as written, a list an array (of tables, if it holds tables), a dict a table."""
-
-RAW_VALUES = (
-    *("0", "+1_0", "0xf", "-1.5e3", "inf", "-nan", "true", "false"),
-    *("1979-05-27", "07:32:00.125", "1979-05-27 07:32:00", "1979-05-27 07:32:00.5+01:30", "1979-05-27T07:32:00Z"),
-    *('""', "''", '""""""', "''''''", '"#"', "'#'", '"\\u00e9\\"\\\\"', "'\\'", '"""\\\n  """', "'''\n'\n''\n'''"),
-    *('""""a"b""c"""""', "''''a'b''c'''''", '"""\\""""', '"]"', "'}'", "'''a = 1\n[b]\n# c'''", '"""\n[[x]]\n"""'),
-)
-
-
-def _escaped(text: str, keep: str) -> str:
-    return "".join(
-        character
-        if (character.isprintable() and character not in '"\\') or character in keep
-        else f"\\U{ord(character):08x}"
-        for character in text
-    )
-
-
-def _text_value(draw: st.DrawFn) -> str:
-    """Write random text in one of TOML's four ways."""
-    text = draw(AWKWARD)
-    way = draw(st.integers(0, 3))
-    if way == 1 and re.fullmatch(r"[^'\x00-\x08\x0a-\x1f\x7f]*", text):
-        return f"'{text}'"
-    if way == 2 and "'''" not in text and re.fullmatch(r"[^\x00-\x08\x0b-\x1f\x7f]*", text):
-        return f"'''{text}'''"
-    if way == 3:
-        # Quotes stay as they are where TOML lets them: no more than two in a row.
-        raw = _escaped(text, keep='"\n\t').replace('"""', '""\\"')
-        glue = draw(st.sampled_from(["", "\n", "\\\n \n  "]))
-        return f'"""{glue}{raw}"""'
-    return f'"{_escaped(text, keep="")}"'
-
-
-KEYS = st.one_of(
-    st.sampled_from(["a", "b", "c", "1", "-", "", "a.b", "é", '"', "'", "[x]", "#", "=", "\\", "\n"]), AWKWARD
-)
-
-
-def _key(draw: st.DrawFn, key: str) -> str:
-    """Write a key in one of its ways."""
-    way = draw(st.integers(0, 2))
-    if way == 0 and re.fullmatch("[A-Za-z0-9_-]+", key):
-        return key
-    if way == 1 and re.fullmatch(r"[^'\x00-\x08\x0a-\x1f\x7f]*", key):
-        return f"'{key}'"
-    return f'"{_escaped(key, keep="")}"'
-
-
-@st.composite
-def trees(draw: st.DrawFn, depth: int = 3) -> Tree:
-    tree: Tree = {}
-    for key in draw(st.lists(KEYS, max_size=4, unique=True)):
-        kind = draw(st.integers(0, 5 if depth else 1))
-        if kind <= 1:
-            tree[key] = _text_value(draw) if kind else draw(st.sampled_from(RAW_VALUES))
-        elif kind == 2:
-            tree[key] = draw(st.lists(st.sampled_from(RAW_VALUES), max_size=3))
-        elif kind == 3:
-            tree[key] = draw(st.lists(trees(depth - 1), max_size=3))
-        else:
-            tree[key] = draw(trees(depth - 1))
-    return tree
-
-
-class _Writer:
-    """Writes a tree, at every turn in one of the ways TOML allows."""
-
-    def __init__(self, draw: st.DrawFn) -> None:
-        self.draw = draw
-        self.lines: list[str] = []
-
-    def space(self) -> str:
-        return self.draw(st.sampled_from(["", " ", "\t "]))
-
-    def end(self) -> str:
-        return self.draw(st.sampled_from(["", " ", "# x = [1]", '\t# """', " # '", "\n", "\n  # ]"]))
-
-    def gap(self) -> str:
-        """What may stand between the elements of an array."""
-        return self.draw(st.sampled_from(["", " ", "\n", "# ], }\n", '\n # """\n\t']))
-
-    def value(self, value: object) -> str:
-        if isinstance(value, str):
-            return value
-        if isinstance(value, list):
-            inner = "".join(f"{self.gap()}{self.value(element)}{self.gap()}," for element in value)
-            trailing = self.draw(st.booleans())
-            return f"[{inner if trailing else inner[:-1]}{self.gap()}]"
-        assert isinstance(value, dict)
-        return "{" + ",".join(f"{self.space()}{pair}{self.space()}" for pair in self.pairs(value)) + "}"
-
-    def pairs(self, tree: Tree, prefix: str = "") -> Iterator[str]:
-        """Key = value of a whole tree, its tables inline or by dotted keys."""
-        for key, value in tree.items():
-            written = f"{prefix}{_key(self.draw, key)}"
-            if isinstance(value, dict) and value and self.draw(st.booleans()):
-                yield from self.pairs(value, f"{written}{self.space()}.{self.space()}")
-            else:
-                yield f"{written}{self.space()}={self.space()}{self.value(value)}"
-
-    def header(self, path: tuple[str, ...], brackets: tuple[str, str]) -> None:
-        dot = f"{self.space()}.{self.space()}"
-        keys = dot.join(_key(self.draw, key) for key in path)
-        self.lines.append(f"{brackets[0]}{self.space()}{keys}{self.space()}{brackets[1]}{self.end()}")
-
-    def table(self, tree: Tree, path: tuple[str, ...], brackets: tuple[str, str] | None) -> None:
-        """A table under its header (at the top, none), its sub-tables under theirs or inside."""
-        under_headers = {
-            key: value
-            for key, value in tree.items()
-            if (isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict)))
-            and self.draw(st.booleans())
-        }
-        own = {key: value for key, value in tree.items() if key not in under_headers}
-        first = brackets is None or brackets[0] == "[[" or self.draw(st.booleans())
-        # A header is needed for what would be empty, or has keys of its own.
-        needed = brackets is not None and (
-            bool(own) or not under_headers or brackets[0] == "[[" or self.draw(st.booleans())
-        )
-        if first:
-            self.body(own, path, brackets if needed else None)
-        for key, value in under_headers.items():
-            if isinstance(value, dict):
-                self.table(value, (*path, key), ("[", "]"))
-            else:
-                for element in value:
-                    self.table(element, (*path, key), ("[[", "]]"))
-        if not first:
-            self.body(own, path, brackets if needed else None)
-
-    def body(self, own: Tree, path: tuple[str, ...], brackets: tuple[str, str] | None) -> None:
-        if brackets is not None:
-            self.header(path, brackets)
-        self.lines.extend(f"{self.space()}{pair}{self.end()}" for pair in self.pairs(own))
-
-
-@st.composite
-def awkward_documents(draw: st.DrawFn) -> str:
-    writer = _Writer(draw)
-    writer.table(draw(trees()), (), None)
-    return "\n".join(writer.lines) + draw(st.sampled_from(["", "\n", "\n\n# x"]))
-
-
-@given(text=awkward_documents())
-@example(text="\"'\" . a . '\"' = 1 # '\n[[ 'x' ]]\n[ x . y ]\nz = [ # ]\n{ a.b = [ ], c = '''''' } , ]")
-def test_places_of_awkward_layouts_are_those_of_the_standard_library(text: str) -> None:
-    check(text)
-
-
-@given(text=awkward_documents())
-def test_line_ends_of_windows_move_no_place(text: str) -> None:
-    document = decode(text.replace("\n", "\r\n").encode(), name="f")
-    assert (document.places, document.comments) == (places(text), comments(text))
-
-
-@given(text=awkward_documents(), front=st.sampled_from(('# x = """\n', "\n", " \n\t")))
-def test_lines_in_front_move_every_place_by_their_length(text: str, front: str) -> None:
-    moved, moved_comments = places(front + text), comments(front + text)
-    assert {path: Place(*(at - len(front) for at in place)) for path, place in moved.items()} == places(text)
-    assert [at - len(front) for at in moved_comments if at >= len(front)] == comments(text)
-    assert [at for at in moved_comments if at < len(front)] == [at for at in (0,) if front[at] == "#"]

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
@@ -14,10 +13,10 @@ import busplan
 from busplan.errors import BusplanError
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import model_names, network_of
+from tests.oracles.ieee1394_cycle import exact_required_us
 from tests.registers import shipped_names
 
 Maker = Callable[..., busplan.Profile]
-Exact = Callable[[busplan.Profile, str, int], Fraction]
 MOST_REQUIRED_US = 1e6
 MOST_NODES = 1000
 """As many as a timeline shows."""
@@ -26,7 +25,7 @@ MODELS = ("paper", "standard")
 
 @given(data=st.data())
 def test_the_last_event_ends_at_the_closed_forms_required_time(
-    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile], exact: Exact
+    data: st.DataObject, any_profile: st.SearchStrategy[busplan.Profile]
 ) -> None:
     profile = data.draw(any_profile)
     network = network_of(profile)
@@ -38,7 +37,7 @@ def test_the_last_event_ends_at_the_closed_forms_required_time(
         assert plan.figures.required_us < MOST_REQUIRED_US
         assert abs(plan.used_us - plan.figures.required_us) <= 1e-9
         # The addition itself is better than that: a unit in the last place of the exact sum of rounded phases.
-        assert abs(plan.used_us - float(exact(profile, model, profile.node_groups[0].nodes))) <= 1e-9
+        assert abs(plan.used_us - float(exact_required_us(profile, model, profile.node_groups[0].nodes))) <= 1e-9
 
 
 @given(data=st.data())
