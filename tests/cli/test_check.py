@@ -114,15 +114,6 @@ def test_quiet_keeps_failures_and_nothing_else(busplan: Busplan, folder: Path) -
     assert "gone.toml: no such file" in run.stderr
 
 
-def test_verbose_names_what_is_fine_and_what_is_skipped(busplan: Busplan, folder: Path) -> None:
-    run = busplan("check", "p", "-v", cwd=folder)
-    assert run.stderr.splitlines() == [
-        "p/other.toml: skipped, claims no schema_version",
-        "p/clean.toml: ok",
-        "checked 3 profiles: 1 error, 1 warning",
-    ]
-
-
 def test_standard_input(busplan: Busplan, folder: Path) -> None:
     run = busplan("check", "-", cwd=folder, stdin=FAILS)
     assert (run.returncode, run.stdout[:15]) == (1, "<stdin>:11:1: B")
@@ -323,13 +314,6 @@ def test_a_renamed_profile_is_one_without_a_record_and_a_record_without_one(busp
     assert busplan("check", "p/new.toml", "--baseline", "b.json", cwd=folder).returncode == 0
 
 
-def test_a_broken_file_needs_no_record(busplan: Busplan, folder: Path) -> None:
-    busplan("check", "p", "--baseline", "b.json", "--update-baseline", cwd=folder)
-    (folder / "p" / "new.toml").write_text(BROKEN, encoding="utf-8")
-    run = busplan("check", "p", "gone.toml", "--baseline", "b.json", cwd=folder)
-    assert (run.returncode, "no record" in run.stderr) == (2, False)
-
-
 MESSAGES = """\
 schema_version = 1
 name = "car"
@@ -423,19 +407,6 @@ def test_completion_of_names_codes_and_values(busplan: Busplan, tmp_path: Path) 
     assert completed("busplan check --fail-on ") == ["error", "warning"]
     # Nothing of ours: the shell goes on to files.
     assert completed("busplan check ./pro") == []
-
-
-@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
-def test_completion_in_a_real_bash(run: Busplan, program: Path, tmp_path: Path) -> None:
-    script = f"""
-        eval "$(_BUSPLAN_COMPLETE=source_bash {program})"  # --show-completion guesses the shell by its processes
-        busplan() {{ {program} "$@"; }}
-        COMP_WORDS=(busplan rule BP30) COMP_CWORD=2
-        _busplan_completion "{program}"
-        echo "${{COMPREPLY[@]}}"
-    """
-    done = run(program=("bash", "-c", script), cwd=tmp_path)
-    assert done.stdout == "BP301\n", done.stderr
 
 
 # What others run

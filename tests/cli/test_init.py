@@ -202,18 +202,6 @@ def test_init_starts_from_the_shipped_profile_that_is_asked_for(run: Run, tmp_pa
     assert "assumption" in text
 
 
-@pytest.mark.parametrize("shipped", ["paper-4ms", "paper-dma"])
-def test_the_gate_says_of_a_new_profile_what_it_was_told_not_to_say_of_the_shipped_one(
-    run: Run, tmp_path: Path, shipped: str
-) -> None:
-    run("init", "--from", shipped, cwd=tmp_path)
-    text = (tmp_path / "my-machine.toml").read_text(encoding="utf-8")
-    assert "busplan: ignore" not in text
-    assert text.count("#") >= 5
-    assert "BP110" in run("check", "my-machine.toml", "--no-circle", cwd=tmp_path).stdout
-    assert "BP110" not in run("check", shipped, "--no-circle").stdout
-
-
 def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: Path) -> None:
     target = tmp_path / "mine.toml"
     target.write_bytes(b"old")

@@ -6,62 +6,40 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.buses.published import published
-from busplan.errors import BusplanError
-from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, Measurement, parse_measurements
-from busplan.profile.sources import locate_measurements
+import busplan
+from busplan import BusplanError
 
 EXPECTED = "expected payload_bytes,latency_us and, where known, transaction"
 
 
-def refusals(text: str | bytes) -> list[str]:
+@pytest.fixture(autouse=True)
+def _work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def calibrated(content: str | bytes) -> busplan.CalibrateAnswer:
+    Path("m.csv").write_bytes(content.encode() if isinstance(content, str) else content)
+    return busplan.calibrate("paper-two-node", "m.csv")
+
+
+def refusals(content: str | bytes) -> list[str]:
     with pytest.raises(BusplanError) as raised:
-        parse_measurements(text.encode() if isinstance(text, str) else text, name="m.csv")
+        calibrated(content)
     return list(raised.value.problems)
-
-
-def test_the_shipped_example_is_table_1() -> None:
-    path, name, shipped = locate_measurements("table-1.csv")
-    found = parse_measurements(path.read_bytes(), name=name)
-    assert (name, shipped) == ("table-1.csv", True)
-    _, _, latencies, *_ = (table["rows"] for table in published("paper")["evidence"])
-    assert [one.latency_us for one in found] == [row["published"] for row in latencies]
-    assert {f"{one.payload_bytes} bytes" for one in found} == {row["quantity"] for row in latencies}
-    assert {one.transaction for one in found} == {"write"}
 
 
 def test_columns_in_any_order_comments_blank_lines_quotes_space_and_any_line_end() -> None:
     header = '\ufeff# bench 3\r\n\r\n"latency_us", transaction ,payload_bytes # as logged\r\n'
-    text = f'{header} 5e1 ,READ,"4"\n\r\n.5,write, 16#\n'
-    assert parse_measurements(text.encode(), name="m.csv") == (
-        Measurement(4, "read", 4, 50.0),
-        Measurement(6, "write", 16, 0.5),
-    )
-
-
-measurements = st.builds(
-    Measurement,
-    line=st.just(0),
-    transaction=st.sampled_from(["read", "write"]),
-    payload_bytes=st.integers(1, 10**6),
-    latency_us=st.floats(1e-6, 1e9),
-)
-
-
-@given(st.lists(measurements, min_size=1, max_size=5))
-def test_what_is_written_is_read(rows: list[Measurement]) -> None:
-    lines = [",".join(map(str, row[1:])) for row in rows]
-    text = "\n".join(["transaction,payload_bytes,latency_us", *lines])
-    found = parse_measurements(text.encode(), name="m.csv")
-    assert [one._replace(line=0) for one in found] == rows
-    assert [one.line for one in found] == list(range(2, len(rows) + 2))
+    text = f'{header} 5e1 ,READ,"4"\n\r\n.8e2,write, 16#\n'
+    plain = busplan.calibrate("paper-two-node", [(4, 50.0, "read"), (16, 80.0, "write")], source="m.csv")
+    assert calibrated(text).edits == plain.edits
 
 
 @given(st.one_of(st.binary(max_size=60), st.text('payload_bytes,latency_us\n4.-e#";\t', max_size=60).map(str.encode)))
 def test_no_bytes_lead_to_a_traceback(content: bytes) -> None:
     for text in (content, b"payload_bytes,latency_us\n" + content):
         try:
-            assert parse_measurements(text, name="m.csv")
+            assert calibrated(text).edits
         except BusplanError as error:
             assert all(problem.startswith("m.csv:") for problem in error.problems)  # noqa: PT017
 
@@ -127,15 +105,12 @@ def test_very_many_problems_are_counted() -> None:
 
 def test_no_text_and_too_much_of_it() -> None:
     assert refusals(b"payload_bytes,latency_us\n4,\xff\n")[0].startswith("m.csv:2:3: not a text file: byte 0xff")
-    assert "larger than 20,000,000 bytes" in refusals(b"#" * (MAX_MEASUREMENTS_BYTES + 1))[0]
+    assert "larger than 20,000,000 bytes" in refusals(b"#" * 20_000_001)[0]
 
 
-def test_a_file_of_ones_own_is_never_taken_for_the_example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert locate_measurements("table-1.csv").shipped
-    (tmp_path / "table-1.csv").write_text("payload_bytes,latency_us\n4,50\n")
-    assert not locate_measurements("table-1.csv").shipped
-    with pytest.raises(
-        BusplanError, match=r"no such file, and no shipped example of that name; shipped is table-1\.csv"
-    ):
-        locate_measurements("table-2.csv")
+def test_a_file_of_ones_own_is_never_taken_for_the_example() -> None:
+    assert " of 8 measurements at " in str(busplan.calibrate("paper-two-node", "table-1.csv"))
+    Path("table-1.csv").write_text("payload_bytes,latency_us\n4,50\n")
+    assert " of 1 measurement at " in str(busplan.calibrate("paper-two-node", "table-1.csv"))
+    with pytest.raises(BusplanError, match=r"no such file, and no shipped example of that name; shipped is table-1"):
+        busplan.calibrate("paper-two-node", "table-2.csv")

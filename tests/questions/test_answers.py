@@ -1,7 +1,6 @@
 """What every answer can do: it is frozen, shows itself, and can be pickled."""
 
 import pickle
-import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -128,25 +127,3 @@ def test_circles_of_a_map_run_on_any_executor_and_are_counted() -> None:
         found = busplan.map_("paper-4ms", **along, executor=executor, progress=lambda *parts: done.append(parts))
     assert found == busplan.map_("paper-4ms", **along)
     assert done[-1] == (4, 4)
-
-
-def test_a_note_stands_behind_the_title_of_a_picture() -> None:
-    for found in (busplan.map_("paper-4ms", y={"cycle.period_us": [500]}), busplan.compare("paper-4ms", buses="can")):
-        title = found.svg().split("</title>", maxsplit=1)[0]
-        assert found.svg(note="With a note.").startswith(f"{title} With a note.</title>")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"x": ["bus.nodes"]}, "x ['bus.nodes']: expected one key and its values"),
-        ({"y": {"bus.nodes": [1], "node.axes": [1]}}, "expected one key and its values"),
-        ({"x": {"bus.nodes": 3}}, "x bus.nodes 3: expected several values"),
-        ({"x": {"bus.nodes": "1:x"}}, "x bus.nodes=1:x: 'x' is not a number"),
-        ({"x": {"bus.nodes": range(1, 90)}}, "x bus.nodes: 89 values; a map shows up to 64 of a key"),
-        ({"x": {"circle.radius_mm": [9]}}, "add circle to run circle tests"),
-    ],
-)
-def test_a_map_of_nonsense_is_refused(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(busplan.BusplanError, match=re.escape(message)):
-        busplan.map_("paper-4ms", **arguments)

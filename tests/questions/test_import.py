@@ -6,23 +6,12 @@ import sys
 from functools import cache
 from importlib import import_module
 
-import pytest
-
 import busplan
 
 HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "resvg_py", "scipy", "tomllib", "tomli_w", "json"}
 FUNCTIONS = tuple(name for name in busplan.__all__ if name.islower() and not name.startswith("__"))
 WITH_NUMPY = ("evidence", "sweep", "map_", "report")
 WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)
-
-
-CAPACITY = """\
-sys.argv = ['busplan', 'capacity', 'paper-4ms']
-from busplan.__main__ import main
-try:
-    main()
-except SystemExit:
-    pass"""
 
 
 @cache
@@ -99,13 +88,6 @@ def test_all_names_are_there_and_listed() -> None:
         )
 
 
-def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="module 'busplan' has no attribute 'nope'"):
-        _ = busplan.nope  # type: ignore[attr-defined]
-    with pytest.raises(ImportError):
-        from busplan import nope  # type: ignore[attr-defined] # noqa: F401, PLC0415
-
-
 def test_functions_stay_functions_whatever_submodules_are_loaded() -> None:
     names = [name for _, name, _ in pkgutil.walk_packages(busplan.__path__, "busplan.") if "__main__" not in name]
     # A submodule of that name would take its place as soon as it is imported.
@@ -113,17 +95,3 @@ def test_functions_stay_functions_whatever_submodules_are_loaded() -> None:
     for name in names:
         import_module(name)
     assert all(callable(getattr(busplan, name)) for name in FUNCTIONS)
-
-
-def test_a_star_import_gives_every_name() -> None:
-    given: dict[str, object] = {}
-    exec("from busplan import *", given)
-    assert {name: given.get(name) for name in busplan.__all__} == {
-        name: getattr(busplan, name) for name in busplan.__all__
-    }
-
-
-def test_capacity_alone_does_not_load_what_moves_the_margin() -> None:
-    found = loaded(CAPACITY)
-    assert not {name for name in found if "sensitivity" in name or "bottleneck" in name or name == "xml.etree"}
-    assert "xml.etree" not in loaded("import busplan; busplan.capacity('paper-4ms').to_dict()")

@@ -51,22 +51,6 @@ def texts(test: busplan.CircleTestAnswer) -> list[str]:
     return [sentence_text(words) for words in blocks(test, Sentence)]
 
 
-@pytest.mark.parametrize("form", ["table", "markdown", "html"])
-def test_each_period_has_a_column(form: str, values_in: ValuesIn) -> None:
-    test = circle_of(*SMALL.items(), periods_us=(4000.0, 2000.0, 100.0))
-    table = blocks(test, Table)[0]
-    assert [column.heading for column in table.columns] == ["figure", "eq", "unit", "4 ms", "2 ms", "100 us"]
-    rows = {str(row.cells[0]): row.cells for row in table.rows}
-    for cells in rows.values():
-        shown = [cell for cell in cells if isinstance(cell, ShownValue)]
-        assert [cell.value for cell in shown] == [getattr(result, shown[0].key) for result in test.results]
-    assert [figure_text(cell) for cell in rows["passed"] if isinstance(cell, ShownValue)] == ["yes", "yes", "no"]
-    # What was not simulated is a dash; only what fails is set apart.
-    assert [figure_text(cell) for cell in rows["circular deviation G"] if isinstance(cell, ShownValue)][2] == "-"
-    assert [value for value in values_in(table) if value.state == "fails"] == [rows["passed"][-1]]
-    assert "nan" not in render(test.report(), form).lower()  # type: ignore[arg-type]
-
-
 # --- sentences --------------------------------------------------------------------------------------------------
 
 
@@ -200,13 +184,6 @@ def test_sources_that_take_nothing_have_no_bar() -> None:
     _, table = blocks(replace(small(), results=(result._replace(contributions=nothing),)), Table)
     assert table.rows
     assert not [cell for row in table.rows for cell in row.cells if isinstance(cell, Bar)]
-
-
-def test_sources_stand_only_where_they_were_asked_for() -> None:
-    test = circle_of(*TIGHT.items(), ranked=False)
-    assert test.results[0].contributions
-    assert len(blocks(test, Table)) == 1
-    assert "contributions" not in test.to_dict()["results"][0]
 
 
 # --- drawing ----------------------------------------------------------------------------------------------------

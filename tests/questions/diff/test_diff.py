@@ -1,6 +1,5 @@
 """Two profiles side by side: which keys differ, which way each figure goes, and what of it is a regression."""
 
-import tomllib
 from collections.abc import Callable
 from math import nextafter
 from typing import Any
@@ -10,9 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.profile.kinds import dotted_keys
-from busplan.profile.sources import load
-from tests.registers import shipped_names
 
 Make = Callable[..., busplan.Profile]
 
@@ -51,33 +47,6 @@ def test_each_figure_has_its_direction(make: Make) -> None:
 
 
 # --- keys -------------------------------------------------------------------------------------------------
-
-
-def leaves(data: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for key, value in data.items():
-        if isinstance(value, dict):
-            found |= leaves(value, f"{prefix}{key}.")
-        elif key in ("group", "message"):
-            found[key] = [one["name"] for one in value]
-            for one in value:
-                found |= leaves(
-                    {inner: each for inner, each in one.items() if inner != "name"}, f"{key}.{one['name']}."
-                )
-        else:
-            found[f"{prefix}{key}"] = value
-    return found
-
-
-@pytest.mark.parametrize("name", shipped_names())
-def test_what_stands_in_the_file_is_what_toml_reads_there(name: str) -> None:
-    loaded = load(name)
-    written = leaves(tomllib.loads(loaded.document.text))
-    keys = dotted_keys(loaded.profile)
-    assert {key for key, one in keys.items() if one.source == "file"} == set(written)
-    for key, value in written.items():
-        found = keys[key].value
-        assert (list(found) if isinstance(found, tuple) else found) == value
 
 
 def test_a_value_that_is_the_default_is_no_difference(make: Make) -> None:

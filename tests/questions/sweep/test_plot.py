@@ -60,6 +60,7 @@ def test_a_curve_has_a_gap_and_a_map_a_blank_where_a_value_is_missing() -> None:
     answer = busplan.sweep("paper-4ms", vary=TOO_FAST_AND_NOT, circle=True, timing_model="standard")
     (curve,) = curves(answer.drawing(figure="max_contour_error_mm")).curves
     assert [y is None for _, y in curve.points] == [True, False, False]
+    assert ' d="L' not in answer.svg(figure="max_contour_error_mm")
     both = {**TOO_FAST_AND_NOT, "circle.radius_mm": [10.0, 20.0]}
     drawing = busplan.sweep("paper-4ms", vary=both, circle=True, timing_model="standard").drawing(
         figure="max_contour_error_mm"
