@@ -1,7 +1,10 @@
 """Numbers and equations with their sources, numbers with a grade of certainty, and inputs of a derivation."""
 
 import re
-from collections.abc import Callable, Mapping
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from importlib.resources import files
+from math import nan
 from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple, Self, TypeVar
 
@@ -31,6 +34,8 @@ class Sourced(float):
         What the number is, in one line.
     symbol
         Symbol in formulas; without it, formulas show the value.
+    name
+        Name among the constants of its kind of bus; without it, the meaning.
 
     Examples
     --------
@@ -49,9 +54,10 @@ class Sourced(float):
     meaning: str
     symbol: str
     name: str
-    """Name among the constants of its module; `meaning` until `constants` is called."""
 
-    def __new__(cls, value: float, *, unit: str, grade: Grade, source: str, meaning: str, symbol: str = "") -> Self:
+    def __new__(
+        cls, value: float, *, unit: str, grade: Grade, source: str, meaning: str, symbol: str = "", name: str = ""
+    ) -> Self:
         """Make the number; see the class."""
         number = super().__new__(cls, value)
         number.unit = unit
@@ -59,13 +65,61 @@ class Sourced(float):
         number.source = source
         number.meaning = meaning
         number.symbol = symbol
-        number.name = meaning
+        number.name = name or meaning
         return number
 
     def __getnewargs_ex__(self) -> tuple[tuple[float], dict[str, str]]:
         # Pickle and copy make the number as any caller must, and then set its slots.
         words = {"unit": self.unit, "grade": self.grade, "source": self.source, "meaning": self.meaning}
         return (float(self),), words
+
+
+def read_toml(package: str, name: str) -> dict[str, Any]:
+    """Read a TOML file that lies in a package."""
+    return tomllib.loads((files(package) / name).read_text(encoding="utf-8"))
+
+
+class Constants(dict[str, Sourced]):
+    """Sourced constants of a kind of bus by name, in the order of their TOML files.
+
+    A table `[NAME]` has the value and the words of one constant, `[NAME.KEY]` one of several by key; it is called
+    NAME[KEY]. A table in small letters is a group. What stands in a group, or in `[NAME]` beside keys, holds for
+    all of it. Python computes what has no value.
+
+    Parameters
+    ----------
+    package
+        The package that the files lie in.
+    names
+        Names of the files.
+    """
+
+    def __init__(self, package: str, *names: str) -> None:
+        for file in names or ("constants.toml",):
+            for name, words in _entries("", read_toml(package, file)):
+                self[name] = Sourced(**{"value": nan, **words}, name=name)
+
+    def computed(self, name: str, value: float, **words: Any) -> Sourced:
+        """Give the value of a constant that is computed, and words that are not in the file."""
+        number = self[name]
+        file_words = {key: getattr(number, key) for key in ("unit", "grade", "source", "meaning", "symbol")}
+        self[name] = Sourced(value, **{**file_words, **words}, name=name)
+        return self[name]
+
+    def by_key(self, name: str) -> Mapping[str, Sourced]:
+        """Constants of one name by key."""
+        start = f"{name}["
+        return MappingProxyType({key[len(start) : -1]: number for key, number in self.items() if key.startswith(start)})
+
+
+def _entries(name: str, table: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and words of each constant in a table."""
+    words = {key: value for key, value in table.items() if not isinstance(value, dict)}
+    tables = {key: value for key, value in table.items() if key not in words}
+    if not tables:
+        yield name, words
+    for key, entry in tables.items():
+        yield from _entries(f"{name}[{key}]" if name.isupper() else key, {**words, **entry})
 
 
 def constants(namespace: Mapping[str, object]) -> Mapping[str, Sourced]:
