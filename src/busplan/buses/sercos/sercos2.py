@@ -65,10 +65,6 @@ _STEP_US: Final = 1000
 _LONGEST_US: Final = 65_000
 PERIODS: Final = Periods((62.5, 125.0, 250.0, 500.0, *map(float, range(_STEP_US, _LONGEST_US + 1, _STEP_US))))
 """Communication periods: sercos.com, cycle times; the longest by Rexroth."""
-PERIODS_SOURCE: Final = (
-    "62.5, 125, 250 and 500 us, and multiples of 1 ms (sercos.com), up to 65 ms (Rexroth); a drive may know fewer, as "
-    "0.5, 1, 2, ... 8 ms (Kollmorgen)"
-)
 
 CONSTANTS: Final = {**sercos.CONSTANTS, **constants(globals())}
 

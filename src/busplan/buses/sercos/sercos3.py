@@ -85,7 +85,6 @@ _STEP_US: Final = 250
 _LONGEST_US: Final = 65_000
 PERIODS: Final = Periods((31.25, 62.5, 125.0, *map(float, range(_STEP_US, _LONGEST_US + 1, _STEP_US))))
 """Communication periods, CSMD_TSCYC of CoSeMa."""
-PERIODS_SOURCE: Final = f"31.25, 62.5 and 125 us, and multiples of 250 us up to 65 ms ({_COSEMA})"
 
 CONSTANTS: Final = {**sercos.CONSTANTS, **constants(globals())}
 

@@ -9,8 +9,9 @@ from typing import Final, TypeAlias
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusLatency
 from busplan.buses.figure import Figure
-from busplan.buses.limits import Key, Starter
+from busplan.buses.limits import Key, Starter, unknown_period
 from busplan.buses.network import Network
+from busplan.buses.rule import read_rules
 from busplan.elementwise import Number, larger, plain, rounded_up, total
 from busplan.sourced import Sourced, constants
 
@@ -30,6 +31,10 @@ PIPELINE_CYCLES: Final = Sourced(
 )
 
 CONSTANTS: Final = constants(globals())
+RULES: Final = {
+    rule.code: rule for rule in read_rules("busplan.buses.sercos", {"BP141": unknown_period, "BP151": unknown_period})
+}
+"""Rules of both kinds, by code."""
 MOST_PIPELINE: Final = 1000
 """Most cycles of a pipeline that a profile takes."""
 
