@@ -105,10 +105,9 @@ class Constants(dict[str, Sourced]):
             for name, words in _entries("", read_toml(package, file)):
                 self[name] = Sourced(**{"value": nan, **words}, name=name)
 
-    def computed(self, name: str, value: float, **words: Any) -> Sourced:
-        """Give the value of a constant that is computed, and words that are not in the file."""
-        known = {slot: getattr(self[name], slot) for slot in Sourced.__slots__}
-        number = self[name] = Sourced(value, **{**known, **words})
+    def computed(self, name: str, value: float) -> Sourced:
+        """Give a constant the value that its file leaves to Python."""
+        number = self[name] = Sourced(value, **{slot: getattr(self[name], slot) for slot in Sourced.__slots__})
         return number
 
     def by_key(self, name: str) -> Mapping[str, Sourced]:
