@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Callable
-from math import sqrt
+from math import isfinite, sqrt
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
@@ -440,8 +440,8 @@ def test_published_figures_are_met_within_what_their_sources_leave_open() -> Non
     assert all((result[name, "vendors model"] or 0) < 0 for name in ("1000 digital I/O", "1486 bytes"))
 
 
-def test_constants_have_a_source_and_a_grade() -> None:
-    assert all(constant.source and constant.grade for constant in CONSTANTS.values())
+def test_constants_have_a_value_a_source_and_a_grade() -> None:
+    assert all(isfinite(constant) and constant.source and constant.grade for constant in CONSTANTS.values())
 
 
 @pytest.mark.parametrize("figure", ["required_us", "command_us", "frames", "latency.end_to_end_us"])
