@@ -91,7 +91,13 @@ class Constants(dict[str, Sourced]):
     package
         The package that the files lie in.
     names
-        Names of the files.
+        Names of the files; `constants.toml` without any.
+
+    Examples
+    --------
+    >>> paper = Constants("busplan.buses.ieee1394")
+    >>> paper["MAX_HOPS"], paper["MAX_HOPS"].source, paper.by_key("DATA_RATE_MBIT_S")["S100"].name
+    (16.0, 'paper, section I; IEEE project page', 'DATA_RATE_MBIT_S[S100]')
     """
 
     def __init__(self, package: str, *names: str) -> None:
@@ -101,10 +107,9 @@ class Constants(dict[str, Sourced]):
 
     def computed(self, name: str, value: float, **words: Any) -> Sourced:
         """Give the value of a constant that is computed, and words that are not in the file."""
-        number = self[name]
-        file_words = {key: getattr(number, key) for key in ("unit", "grade", "source", "meaning", "symbol")}
-        self[name] = Sourced(value, **{**file_words, **words}, name=name)
-        return self[name]
+        known = {slot: getattr(self[name], slot) for slot in Sourced.__slots__}
+        number = self[name] = Sourced(value, **{**known, **words})
+        return number
 
     def by_key(self, name: str) -> Mapping[str, Sourced]:
         """Constants of one name by key."""
