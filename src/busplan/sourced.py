@@ -126,25 +126,6 @@ def _entries(name: str, table: Mapping[str, Any]) -> Iterator[tuple[str, dict[st
         yield from _entries(f"{name}[{key}]" if name.isupper() else key, {**words, **entry})
 
 
-def constants(namespace: Mapping[str, object]) -> Mapping[str, Sourced]:
-    """List the sourced numbers of a module by name, and set their `name`.
-
-    Parameters
-    ----------
-    namespace
-        The module's `globals()`: sourced numbers, and mappings of them.
-    """
-    numbers: dict[str, Sourced] = {}
-    for name, value in namespace.items():
-        if isinstance(value, Sourced):
-            numbers[name] = value
-        elif isinstance(value, MappingProxyType):
-            numbers |= {f"{name}[{key}]": number for key, number in value.items() if isinstance(number, Sourced)}
-    for name, number in numbers.items():
-        number.name = name
-    return MappingProxyType(numbers)
-
-
 class Input(NamedTuple):
     """An input of a derivation.
 
