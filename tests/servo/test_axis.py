@@ -1,7 +1,6 @@
 """One axis: every element of the kernel against what it must do."""
 
 import math
-import tracemalloc
 import warnings
 from collections.abc import Iterator
 from typing import Any, Literal
@@ -199,22 +198,6 @@ def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch, loop: str) -> None:
     assert len(told) == math.ceil(300 / 7)
     assert told == sorted(told)
     assert told[-1] == (len(whole), len(whole)) == (3000, 3000)
-
-
-def test_memory_grows_by_no_more_than_16_bytes_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(axis_module, "_CHUNK_STEPS", {False: 1000, True: 1000})
-
-    def peak(cycles: int) -> int:
-        setpoints = ramp(10.0, cycles=cycles)
-        tracemalloc.start()
-        simulate_axis(setpoints, axis=an_axis(), timing=TIMING)
-        _, highest = tracemalloc.get_traced_memory()
-        tracemalloc.stop()
-        return highest
-
-    peak(100)
-    short, long = peak(2000), peak(6000)
-    assert (long - short) / (4000 * TIMING.steps_per_period) <= 16
 
 
 # --- bad input ---------------------------------------------------------------------------------------------

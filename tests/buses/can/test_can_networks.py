@@ -229,18 +229,3 @@ def test_a_plan_raises_the_data_bit_rate_of_fd_alone() -> None:
     assert recommended.changes == {"bus.data_bit_rate_kbit_s": 2000}
     with pytest.raises(busplan.BusplanError, match="data_bit_rate"):
         busplan.plan(profile(), free=["data_bit_rate"])
-
-
-def test_every_question_takes_an_fd_machine(run: Run, tmp_path: Path) -> None:
-    own = profile(
-        message("long", 0x580, fd=True, payload_bytes=48), bus=FD, payload={"read_bytes": 20, "write_bytes": 8}
-    )
-    (tmp_path / "arm.toml").write_text(text_of(own), encoding="utf-8")
-    for command in ("capacity", "latency", "timeline", "map", "plan", "compare", "check"):
-        assert run(command, "arm.toml", cwd=tmp_path).returncode in (0, 1), command
-    said = run("latency", "arm.toml", cwd=tmp_path).stdout
-    assert "1000 kbit/s, 5000 kbit/s of data" in said
-    other = profile(message("long", 0x580, payload_bytes=8), payload={"read_bytes": 20, "write_bytes": 8})
-    (tmp_path / "old.toml").write_text(text_of(other), encoding="utf-8")
-    said = run("diff", "old.toml", "arm.toml", cwd=tmp_path).stdout
-    assert "bus.data_bit_rate_kbit_s" in said

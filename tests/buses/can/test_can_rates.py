@@ -1,16 +1,12 @@
 """PDOs with every n-th SYNC: the fullest cycle decides, the load is that of the mean cycle."""
 
-from collections.abc import Callable
 from math import lcm
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 import busplan
-from tests.buses.can.machines import WORST, figures, loaded, responses, terms, text_of
-
-Run = Callable[..., Any]
+from tests.buses.can.machines import WORST, figures, loaded, responses, terms
 
 
 def group(name: str, nodes: int, *, size: int = 8, axes: int = 1, **keys: Any) -> dict[str, Any]:
@@ -148,20 +144,6 @@ def test_the_circle_needs_a_set_point_in_every_cycle() -> None:
     own = busplan.load_profile(mixed(), changes={"group.drives.every": 2})
     with pytest.raises(busplan.BusplanError, match=r"group\.drives\.every = 2: the circle test has a set-point in"):
         busplan.circle_test(own)
-
-
-def test_every_question_takes_a_machine_of_two_rates(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "arm.toml").write_text(text_of(mixed()), encoding="utf-8")
-    (tmp_path / "old.toml").write_text(text_of(mixed(every=1)), encoding="utf-8")
-    for command in ("capacity", "latency", "timeline", "map", "plan", "compare", "check"):
-        assert run(command, "arm.toml", cwd=tmp_path).returncode in (0, 1), command
-    assert "% with all PDOs in every cycle" in run("capacity", "arm.toml", cwd=tmp_path).stdout
-    assert "1000 kbit/s, PDOs of io every 4 cycles" in run("timeline", "arm.toml", cwd=tmp_path).stdout
-    assert "group.io.every" in run("diff", "old.toml", "arm.toml", cwd=tmp_path).stdout
-    assert "/ every,io" in run("explain", "arm.toml", "bus_load", cwd=tmp_path).stdout
-    said = run("sweep", "arm.toml", "--vary", "group.io.every=1,2,4", "--vary", "group.io.nodes=2,6", cwd=tmp_path)
-    assert said.returncode == 0
-    assert run("sweep", "arm.toml", "--vary", "group.io.every=1,241", cwd=tmp_path).returncode == 2
 
 
 def test_rates_of_groups_go_along_where_the_other_kind_has_them() -> None:

@@ -176,14 +176,6 @@ def test_a_command_applied_on_arrival_costs_each_node_its_own_time(small: buspla
     assert (only(changed(turned, {"bus.nodes": 1})).circular_deviation_mm or 1.0) < 50e-6
 
 
-def test_more_nodes_on_the_bus_cost_a_host_that_updates_on_arrival_its_margin(small: busplan.Profile) -> None:
-    host = changed(small, {"servo.loop": "host", "servo.update": "on_arrival"})
-    few, many = (only(changed(host, {"bus.nodes": nodes})).phase_margin_deg for nodes in (1, 5))
-    assert few is not None
-    assert many is not None
-    assert many < few
-
-
 def test_matched_axes_do_not_see_a_delay_outside_the_loop(small: busplan.Profile) -> None:
     # A skew of the two axes does show; the same skew of both would not.
     small = changed(small, {"circle.path": "iso230-4"})
@@ -326,13 +318,6 @@ def test_all_periods_are_checked_before_the_first_is_simulated(
             changed(small, changes), period_us=[4000.0, 2000.0], progress=lambda done, _total: simulated.append(done)
         )
     assert simulated == []
-
-
-def test_the_seed_decides_what_is_lost(small: busplan.Profile) -> None:
-    lossy = changed(small, {"delivery.loss_probability": 0.05})
-    first, again, second = (only(changed(lossy, {"delivery.seed": seed})) for seed in (1, 1, 2))
-    assert first == again
-    assert first.max_contour_error_mm != second.max_contour_error_mm
 
 
 def test_progress_never_runs_back_and_ends_at_its_total(small: busplan.Profile) -> None:
@@ -542,14 +527,6 @@ def test_a_long_test_says_what_it_costs_before_it_runs(
     # 628,339 set-points, 40 steps each, both axes; the same without each of two sources.
     assert message.startswith("circle test: 150,801,360 steps, about ")
     assert message.endswith(("GB", "GB, in plain Python"))
-
-
-def test_the_step_is_the_longest_that_divides_the_period(small: busplan.Profile) -> None:
-    # Drives run their loops in step with the bus; 14 steps of 2000 us are no whole nanoseconds, 16 are.
-    for step_us, taken_us in ((3000, 2000), (1500, 1000), (150, 125), (100, 100)):
-        result = only(changed(small, {"servo.step_us": step_us}))
-        assert result.step_us == taken_us
-        assert result.steps == result.setpoints * 2000 / taken_us
 
 
 def test_a_failure_without_a_value_is_null_and_says_why() -> None:

@@ -286,14 +286,6 @@ def test_what_no_tolerance_judges_and_what_cannot_be_simulated_is_said() -> None
     assert [cell.circle_passed is None for cell in judged.cells] == [False, True]
 
 
-def test_a_step_that_does_not_divide_a_period_is_the_longest_that_does() -> None:
-    y = {PERIOD: (4000, 4001)}
-    answer = busplan.map_(SMALL, x={"bus.nodes": (2,)}, y=y, circle=True)
-    changes = {"bus.nodes": 2, PERIOD: 4001}
-    (result,) = busplan.circle_test(busplan.load_profile(SMALL, changes=changes)).results
-    assert [cell.circle_passed for cell in answer.cells] == [True, result.passed]
-
-
 def test_too_many_circles_are_refused_before_any_is_run() -> None:
     y = {PERIOD: range(8000, 14400, 100)}
     with pytest.raises(busplan.BusplanError, match="1,024 settings fit, and a map runs up to 1,000 circle tests"):

@@ -71,15 +71,6 @@ def test_a_sweep_is_the_same_on_every_executor() -> None:
     assert shuffled.order != sorted(shuffled.order)
 
 
-def test_progress_counts_the_tests() -> None:
-    done: list[tuple[int, int]] = []
-    busplan.sweep("paper-1ms", vary=SMALL, circle=True, progress=lambda *counts: done.append(counts))
-    assert done == [(number, 12) for number in range(1, 13)]
-    done.clear()
-    busplan.sweep("paper-1ms", vary={"bus.nodes": range(1, 9)}, progress=lambda *counts: done.append(counts))
-    assert done == [(8, 8)]
-
-
 @pytest.mark.parametrize(("beside", "place"), [({}, ""), ({"bus.nodes": [1, 2]}, "at bus.nodes = 1: ")])
 def test_the_first_point_that_cannot_be_run_is_named_before_any_is(beside: dict[str, Any], place: str) -> None:
     executor = Shuffled(1)
@@ -89,13 +80,6 @@ def test_the_first_point_that_cannot_be_run_is_named_before_any_is(beside: dict[
     # The key that is refused is named once.
     assert str(caught.value).startswith(f"{place}circle.feed_mm_per_min = 500000.0: axis x reaches ")
     assert not executor.order
-
-
-def test_a_step_that_does_not_divide_a_period_is_the_longest_that_does() -> None:
-    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": [4000, 4001]}, timing_model="standard", circle=True)
-    for period_us, error_mm in zip((4000, 4001), answer["mean_contour_error_mm"], strict=True):
-        changed = busplan.load_profile("paper-4ms", changes={"cycle.period_us": period_us})
-        assert error_mm == busplan.circle_test(changed).results[0].mean_contour_error_mm
 
 
 @pytest.mark.parametrize(
