@@ -1,5 +1,6 @@
 """Every figure that an answer shows in a cell or beside its name is a value of its key in the document."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -62,3 +63,9 @@ def test_every_figure_is_one_of_the_document(name: str, values_in: Callable[[obj
     shown = [value for value in outside_sentences(tuple(report.blocks), values_in) if value.key in by_key]
     assert [value for value in shown if value.value not in by_key[value.key]] == []
     assert len(shown) > least
+
+
+def test_every_comparison_of_the_evidence_stands_once(values_in: Callable[[object], Iterator[ShownValue]]) -> None:
+    answer = busplan.evidence("ieee1394")
+    shown = [value.value for value in values_in(tuple(answer.report().blocks)) if value.key == "computed"]
+    assert Counter(shown) == Counter(row["computed"] for row in answer.to_dict()["figures"])

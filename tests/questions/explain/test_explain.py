@@ -86,6 +86,19 @@ def test_equation_2_adds_up_every_term_of_the_cycle(make: Make) -> None:
         assert (each.symbol, each.reference, each.formula) == ("T_cs,needed", "(2)", "T_need / N")
 
 
+def test_the_rows_of_csv_are_the_steps_of_json() -> None:
+    answer = busplan.explain("paper-4ms", "required_us", timing_model=["paper", "standard"])
+    keys = ("reference", "symbol", "formula", "numbers", "value", "unit")
+    steps = [
+        (derivation["timing_model"], number, *(step[key] for key in keys))
+        for derivation in answer.to_dict()["derivations"]
+        for number, step in enumerate(derivation["steps"], start=1)
+    ]
+    rows = [tuple(row[key] for key in ("timing_model", "step", *keys)) for row in answer.report().records or ()]
+    assert rows == steps
+    assert len(rows) > 30
+
+
 def test_the_corrected_margin_comes_with_its_uncertainty() -> None:
     found = busplan.explain("paper-1ms", "margin_corrected_us").derivations
     assert [one.figure.key for one in found] == ["margin_corrected_us", "uncertainty_us"]

@@ -104,6 +104,10 @@ def test_an_overrun_is_said_and_seen() -> None:
     assert "idle" not in "\n".join(lines)
     (beyond,) = lane(one, "over").spans
     assert beyond.words == "beyond the slice, 57.117 us: 150.000 to 207.117 us"
+    assert [lane(answer, "paper").note for answer in (one, plan())] == [
+        "207.117 us needed, 57.117 us short",
+        "207.117 us needed, margin 1792.883 us",
+    ]
     assert [line.partition("|")[0].strip() for line in lines].count("over") == 2
     assert {guide.x for guide in (*lanes(one, 0).guides, *lanes(one, 1).guides)} == {150.0}
     document = one.to_dict()
