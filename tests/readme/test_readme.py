@@ -163,17 +163,23 @@ SHOWN_FIRST = "ieee1394"
 """The kind whose keys and figures the pages of every kind show; a further kind shows what it has beside them."""
 
 
+def constants_table(kind: str) -> list[str]:
+    """Constants of a kind that nobody has published; `explain` has all of them."""
+    keys = ("unit", "grade", "source", "meaning")
+    cells = [
+        [code(row["name"]), short(row["value"]), *(row[key] for key in keys)]
+        for row in constant_rows(kind_named(kind))
+        if row["grade"] != "published"
+    ]
+    return table([f"constant of `{kind}`", "value", *keys], cells, left=6)
+
+
 def further_tables(kind: str) -> Iterator[list[str]]:
     """What a further kind of bus has of its own: keys, constants, and figures of `capacity` and `latency`."""
     known = set(reference(kind_named("ieee1394").profile_model()))
     own = [row for row in dict.fromkeys(reference(kind_named(kind).profile_model())) if row not in known]
     yield [f"| key of `{kind}` | values | default | meaning |", "|---|---|---|---|", *own]
-    names = ("name", "value", "unit", "grade", "source", "meaning")
-    cells = [
-        [code(row["name"]), short(row["value"]), *(row[key] for key in names[2:])]
-        for row in constant_rows(kind_named(kind))
-    ]
-    yield table([f"constant of `{kind}`", *names[1:]], cells, left=6)
+    yield constants_table(kind)
     first = figures_of(kind_named(SHOWN_FIRST))
     for command in ("capacity", "latency"):
         described = (
@@ -198,12 +204,7 @@ def tables() -> Iterator[list[str]]:
         ([row["reference"], code(row["formula"]), code(row["function"]), row["source"]] for row in rows),
         left=4,
     )
-    constants = constant_rows(kind_named("ieee1394"))
-    cells = [
-        [code(row["name"]), short(row["value"]), *(row[key] for key in ("unit", "grade", "source", "meaning"))]
-        for row in constants
-    ]
-    yield table(list(constants[0]), cells, left=6)
+    yield constants_table(SHOWN_FIRST)
     for command, figures in (*figures_of(kind_named("ieee1394")).items(), ("circle-test", CIRCLE_BY_KEY)):
         described = (
             [code(one.key), one.symbol, one.unit, one.meaning, one.reference, one.better.replace("neither", "")]
@@ -225,6 +226,16 @@ def test_tables_are_those_of_the_program() -> None:
     for lines in tables():
         (found,) = filter(None, (shown_table(lines[0], text) for text in PAGES.values()))
         assert found.splitlines() == lines
+
+
+def test_the_command_that_a_page_names_has_all_constants() -> None:
+    named = [re.findall(r"`busplan explain (\S+) --format json`", text) for text in PAGES.values()]
+    kinds = []
+    for name in (one for names in named for one in names):
+        done = CliRunner().invoke(app, ["explain", name, "--format", "json"])
+        kinds.append(load(name).profile.bus.kind)
+        assert json.loads(done.stdout)["constants"] == constant_rows(kind_named(kinds[-1]))
+    assert sorted(kinds) == sorted(kind_names())
 
 
 def test_the_example_profile_is_the_shipped_one() -> None:
@@ -271,12 +282,29 @@ def keys_of(document: object) -> Iterator[str]:
                 yield from keys_of(value)
 
 
+def figure_keys() -> str:
+    """First cells of the tables of figures, whose keys mean the same in every document."""
+    pages = (PAGES[FOLDER / "models.md"], PAGES[FOLDER / "circle.md"])
+    return "".join(
+        re.match(r"\|[^|]*\|", row)[0]  # type: ignore[index]
+        for command in ("capacity", "latency", "circle-test")
+        for page in pages
+        for row in shown_table(f"| `{command}` | symbol | unit | meaning | reference | better |", page).splitlines()
+    )
+
+
+def json_section(command: str) -> str:
+    """What the page says of a command's document."""
+    return PAGES[FOLDER / "json.md"].partition(f"\n### {command}\n")[2].partition("\n### ")[0]
+
+
 @pytest.mark.parametrize("command", DOCUMENTS)
 def test_every_json_key_is_listed(command: str) -> None:
     done = CliRunner().invoke(app, [command, *DOCUMENTS[command].split(), "--format", "json"])
-    said = PAGES[FOLDER / "json.md"].partition(f"\n### {command}\n")[2].partition("\n### ")[0]
-    if command in {"latency", "capacity", "circle-test", "sweep"}:
-        said += PAGES[FOLDER / "models.md"] + PAGES[FOLDER / "circle.md"]
+    _, _, documents = PAGES[FOLDER / "json.md"].partition("\n## Documents\n")
+    everywhere = documents.partition("\n### ")[0] + figure_keys()
+    own = json_section(command)
+    said = everywhere + own + "".join(json_section(name) for name in re.findall(r"as in `(\w+)`", own))
     keys = set(keys_of(json.loads(done.stdout))) - {"schema", "command", "bus.nodes"}
     assert len(keys) >= 2 - (command in {"rule", "report"})
     assert [key for key in sorted(keys) if f"`{key}`" not in said] == []

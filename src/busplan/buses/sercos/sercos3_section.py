@@ -53,7 +53,7 @@ class Sercos3Bus(BusSection):
     )
     master_jitter_us: TimeUs = Field(
         default=float(MASTER_JITTER_US),
-        description="Jitter with which the master sends; no more than an eighth of the period [us]",
+        description="Jitter with which the master sends; CoSeMa demands an eighth of the period at most [us]",
         examples=[0.1],
     )
     master_delay_us: TimeUs = Field(
