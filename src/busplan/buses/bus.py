@@ -59,7 +59,7 @@ class Bus(ABC):
     limits: ClassVar[tuple[Limit, ...]]
     """Limits in the order of reports; at least one grows with the nodes."""
     periods: ClassVar[Periods] = ANY_PERIOD
-    """Communication periods that it allows; a kind with a list of them also has `period_limit` and `period_rule`."""
+    """Periods that it allows; a kind with a list has a `period_limit` and a rule on `unknown_period`."""
     starter: ClassVar[Starter]
     """Defaults of a new profile."""
     rules: ClassVar[tuple[Rule, ...]] = ()
