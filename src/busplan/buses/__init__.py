@@ -80,7 +80,7 @@ def _plain(name: str) -> str:
 
 @contextmanager
 def registered(bus: "Bus") -> Iterator[None]:
-    """Register a further kind for a while, as a test does.
+    """Register a further kind for a while, for a test.
 
     Raises
     ------

@@ -137,7 +137,7 @@ class Bus(ABC):
         return ()
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - a kind may have none
-        """Warnings that do not depend on the verdict, for each of some numbers of nodes."""
+        """Warnings that do not depend on the verdict, for each number of nodes in `nodes`."""
         return []
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:

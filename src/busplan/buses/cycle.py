@@ -43,7 +43,7 @@ class BusEvent(NamedTuple):
     term: str
     """Key of the term that it is a part of."""
     us: Number
-    """Duration [us]: a plain number once it is laid out, of any sort in a run."""
+    """Duration [us]: a float once it is laid out; in a run it may be an array or a traced number."""
     label: str
     """Name of the event, with the node or device that causes it."""
     node: int | None = None
@@ -221,7 +221,7 @@ class BusCycle(ABC):
         return extra_us
 
     def bias_us(self) -> Number | None:
-        """Mean time that the bus takes beyond the timing model [us]; None where it is unknown."""
+        """Mean time that the bus takes in addition to the timing model [us]; None where it is unknown."""
         return None
 
     def sync_jitter_us(self) -> Number:
@@ -264,7 +264,7 @@ class BusCycle(ABC):
         return chain.from_iterable(self.each_round())
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
-        """The events of each round, which the bus never interrupts by another; of plain numbers."""
+        """The events of each round, which are never interrupted; of plain numbers."""
         for run in self.runs:
             count = 1 if run.times is None else int(plain(run.times))
             first, rounds = self._turns(run)
@@ -310,7 +310,7 @@ class BusCycle(ABC):
         return 0.0
 
     def figures(self) -> Mapping[str, Number | None]:
-        """Figures of the kind beside the terms, by key; None where these groups of nodes have no such figure."""
+        """Figures of this kind other than the terms, by key; None for a figure that these groups do not have."""
         return {}
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:

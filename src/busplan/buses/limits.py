@@ -307,7 +307,7 @@ class Periods(NamedTuple):
         """
         return not self.us or period_us in self.us
 
-    def next_us(self, least_us: Number) -> Number:
+    def shortest_us(self, least_us: Number) -> Number:
         """The shortest allowed period of at least a time, float rounding aside; infinite where there is none [us].
 
         Parameters
@@ -317,7 +317,7 @@ class Periods(NamedTuple):
 
         Examples
         --------
-        >>> Periods((250.0, 500.0)).next_us(250.1), Periods().next_us(250.1)
+        >>> Periods((250.0, 500.0)).shortest_us(250.1), Periods().shortest_us(250.1)
         (500.0, 250.1)
         """
         if not self.us:
@@ -366,7 +366,7 @@ def period_limit(periods: Periods) -> Limit:
     return Limit(
         PERIOD_LIMIT,
         lambda network: periods.refusal(plain(network.period_us)),
-        lambda network: choose(periods.next_us(network.period_us) > network.period_us, 1, 0),
+        lambda network: choose(periods.shortest_us(network.period_us) > network.period_us, 1, 0),
         lambda _network: 0,
         way_out="a period that the bus allows will do",
         role="period",
@@ -416,7 +416,7 @@ def _all_busy_words(network: Network) -> str:
 
 
 def _busiest_us(network: Network, coverage: int) -> Number:
-    """Execution time per cycle of the busiest group, over n for every n-th, plus `coverage` uncertainties [us]."""
+    """Most execution time per cycle, divided by n for every n-th cycle, plus `coverage` standard uncertainties [us]."""
     if not network.groups:
         return 0.0
     busy_us = ((_busy_us(group) + coverage * _busy_doubt_us(group)) / group.every for group in network.groups)

@@ -1,4 +1,4 @@
-"""Rules of the gate, and what a recording shows, as a kind of bus gives them."""
+"""What a kind of bus gives the gate and `measured`: rules, and figures of a recording."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime

@@ -79,7 +79,7 @@ class MeasuredAnswer(Answer):
     edits
         New value of each measured key, as `--apply` writes it; None removes a key.
     day
-        Day of the recording in UTC, as 2026-11-23; empty where its stamps do not say it.
+        Day of the recording in UTC, such as 2026-11-23; empty where its stamps do not say it.
     shows_nothing
         Why the recording as a whole cannot show that the machine keeps its plan; empty where it can.
     """

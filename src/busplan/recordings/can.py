@@ -32,9 +32,9 @@ _REPORT_EVERY: Final = 5000
 _CRC_15: Final = 0x4599
 _CRC_BITS: Final = 15
 _NEVER_STUFFED: Final = 13
-"""Bits behind the CRC: its delimiter, acknowledge, end of frame and interframe space."""
+"""Bits after the CRC: its delimiter, acknowledge, end of frame and interframe space."""
 _RUN: Final = 5
-"""Equal bits behind which the opposite one is stuffed."""
+"""Equal bits after which the opposite one is stuffed."""
 _PIECE: Final = 50_000  # frames whose stuff bits are counted at once
 _CLASSICAL_BYTES: Final = 8
 _LONG_BYTES: Final = (16, 20, 24, 32, 48, 64)
@@ -47,7 +47,7 @@ _END_S: Final = float(1 << 33)
 _MOST_CONTAINER_BYTES: Final = 16_000_000
 """Most data of a BLF container; Vector's and python-can's have 131,072 bytes."""
 _BLF_OBJECT: Final = Struct("<4s4xII")
-"""Head of an object: signature, size and kind, as python-can has it."""
+"""Header of an object as python-can reads it: signature, size and kind."""
 _BLF_METHOD: Final = Struct("<H14x")
 _BLF_CONTAINER, _BLF_DEFLATED = 10, 2
 

@@ -62,7 +62,7 @@ class SentFrames(NamedTuple):
 def mean_period(times_us: Floats, periods: PeriodicEvents) -> Quantile:
     """Mean period from the first event to the last, with its standard uncertainty [us].
 
-    The lateness of these two differs by no more than the range over all events.
+    The lateness of the first and the last differs by no more than the range over all events.
     """
     number = int(periods.places[-1])
     return Quantile(float(times_us[-1] - times_us[0]) / number, float(np.ptp(periods.late_us)) / number)

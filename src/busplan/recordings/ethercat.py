@@ -69,9 +69,9 @@ class EthercatFrames(NamedTuple):
     layout: Numbers
     """Index of its datagrams in `layouts`."""
     key: Numbers
-    """Number of its datagrams with their indexes: a frame returns with the key that it was sent with."""
+    """Key of its datagrams, their indexes included: a frame returns with the key that it was sent with."""
     counters: Numbers
-    """Number of its working counters: frames with the same counters have the same number."""
+    """Key of its working counters: frames with the same counters have the same key."""
     layouts: tuple[tuple[Datagram, ...], ...]
     notes: CaptureNotes
     others: int
@@ -280,12 +280,12 @@ def _row_numbers(rows: npt.NDArray[Any], numbers: dict[bytes, int], on_new: Call
     flat = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.shape[1]))).ravel()
     unique, inverse = np.unique(flat, return_inverse=True)
     of_unique = np.empty(len(unique), dtype=np.int64)
-    for place, row in enumerate(unique):
+    for index, row in enumerate(unique):
         content = row.tobytes().rstrip(b"\0")
         if content not in numbers:
             numbers[content] = len(numbers)
             on_new(content)
-        of_unique[place] = numbers[content]
+        of_unique[index] = numbers[content]
     return of_unique[inverse.ravel()]
 
 

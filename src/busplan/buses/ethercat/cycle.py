@@ -75,7 +75,7 @@ def sync0_us(network: Network) -> Number:
 
 
 def sync0_share(network: Network) -> Number:
-    """The same as a share of the period; 1 for a shift of 0, since frames reach the devices after that SYNC0 [1]."""
+    """The same as a share of the period; 1 for a shift of 0, since frames come after the SYNC0 at the task [1]."""
     shift = network.profile.bus.sync_shift
     return choose(shift > 0, shift, 1)
 
@@ -259,7 +259,7 @@ class EthercatCycle(BusCycle):
     def arrival_us(self, node: int) -> float:
         """When a device has its command, from the start of a cycle of plain numbers [us].
 
-        It takes its command at the end of its frame, behind the check sequence. The frames are those of the fullest
+        It takes its command at the end of its frame, after the check sequence. The frames are those of the fullest
         cycle and start as late as the master's jitter allows; a device without data in them counts as in the last.
 
         Parameters
@@ -370,11 +370,11 @@ class EthercatCycle(BusCycle):
         """Phases of feedback: from the sample through the wait for a frame, until the master has all frames."""
         network, bus = self.network, self.network.profile.bus
         ready_us = group.read_execution_us + group.worst_extra_us
-        behind_us = sync0_us(network) + ready_us
+        ready_at_us = sync0_us(network) + ready_us
         period_us = _period_us(group, network)
         return {
             "drive_us": ready_us,
-            "frame_wait_us": _until_taken(behind_us / period_us) * period_us - behind_us,
+            "frame_wait_us": _until_taken(ready_at_us / period_us) * period_us - ready_at_us,
             "pipeline_us": 0.0,
             "master_us": bus.master_us,
             "jitter_us": bus.master_jitter_us,

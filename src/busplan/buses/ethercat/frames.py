@@ -64,7 +64,7 @@ class Packing(NamedTuple):
     frames: Number
     """Number of frames [1]."""
     datagrams_bytes: Number
-    """Datagrams of all of them, headers and data [bytes]."""
+    """Datagrams of all frames, headers and data [bytes]."""
     padding_bytes: Number
     """Padding of short frames [bytes]."""
     last_bytes: Number
@@ -110,7 +110,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     padding: Number = 0.0
     before: Number = 0.0
     if not is_off(first_bytes):
-        # The master's datagrams go alone where the first device has no room behind them.
+        # The master's datagrams go alone where the first device has no room after them.
         has_room = room - first_bytes - _first_device_bytes(devices) >= 0
         free = choose(has_room, room - first_bytes, 0.0)
         last = first_bytes + choose(has_room, headers, 0.0)
@@ -149,7 +149,7 @@ def _first_device_bytes(devices: Sequence[Devices]) -> Number:
 
 
 class FrameRun(NamedTuple):
-    """Equal frames in sequence, each with as many devices; of plain numbers."""
+    """Equal frames in sequence, each with the same number of devices; of plain numbers."""
 
     first: int
     """First device in the first frame, from 1."""
@@ -181,8 +181,8 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
         size, left = plain(group.data_bytes), int(plain(group.number))
         # Couplers have no data and fit into any frame.
         fitting = max(int((room - opened - filled) // size), 0 if held or opened else 1) if size else left
-        beside = min(left, fitting)
-        held, filled, left = held + beside, filled + beside * size, left - beside
+        added = min(left, fitting)
+        held, filled, left = held + added, filled + added * size, left - added
         if left:
             yield FrameRun(first, held, opened + bool(filled) * headers + filled)
             first, in_frame = first + held, max(int(room // size), 1)
@@ -254,12 +254,12 @@ def unit_rates(units: Sequence[Unit], *, is_spread: bool) -> tuple[Rate, ...]:
     starts = [0] * len(units)
     filled_bytes = [0.0] * checked_hyperperiod([unit.every for unit in units])
     sizes_bytes = [unit.devices * unit.data_bytes for unit in units]
-    for place in sorted(range(len(units)), key=lambda place: (units[place].every, -sizes_bytes[place])):
-        every = units[place].every
+    for index in sorted(range(len(units)), key=lambda index: (units[index].every, -sizes_bytes[index])):
+        every = units[index].every
         if is_spread:
-            starts[place] = min(range(every), key=lambda start: max(filled_bytes[start::every]))
-        for cycle in range(starts[place], len(filled_bytes), every):
-            filled_bytes[cycle] += sizes_bytes[place]
+            starts[index] = min(range(every), key=lambda start: max(filled_bytes[start::every]))
+        for cycle in range(starts[index], len(filled_bytes), every):
+            filled_bytes[cycle] += sizes_bytes[index]
     return tuple(Rate(unit.every, start + 1) for unit, start in zip(units, starts, strict=True))
 
 
@@ -333,13 +333,13 @@ def devices(network: Network) -> tuple[Devices, ...]:
         return whole
     numbers = _cycle_inputs(network, whole)
 
-    def is_in(place: int) -> Number:
+    def is_in(index: int) -> Number:
         words = "whether the group goes in the fullest cycle"
-        return pointwise(lambda *numbers: float(_cycles(network, numbers)[0].due[place]), *numbers, words=words)
+        return pointwise(lambda *numbers: float(_cycles(network, numbers)[0].due[index]), *numbers, words=words)
 
     return tuple(
-        entry._replace(data_bytes=choose(is_in(place) > 0, entry.data_bytes, 0)) if group.is_slower else entry
-        for place, (entry, group) in enumerate(zip(whole, network.groups, strict=True))
+        entry._replace(data_bytes=choose(is_in(index) > 0, entry.data_bytes, 0)) if group.is_slower else entry
+        for index, (entry, group) in enumerate(zip(whole, network.groups, strict=True))
     )
 
 

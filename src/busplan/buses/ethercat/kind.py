@@ -218,11 +218,11 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         return f"worst case of a command, of feedback and of a loop over both, {cycles}, {clocks}"
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
-        """Whether a latency is meant: no device delays a frame, so the cycle contains no execution."""
+        """Execution counts in latencies only: no device delays a frame for it."""
         return of_latency
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """Later SYNC0, for commands that come after it."""
+        """A plan may shift SYNC0 to a later time, for commands that come after it."""
         bus = network.profile.bus
         if not (bus.distributed_clocks and bus.sync_shift):
             return ()

@@ -110,8 +110,8 @@ class LineDelays(NamedTuple):
 def line_delays(latches: tuple[Latch, ...], unlatched: int) -> LineDelays:
     """Delays of the devices in a line, from port receive times.
 
-    A frame passes a device, all behind it, and the device again: half the difference of its two port times less that
-    of the next device is the delay one way. The difference falls from device to device, which gives their order.
+    A frame passes a device, all those after it, and the device again: half the difference of its two port times, less
+    that of the next device, is the delay one way. The difference falls from device to device: this gives their order.
 
     Parameters
     ----------

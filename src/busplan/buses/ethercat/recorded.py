@@ -234,12 +234,12 @@ class _Seen:
         has_less = (per_cycle.frames < frames) | (per_cycle.data_bytes < data_bytes)
         yield self._without_frame(cycles, int(np.count_nonzero(has_less)))
         whole = per_cycle.is_back & (per_cycle.frames == frames) & (per_cycle.data_bytes == data_bytes)
-        for place, sort in enumerate(cycles.sorts):
+        for index, sort in enumerate(cycles.sorts):
             names = [group.name for group, is_due in zip(self.network.groups, sort.due, strict=True) if is_due]
             with_names = f" with {' and '.join(names) or 'no group'}" if has_rates(self.network) else ""
-            of_sort = np.flatnonzero(whole & (cycles.sort == place))
+            of_sort = np.flatnonzero(whole & (cycles.sort == index))
             if sort.data_bytes:
-                host_us = () if place else (per_cycle.host_us[of_sort], per_cycle.host_us[whole])
+                host_us = () if index else (per_cycle.host_us[of_sort], per_cycle.host_us[whole])
                 yield from self._times(sort, with_names, per_cycle.trips_us[of_sort], host_us)
             yield from self._layout(sort, with_names, cycles, of_sort, per_cycle)
 
@@ -444,7 +444,7 @@ class _Seen:
 
 
 def _usual(values: npt.NDArray[Any], sort: Ints) -> npt.NDArray[Any]:
-    """For each of n values, the most frequent value of the same sort."""
+    """For each of n values, the most frequent value in the same kind of cycle or frame."""
     usual = np.zeros_like(values)
     for number in np.unique(sort):
         distinct, often = np.unique(values[sort == number], return_counts=True)

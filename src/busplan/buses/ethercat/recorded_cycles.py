@@ -30,8 +30,8 @@ class PlannedCycles:
         """The distinct cycles, the fullest first."""
         self.sort = np.zeros(sum(len(sort.numbers) for sort in self.sorts), dtype=np.int64)
         """Index in `sorts` of each cycle."""
-        for place, sort in enumerate(self.sorts):
-            self.sort[np.array(sort.numbers) - 1] = place
+        for index, sort in enumerate(self.sorts):
+            self.sort[np.array(sort.numbers) - 1] = index
         self.data_bytes = np.array([float(sort.data_bytes) for sort in self.sorts])[self.sort]
         """Process data of each cycle [bytes]."""
         self._filled = np.concatenate(([0], np.cumsum(self.data_bytes > 0)))
@@ -142,10 +142,10 @@ def _starts(times_us: Floats, kinds: Ints, plan: PlannedCycles, period_us: float
         least_us = float(np.quantile(between_us, plan.least_share / 2)) if len(between_us) else 0.0
         for cycles in range(1, plan.least_apart + 1):
             near_us = least_us / cycles
-            beside = abs(log(near_us / period_us)) if near_us > 0 else inf
+            off = abs(log(near_us / period_us)) if near_us > 0 else inf
             close, far = between_us < near_us / 2, apart_us[~begins[1:]] > near_us / 2
-            tried.append((beside, int(np.count_nonzero(close) + np.count_nonzero(far)), starts, near_us))
-    least = min(beside for beside, *_ in tried)
+            tried.append((off, int(np.count_nonzero(close) + np.count_nonzero(far)), starts, near_us))
+    least = min(off for off, *_ in tried)
     if least > _FARTHEST:
         return tried[0][2:]
     return min((bound for bound in tried if bound[0] <= least + _SAME), key=lambda bound: bound[1])[2:]
@@ -175,8 +175,8 @@ def _in_operation(gaps: Ints) -> tuple[int, int]:
     if not len(rows):
         return 0, len(gaps) + 1
     first, last = int(rows[0]), int(rows[-1]) + LEAST_EVENTS
-    before, behind = int(gaps[:first].sum()), int(gaps[last - 1 :].sum())
-    return first if before > first else 0, last if behind > len(gaps) + 1 - last else len(gaps) + 1
+    before, after = int(gaps[:first].sum()), int(gaps[last - 1 :].sum())
+    return first if before > first else 0, last if after > len(gaps) + 1 - last else len(gaps) + 1
 
 
 def _whole(frames: Ints, sort: Ints) -> tuple[int, int]:

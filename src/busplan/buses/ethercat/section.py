@@ -195,7 +195,7 @@ class EthercatProfile(Profile):
         try:
             checked_hyperperiod([group.every for group in self.group])
         except BusplanError as error:
-            slowest = max(range(len(self.group)), key=lambda place: self.group[place].every)
+            slowest = max(range(len(self.group)), key=lambda index: self.group[index].every)
             raise refused(Problem(str(error), key=f"group.{slowest}.every", kind="inconsistent")) from None
         return self
 

@@ -249,8 +249,8 @@ def _lanes(window: Schedule) -> tuple[Panel, str]:
         draw = _events
         if len(events) > _MOST_BARS:
             draw, legend = _transactions, "A bar is a whole transaction."
-        spans, is_cut = _few_bars([list(draw(window, own)) for own in of_lane], window.from_us, window.to_us)
-        if is_cut:
+        spans, is_merged = _few_bars([list(draw(window, own)) for own in of_lane], window.from_us, window.to_us)
+        if is_merged:
             legend = f"A bar is what takes most of a {_MOST_BARS}th of the scale."
         labels = ["bus", *(f"node {n[0]}" if len(n) == 1 else f"nodes {n[0]} to {n[-1]}" for n in shared)]
         lanes = [Lane(label, bars) for label, bars in zip(labels, spans, strict=True) if bars]
@@ -310,7 +310,7 @@ def _bar(schedule: Schedule, kind: str, title: str, start_us: float, end_us: flo
 
 
 def _few_bars(lanes: Sequence[Sequence[Span]], start_us: float, end_us: float) -> tuple[list[tuple[Span, ...]], bool]:
-    """The bars of lanes on one scale; if they are too many, all bars with their middle in one step of it become one.
+    """The bars of lanes on one scale; if they are too many, bars with their middles in the same step become one.
 
     Returns
     -------
