@@ -388,11 +388,11 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
         Whether limits must be shown to be kept; otherwise the uncertainty of their values plays no part.
     """
     bus = network.bus
-    period_us = bus.periods.from_us(needed_us / network.slice_ratio)
+    period_us = bus.periods.shortest_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
         if limit.period is not None and not limit.is_slow:
             kept = limit.shown if is_shown else limit.nominal
-            period_us = larger(period_us, bus.periods.from_us(kept.shortest_period_us(network)))
+            period_us = larger(period_us, bus.periods.shortest_us(kept.shortest_period_us(network)))
     return period_us
 
 

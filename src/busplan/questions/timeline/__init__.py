@@ -1,4 +1,4 @@
-"""`busplan.timeline`."""
+"""`busplan.timeline`: one communication cycle as events, in a window."""
 
 import re
 from typing import Final
@@ -16,7 +16,7 @@ _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9
 
 
 class TimelineAnswer(Answer, Schedule):
-    """Answer of `timeline`: the `events` inside the window, and of the whole cycle."""
+    """Answer of `timeline`: the `events` inside the window, and `cycle_events` of the whole cycle."""
 
     __slots__ = ()
 
@@ -54,8 +54,8 @@ def timeline(
     transaction
         One transaction of one node with its gaps: ("read", 1) or "read:1".
     cycle
-        Number of a cycle of the common multiple of the rates of groups, from 1; beyond it they repeat. By default the
-        fullest, which the verdict is for.
+        Number of a cycle, from 1; cycles repeat after the hyperperiod (the common multiple of the rates of groups). By
+        default the fullest, which the verdict is for.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def timeline(
 
 
 def _transaction(given: object, network: Network) -> tuple[str, int]:
-    """Kind and node of a transaction of the profile's bus."""
+    """Kind and node of a transaction, checked against the profile's bus."""
     match given:
         case str() as text:
             written = _TRANSACTION.fullmatch(text)
