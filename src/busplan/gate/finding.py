@@ -22,7 +22,7 @@ from busplan.profile.document import LoadedProfile, Spot
 from busplan.profile.edit import short_text
 from busplan.questions.base.inputs import Path
 from busplan.questions.fit.certainty import available_us, fits_in
-from busplan.questions.fit.circle_refusal import path_steps, refusals
+from busplan.questions.fit.circle_setup import path_steps, refusals
 from busplan.questions.fit.figures import FitFigures, GroupCapacity, figures, node_counts
 from busplan.questions.fit.network import PERIOD, changed, model_names, network_of
 from busplan.questions.plan.search import changeable, cure

@@ -15,7 +15,7 @@ from busplan.buses.network import Network
 from busplan.progress import Progress
 from busplan.questions.circle import NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer, Contribution
 from busplan.questions.circle.failures import bus_failures, circle_failures, tightest_margins
-from busplan.questions.fit.circle_refusal import (
+from busplan.questions.fit.circle_setup import (
     delivery_of,
     jitter_us,
     loop_axes,

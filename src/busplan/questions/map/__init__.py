@@ -22,7 +22,7 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_network, with_cycle
 from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
-from busplan.questions.fit.circle_refusal import refusals
+from busplan.questions.fit.circle_setup import refusals
 from busplan.questions.fit.figures import figures, limits_behind, safe_nodes, shortest_period_us
 from busplan.questions.fit.network import PERIOD, at_period, changed, varied_nodes
 from busplan.questions.sweep import axis_values

@@ -17,7 +17,7 @@ from busplan.profile.document import override
 from busplan.progress import Progress
 from busplan.questions.circle import CIRCLE_BY_KEY, CircleFigures
 from busplan.questions.circle.roundness import Estimate, announce, estimate, run_circles, setup
-from busplan.questions.fit.circle_refusal import refusals
+from busplan.questions.fit.circle_setup import refusals
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Array, Columns, Grid

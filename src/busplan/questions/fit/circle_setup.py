@@ -1,4 +1,4 @@
-"""The circle that a profile asks for, without simulating it: why it cannot be run, its loops and its length."""
+"""Setup of a profile's circle test: delays, skew and jitter by the bus, why it cannot be run, inputs and length."""
 
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
