@@ -1,4 +1,4 @@
-"""Base class of the answers of the Python interface."""
+"""Base class of the answers of the Python interface, and words that quote a command line in them."""
 
 import json
 import os
@@ -59,7 +59,7 @@ def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
 
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
-"""Check that the library for a file is installed, by ending."""
+"""Function that refuses a file whose library is not installed, by ending."""
 
 
 class Answer(ABC):
@@ -86,7 +86,7 @@ class Answer(ABC):
         return render(self.report(), "html")
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the answer to a file in the form of its ending; an old file is whole until the new one replaces it.
+        """Write the answer to a file in the form that its ending names; an old file is replaced atomically.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class Answer(ABC):
         write_file(Path(path), document_bytes(contents[ending]()), overwrite=True)
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
-        """Makers of a file's content, by ending."""
+        """Functions that make the content of a file, by ending."""
         texts = {ending: partial(self._text, form) for ending, form in ENDINGS.items()}
         return {**texts, ".svg": self.svg, ".png": self._png}
 
@@ -154,10 +154,10 @@ class Answer(ABC):
 
     @abstractmethod
     def report(self) -> Report:
-        """The answer in blocks, from which every form but JSON and CSV is made."""
+        """The answer in blocks, from which every form but JSON and CSV is written."""
 
     def _shown(self) -> Report:
-        """The report for a reader in Python."""
+        """The report with a pointer to `to_dict()`, where the command line points to an option."""
         return self.report()._replace(whole_by="to_dict() has all figures.")
 
     def _headline(self) -> str:

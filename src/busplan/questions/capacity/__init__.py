@@ -13,7 +13,7 @@ from busplan.questions.base.inputs import (
     checked_models,
     load_network,
     one_or_several,
-    with_cycle,
+    require_cycle,
 )
 from busplan.questions.capacity.verdict import Verdict, verdict_of
 from busplan.questions.fit.certainty import FITS, VerdictWord
@@ -141,7 +141,7 @@ def capacity(
     """
     network = load_network(profile)
     if sensitivity:
-        with_cycle(network.profile, question="the effect of small changes on its margin")
+        require_cycle(network.profile, question="the effect of small changes on its margin")
     models = checked_models(timing_model, network) or model_names(network)
     networks = at_periods(network, None if period_us is None else one_or_several(period_us, name="period_us"))
     periods = tuple(tuple(capacity_figures(at, model=model) for model in models) for at in networks)

@@ -23,7 +23,7 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import period, sentence_text
-from busplan.questions.base.sentences import Owner, document, fields, figure_table, safety_record, with_profile
+from busplan.questions.base.sentences import FigureColumn, document, fields, figure_table, safety_record, with_profile
 from busplan.questions.capacity import CapacityAnswer
 from busplan.questions.capacity.verdict import Verdict, card, uncertainty_parts
 from busplan.questions.fit.certainty import FITS, TIME
@@ -88,7 +88,7 @@ def _table(answer: CapacityAnswer) -> Table:
         shown |= {figure.key for figure in bus.figures.table}
     return figure_table(
         rows,
-        list(_owners(answer)),
+        list(_columns(answer)),
         caption=caption,
         hides_equations=True,
         is_detail=lambda figure: figure.key not in shown,
@@ -110,7 +110,7 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
     return [*((row, 0) for row in above), *((term, 1) for term in bus.figures.terms), *((row, 0) for row in below)]
 
 
-def _owners(answer: CapacityAnswer) -> Iterator[Owner]:
+def _columns(answer: CapacityAnswer) -> Iterator[FigureColumn]:
     """A column for each period and timing model, the profile's own model first."""
     network = answer.verdicts[0].network
     leading, deciding = leading_model(network), network.bus.deciding_model
@@ -119,7 +119,7 @@ def _owners(answer: CapacityAnswer) -> Iterator[Owner]:
         group = period(results[0].period_us) if several else ""
         for figures in sorted(results, key=lambda figures: figures.timing_model != leading):
             rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
-            yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures.values())
+            yield FigureColumn(TableColumn(figures.timing_model, group=group, rank=rank), figures.values())
 
 
 def _state(row: Figure, values: Mapping[str, Any]) -> State:

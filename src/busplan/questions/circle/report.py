@@ -26,7 +26,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.charts import Drawing, Panel
 from busplan.forms.numbers import period, period_value
-from busplan.questions.base.sentences import Owner, document, figure_table, with_profile
+from busplan.questions.base.sentences import FigureColumn, document, figure_table, with_profile
 from busplan.questions.circle import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer
 from busplan.questions.circle.drawing import contour_profile, dial, magnified
 from busplan.questions.circle.failures import MARGINS
@@ -164,11 +164,11 @@ def _blocks(test: CircleTestAnswer) -> Iterator[Block]:
 
 def _circle_table(results: Sequence[CircleFigures]) -> Table:
     """Figures of the circle test, the periods side by side."""
-    owners = [Owner(TableColumn(period(result.period_us)), result) for result in results]
+    columns = [FigureColumn(TableColumn(period(result.period_us)), result) for result in results]
     of_host = () if any(result.loop == "host" for result in results) else _OF_HOST
     hidden = of_host if any(result.jitter_us for result in results) else (*of_host, JITTER.key)
     rows = ((CIRCLE_BY_KEY[key], 0) for key in _SHOWN if key not in hidden)
-    return figure_table(rows, owners, caption=Sentence(("Figures of the circle test",)))
+    return figure_table(rows, columns, caption=Sentence(("Figures of the circle test",)))
 
 
 def _contributions_table(result: CircleFigures) -> Table:

@@ -19,7 +19,7 @@ from busplan.forms.scale import round_numbers
 from busplan.profile.edit import whole
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_network, with_cycle
+from busplan.questions.base.inputs import ProfileLike, load_network, require_cycle
 from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
 from busplan.questions.fit.circle_setup import refusals
@@ -229,7 +229,9 @@ def map_(
     require_executor(executor, circle=circle)
     network = load_network(profile)
     if x is None or y is None:
-        with_cycle(network.profile, question="a map of period and axes", instead="give x and y, each a key with values")
+        require_cycle(
+            network.profile, question="a map of period and axes", instead="give x and y, each a key with values"
+        )
     across, up = _directions(network, x, y, with_circle=circle)
     settings = {
         (row, column): _setting(network, {across.key: value_x, up.key: value_y})
