@@ -62,10 +62,8 @@ _GROUP_BY_DECIDING: Final[tuple[Figure, ...]] = (figure.SAFE_NODES, figure.SAFE_
 """Figures of a group by the timing model that decides."""
 _GROUP_BY_OTHER: Final[tuple[Figure, ...]] = (figure.MAX_NODES, figure.LIMITED_BY)
 """Figures of a group by another timing model."""
-_VERDICT: Final = (
-    *(figure.VERDICT, figure.FITS, figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS),
-    *_GROUP_BY_DECIDING,
-)
+_CERTAINTY: Final = (figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS)
+_VERDICT: Final = (figure.VERDICT, figure.FITS, *_CERTAINTY, *_GROUP_BY_DECIDING)
 _ALWAYS_SHOWN: Final = frozenset(row.key for row in (*_VERDICT, figure.AVAILABLE, figure.REQUIRED, figure.MARGIN))
 """Keys of the figures that are always shown, as are the terms that take time; all others are details."""
 

@@ -169,12 +169,7 @@ def bus_failures(network: Network, fit: FitFigures) -> tuple[Failure, ...]:
         of_time = (Failure("safe_required_us", fit.safe_required_us, fit.available_us),)
     return (
         *(
-            Failure(
-                limit.key,
-                existing(limit.value(network)),
-                existing(limit.most(network)),
-                limit.words(network),
-            )
+            Failure(limit.key, existing(limit.value(network)), existing(limit.most(network)), limit.words(network))
             for limit in broken
         ),
         *of_time,

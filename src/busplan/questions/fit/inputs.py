@@ -55,14 +55,14 @@ def given(profile: Profile, key: str) -> Input:
         section = value_at(profile, ".".join(sections[:number]))
         if getattr(section, "grade", None):
             own_grade, graded_by = section.grade, f"; graded by {'.'.join(sections[:number])}.grade"
-    beside = f"{name.removesuffix('_us')}_grade"
-    if getattr(section, beside, None):
-        own_grade, graded_by = getattr(section, beside), f"; graded by {'.'.join(sections)}.{beside}"
+    grade_name = f"{name.removesuffix('_us')}_grade"
+    if getattr(section, grade_name, None):
+        own_grade, graded_by = getattr(section, grade_name), f"; graded by {'.'.join(sections)}.{grade_name}"
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
     bus = bus_of(profile)
-    # A default of zero and a word that selects a formula are not measured: the grade beside them is not theirs.
+    # A default of zero and a word that selects a formula are not measured: a grade beside them does not apply.
     is_no_measurement = (not is_set and not value) or _selects_formula(profile, key)
     grade = "given" if own_grade is None or is_no_measurement else own_grade
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"

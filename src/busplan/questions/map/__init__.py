@@ -304,7 +304,7 @@ def _direction(profile: Profile, along: Along, *, name: str, with_circle: bool) 
 _FACTORS: Final = ((1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 2, 5), (1,))
 """Round numbers of a decade, the finest choice first."""
 _MOST_BY_DEFAULT: Final = 20
-"""Most values of a default direction, beside the design's own."""
+"""Most values of a default direction, not counting the design's own."""
 _BEYOND: Final = 2
 """Nodes drawn beyond the most that fit."""
 
@@ -324,8 +324,8 @@ def _default_direction(key: str, network: Network) -> Direction:
         counts, node_axes = _counts(design_nodes, most), int(varied.node.axes)
         if not node_axes:  # nodes without axes are counted themselves
             return Direction(varied.nodes_key, counts)
-        axes_beside = design_value(AXES, network) - design_nodes * node_axes
-        return Direction(AXES, tuple(axes_beside + count * node_axes for count in counts))
+        other_axes = design_value(AXES, network) - design_nodes * node_axes
+        return Direction(AXES, tuple(other_axes + count * node_axes for count in counts))
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
     allowed = [us for us in network.bus.periods.us if least_us <= us <= most_us]
     periods_us = (
@@ -398,10 +398,10 @@ def _nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
     """
     varied = next(nodes for nodes in network.profile.node_groups if nodes.nodes_key == nodes_key)
     node_axes = int(varied.node.axes)
-    axes_beside = int(plain(network.axes)) - int(varied.nodes) * node_axes
-    varied_axes = axes - axes_beside if isinstance(axes, int) else 0
+    other_axes = int(plain(network.axes)) - int(varied.nodes) * node_axes
+    varied_axes = axes - other_axes if isinstance(axes, int) else 0
     if varied_axes < max(node_axes, 1) or not node_axes or varied_axes % node_axes:
-        beside = f" beside {axes_beside} others" if axes_beside else ""
+        beside = f" beside {other_axes} others" if other_axes else ""
         raise BusplanError(f"axes = {axes}: no whole number of nodes, with {node_axes} axes each{beside}")
     return varied_axes // node_axes
 
