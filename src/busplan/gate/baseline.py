@@ -77,7 +77,7 @@ def keys_of(profile: Profile) -> dict[str, object]:
 
 
 def _loads(kind: str) -> Iterable[Figure]:
-    """Figures of a kind of bus that get worse as they grow, such as the load by all that is sent."""
+    """Figures of a kind of bus that are worse when larger, such as the load."""
     return (figure for figure in kind_named(kind).figures.compared if figure.better == "less")
 
 

@@ -1,4 +1,4 @@
-"""`busplan.check`."""
+"""`busplan.check`: do profiles fit their bus, hold their circle and keep what a baseline recorded?"""
 
 import os
 from collections.abc import Iterable, Mapping, Sequence

@@ -123,7 +123,7 @@ class Subject:
 
     @property
     def others_fit(self) -> tuple[tuple[str, bool], ...]:
-        """The other timing models, each with whether the cycle fits; no figures are computed for that."""
+        """The other timing models, each with whether the cycle fits, found without all their figures."""
         given_us, bus = available_us(self.network), self.network.bus
         return tuple(
             (model, bool(fits_in(bus.cycle(self.network, model=model).required_us, available_us=given_us)))
@@ -243,7 +243,7 @@ class Recording(NamedTuple):
 
 
 def plan_problems(profile: Profile, recording: Recording) -> Iterator[tuple[Rule, RuleProblem]]:
-    """Compare a recording with the plan: yield figures outside it, figures not shown to be within, and why none are.
+    """Compare a recording with the plan: what is outside it, what is not shown to be within, or why nothing is shown.
 
     Raises
     ------

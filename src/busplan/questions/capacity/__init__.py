@@ -1,4 +1,4 @@
-"""`busplan.capacity`."""
+"""`busplan.capacity`: does the cycle fit its period, and how many axes does the bus carry?"""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast

@@ -1,4 +1,4 @@
-"""`busplan.circle_test`."""
+"""`busplan.circle_test`: is a circle still round at this period? Figures and answer; roundness.py runs the test."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

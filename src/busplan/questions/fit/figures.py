@@ -149,7 +149,7 @@ class GroupCapacity:
     limited_by: str
     """Key of the limit that keeps `max_nodes` from being more."""
     safe_nodes: int | None
-    """Most nodes that are shown to fit; this and the figures below exist for the timing model that decides."""
+    """Most nodes that are shown to fit. This and the figures below are None under a model that does not decide."""
     safe_axes: int | None
     """Their axes."""
     safe_limited_by: str | None
@@ -181,7 +181,7 @@ class FitFigures:
     binding_term: str | None
     """Name of the largest term."""
     min_period_us: float | None
-    """This and `safe_min_period_us` are None where no period that the bus allows is long enough."""
+    """This and `safe_min_period_us` are None if no period that the bus allows is long enough."""
     min_slice_ratio: float
     exceeded: tuple[str, ...]
     """Keys of the limits that are broken."""

@@ -1,4 +1,4 @@
-"""`busplan.map_`."""
+"""`busplan.map_`: where does a design fit as two keys vary, and what limits it elsewhere?"""
 
 from bisect import bisect_right
 from collections import Counter
