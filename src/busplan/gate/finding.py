@@ -101,7 +101,7 @@ class Subject:
     loaded
         The profile and its text.
     changes
-        Changes that the profile has already and its text does not show.
+        Changes already made to the profile, but not to its text.
     circle_steps
         Most simulated steps of each axis of its circle; None to run no circle.
     """
@@ -248,7 +248,7 @@ def plan_problems(profile: Profile, recording: Recording) -> Iterator[tuple[Rule
     Raises
     ------
     BusplanError
-        The recording cannot be read, or not compared with the profile.
+        The recording cannot be read, or cannot be compared with the profile.
     """
     from busplan.questions.measured import measured
 

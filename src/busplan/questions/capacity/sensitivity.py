@@ -125,9 +125,9 @@ def _slower(network: Network) -> Perturbed:
     groups = []
     for group in network.groups:
         read_us, write_us = factor * group.read_execution_us, factor * group.write_execution_us
-        u_us = group.node.execution.standard_uncertainty_us
+        read_u_us, write_u_us = map(group.node.execution.standard_uncertainty_us, (read_us, write_us))
         slower = group._replace(read_execution_us=read_us, write_execution_us=write_us)
-        groups.append(slower._replace(read_uncertainty_us=u_us(read_us), write_uncertainty_us=u_us(write_us)))
+        groups.append(slower._replace(read_uncertainty_us=read_u_us, write_uncertainty_us=write_u_us))
     slowed = network._replace(groups=tuple(groups))
     before, after = (
         _common_value(us for group in at.groups for us in (group.read_execution_us, group.write_execution_us))

@@ -56,7 +56,7 @@ class Verdict:
     broken_limits: tuple[str, ...]
     """By how much each limit of the bus is broken, or why it is not shown to be kept."""
     missed_limits: tuple[tuple[str, str], ...]
-    """Keys of [limits] that the network misses, each with the reason."""
+    """Keys of [limits] that the network does not keep, each with the reason."""
     fastest: SmallestPeriod | None
     """The shortest period with the verdict "fits"; None for a network without a cycle."""
     after_reset: FitFigures | None

@@ -28,7 +28,7 @@ JITTER: Final = Figure(
     "jitter_us",
     "J",
     "profile",
-    "jitter of the synchronous packet, either way of its mean: delivery.jitter_us and what the bus adds",
+    "jitter of the synchronous packet, +/- about its mean: delivery.jitter_us and what the bus adds",
     "jitter of the packet",
 )
 CIRCLE_FIGURES: Final = (
@@ -216,7 +216,7 @@ class CircleFigures(NamedTuple):
     delay_x_us: float
     delay_y_us: float
     jitter_us: float
-    """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds."""
+    """Jitter of the synchronous packet, +/- about its mean: the profile's own and what the bus adds."""
     timing_model: str
     """Timing model that decided whether the bus fits."""
     bus_fits: bool
@@ -250,7 +250,7 @@ class CircleFigures(NamedTuple):
     """Arc at constant speed from which F, G, radius and centre are taken: 360 on a turn."""
     sources_matter: bool | None
     """Whether a measure with a tolerance, or the largest error if none has one, is 0.1 um or more. If not, no error
-    source of the profile matters, which says nothing of how round a machine is. None if none was measured."""
+    source of the profile matters, and the test says nothing about a machine. None if nothing was measured."""
     passed: bool | None
     """None, not judged, if nothing fails, and the profile has no contour tolerance or no error source matters."""
     failures: "tuple[Failure, ...]"

@@ -45,7 +45,7 @@ class Certainty(NamedTuple):
     """Margin of a cycle with its bias and uncertainty [us]. The numbers may be arrays or traced numbers."""
 
     bias_us: Number | None
-    """Time that the bus takes beyond the timing model; None where it is unknown."""
+    """Time that the bus takes in addition to the timing model; None if it is unknown."""
     margin_corrected_us: Number
     """Available time less the required time and the bias."""
     uncertainty_us: Number

@@ -28,10 +28,10 @@ from busplan.servo.runnable import (
 def loop_delays_us(network: Network) -> tuple[float, float]:
     """Bus delay inside the position loops of x and y; 0 for loops on the node [us].
 
-    A loop on the host has one period of it, because the synchronous packet triggers both the sample and the update with
-    the last command; some kinds of bus have more. If nodes apply their commands on arrival, it lasts from the sample to
-    the end of the command's execution. Then x is taken to be on the first node with axes and y on the last, which
-    differ most.
+    The bus delay of a loop on the host is one period, because the synchronous packet triggers both the sample and the
+    update with the last command; it is longer on some kinds of bus. If nodes apply their commands on arrival, the delay
+    lasts from the sample to the end of the command's execution. Then x is taken to be on the first node with axes and y
+    on the last, which differ most.
 
     References
     ----------
@@ -62,7 +62,7 @@ def skew_us(network: Network) -> float:
 
 
 def jitter_us(network: Network) -> float:
-    """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds [us]."""
+    """Jitter of the synchronous packet, +/- about its mean: the profile's own and what the bus adds [us]."""
     return plain(network.profile.delivery.jitter_us + deciding_cycle(network).sync_jitter_us())
 
 
@@ -145,14 +145,14 @@ def _long_bus_delay(network: Network) -> Iterator[Refused]:
     most_us = LONGEST_DELAY_PERIODS * period_us
     if delay_us > most_us:
         most = f"at most {LONGEST_DELAY_PERIODS} periods, {most_us:g} us"
-        why = f"the bus puts {delay_us:g} us into a loop over it, and the circle test models {most}"
+        why = f"the bus puts {delay_us:g} us into a loop closed over it, and the circle test models {most}"
         key, profile = network.bus.key_of("pipeline"), network.profile
         less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
         yield Refused("servo.loop", '"host"', f'{why}; {less}close the loop on the node, servo.loop = "node"')
 
 
 def _out_of_order(network: Network) -> Iterator[Refused]:
-    """Refuse jitter and skew that would change the order of set-points: the profile's, else with what the bus adds."""
+    """Refuse jitter and skew that would change the order of set-points: the profile's own, then with the bus's."""
     profile, period_us = network.profile, network.profile.cycle.period_us
     delivery = Delivery(**parameters_in(profile.delivery, Delivery))
     causes = [*unfit_delivery(delivery, period_us=period_us)]
@@ -165,7 +165,7 @@ def _out_of_order(network: Network) -> Iterator[Refused]:
             yield Refused(network.bus.key_of("clock"), "false", f"{why}; set it true if the drives have a clock")
         else:
             added_us = jitter_us(network) - delivery.jitter_us
-            why = f"the bus adds {added_us:g} us of jitter either way, {most}; a longer period has room"
+            why = f"the bus adds +/- {added_us:g} us of jitter, {most}; a longer period has room"
             yield Refused("cycle.period_us", period_us, why)
 
 

@@ -198,7 +198,7 @@ def _is_assumed(profile: Profile, key: str) -> bool:
 
 
 def _execution_shares(figures: RuleFigures, network: Network, variance: float) -> list[_Share]:
-    """Shares of the assumed execution times in the variance, and in the required time: what terms lose without them."""
+    """Shares of the assumed execution times in the variance, and in the required time: terms shrink without them."""
     network, bus = network._replace(period_us=figures.period_us), network.bus
     assumed = [
         group
@@ -211,7 +211,7 @@ def _execution_shares(figures: RuleFigures, network: Network, variance: float) -
     cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(group.key(_EXECUTION) for group in assumed)
     whole_us, rest_us = (_execution_uncertainty_us(doubts) for doubts in (figures.doubts, cycle.doubts()))
     rest = {term.key: plain(term.us) for term in cycle.terms}
-    # A term that grows without execution times, as the wait for a gap does, is not carried by them.
+    # A term that grows without execution times, such as the wait for a gap, is not due to them.
     carried_us = sum(max(0.0, plain(term.us) - rest[term.key]) for term in figures.terms)
     of_time = (keys, carried_us / figures.required_us, "the required time")
     return [(keys, whole_us * (whole_us - rest_us) / variance, "the variance"), of_time] if variance else [of_time]
@@ -223,7 +223,7 @@ def assumed_rates(network: Network) -> tuple[str, ...]:
 
 
 def _rate_shares(figures: RuleFigures, network: Network) -> Iterator[_Share]:
-    """What an infinite rate saves of the required time, or of the load without a cycle, for each assumed bit rate."""
+    """For each assumed bit rate, what an infinite one saves of the required time, or of the load without a cycle."""
     bus = network.bus
     for key in assumed_rates(network):
         unlimited = trial(network, {key: _INFINITE_KBIT_S})

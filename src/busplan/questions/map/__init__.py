@@ -315,8 +315,8 @@ def _default_direction(key: str, network: Network) -> Direction:
     design_us, design_nodes = network.profile.cycle.period_us, int(varied.nodes)
     # If not even one node fits at any period, the range follows from the design's period alone.
     fit_us = _periods_of_nodes(network, varied.name) or [design_us]
-    # Chosen: to twice the design's period, to what its nodes need and a quarter more, and on to what the most nodes
-    # need, if that is within four times the design's period.
+    # Chosen: the largest of twice the design's period; what its nodes need, and a quarter more; and what the most nodes
+    # need, and a quarter more, but four times the design's period at most.
     to_us = max(2 * design_us, 1.25 * fit_us[min(design_nodes, len(fit_us)) - 1], min(4 * design_us, 1.25 * fit_us[-1]))
     from_us = min(design_us, fit_us[0], to_us / 4) / 1.25
     if key == AXES:
@@ -350,7 +350,7 @@ def _periods_of_nodes(network: Network, group: str) -> list[float]:
 def _counts(design: int, most: int) -> tuple[int, ...]:
     """Numbers of nodes, from one to some beyond the most that fit the longest period drawn.
 
-    Up to twice the nodes of this design in equal steps, beyond that in growing ones.
+    Steps are equal up to twice the nodes of this design, and grow beyond.
     """
     last = min(max(design + 1, most + _BEYOND), MAX_COUNT)
     near = last if last <= _MOST_BY_DEFAULT else min(2 * design, last)
