@@ -1,7 +1,10 @@
 """Numbers and equations with their sources, numbers with a grade of certainty, and inputs of a derivation."""
 
 import re
-from collections.abc import Callable, Mapping
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from importlib.resources import files
+from math import nan
 from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple, Self, TypeVar
 
@@ -31,6 +34,8 @@ class Sourced(float):
         What the number is, in one line.
     symbol
         Symbol in formulas; without it, formulas show the value.
+    name
+        Name among the constants of its kind of bus; without it, the meaning.
 
     Examples
     --------
@@ -49,9 +54,10 @@ class Sourced(float):
     meaning: str
     symbol: str
     name: str
-    """Name among the constants of its module; `meaning` until `constants` is called."""
 
-    def __new__(cls, value: float, *, unit: str, grade: Grade, source: str, meaning: str, symbol: str = "") -> Self:
+    def __new__(
+        cls, value: float, *, unit: str, grade: Grade, source: str, meaning: str, symbol: str = "", name: str = ""
+    ) -> Self:
         """Make the number; see the class."""
         number = super().__new__(cls, value)
         number.unit = unit
@@ -59,7 +65,7 @@ class Sourced(float):
         number.source = source
         number.meaning = meaning
         number.symbol = symbol
-        number.name = meaning
+        number.name = name or meaning
         return number
 
     def __getnewargs_ex__(self) -> tuple[tuple[float], dict[str, str]]:
@@ -68,23 +74,56 @@ class Sourced(float):
         return (float(self),), words
 
 
-def constants(namespace: Mapping[str, object]) -> Mapping[str, Sourced]:
-    """List the sourced numbers of a module by name, and set their `name`.
+def read_toml(package: str, name: str) -> dict[str, Any]:
+    """Read a TOML file that lies in a package."""
+    return tomllib.loads((files(package) / name).read_text(encoding="utf-8"))
+
+
+class Constants(dict[str, Sourced]):
+    """Sourced constants of a kind of bus by name, in the order of their TOML files.
+
+    A table `[NAME]` has the value and the words of one constant, `[NAME.KEY]` one of several by key; it is called
+    NAME[KEY]. A table in small letters is a group. What stands in a group, or in `[NAME]` beside keys, holds for
+    all of it. Python computes what has no value.
 
     Parameters
     ----------
-    namespace
-        The module's `globals()`: sourced numbers, and mappings of them.
+    package
+        The package that the files lie in.
+    names
+        Names of the files; `constants.toml` without any.
+
+    Examples
+    --------
+    >>> paper = Constants("busplan.buses.ieee1394")
+    >>> paper["MAX_HOPS"], paper["MAX_HOPS"].source, paper.by_key("DATA_RATE_MBIT_S")["S100"].name
+    (16.0, 'paper, section I; IEEE project page', 'DATA_RATE_MBIT_S[S100]')
     """
-    numbers: dict[str, Sourced] = {}
-    for name, value in namespace.items():
-        if isinstance(value, Sourced):
-            numbers[name] = value
-        elif isinstance(value, MappingProxyType):
-            numbers |= {f"{name}[{key}]": number for key, number in value.items() if isinstance(number, Sourced)}
-    for name, number in numbers.items():
-        number.name = name
-    return MappingProxyType(numbers)
+
+    def __init__(self, package: str, *names: str) -> None:
+        for file in names or ("constants.toml",):
+            for name, words in _entries("", read_toml(package, file)):
+                self[name] = Sourced(**{"value": nan, **words}, name=name)
+
+    def computed(self, name: str, value: float) -> Sourced:
+        """Give a constant the value that its file leaves to Python."""
+        number = self[name] = Sourced(value, **{slot: getattr(self[name], slot) for slot in Sourced.__slots__})
+        return number
+
+    def by_key(self, name: str) -> Mapping[str, Sourced]:
+        """Constants of one name by key."""
+        start = f"{name}["
+        return MappingProxyType({key[len(start) : -1]: number for key, number in self.items() if key.startswith(start)})
+
+
+def _entries(name: str, table: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and words of each constant in a table."""
+    words = {key: value for key, value in table.items() if not isinstance(value, dict)}
+    tables = {key: value for key, value in table.items() if key not in words}
+    if not tables:
+        yield name, words
+    for key, entry in tables.items():
+        yield from _entries(f"{name}[{key}]" if name.isupper() else key, {**words, **entry})
 
 
 class Input(NamedTuple):

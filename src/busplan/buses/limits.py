@@ -9,7 +9,7 @@ from typing import Final, Literal, NamedTuple
 
 from busplan.buses.figure import MARGIN, Figure, Ink
 from busplan.buses.network import Group, Network
-from busplan.buses.rule import Rule, RuleProblem, RuleSubject, told_apart
+from busplan.buses.rule import RuleProblem, RuleSubject, told_apart
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, next_entry, plain
 from busplan.sourced import Grade, Sourced
 
@@ -374,35 +374,11 @@ def period_limit(periods: Periods) -> Limit:
     )
 
 
-def period_rule(code: str, periods: Periods, *, kind: str, source: str) -> Rule:
-    """The rule that reports a period that the bus does not allow, with its neighbours.
-
-    Parameters
-    ----------
-    code
-        Its code.
-    periods
-        The periods that it allows.
-    kind
-        Name of the kind of bus.
-    source
-        The periods in words, with their source.
-    """
-
-    def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
-        period_us = subject.profile.cycle.period_us
-        if not periods.allows(period_us):
-            yield RuleProblem("cycle.period_us", periods.refusal(period_us), *subject.cure())
-
-    return Rule(
-        code,
-        f"{kind}-unknown-period",
-        "error",
-        "the bus does not allow this period",
-        f"The bus runs only at some communication periods: {source}. A profile with another period loads, and capacity "
-        "gives its figures, but it does not fit. The message names the next shorter and the next longer period.",
-        unknown_period,
-    )
+def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """Check of the rule that the bus must allow the period; it names the neighbours."""
+    periods, period_us = subject.network.bus.periods, subject.profile.cycle.period_us
+    if not periods.allows(period_us):
+        yield RuleProblem("cycle.period_us", periods.refusal(period_us), *subject.cure())
 
 
 NODE: Final = "node"

@@ -1,13 +1,11 @@
 """The data files with published and measured figures."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from math import fsum, sqrt
-from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
-_DATA: Final = Path(__file__).resolve().parents[1] / "data"
+from busplan.sourced import read_toml
 
 
 @cache
@@ -19,7 +17,7 @@ def published(name: str) -> dict[str, Any]:
     name
         Name of the file.
     """
-    return tomllib.loads((_DATA / f"{name}.toml").read_text(encoding="utf-8"))
+    return read_toml("busplan", f"data/{name}.toml")
 
 
 def rows_of(name: str, part: str) -> list[dict[str, Any]]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
 
-from busplan.sourced import Sourced
+from busplan.sourced import Sourced, read_toml
 
 if TYPE_CHECKING:
     from busplan.buses.limits import Value
@@ -70,6 +70,10 @@ class RuleSubject(Protocol):
         """The least change after which the profile holds every constraint of a plan."""
 
 
+Check: TypeAlias = Callable[[RuleSubject], Iterator[RuleProblem]]
+"""Check of a profile that could be read: the problems that it has."""
+
+
 class Rule(NamedTuple):
     """One rule of the gate."""
 
@@ -80,8 +84,24 @@ class Rule(NamedTuple):
     """The problem in one line."""
     explanation: str
     """Why it matters and how to mend it."""
-    check: Callable[[RuleSubject], Iterator[RuleProblem]] | None = None
-    """Check of a profile that could be read; None where another part of the gate reports the problem."""
+    check: Check | None = None
+    """None where another part of the gate reports the problem."""
+
+
+def read_rules(package: str, checks: Mapping[str, Check]) -> tuple[Rule, ...]:
+    """Read the rules of a package from its `rules.toml`; a line break in an explanation is a space.
+
+    Parameters
+    ----------
+    package
+        The package.
+    checks
+        Check of a rule by its code.
+    """
+    rules = read_toml(package, "rules.toml")
+    for rule in rules.values():
+        rule["explanation"] = " ".join(rule["explanation"].split())
+    return tuple(Rule(code, **rule, check=checks.get(code)) for code, rule in rules.items())
 
 
 def contradicts(fits: bool, figures: RuleFigures) -> bool:

@@ -1,16 +1,14 @@
 """All rules of the gate by code, and the answer of `busplan rule`. A dropped code is never used again."""
 
-import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from importlib.resources import files
 from types import MappingProxyType
 from typing import Any, Final
 
 from busplan.buses import kind_named, kind_names
 from busplan.buses.bus import Bus
 from busplan.buses.limits import NODE, busy_words, slow_groups
-from busplan.buses.rule import Mending, Rule, RuleProblem, RuleSubject, margin, overrun, told_apart
+from busplan.buses.rule import Check, Mending, Rule, RuleProblem, RuleSubject, margin, overrun, read_rules, told_apart
 from busplan.english import did_you_mean
 from busplan.errors import BusplanError, ProblemKind
 from busplan.forms.blocks import (
@@ -124,7 +122,7 @@ def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
             yield RuleProblem(place, f"{noun}, which {assumption.carries}", "measure it")
 
 
-CHECKS: Final[Mapping[str, Callable[[RuleSubject], Iterator[RuleProblem]]]] = {
+CHECKS: Final[Mapping[str, Check]] = {
     "BP101": slice_overrun,
     "BP114": not_shown_to_fit,
     "BP103": over_utilisation,
@@ -136,15 +134,7 @@ CHECKS: Final[Mapping[str, Callable[[RuleSubject], Iterator[RuleProblem]]]] = {
 """The check of each rule, by its code in `rules.toml`."""
 
 
-def _read() -> Iterator[Rule]:
-    """Rules of the gate's own file; a line break in an explanation is a space."""
-    text = (files("busplan.gate") / "rules.toml").read_text(encoding="utf-8")
-    for code, rule in tomllib.loads(text).items():
-        words = " ".join(rule.pop("explanation").split())
-        yield Rule(code, **rule, explanation=words, check=CHECKS.get(code))
-
-
-COMMON: Final[Mapping[str, Rule]] = MappingProxyType({rule.code: rule for rule in _read()})
+COMMON: Final[Mapping[str, Rule]] = MappingProxyType({rule.code: rule for rule in read_rules("busplan.gate", CHECKS)})
 """Rules common to all kinds of bus, by code."""
 _FILE_CODES: Final[Mapping[ProblemKind, str]] = {
     "syntax": "BP001",

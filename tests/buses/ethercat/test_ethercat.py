@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 import busplan
-from busplan.buses.ethercat.equations import CONSTANTS
 from busplan.buses.ethercat.section import EthercatProfile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
@@ -438,10 +437,6 @@ def test_published_figures_are_met_within_what_their_sources_leave_open() -> Non
         assert abs(residual) <= tolerance + 1e-12, (key, residual)
     # What propagation explains is missing, never too much.
     assert all((result[name, "vendors model"] or 0) < 0 for name in ("1000 digital I/O", "1486 bytes"))
-
-
-def test_constants_have_a_source_and_a_grade() -> None:
-    assert all(constant.source and constant.grade for constant in CONSTANTS.values())
 
 
 @pytest.mark.parametrize("figure", ["required_us", "command_us", "frames", "latency.end_to_end_us"])

@@ -6,17 +6,16 @@ import pytest
 
 import busplan
 from busplan.forms.charts import Curves
-from busplan.questions.compare import CompareAnswer
 
 EACH = pytest.mark.parametrize("name", ["can-servo-8", "dvrk", "gantry-24", "paper-1ms"])
 
 
 @cache
-def compared(name: str) -> CompareAnswer:
+def compared(name: str) -> busplan.CompareAnswer:
     return busplan.compare(name)
 
 
-def plot_of(found: CompareAnswer) -> Curves:
+def plot_of(found: busplan.CompareAnswer) -> Curves:
     (panel,) = found.drawing().panels
     assert isinstance(panel.plot, Curves)
     return panel.plot

@@ -12,8 +12,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import busplan
-from busplan.errors import BusplanError
-from busplan.questions.import_ import ImportAnswer
 from busplan.recordings.can_timing import event_model
 from tests.oracles.can_recording import Logged, Queued, arbitrated, bits_of, candump
 
@@ -66,17 +64,17 @@ def random_network(seed: int, *, span_us: float = 3e6) -> Network:
     return Network(bit_rate, arbitrated(queued, bit_us=1000 / bit_rate), periods, fd_messages)
 
 
-def imported(text: str, folder: Path, *beside: str) -> ImportAnswer:
+def imported(text: str, folder: Path, *beside: str) -> busplan.ImportAnswer:
     (folder / "drive.log").write_text(text, encoding="utf-8")
     return busplan.import_profile([folder / "drive.log", *(folder / name for name in beside)])
 
 
-def can_profile(answer: ImportAnswer) -> Any:
+def can_profile(answer: busplan.ImportAnswer) -> Any:
     """The profile, with the keys of CAN."""
     return answer.profile
 
 
-def keys_of(answer: ImportAnswer) -> dict[tuple[int, bool], Any]:
+def keys_of(answer: busplan.ImportAnswer) -> dict[tuple[int, bool], Any]:
     """Messages by identifier, and whether it has 29 bits."""
     profile = can_profile(answer)
     usual = profile.bus.identifier_bits
@@ -339,14 +337,16 @@ def test_no_response_is_below_the_delay_of_a_bus_with_coarse_stamps(step_us: flo
 
 
 def test_stamps_of_whole_seconds_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(BusplanError, match="stamps have steps of 1,000,000 us, too coarse for 0x1") as refused:
+    with pytest.raises(busplan.BusplanError, match="stamps have steps of 1,000,000 us, too coarse for 0x1") as refused:
         imported(candump(coarse(arbitrated(random_queue()), 1e6)), tmp_path)
     assert "record with finer stamps" in str(refused.value)
 
 
 def test_frames_that_no_bus_carries_are_refused(tmp_path: Path) -> None:
     replayed = [frame._replace(us=27.0 * k) for k, frame in enumerate(arbitrated(random_queue())[:400])]
-    with pytest.raises(BusplanError, match="kbit/s, more than a CAN bus has: the stamps are not those of the bus"):
+    with pytest.raises(
+        busplan.BusplanError, match="kbit/s, more than a CAN bus has: the stamps are not those of the bus"
+    ):
         imported(candump(replayed), tmp_path)
 
 
@@ -391,7 +391,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_a_log_without_periods_is_refused(case: str, tmp_path: Path) -> None:
     text, words = REFUSED[case]
-    with pytest.raises(BusplanError) as refused:
+    with pytest.raises(busplan.BusplanError) as refused:
         imported(text, tmp_path)
     assert words in str(refused.value)
 
@@ -448,7 +448,7 @@ def test_many_identifiers_and_any_bytes_are_no_crash(tmp_path: Path) -> None:
         (tmp_path / "drive.log").write_bytes(damaged[: random.randrange(len(damaged))])
         try:
             busplan.import_profile(tmp_path / "drive.log")
-        except BusplanError as error:
+        except busplan.BusplanError as error:
             assert len(error.problems) == 1  # noqa: PT017
 
 

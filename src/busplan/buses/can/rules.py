@@ -13,7 +13,7 @@ from busplan.buses.can.frames import Points, Stream, Traffic, last_identifier, s
 from busplan.buses.can.waiting import message_responses
 from busplan.buses.limits import NODE_LIMIT, Limit
 from busplan.buses.network import Network
-from busplan.buses.rule import Rule, RuleProblem, RuleSubject
+from busplan.buses.rule import RuleProblem, RuleSubject, read_rules
 from busplan.elementwise import Number, larger, plain, pointwise, smaller, total, within
 from busplan.english import first_of
 from busplan.sections.base import MAX_TIME_US
@@ -270,35 +270,6 @@ def deadline_missed(subject: RuleSubject) -> Iterator[RuleProblem]:
         yield RuleProblem(f"message.{message.name}.deadline_us", why, *subject.cure())
 
 
-RULES: Final = (
-    Rule(
-        "BP121",
-        "bus-load-over-limit",
-        "error",
-        "the bus load is over limits.max_load",
-        "All messages of the bus, with the stuff bits of the worst case, take a larger share of it than "
-        "limits.max_load allows, 0.8 unless the profile says otherwise. Errors on the wire cause repetitions, which "
-        "need room. From a load of 1 on, queues grow without end and no response time exists.",
-        load_over_limit,
-    ),
-    Rule(
-        "BP122",
-        "identifiers-collide",
-        "error",
-        "two messages have one identifier",
-        "Arbitration tells messages apart by their identifiers alone. Two nodes that send one identifier at the same "
-        "time with different data destroy each other's frames. Each PDO takes the identifier behind that of the one "
-        "before, and each further frame of a PDO 256 more.",
-        identifiers_collide,
-    ),
-    Rule(
-        "BP123",
-        "deadline-missed",
-        "error",
-        "a message may arrive behind its deadline",
-        "The worst-case response time of the message, with its jitter, the longest frame of a lower priority, and all "
-        "frames of higher priorities, in its worst instance, is longer than message.deadline_us. `busplan latency` "
-        "shows the parts.",
-        deadline_missed,
-    ),
+RULES: Final = read_rules(
+    "busplan.buses.can", {"BP121": load_over_limit, "BP122": identifiers_collide, "BP123": deadline_missed}
 )

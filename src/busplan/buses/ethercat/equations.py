@@ -7,7 +7,7 @@ from typing import Final, Literal
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.published import Spread, published, rows_of
 from busplan.elementwise import Number, choose, larger, plain, traced_with
-from busplan.sourced import Grade, Sourced, constants
+from busplan.sourced import Constants
 
 Port = Literal["100BASE-TX", "E-bus"]
 ProcessData = Literal["LRW-separate", "LRW-shared", "LRD-LWR"]
@@ -18,132 +18,46 @@ Master = Literal["SOEM", "IgH", "ethercrab", "TwinCAT", "acontis"]
 UNNAMED: Final = "unnamed"
 """The master of a profile that names none."""
 
-_ETHERNET: Final = "IEEE 802.3"
-_ETG: Final = "ETG.1000; SOEM, ethercattype.h"
-_MEASURED: Final = published("ethercat")["delays"]
-_COPIES: Final = "round trips of 72 to 1064 bytes in three captures of SOEM, dumps of ethercrab"
-
-
-def _bytes(value: int, meaning: str, source: str) -> Sourced:
-    return Sourced(value, unit="bytes", grade="published", source=source, meaning=meaning)
-
-
-def _delay(spread: Spread, port: str, source: str) -> tuple[Sourced, Sourced]:
-    """The mean delay of the devices of a port, and the standard uncertainty of a further kind of device."""
-    mean = Sourced(
-        spread.mean,
-        unit="us",
-        grade="measured",
-        source=f"{source}, their mean",
-        meaning=f"one-way delay of a device with {port} ports",
-    )
-    doubt = Sourced(
-        spread.uncertainty,
-        unit="us",
-        grade="derived",
-        source=f"{source}, their sd sqrt(1 + 1/n)",
-        meaning=f"standard uncertainty of the delay of all {port} devices of a machine, one way",
-    )
-    return mean, doubt
-
-
-BYTE_US: Final = Sourced(
-    0.08, unit="us", grade="published", source="acontis, cycle time calculator", meaning="time of a byte at 100 Mbit/s"
-)
-PREAMBLE_BYTES: Final = _bytes(8, "preamble and start of a frame", _ETHERNET)
-ETHERNET_BYTES: Final = _bytes(14, "Ethernet header: two addresses and the type", _ETHERNET)
-CHECK_BYTES: Final = _bytes(4, "frame check sequence", _ETHERNET)
-GAP_BYTES: Final = _bytes(12, "gap after a frame", _ETHERNET)
-HEADER_BYTES: Final = _bytes(2, "EtherCAT header of a frame", _ETG)
-DATAGRAM_BYTES: Final = _bytes(12, "header of a datagram, 10, and its working counter, 2", _ETG)
-LEAST_FRAME_BYTES: Final = _bytes(84, "shortest frame on the wire, gap included; shorter ones are padded", _ETHERNET)
-MOST_FRAME_BYTES: Final = _bytes(1538, "longest frame on the wire, gap included", _ETHERNET)
-MAILBOX_BYTES: Final = _bytes(128, "data of a mailbox", "Lenze, communication manual E84AYCET: at most 128")
-MOST_DEVICES: Final = Sourced(
-    65535, unit="1", grade="published", source="ETG.1000: addresses of 16 bits", meaning="devices of one segment"
-)
-MOST_CABLE_M: Final = Sourced(
-    100, unit="m", grade="published", source=_ETHERNET, meaning="longest cable of 100BASE-TX between two devices"
-)
-CABLE_US_PER_M: Final = Sourced(
-    0.005, unit="us/m", grade="published", source="SOEM issue 585: 5 ns/m", meaning="delay of a metre of cable"
-)
-_TX, _TX_DOUBT = _delay(Spread.of(_MEASURED["tx_one_way_us"]), "100BASE-TX", _MEASURED["source"])
-_EBUS, _EBUS_DOUBT = _delay(
-    Spread(_MEASURED["e_bus_one_way_us"], _MEASURED["e_bus_uncertainty_us"]), "E-bus", _MEASURED["source"]
-)
-DELAY_US: Final[Mapping[Port, Sourced]] = MappingProxyType({"100BASE-TX": _TX, "E-bus": _EBUS})
-DELAY_UNCERTAINTY_US: Final[Mapping[Port, Sourced]] = MappingProxyType({"100BASE-TX": _TX_DOUBT, "E-bus": _EBUS_DOUBT})
-MEASURED_DELAY_UNCERTAINTY_US: Final = Sourced(
-    0.010 / 12**0.5,
-    unit="us",
-    grade="derived",
-    source="a step of 10 ns of the devices' clocks, rectangular (JCGM 100, 4.3.7)",
-    meaning="standard uncertainty of a measured delay, each device by itself",
-)
-_PER_BYTE: Final = Spread.of([row["published"] for row in rows_of("ethercat", "bytes")])
-BYTE_BIAS_US: Final = Sourced(
-    _PER_BYTE.mean - BYTE_US,
-    unit="us",
-    grade="derived",
-    source=f"{_COPIES}, their mean less the time on the wire",
-    meaning="what a byte of process data takes beyond the wire, about a copy in the host",
-)
-BYTE_BIAS_UNCERTAINTY_US: Final = Sourced(
-    _PER_BYTE.uncertainty,
-    unit="us",
-    grade="derived",
-    source=f"{_COPIES}, their sd sqrt(1 + 1/n)",
-    meaning="standard uncertainty of that, all bytes together",
-)
-UNMEASURED_MASTER_SHARE: Final = Sourced(
-    0.5,
-    unit="1",
-    grade="assumed",
-    source="chosen: published times of like hosts differ by as much",
-    meaning="standard uncertainty of a master's time that nobody has measured, as a share of it",
-)
-
-
-def _by_master(datagrams: str) -> Mapping[str, Sourced]:
-    """Datagrams that each master adds to a frame, headers and working counters included [bytes]."""
-    return MappingProxyType({name: _datagrams(**of[datagrams]) for name, of in _MASTERS.items() if datagrams in of})
-
-
-def _datagrams(commands: str, sizes: list[int], source: str, grade: Grade = "published") -> Sourced:
-    meaning = f"datagrams of the master: {commands}, data {' + '.join(map(str, sizes)) or '0'}"
-    value = sum(sizes) + len(sizes) * DATAGRAM_BYTES
-    return Sourced(value, unit="bytes", grade=grade, source=source, meaning=meaning)
-
-
-_MASTERS: Final = published("ethercat")["masters"]
 LAYOUTS: Final[Mapping[str, ProcessData]] = MappingProxyType(
-    {name: master["process_data"] for name, master in _MASTERS.items()}
+    {"SOEM": SEPARATE, "IgH": SEPARATE, "ethercrab": SEPARATE, "TwinCAT": SHARED, "acontis": SHARED, UNNAMED: SEPARATE}
 )
 """Layout of the process data by master."""
-HOUSEKEEPING_BYTES: Final = _by_master("every_cycle")
+
+CONSTANTS: Final = Constants("busplan.buses.ethercat")
+"""Every constant with a source, by its name here."""
+
+BYTE_US: Final = CONSTANTS["BYTE_US"]
+PREAMBLE_BYTES: Final = CONSTANTS["PREAMBLE_BYTES"]
+ETHERNET_BYTES: Final = CONSTANTS["ETHERNET_BYTES"]
+CHECK_BYTES: Final = CONSTANTS["CHECK_BYTES"]
+GAP_BYTES: Final = CONSTANTS["GAP_BYTES"]
+HEADER_BYTES: Final = CONSTANTS["HEADER_BYTES"]
+DATAGRAM_BYTES: Final = CONSTANTS["DATAGRAM_BYTES"]
+LEAST_FRAME_BYTES: Final = CONSTANTS["LEAST_FRAME_BYTES"]
+MOST_FRAME_BYTES: Final = CONSTANTS["MOST_FRAME_BYTES"]
+MAILBOX_BYTES: Final = CONSTANTS["MAILBOX_BYTES"]
+MOST_DEVICES: Final = CONSTANTS["MOST_DEVICES"]
+MOST_CABLE_M: Final = CONSTANTS["MOST_CABLE_M"]
+CABLE_US_PER_M: Final = CONSTANTS["CABLE_US_PER_M"]
+_TX: Final = Spread.of(published("ethercat")["delays"]["tx_one_way_us"])
+CONSTANTS.computed("DELAY_US[100BASE-TX]", _TX.mean)
+CONSTANTS.computed("DELAY_UNCERTAINTY_US[100BASE-TX]", _TX.uncertainty)
+DELAY_US: Final = CONSTANTS.by_key("DELAY_US")
+"""One-way delay of a device by the ports that it has."""
+DELAY_UNCERTAINTY_US: Final = CONSTANTS.by_key("DELAY_UNCERTAINTY_US")
+MEASURED_DELAY_UNCERTAINTY_US: Final = CONSTANTS.computed("MEASURED_DELAY_UNCERTAINTY_US", 0.010 / 12**0.5)
+_PER_BYTE: Final = Spread.of([row["published"] for row in rows_of("ethercat", "bytes")])
+BYTE_BIAS_US: Final = CONSTANTS.computed("BYTE_BIAS_US", _PER_BYTE.mean - BYTE_US)
+BYTE_BIAS_UNCERTAINTY_US: Final = CONSTANTS.computed("BYTE_BIAS_UNCERTAINTY_US", _PER_BYTE.uncertainty)
+UNMEASURED_MASTER_SHARE: Final = CONSTANTS["UNMEASURED_MASTER_SHARE"]
+HOUSEKEEPING_BYTES: Final = CONSTANTS.by_key("HOUSEKEEPING_BYTES")
 """Datagrams that each master adds to the first frame of every cycle, without that of distributed clocks."""
-CLOCK_BYTES: Final = _by_master("clocks")
+CLOCK_BYTES: Final = CONSTANTS.by_key("CLOCK_BYTES")
 """Datagram of distributed clocks, which each master adds to them."""
-STATE_CHECK_BYTES: Final = _by_master("every_device")
+STATE_CHECK_BYTES: Final = CONSTANTS.by_key("STATE_CHECK_BYTES")
 """Datagram for each device, by master: it reads the state of all devices in every cycle."""
-PIPELINE_CYCLES: Final = Sourced(
-    1,
-    unit="1",
-    grade="assumed",
-    source="chosen: a frame that brings feedback cannot take the command computed from it",
-    meaning="cycles from the frame that brings feedback to the one that takes the command computed from it",
-)
-SYNC_SHIFT: Final = Sourced(
-    0.5,
-    unit="1",
-    grade="assumed",
-    source="chosen: the middle of the cycle",
-    meaning="where SYNC0 of the distributed clocks lies after the master's task, as a share of the period",
-)
-
-CONSTANTS: Final = constants({key: value for key, value in globals().items() if not key.startswith("_")})
-
+PIPELINE_CYCLES: Final = CONSTANTS["PIPELINE_CYCLES"]
+SYNC_SHIFT: Final = CONSTANTS["SYNC_SHIFT"]
 
 _BOTH_WAYS: Final = 2
 

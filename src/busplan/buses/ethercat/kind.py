@@ -41,7 +41,7 @@ from busplan.buses.limits import (
     share_of_period,
 )
 from busplan.buses.network import Network
-from busplan.buses.rule import Recorded, Rule, RuleProblem, RuleSubject
+from busplan.buses.rule import Recorded, RuleProblem, RuleSubject, read_rules
 from busplan.elementwise import Number, larger, plain
 from busplan.english import plural
 from busplan.progress import Progress
@@ -137,30 +137,7 @@ def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
     )
 
 
-RULES: Final = (
-    Rule(
-        "BP131",
-        "no-common-clock",
-        "warning",
-        "the axes of a circle have no distributed clocks",
-        "A frame passes one drive after the other, and several frames take longer still. With distributed clocks all "
-        "drives take their set-points at SYNC0; without them each takes its own when its frame has passed, and a "
-        "circle has that difference between its axes.",
-        no_common_clock,
-    ),
-    Rule(
-        "BP132",
-        "command-behind-sync",
-        "error",
-        "commands are not shown to be taken before SYNC0",
-        "Drives with distributed clocks act at SYNC0, which lies at bus.sync_shift of the period after the master's "
-        "task. A command that has not arrived by then, with the master's jitter and the drive's own time, waits for "
-        "the next one: a cycle more of dead time, and where only some drives are late their axes are a cycle apart. It "
-        "is a limit, judged with its doubt as time is. With bus.sync_shift = 0, SYNC0 at the task itself, the SYNC0 "
-        "of the next cycle counts.",
-        command_behind_sync,
-    ),
-)
+RULES: Final = read_rules("busplan.buses.ethercat", {"BP131": no_common_clock, "BP132": command_behind_sync})
 
 
 _PROCESS_DATA = "bus.process_data"

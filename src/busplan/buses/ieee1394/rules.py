@@ -26,7 +26,7 @@ from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
 from busplan.buses.limits import Limit
 from busplan.buses.network import Network
-from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, margin, told_apart
+from busplan.buses.rule import RuleProblem, RuleSubject, contradicts, margin, read_rules, told_apart
 from busplan.elementwise import Number, plain
 from busplan.english import plural
 from busplan.sections.base import TRANSACTION_KINDS
@@ -227,77 +227,16 @@ def _wasted(subject: RuleSubject) -> str:
     return f"{words} and wins {plural(won, 'node')}"
 
 
-RULES: Final = (
-    Rule(
-        "BP102",
-        "other-model-overrun",
-        "warning",
-        "the paper's equations say otherwise",
-        "The verdict is by the standard's timing, and the paper's equations contradict it. The paper counts gaps in "
-        "the data rate, and adds up those of a transaction; the wire counts them at the base rate, four times slower "
-        "at S400, as thresholds of an idle period. A cycle that fits only by the paper is likely to fail.",
-        paper_disagrees,
-    ),
-    Rule(
-        "BP113",
-        "fits-only-until-bus-reset",
-        "warning",
-        "the cycle fits, but not after a bus reset",
-        "After a bus reset the gap count is 63 until the bus manager writes it again (TI SLLS423I, p. 41). A cycle "
-        "that fits only at a smaller count does not fit then: write the gap count after each reset, or plan with 63.",
-        fits_only_until_bus_reset,
-    ),
-    Rule(
-        "BP106",
-        "too-many-nodes",
-        "error",
-        "more nodes than one bus has addresses for",
-        "An IEEE 1394 bus has 63 nodes, and the host is one of them.",
-        too_many_nodes,
-    ),
-    Rule(
-        "BP107",
-        "too-many-hops",
-        "error",
-        "more cable hops than the standard allows",
-        "Between any two nodes lie at most 16 hops. In a chain with the host at its end that is 16 nodes; a tree "
-        "carries more.",
-        too_many_hops,
-    ),
-    Rule(
-        "BP108",
-        "payload-over-limit",
-        "error",
-        "the payload is larger than a packet of this speed",
-        "An asynchronous packet carries 512 bytes at S100, 1024 at S200 and 2048 at S400.",
-        payload_over_limit,
-    ),
-    Rule(
-        "BP109",
-        "gap-count-unsafe",
-        "error",
-        "the gap count is too small for the hops",
-        "With a gap count below the table of IEEE 1394a, a node may take the gap inside a subaction for the end "
-        'of it, and two nodes talk at once. Use the number of the message, or "optimal".',
-        gap_count_unsafe,
-    ),
-    Rule(
-        "BP110",
-        "gap-count-wasteful",
-        "warning",
-        "the gap count is larger than the hops need",
-        "Every transaction waits for a subaction gap and an arbitration reset gap, both in proportion to the gap "
-        "count. 63 is what a bus starts with; the table of IEEE 1394a says what the hops need. All nodes must "
-        "hold the same number, and it returns to 63 after two bus resets without a new one.",
-        gap_count_wasteful,
-    ),
-    Rule(
-        "BP111",
-        "payload-not-quadlets",
-        "warning",
-        "the payload is no whole number of quadlets",
-        "Payloads travel in quadlets of 4 bytes; what is missing is filled up. The paper's timing does not count "
-        "the fill, the standard's does.",
-        payload_not_quadlets,
-    ),
+RULES: Final = read_rules(
+    "busplan.buses.ieee1394",
+    {
+        "BP102": paper_disagrees,
+        "BP106": too_many_nodes,
+        "BP107": too_many_hops,
+        "BP108": payload_over_limit,
+        "BP109": gap_count_unsafe,
+        "BP110": gap_count_wasteful,
+        "BP111": payload_not_quadlets,
+        "BP113": fits_only_until_bus_reset,
+    },
 )

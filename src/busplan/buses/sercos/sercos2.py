@@ -8,69 +8,34 @@ from busplan.buses.cycle import ALL, BUT_FIRST, BusEvent, BusLatency, Doubt, Lef
 from busplan.buses.figure import NONPERIODIC, BusFigures, Figure
 from busplan.buses.limits import EventKind, Periods
 from busplan.buses.network import Network
-from busplan.buses.sercos import shared as sercos
 from busplan.buses.sercos.shared import DELAYS, SercosCycle, delays, word_bytes
 from busplan.elementwise import Number, choose, named, plain, rounded_down, total
-from busplan.sourced import Sourced, constants
+from busplan.sourced import Constants
 
 DataRate = Literal[2, 4, 8, 16]
 """Data rates [Mbit/s]."""
 
-_CODE: Final = "sercos2-linuxcnc, a master that drives a ring"
-_KOLLMORGEN: Final = "Kollmorgen, sercos IDN set of S300/S700"
-_HDLC: Final = "sercos.com, telegrams of SERCOS I and II: a 0 after five 1s"
-
-
-def _bytes(value: int, meaning: str, *, source: str = _CODE) -> Sourced:
-    return Sourced(value, unit="bytes", grade="published", source=source, meaning=meaning)
-
-
-def _us(value: float, meaning: str, *, symbol: str = "") -> Sourced:
-    return Sourced(value, unit="us", grade="published", source=_KOLLMORGEN, meaning=meaning, symbol=symbol)
-
-
-BITS_PER_BYTE: Final = Sourced(8, unit="bits", grade="published", source="definition", meaning="bits of a byte")
-FLAG_BITS: Final = Sourced(
-    16, unit="bits", grade="published", source=_CODE, meaning="opening and closing flag of a telegram, never stuffed"
-)
-STUFF_STEP_BITS: Final = Sourced(
-    5, unit="bits", grade="published", source=_HDLC, meaning="bits for each stuff bit in the worst case"
-)
-FRAME_BYTES: Final = _bytes(3, "address 1 and check sequence 2 of a telegram")
-MST_BYTES: Final = _bytes(1, "data of the synchronisation telegram")
-RECORD_BYTES: Final = _bytes(4, "status 2 and service 2 of an AT; control 2 and service 2 of a record of the MDT")
-MOST_MDT_BYTES: Final = _bytes(65_534, "most data of the MDT", source=_KOLLMORGEN)
-MOST_DRIVE_BYTES: Final = _bytes(
-    32, "data of a drive that can be configured in either direction", source="Rexroth, IndraDrive MPx-02"
-)
-MOST_DRIVES: Final = Sourced(
-    254, unit="1", grade="published", source="sercos.de, introduction", meaning="drives of a ring"
-)
-SLOW_MBIT_S: Final = Sourced(
-    4, unit="Mbit/s", grade="published", source=_KOLLMORGEN, meaning="fastest rate of the slow start"
-)
-SLOW_START_US: Final = _us(12, "from MST to the first AT at 2 and 4 Mbit/s, t1min", symbol="t_1")
-FAST_START_US: Final = _us(4, "from MST to the first AT at 8 and 16 Mbit/s, t1min", symbol="t_1")
-TURNAROUND_US: Final = _us(12, "from the last AT to the MDT, t_ATMT", symbol="t_ATMT")
-
-GAP_SHARE: Final = Sourced(
-    0.1,
-    unit="1",
-    grade="assumed",
-    source="chosen, as of an execution time that is assumed",
-    meaning="standard uncertainty of the gap between two drives, as a share of it",
-)
+CONSTANTS: Final = Constants("busplan.buses.sercos", "shared.toml", "sercos2.toml")
+"""Constants with a source, by their names here."""
+BITS_PER_BYTE: Final = CONSTANTS["BITS_PER_BYTE"]
+FLAG_BITS: Final = CONSTANTS["FLAG_BITS"]
+STUFF_STEP_BITS: Final = CONSTANTS["STUFF_STEP_BITS"]
+FRAME_BYTES: Final = CONSTANTS["FRAME_BYTES"]
+MST_BYTES: Final = CONSTANTS["MST_BYTES"]
+RECORD_BYTES: Final = CONSTANTS["RECORD_BYTES"]
+MOST_MDT_BYTES: Final = CONSTANTS["MOST_MDT_BYTES"]
+MOST_DRIVE_BYTES: Final = CONSTANTS["MOST_DRIVE_BYTES"]
+MOST_DRIVES: Final = CONSTANTS["MOST_DRIVES"]
+SLOW_MBIT_S: Final = CONSTANTS["SLOW_MBIT_S"]
+SLOW_START_US: Final = CONSTANTS["SLOW_START_US"]
+FAST_START_US: Final = CONSTANTS["FAST_START_US"]
+TURNAROUND_US: Final = CONSTANTS["TURNAROUND_US"]
+GAP_SHARE: Final = CONSTANTS["GAP_SHARE"]
 
 _STEP_US: Final = 1000
 _LONGEST_US: Final = 65_000
 PERIODS: Final = Periods((62.5, 125.0, 250.0, 500.0, *map(float, range(_STEP_US, _LONGEST_US + 1, _STEP_US))))
 """Communication periods: sercos.com, cycle times; the longest by Rexroth."""
-PERIODS_SOURCE: Final = (
-    "62.5, 125, 250 and 500 us, and multiples of 1 ms (sercos.com), up to 65 ms (Rexroth); a drive may know fewer, as "
-    "0.5, 1, 2, ... 8 ms (Kollmorgen)"
-)
-
-CONSTANTS: Final = {**sercos.CONSTANTS, **constants(globals())}
 
 
 def telegram_bits(data_bytes: Number, *, is_stuffed: bool) -> Number:

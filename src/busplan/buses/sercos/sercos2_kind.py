@@ -11,7 +11,6 @@ from busplan.buses.limits import (
     Perturbation,
     TimingModel,
     period_limit,
-    period_rule,
 )
 from busplan.buses.network import Network
 from busplan.buses.sercos.sercos2 import (
@@ -23,13 +22,12 @@ from busplan.buses.sercos.sercos2 import (
     MOST_MDT_BYTES,
     NONE,
     PERIODS,
-    PERIODS_SOURCE,
     STRETCHES,
     TURNAROUND_US,
     WORST,
     Sercos2Cycle,
 )
-from busplan.buses.sercos.shared import KEYS, WORD_BYTES, SercosBus, starter
+from busplan.buses.sercos.shared import KEYS, RULES, WORD_BYTES, SercosBus, starter
 from busplan.elementwise import plain
 
 _FASTEST: Final = 16
@@ -67,7 +65,7 @@ class Sercos2(SercosBus):
     deciding_model = WORST
     figures = FIGURES
     limits = LIMITS
-    rules = (period_rule("BP151", PERIODS, kind="sercos2", source=PERIODS_SOURCE),)
+    rules = (RULES["BP151"],)
     periods = PERIODS
     starter = starter(
         """\

@@ -14,7 +14,6 @@ from busplan.buses.limits import (
     Setting,
     TimingModel,
     period_limit,
-    period_rule,
 )
 from busplan.buses.network import Network
 from busplan.buses.sercos.sercos3 import (
@@ -31,13 +30,12 @@ from busplan.buses.sercos.sercos3 import (
     MOST_DEVICES,
     MOST_TELEGRAMS,
     PERIODS,
-    PERIODS_SOURCE,
     SORTS,
     data_bytes,
     telegrams_of,
 )
 from busplan.buses.sercos.sercos3_cycle import EVENTS, STRETCHES, TELEGRAMS, WINDOW, Sercos3Cycle
-from busplan.buses.sercos.shared import KEYS, WORD_BYTES, SercosBus, starter
+from busplan.buses.sercos.shared import KEYS, RULES, WORD_BYTES, SercosBus, starter
 from busplan.elementwise import Number, larger, plain
 
 _METHOD: Final = "bus.timing_method"
@@ -92,7 +90,7 @@ class Sercos3(SercosBus):
     deciding_model = WINDOW
     figures = FIGURES
     limits = LIMITS
-    rules = (period_rule("BP141", PERIODS, kind="sercos3", source=PERIODS_SOURCE),)
+    rules = (RULES["BP141"],)
     periods = PERIODS
     starter = starter(
         """\

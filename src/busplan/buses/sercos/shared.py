@@ -9,27 +9,21 @@ from typing import Final, TypeAlias
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusLatency
 from busplan.buses.figure import Figure
-from busplan.buses.limits import Key, Starter
+from busplan.buses.limits import Key, Starter, unknown_period
 from busplan.buses.network import Network
+from busplan.buses.rule import read_rules
 from busplan.elementwise import Number, larger, plain, rounded_up, total
-from busplan.sourced import Sourced, constants
+from busplan.sourced import Constants
 
-WORD_BYTES: Final = Sourced(
-    2,
-    unit="bytes",
-    grade="published",
-    source="CoSeMa, CSMD_RND_UP_2; Kollmorgen, sercos IDN set of S300/S700",
-    meaning="step of a device's cyclic data",
-)
-PIPELINE_CYCLES: Final = Sourced(
-    1,
-    unit="1",
-    grade="assumed",
-    source="chosen: the master computes between the feedback of a cycle and the next MDT",
-    meaning="cycles from the AT that bring feedback to the MDT with the commands computed from it",
-)
+CONSTANTS: Final = Constants("busplan.buses.sercos", "shared.toml")
+"""Constants of all SERCOS with a source, by their names here."""
+WORD_BYTES: Final = CONSTANTS["WORD_BYTES"]
+PIPELINE_CYCLES: Final = CONSTANTS["PIPELINE_CYCLES"]
 
-CONSTANTS: Final = constants(globals())
+RULES: Final = {
+    rule.code: rule for rule in read_rules("busplan.buses.sercos", {"BP141": unknown_period, "BP151": unknown_period})
+}
+"""Rules of both kinds, by code."""
 MOST_PIPELINE: Final = 1000
 """Most cycles of a pipeline that a profile takes."""
 
