@@ -40,7 +40,7 @@ from busplan.errors import BusplanError
 from busplan.profile.document import decode, validate
 from busplan.profile.kinds import profile_schema
 from busplan.profile.starter import Machine, machine_text, shared_out
-from busplan.questions.fit.circle_refusal import path_steps
+from busplan.questions.fit.circle_setup import path_steps
 from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
 

@@ -20,8 +20,7 @@ from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, ShownValue, Table
 from busplan.forms.inks import INKS
 from busplan.forms.numbers import cell_text, sentence_text
-from busplan.profile.changes import NO_CHANGES
-from busplan.questions.base.answer import shell_word
+from busplan.profile.changes import NO_CHANGES, shell_word
 
 NAMES = (
     "</title><script>alert(1)</script> \"><img src=x onerror=alert(1)> ' autofocus onfocus='alert(1)",

@@ -8,7 +8,7 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole, with_cycle
+from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, require_cycle, whole
 from busplan.questions.fit.network import network_of
 from busplan.questions.timeline.events import Schedule, Total, schedule, totals, zoom
 
@@ -78,7 +78,7 @@ def timeline(
     >>> [(event.kind, round(event.duration_us, 3)) for event in answer.events][1:4]
     [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.733)]
     """
-    network = network_of(with_cycle(load_profile(profile), question="timeline"))
+    network = network_of(require_cycle(load_profile(profile), question="timeline"))
     model = None if timing_model is None else checked_models([timing_model], network)[0]
     window = zoom(
         schedule(network, model=model, number=None if cycle is None else whole(cycle, name="cycle")),

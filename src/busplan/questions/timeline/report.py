@@ -31,7 +31,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
 from busplan.forms.numbers import figure_text, period_value, sentence_text, with_unit
-from busplan.questions.base.sentences import document, fields, safety_record, story, warning_sentences
+from busplan.questions.base.sentences import document, fields, margin_words, safety_record, warning_sentences
 from busplan.questions.fit.certainty import FITS, fits_in
 from busplan.questions.fit.figures import margin_us
 from busplan.questions.fit.network import model_names
@@ -106,7 +106,7 @@ def _headline(schedule: Schedule) -> Sentence:
     figures = schedule.figures
     parts: tuple[Part, ...] = (
         *(Code(schedule.profile.name), " at ", period_value(figures.period_us), ": "),
-        *story(figures, schedule.network),
+        *margin_words(figures, schedule.network),
         f" by the {figures.timing_model} model",
         " in the fullest cycle" if schedule.number is not None and schedule.cycles > 1 else "",
     )
