@@ -86,7 +86,7 @@ else:
         "import_profile": "busplan.questions.import_",
         "ImportAnswer": "busplan.questions.import_",
     }
-    """Module of a name that is no question and no answer."""
+    """Module of each name that the rule below does not find."""
 
     def __getattr__(name: str) -> object:
         if name not in __all__:

@@ -23,17 +23,17 @@ KNOWN = Periods((31.25, 62.5, 125.0, 250.0, 500.0))
 @given(st.floats(1.0, 600.0))
 def test_the_next_period_is_the_first_that_is_no_shorter(least_us: float) -> None:
     longer = [one for one in KNOWN.us if one >= least_us]
-    assert KNOWN.from_us(least_us) == (longer[0] if longer else float("inf"))
-    assert np.asarray(KNOWN.from_us(np.array([least_us])))[0] == KNOWN.from_us(least_us)
-    assert ANY_PERIOD.from_us(least_us) == least_us
+    assert KNOWN.shortest_us(least_us) == (longer[0] if longer else float("inf"))
+    assert np.asarray(KNOWN.shortest_us(np.array([least_us])))[0] == KNOWN.shortest_us(least_us)
+    assert ANY_PERIOD.shortest_us(least_us) == least_us
     neighbours = KNOWN.neighbours(least_us)
     assert all(one in KNOWN.us and one != least_us for one in neighbours)
     assert not [one for one in KNOWN.us if min(neighbours) < one < max(neighbours) and one != least_us]
 
 
 def test_rounding_asks_for_no_longer_period() -> None:
-    assert KNOWN.from_us(250.0 * (1 + 1e-14)) == 250.0
-    assert KNOWN.from_us(250.0 * (1 + 1e-9)) == 500.0
+    assert KNOWN.shortest_us(250.0 * (1 + 1e-14)) == 250.0
+    assert KNOWN.shortest_us(250.0 * (1 + 1e-9)) == 500.0
 
 
 @KINDS

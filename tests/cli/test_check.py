@@ -248,7 +248,7 @@ def test_a_baseline_of_other_timing_models_is_recorded_again_as_a_whole(busplan:
     assert (document["models"], list(document["profiles"])) == (2, ["p/clean.toml", "p/warns.toml"])
 
 
-CURE = "; --update-baseline records and drops them, --pass-on-unmatched lets them pass\n"
+CURE = "; --update-baseline adds or drops these records, --pass-on-unmatched lets them pass\n"
 
 
 def test_a_baseline_holds_from_every_folder(busplan: Busplan, folder: Path) -> None:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.recordings.statistics import grid, lateness, quantile
+from busplan.recordings.statistics import lateness, periodic_events, quantile
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=200), st.floats(0.5, 1))
@@ -34,7 +34,7 @@ def test_a_period_is_found_whatever_is_missing(seed: int, scatter: float, count:
     kept = np.sort(random.choice(places[1:-1], count - 2, replace=False))
     kept = np.concatenate(([0], kept, [count + missing - 1]))
     times = kept * 100.0 + random.uniform(0, 100 * scatter, count)
-    periodic = grid(times - times[0])
+    periodic = periodic_events(times - times[0])
     assert periodic is not None
     assert periodic.missing == missing
     assert periodic.period_us == pytest.approx(100, abs=8 * periodic.uncertainty_us + 1e-9)
@@ -46,7 +46,7 @@ def test_the_latest_event_is_found_within_its_u(shape: str, count: int) -> None:
     random, within, ever_more = np.random.default_rng(3), 0, 0.0
     for _ in range(100):
         late = getattr(random, shape)(size=count)
-        periodic = grid(np.arange(count) * 1000.04 + late - late[0])
+        periodic = periodic_events(np.arange(count) * 1000.04 + late - late[0])
         assert periodic is not None
         latest, spread = lateness(periodic, 1), float(late.max() - late.min())
         assert latest.uncertainty is not None
@@ -62,7 +62,7 @@ def test_clocks_that_drift_are_in_the_u_of_the_latest_event() -> None:
     for _ in range(30):
         late, count = random.uniform(0, 10, 20_000), 20_000
         times = np.arange(count) * 1000.0 + late
-        periodic = grid(times + 20e-6 * times**2 / (2 * times[-1]) - times[0])
+        periodic = periodic_events(times + 20e-6 * times**2 / (2 * times[-1]) - times[0])
         assert periodic is not None
         latest = lateness(periodic, 1)
         assert latest.uncertainty is not None
@@ -75,7 +75,7 @@ def test_a_clock_that_bends_is_followed() -> None:
     random, count = np.random.default_rng(5), 4_000
     late, places = random.uniform(0, 1, count), np.arange(count)
     clock = np.interp(places, np.linspace(0, count, 5), [0, 100, 0, 100, 0])
-    periodic = grid(places * 1000.0 + clock + late)
+    periodic = periodic_events(places * 1000.0 + clock + late)
     assert periodic is not None
     latest = lateness(periodic, 1)
     assert latest.uncertainty is not None
@@ -85,6 +85,6 @@ def test_a_clock_that_bends_is_followed() -> None:
 
 def test_an_even_clock_has_no_doubt_of_its_bends() -> None:
     random, count = np.random.default_rng(6), 20_000
-    periodic = grid(np.arange(count) * 1000.0 + random.uniform(0, 10, count))
+    periodic = periodic_events(np.arange(count) * 1000.0 + random.uniform(0, 10, count))
     assert periodic is not None
     assert periodic.doubt_us == pytest.approx(0, abs=0.2)

@@ -1,6 +1,6 @@
-"""Kinds of bus: the questions that an analysis may ask, and a folder for each kind.
+"""Register of the kinds of bus: each has a folder here, and its module is imported when a profile asks for it.
 
-The register names the module of each kind; a kind loads when a profile asks for it.
+The interface that all kinds implement is `Bus`, in module `bus`.
 """
 
 from collections.abc import Iterator
@@ -25,12 +25,12 @@ _LOADED: Final[dict[str, "Bus"]] = {}
 
 
 def kind_names() -> tuple[str, ...]:
-    """Names of all kinds, as `bus.kind` has them."""
+    """Names of all kinds, the values of `bus.kind` in a profile."""
     return tuple(_MODULES)
 
 
 def kind_named(name: str) -> "Bus":
-    """Give the kind of a name.
+    """The kind of bus with a name.
 
     Raises
     ------
@@ -44,19 +44,19 @@ def kind_named(name: str) -> "Bus":
 
 
 def kind_called(word: str, *, option: str = "") -> str:
-    """Name of the kind that users call by a word: its name, its title, or another name that it declares.
+    """Name of the kind that a user's word means: a kind's name, its title, or another name that it declares.
 
     Parameters
     ----------
     word
         The word as typed; case, spaces and punctuation do not count.
     option
-        The option that gives it, for the message.
+        The command-line option with the word, for the message.
 
     Raises
     ------
     BusplanError
-        No kind is called so.
+        The word means no kind.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def _plain(name: str) -> str:
 
 @contextmanager
 def registered(bus: "Bus") -> Iterator[None]:
-    """Register a further kind for a while, as a test does.
+    """Register a further kind for a while, for a test.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Questions that an analysis may ask of a kind of bus.
+"""Interface of a kind of bus: all that an analysis may ask of it.
 
-An analysis asks a bus, never its keys. Cycles, figures and limits are written with operators and the functions of
-`busplan.elementwise`, so that they serve floats, arrays and traced numbers alike. They branch on words, never on
-numbers.
+An analysis calls these methods and never reads a kind's own keys. Cycles, figures and limits use operators and the
+functions of `busplan.elementwise`: so they take floats, arrays and traced numbers, and branch on strings only. What is
+"of plain numbers" takes floats alone.
 """
 
 from abc import ABC, abstractmethod
@@ -59,31 +59,31 @@ class Bus(ABC):
     limits: ClassVar[tuple[Limit, ...]]
     """Limits in the order of reports; at least one grows with the nodes."""
     periods: ClassVar[Periods] = ANY_PERIOD
-    """Communication periods that it allows; if not all, it has the limit and the rule of `buses.limits`."""
+    """Periods that it allows; a kind with a list has a `period_limit` and a rule on `unknown_period`."""
     starter: ClassVar[Starter]
     """Defaults of a new profile."""
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """Kinds of event in the order of the cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
-    """Stretches that several events make together."""
+    """Kinds of a sequence of events, such as a transaction or a frame."""
     rate_keys: ClassVar[tuple[str, ...]] = ()
     """Bit rates that a profile gives [kbit/s]: all times on the wire follow from them."""
     constants: ClassVar[Mapping[str, Sourced]] = {}
     """Its constants, each with its source, by name."""
     keys: ClassVar[Mapping[str, Key]] = {}
-    """Facts about keys of its profiles; a key of a group is here as `node.` or `payload.` has it."""
+    """Facts about the kind's own keys, by dotted key; those of [[group]] stand under `node.` or `payload.`."""
     calibration: ClassVar[MeasuredLatencies | None] = None
-    """Calibration of execution times from latencies; None where no latency could be measured."""
+    """Calibration of execution times from measured latencies; None where latencies do not show them."""
     recordings: ClassVar[str] = ""
-    """Recordings that can be compared with a plan, in words; empty where none is read."""
+    """Recordings that it compares with a plan, for messages; empty if it reads none."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
     """Changes that each take a term out of the cycle: new values by dotted key."""
     evidence_data: ClassVar[tuple[str, ...]] = ()
     """Data files, in busplan/data, with figures of it that others have published or measured."""
 
     def profile_model(self) -> "type[Profile]":
-        """The model of its profiles: that of the module `section` beside its `kind`, which loads pydantic."""
+        """Pydantic model of its profiles: `PROFILE` of module `section`, imported only here since it loads pydantic."""
         module = type(self).__module__.removesuffix("kind")
         model: type[Profile] = import_module(f"{module}section").PROFILE
         return model
@@ -93,11 +93,11 @@ class Bus(ABC):
         """The cycle of a network under a timing model."""
 
     def latency_subject(self, network: Network) -> str:
-        """Say whose latency it is."""
+        """Say what the latencies are of, and the settings in force."""
         return ", ".join(("the whole cycle", *self.setup_words(network)))
 
     def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:  # noqa: ARG002 - most can
-        """Keys of a profile that a timing model has no term for: its figures are not applicable then."""
+        """Keys in the profile that a timing model has no term for; with any, the model does not apply."""
         return ()
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - most have
@@ -105,7 +105,7 @@ class Bus(ABC):
         return True
 
     def key_of(self, role: KeyRole) -> str:
-        """The key that gives a part of the machine; empty where the kind has none."""
+        """Dotted key with a role; empty where the kind has none."""
         return next((name for name, key in self.keys.items() if key.role == role), "")
 
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
@@ -113,7 +113,7 @@ class Bus(ABC):
         return ()
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:  # noqa: ARG002 - a kind may have none
-        """Small changes that only this kind of bus has, beside those of every kind."""
+        """Small changes for the sensitivity of this kind, in addition to those of every kind."""
         return ()
 
     @abstractmethod
@@ -121,7 +121,7 @@ class Bus(ABC):
         """Payloads that a plan may choose from."""
 
     def setpoints_every(self, network: Network) -> tuple[str, int]:  # noqa: ARG002 - a kind may have a single rate
-        """Key and number of cycles from a set-point of the fastest axes to the next."""
+        """Cycles between set-points of the fastest axes: the key that sets them, and their number."""
         return "", 1
 
     def counted(self, network: Network) -> tuple[tuple[int, str], ...]:
@@ -129,7 +129,7 @@ class Bus(ABC):
         return (int(plain(network.nodes)), "node"), (int(plain(network.axes)), "axis")
 
     def path_words(self, network: Network) -> str:  # noqa: ARG002 - a kind may have a single way
-        """Say which way on the wire the times of a node include, where there are several."""
+        """Say which distance on the wire each node is charged with, where the kind has a choice."""
         return ""
 
     def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none
@@ -137,11 +137,11 @@ class Bus(ABC):
         return ()
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - a kind may have none
-        """Warnings in words, which hold whatever the verdict, at each of some numbers of nodes."""
+        """Warnings that do not depend on the verdict, for each number of nodes in `nodes`."""
         return []
 
     def evidence_functions(self) -> Mapping[str, Callable[..., Any]]:
-        """Functions that rows of evidence name, beside its figures; each takes a cycle and the values of the row."""
+        """Functions by the name that a row of evidence has; each takes a cycle and the values of the row."""
         return {}
 
     def recorded(self, network: Network, path: "Path", *, share: float, progress: Progress) -> Recorded:  # noqa: ARG002 - a kind may have none
@@ -154,7 +154,7 @@ class Bus(ABC):
         path
             The recording.
         share
-            Share of the events that a worst case is to hold for, 0.5..1.
+            Quantile of the events for worst cases, 0.5..1.
         progress
             Called with the bytes read and those of the file.
 
@@ -171,11 +171,11 @@ class Bus(ABC):
         return next((limit for limit in self.limits if limit.key == key), None)
 
     def broken(self, network: Network) -> tuple[Limit, ...]:
-        """The limits that plain numbers break, those of safety left out."""
+        """The limits that a network breaks, safety limits left out; of plain numbers."""
         return tuple(limit for limit in self.limits if limit.role != "safety" and limit.is_broken(network))
 
     def is_safe(self, network: Network) -> bool:
-        """Whether plain numbers keep every safety limit."""
+        """Whether a network keeps every safety limit; of plain numbers."""
         return not any(limit.is_broken(network) for limit in self.limits if limit.role == "safety")
 
     def event_kind(self, key: str) -> EventKind:

@@ -1,7 +1,7 @@
-"""A cycle of any bus: counted events in the order of the wire, which terms and the timeline come from.
+"""A cycle of any bus: events in the order of the wire, from which terms and the timeline come.
 
-Each kind writes its cycle once, as runs of events. Terms are their sums: a run counts its events, so that a million
-nodes take no longer to add up than a single node. The timeline lays the same runs out, event by event.
+Each kind writes its cycle once, as runs: a run is a sequence of events, repeated for some rounds. Terms are sums over
+runs and multiply by the rounds, so a million nodes cost no more than one. The timeline lays out every event of a run.
 """
 
 from abc import ABC, abstractmethod
@@ -31,7 +31,7 @@ class Term(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name beside the other terms."""
+        """Short name: the key without prefix and unit."""
         return term_name(self.key)
 
 
@@ -43,62 +43,63 @@ class BusEvent(NamedTuple):
     term: str
     """Key of the term that it is a part of."""
     us: Number
-    """Duration [us]: a plain number where it is laid out, of any sort in a run."""
+    """Duration [us]: a float once it is laid out; in a run it may be an array or a traced number."""
     label: str
-    """Name, and who is at work."""
+    """Name of the event, with the node or device that causes it."""
     node: int | None = None
     """Node number, from 1, where the cycle is laid out; None for an event of the whole bus."""
     transaction: str | None = None
-    """Stretch that the event belongs to: key of an `EventKind`. Where nodes take turns, an event without it belongs to
-    no node."""
+    """Key of the `EventKind` of the transaction or frame that the event is a part of. In a run of a group, an event
+    without it belongs to no node."""
     packet: str | None = None
     """Packet of the transaction that the event belongs to."""
     rests_on: str = ""
     """Dotted key of the profile that it comes from; empty unless it is a single key."""
     rounds: Rounds = ALL
-    """Rounds of its run that have it."""
+    """Rounds of its run in which it happens."""
 
 
 class Run(NamedTuple):
-    """Events in sequence, in one round or several."""
+    """A sequence of events, repeated for some rounds."""
 
     events: tuple[BusEvent, ...]
-    """Events of a round; of the mean round where rounds differ."""
+    """Events of a round, or of the mean round where rounds differ."""
     times: Number | None = None
-    """Rounds [1]; None for a single round."""
+    """Number of rounds [1]; None for a single round."""
     group: int | None = None
-    """Place of the group whose nodes take turns, each with the same number of rounds; None for the whole bus."""
+    """Index of the group whose nodes take turns, each for the same number of rounds; None for the whole bus."""
     laid_out: Callable[[Number], Iterable[BusEvent]] | None = None
-    """Function of the number of a round, from 0, to its events: finer ones for a timeline, or of rounds that differ.
+    """Gives the events of a round by its number, from 0: in more detail for a timeline, or for rounds that differ.
 
-    Over all rounds they add up to `events`. If rounds differ, the number may be a mean, too.
+    Summed over all rounds they equal `events`. Where rounds differ, it must also take a mean number, such as 1.5.
     """
 
     def events_us(self) -> Iterator[tuple[str, Number]]:
-        """Term and duration of each event that is not off [us]."""
+        """Term and duration of each event of a single round, those of 0 left out [us]."""
         return ((event.term, event.us) for event in self.events if not is_off(event.us))
 
     def counted_us(self, times: Number) -> Iterator[tuple[str, Number]]:
-        """The same for several rounds: the events of a term and the same rounds as a single sum."""
+        """Term and duration of all rounds together, one sum for the events with the same term and `rounds` [us]."""
         parts: dict[tuple[str, Rounds], list[Number]] = {}
         for event in self.events:
             if not is_off(event.us):
                 parts.setdefault((event.term, event.rounds), []).append(event.us)
         for (term, rounds), parts_us in parts.items():
             first_us = parts_us[0]
-            # Equal ones are a product, which a derivation shows shorter.
             are_equal = len(parts_us) > 1 and all(us is first_us for us in parts_us)
-            round_us = len(parts_us) * first_us if are_equal else total(parts_us)
-            yield term, round_us if rounds == FIRST else (times if rounds == ALL else times - 1) * round_us
+            round_us = len(parts_us) * first_us if are_equal else total(parts_us)  # a product is a shorter derivation
+            if rounds != FIRST:
+                round_us = (times if rounds == ALL else times - 1) * round_us
+            yield term, round_us
 
 
 def summed(runs: Iterable[Run], keys: Iterable[str]) -> dict[str, Number]:
-    """Time of each term: the sum of its events in the order of the runs, 0.0 of a term without events [us].
+    """Time of each term: the sum of its events in the order of the runs, 0.0 for a term without events [us].
 
     Parameters
     ----------
     runs
-        The runs; a KeyError tells of an event whose term is none of `keys`.
+        The runs; an event whose term is not in `keys` raises a KeyError.
     keys
         Keys of the terms, in their order.
     """
@@ -117,11 +118,11 @@ class Doubt(NamedTuple):
     """Dotted key of the profile, or another name."""
     label: str
     us: Number
-    """Standard uncertainty of the cycle by this input: that of the input times the sensitivity [us]."""
+    """Standard uncertainty of the cycle due to this input: that of the input times the sensitivity [us]."""
 
 
 class LeftOut(NamedTuple):
-    """A part of the cycle that the profile does not give, so that no verdict counts it."""
+    """A part of the cycle that the profile does not give: no verdict counts it."""
 
     label: str
     key: str
@@ -140,47 +141,47 @@ class BusLatency(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name beside the others."""
+        """Name with that of its group."""
         return f"{self.group} {self.name}" if self.group else self.name
 
 
 class BusCycle(ABC):
     """One communication cycle of a network under a timing model.
 
-    The time that it needs depends on neither the period nor the slice ratio, which say what it is given. So the
-    smallest period and ratio follow from it.
+    The time that it needs does not depend on the period or the slice ratio, which say what it is given. So the smallest
+    period and ratio follow from it.
     """
 
     network: Network
     number: int | None = None
-    """Which cycle of the common multiple of the rates it is, from 1; None for the one that the verdict is for."""
+    """Which cycle of the hyperperiod (the common multiple of the rates) it is, from 1; None for that of the verdict."""
     term_figures: ClassVar[tuple[Figure, ...]]
     """One for each term, in their order."""
     command_events: ClassVar[tuple[tuple[str | None, str], ...]] = ()
-    """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
-    cycle. Events without a node are the command of all nodes."""
+    """Transaction and kind of the events that bring a node its command, complete at the end of the last; empty if it is
+    complete at the end of the cycle. Events without a node bring the command of all."""
 
     @property
     def rates(self) -> tuple[Rate, ...]:
-        """In which cycles the data of each group go; of plain numbers."""
+        """The rate of each group: in which cycles its data are sent; of plain numbers."""
         return tuple(Rate(1) for _ in self.network.groups)
 
     @property
     def fullest(self) -> int:
-        """The first cycle of the common multiple in which most is sent, from 1; of plain numbers."""
+        """The first cycle of the hyperperiod in which most is sent, from 1; of plain numbers."""
         return 1
 
     def at(self, number: int) -> "BusCycle":  # noqa: ARG002 - most kinds have a single rate
-        """The cycle with a number within the common multiple, from 1; of plain numbers."""
+        """The cycle with a number, from 1; of plain numbers."""
         return self
 
     @abstractmethod
     def written(self) -> Iterator[BusEvent | Run]:
-        """The cycle in the order of the wire: single events, and runs. What is off takes 0.0, or is not there."""
+        """The cycle in the order of the wire: single events, and runs. A part that is off takes 0.0 or is left out."""
 
     @cached_property
     def runs(self) -> tuple[Run, ...]:
-        """The cycle, written once: a derivation names the very numbers that are added up."""
+        """The cycle, written only once, so that terms and derivations hold the same number objects."""
         return tuple(part if isinstance(part, Run) else Run((part,)) for part in self.written())
 
     @cached_property
@@ -199,7 +200,7 @@ class BusCycle(ABC):
 
     @property
     def required_us(self) -> Number:
-        """Time that the whole cycle needs, the sum of its terms: N times (2) [us]."""
+        """Time that the whole cycle needs, the sum of its terms: N times equation (2) of the paper [us]."""
         return total(self.by_term.values())
 
     @property
@@ -220,15 +221,15 @@ class BusCycle(ABC):
         return extra_us
 
     def bias_us(self) -> Number | None:
-        """Mean time that the bus takes beyond the timing model [us]; None where it is unknown."""
+        """Mean time that the bus takes in addition to the timing model [us]; None where it is unknown."""
         return None
 
     def sync_jitter_us(self) -> Number:
-        """Jitter of the synchronous packet by the traffic of the cycle, either way of its mean [us]."""
+        """Jitter of the synchronous packet due to the traffic of the cycle, +/- about its mean [us]."""
         return 0.0
 
     def taking_us(self, group: Group) -> float:
-        """From a command's arrival at a node of a group to its effect: the slowest execution of a write [us]."""
+        """Time from a command's arrival at a node to its effect: the slowest execution of a write [us]."""
         return plain(group.write_execution_us + group.worst_extra_us)
 
     def sampled_us(self) -> float:
@@ -241,8 +242,8 @@ class BusCycle(ABC):
         Parameters
         ----------
         at_sync
-            Whether commands take effect at the next synchronous point, which is counted; otherwise they do when they
-            arrive, which comes on top.
+            Whether commands take effect at the next synchronous point: the wait for it is counted. Otherwise they take
+            effect on arrival, and the caller adds that time.
         """
         return 1 if at_sync else 0
 
@@ -251,7 +252,7 @@ class BusCycle(ABC):
         return ()
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """Parts of the cycle that the profile does not give."""
+        """Parts of the cycle that the profile does not give, each with its key."""
         return ()
 
     def premises(self) -> tuple[str, ...]:
@@ -259,11 +260,11 @@ class BusCycle(ABC):
         return ()
 
     def events(self) -> Iterator[BusEvent]:
-        """The same cycle laid out, of plain numbers only."""
+        """All events of the cycle, one by one; of plain numbers."""
         return chain.from_iterable(self.each_round())
 
     def each_round(self) -> Iterator[Iterable[BusEvent]]:
-        """The events of each round, which nothing interrupts; of plain numbers only."""
+        """The events of each round, which are never interrupted; of plain numbers."""
         for run in self.runs:
             count = 1 if run.times is None else int(plain(run.times))
             first, rounds = self._turns(run)
@@ -271,7 +272,7 @@ class BusCycle(ABC):
                 yield _round(run, number, None if run.group is None else first + number // rounds)
 
     def _turns(self, run: Run) -> tuple[int, int]:
-        """First node of a run, and the rounds that each of its nodes has; of plain numbers."""
+        """First node of a run, and the number of rounds of each node; of plain numbers."""
         if run.group is None:
             return 1, 1
         nodes = [int(plain(group.nodes)) for group in self.network.groups]
@@ -299,25 +300,25 @@ class BusCycle(ABC):
         return now_us + self.added_before_us(now_us) if arrived_us is None else arrived_us
 
     def added_before_us(self, sent_us: float) -> float:  # noqa: ARG002 - most runs follow each other at once
-        """Time of events between rounds, as cycle starts, up to a point of the runs; in plain numbers [us].
+        """Time of packets that the bus inserts between rounds, such as cycle starts of 1394; of plain numbers [us].
 
         Parameters
         ----------
         sent_us
-            Time of the runs up to the round in question [us].
+            Time of the runs up to a round [us]: what was inserted before it counts.
         """
         return 0.0
 
     def figures(self) -> Mapping[str, Number | None]:
-        """Figures of the kind beside the terms, by key; None where these groups of nodes have no such figure."""
+        """Figures of this kind other than the terms, by key; None for a figure that these groups do not have."""
         return {}
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """Lines that only this kind has on the card of a verdict: labels and words; of plain numbers."""
+        """Lines of this kind in the summary card of `capacity`: labels and words; of plain numbers."""
         return ()
 
     def latencies(self) -> tuple[BusLatency, ...]:
-        """The latencies; of a kind without transactions the cycle."""
+        """The latencies; a kind without transactions has one, the cycle."""
         phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}
         return (BusLatency("cycle", None, phases),)
 
@@ -345,11 +346,11 @@ def _until_us(run: Run, number: int, commands: Container[tuple[str | None, str]]
 
 
 def _rounds_us(run: Run, count: int) -> float:
-    """Time of the first rounds of a run, of plain numbers [us]: as many times their mean."""
+    """Time of the first `count` rounds of a run [us]: `count` times their mean; of plain numbers."""
     if not count:
         return 0.0
     events: Iterable[BusEvent] = run.events
-    if run.laid_out is not None and run.group is not None and len(run.events) > 1:  # rounds may differ
+    if run.laid_out is not None and run.group is not None and len(run.events) > 1:  # rounds may differ: the mean one
         events = run.laid_out((count - 1) / 2)
     counts = {ALL: count, FIRST: 1, BUT_FIRST: count - 1}
     return sum(counts[event.rounds] * plain(event.us) for event in events)

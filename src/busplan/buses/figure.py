@@ -1,7 +1,7 @@
 """One figure of an answer: its key, its symbol, its unit, where it comes from, and what it is.
 
-Each figure stands once. Tables, JSON, sweeps, differences and derivations read it here. What every bus has is in this
-module; a kind of bus adds its own.
+Each figure is defined once: tables, JSON, sweeps, differences and derivations read it here. The figures of every bus
+are in this module; a kind of bus adds its own.
 """
 
 from collections.abc import Callable, Iterable
@@ -63,15 +63,15 @@ class Figure(NamedTuple):
     key
         Name in JSON, CSV and the results.
     symbol
-        What stands for it in a derivation.
+        Its symbol in a derivation.
     reference
         Numbers of its equations, or where else it comes from.
     meaning
         What it is, in one line.
     label
-        How a table calls it; a figure without it stands in no table of a command.
+        Its name in tables; a figure without it is in no table of a command.
     column
-        What a table's unit column says, where it is not the unit: "%" for a share.
+        Text of a table's unit column, where that is not the unit: "%" for a share.
     sort
         What its values are.
     decimals
@@ -79,11 +79,11 @@ class Figure(NamedTuple):
     better
         Which direction is better.
     scale
-        Key of the quantity that its rounding is relative to, where it is a difference of such.
+        Key of the figure that its rounding error is relative to; for a difference of two large figures.
     relative
-        Whether a share of it means something.
+        Whether a relative change of it means anything.
     ink, letter
-        How it is drawn, where it is a part of the slice.
+        Its colour and letter in drawings, where it is a part of the slice.
     is_hexadecimal
         Whether tables write it as 0x1f.
     """
@@ -296,7 +296,7 @@ CERTAINTY: Final = (
     *(BIAS, MARGIN_CORRECTED, UNCERTAINTY, SAFE_REQUIRED, SAFE_NODES, SAFE_AXES),
     *(SAFE_LIMITED_BY, SAFE_MIN_PERIOD, NOT_SHOWN, VERDICT),
 )
-"""Figures of the timing model that decides; under another they do not exist."""
+"""Figures of the timing model that decides; no other model has them."""
 TRANSACTION: Final = Figure("transaction", "kind", "profile", "what is timed", sort="word")
 PAYLOAD_BYTES: Final = Figure("payload_bytes", "P", "profile", "payload of the transaction", sort="count")
 
@@ -307,7 +307,7 @@ class BusFigures(NamedTuple):
     terms: tuple[Figure, ...]
     """Figures of the terms, in the order of the wire."""
     document_terms: tuple[Figure, ...] = ()
-    """The same in the order of the document of `capacity`, where that is another one."""
+    """The same in the order of the JSON of `capacity`, where it differs."""
     setup: tuple[Figure, ...] = ()
     """Figures that say how the bus is set."""
     headings: tuple[str, ...] = ()
@@ -321,7 +321,7 @@ class BusFigures(NamedTuple):
     compared: tuple[Figure, ...] = ()
     """Figures of the kind that `diff` compares under each timing model."""
     planned: tuple[str, ...] = ()
-    """Keys of figures of the kind that a plan's options show."""
+    """Keys of the kind's figures that `plan` shows for each option."""
     latency_rows: tuple[Figure, ...] = ()
     """Rows of the table of `latency`, where they are not the terms."""
     latency_document: tuple[Figure, ...] = ()
@@ -329,7 +329,7 @@ class BusFigures(NamedTuple):
     has_many_transactions: bool = False
     """Whether the table of `latency` has a row for each transaction, and a column for each figure."""
     deadlines: tuple[str, str] | None = None
-    """Keys of the time and of the deadline of a transaction, where a kind has such."""
+    """Keys of the response time and of the deadline of a transaction, for a kind with deadlines."""
 
     @property
     def capacity(self) -> tuple[Figure, ...]:
@@ -357,12 +357,12 @@ class BusFigures(NamedTuple):
         return self.latency_document or (TIMING_MODEL, TRANSACTION, NODES, *self.latency_table)
 
     def term_label(self, name: str | None) -> str:
-        """Label of a term in tables, by its name beside the other terms; empty without a figure."""
+        """Label of a term in tables, by its short name; empty without a figure."""
         return next((figure.label for figure in self.terms if term_name(figure.key) == name), "")
 
 
 def term_name(key: str) -> str:
-    """Name of a term beside the other terms, by the key of its figure.
+    """Short name of a term: the key of its figure without prefix and unit.
 
     Examples
     --------

@@ -46,19 +46,19 @@ class Key(NamedTuple):
     """Facts about a key of a profile that its schema does not have."""
 
     symbol: str = ""
-    """Symbol in formulas, where it is not its name."""
+    """Symbol in formulas, if not its name."""
     default: Sourced | None = None
-    """Its default, where that is a figure with a source."""
+    """Its default, if that is a constant with a source."""
     grade: Grade | None = None
-    """Best grade of its value, where that is less than given."""
+    """Best grade that its value can have, if below the grade "given"."""
     meaning: str = ""
-    """Meaning of a change on the machine, where the key does not say it."""
+    """What a change of it means on the machine, where the key does not say it."""
     short: str = ""
-    """Short form in a table of plans: a format of the value."""
+    """Format of its value in a table of plans."""
     chooses: bool = False
-    """Whether its word selects a formula, so that a derivation has it among its inputs."""
+    """Whether its value selects a formula: a derivation then lists it among its inputs."""
     role: KeyRole | None = None
-    """Part of the machine that the key gives, where other kinds have a key for it, too."""
+    """Part of the machine that the key describes, if other kinds have a key for it, too."""
 
 
 class EventKind(NamedTuple):
@@ -84,41 +84,41 @@ KEPT, NOT_SHOWN_KEPT, BROKEN = range(3)
 
 
 class Limit(NamedTuple):
-    """A value that must not exceed another one, with what is said where it does.
+    """A `value` that must not exceed a bound, `most`, and the words for a network where it does.
 
     Value and doubt must not decrease as nodes are added.
     """
 
     key: str
     over: str | Callable[[Network], str]
-    """Sentence on a limit that is broken or not shown to be kept: a format of `value`, its `uncertainty`, `most` and
-    the profile's `bus`; or what writes it."""
+    """Sentence on a limit that is broken or not shown to be kept: a format with `value`, its `uncertainty`, `most` and
+    the profile's `bus`; or a function that writes it."""
     value: Callable[[Network], Number]
     most: Callable[[Network], Number]
     doubt: Callable[[Network], Number] | None = None
-    """Standard uncertainty of the value, less that of the most; without it both are exact."""
+    """Standard uncertainty of value - bound; None if both are exact."""
     perhaps: Callable[[Network], Number] | None = None
-    """Part of the value that may not be there: it counts where a limit must be shown to be kept, and breaks none."""
+    """Part of the value that is only possible: it can keep the limit from being shown to be kept, but not break it."""
     period: "Callable[[Limit, Network], Number] | None" = None
-    """Shortest period that keeps the limit, by network [us]; None where no longer period does."""
+    """Shortest period that keeps the limit, for a network [us]; None where a longer period does not help."""
     way_out: str = ""
-    """Advice that makes room where this limit keeps nodes out."""
+    """Advice for a network that has no room for more nodes because of this limit."""
     role: Literal["cycle", "safety", "period"] = "cycle"
-    """safety: a cycle fits without it, but nothing is advised that breaks it. period: the period alone breaks it, and a
-    plan takes no period that does."""
+    """cycle: a part of the verdict. safety: not a part of the verdict, but no advice breaks it. period: depends on the
+    period alone, and a plan chooses no period that breaks it."""
     has_rule: bool = False
-    """A rule of the kind reports the broken limit; otherwise the rule of the verdict does."""
+    """Whether a rule of the kind reports the broken limit; otherwise the rule of the verdict does."""
     is_slow: bool = False
-    """Its value and its period take long to find, and are of plain numbers: they are asked last."""
+    """Whether its value and period are slow to compute, and of plain numbers: it is evaluated last."""
 
     @property
     def nominal(self) -> "Limit":
-        """The limit of the value as it is, its uncertainty left out."""
+        """The same limit without uncertainty."""
         return self._replace(doubt=None, perhaps=None)
 
     @property
     def shown(self) -> "Limit":
-        """The limit that a network keeps where it is shown to keep this one: of value + U."""
+        """The limit on value + U: a network that keeps it is shown to keep this one."""
         if self.doubt is None:
             return self
         return self.nominal._replace(value=lambda network: self.value(network) + self.uncertainty(network))
@@ -128,12 +128,12 @@ class Limit(NamedTuple):
         return 0.0 if self.doubt is None else COVERAGE * self.doubt(network)
 
     def least_value(self, network: Network) -> Number:
-        """Lower bound of the value: less U, and without what may not be there."""
+        """Lower bound of the value: value - U, without the part that is only possible."""
         least = self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
         return least if self.perhaps is None else least - self.perhaps(network)
 
     def is_broken(self, network: Network) -> Number:
-        """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
+        """Whether a network surely breaks it, at the lower bound of the value: a bool, or an array of them."""
         return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
 
     def verdict_code(self, network: Network) -> Number:
@@ -172,7 +172,7 @@ def share_of_period(
     key, over, doubt, perhaps, way_out
         As `Limit` has them.
     us
-        The time, which rests on no period [us].
+        The time; it must not depend on the period [us].
     share
         The share [1].
     """
@@ -200,7 +200,7 @@ class Starter(NamedTuple):
     slice_ratio: str = "1            # the whole period is for communication"
     """Value of cycle.slice_ratio, with a comment."""
     measure: str = "measure it on a node"
-    """Advice on finding execution times, a format of `file`, the profile, and `group`, an option of `calibrate`."""
+    """Advice how to find execution times: a format with `file`, the profile, and `group`, an option of `calibrate`."""
     base: str = "what a node does in each cycle"
     """Meaning of execution.base_us."""
     more: str = ""
@@ -221,7 +221,7 @@ class Cost(IntEnum):
     RESPONSES = 3
     """The way nodes answer: their firmware."""
     SCHEDULE = 4
-    """The way the host asks them: the firmware of all."""
+    """The way the host asks nodes: the firmware of host and nodes."""
     PAYLOAD = 5
     """Data of a cycle."""
     PERIOD = 6
@@ -239,11 +239,11 @@ class Setting(NamedTuple):
     """Name in a sentence: gap count."""
     cost: Cost
     keys: tuple[str, ...]
-    """Dotted keys that it turns."""
+    """Dotted keys that it changes."""
     values: tuple[Mapping[str, Value], ...]
-    """Values that this network could have and has not yet, safe and the smallest change first: new values by key."""
+    """Other values that this network could have, as new values by key: safe ones first, then the smallest change."""
     reason: str = ""
-    """Reason for no values."""
+    """Why there are no values, if there are none."""
 
 
 class Perturbation(NamedTuple):
@@ -264,7 +264,7 @@ class PayloadRange(NamedTuple):
     step_bytes: int
     most_bytes: int
     carrier: str = "a packet"
-    """Carrier that holds no more."""
+    """What holds a payload and bounds it, for messages."""
 
 
 class PacketTime(NamedTuple):
@@ -273,7 +273,7 @@ class PacketTime(NamedTuple):
     us: float
     """Time of the packets."""
     shortest_us: float = 0.0
-    """Shortest execution that a latency shows: the bus waits this long, whatever the node does."""
+    """Shortest time that the bus waits for the node: a latency does not show a shorter execution."""
 
 
 class MeasuredLatencies(NamedTuple):
@@ -283,8 +283,8 @@ class MeasuredLatencies(NamedTuple):
     """Time of the packets of a transaction, by network, name of the group, timing model, "read" or "write", and
     payload [bytes]; a BusplanError where its latency could not be measured."""
     fit_keys: Callable[[Network, str], dict[str, Value]]
-    """Keys of [node.execution] that say what an execution time was fitted against, by network and by timing model whose
-    packets were taken off."""
+    """Keys of [node.execution] that record how an execution time was fitted, by network and by the timing model whose
+    packet times were subtracted."""
 
 
 class Periods(NamedTuple):
@@ -298,7 +298,7 @@ class Periods(NamedTuple):
         return self.us[-1] if self.us else inf
 
     def allows(self, period_us: float) -> bool:
-        """Whether a period is one of them.
+        """Whether the bus allows a period.
 
         Examples
         --------
@@ -307,8 +307,8 @@ class Periods(NamedTuple):
         """
         return not self.us or period_us in self.us
 
-    def from_us(self, least_us: Number) -> Number:
-        """The shortest of them that is at least a time, float rounding aside; infinite where none is [us].
+    def shortest_us(self, least_us: Number) -> Number:
+        """The shortest allowed period of at least a time, float rounding aside; infinite where there is none [us].
 
         Parameters
         ----------
@@ -317,7 +317,7 @@ class Periods(NamedTuple):
 
         Examples
         --------
-        >>> Periods((250.0, 500.0)).from_us(250.1), Periods().from_us(250.1)
+        >>> Periods((250.0, 500.0)).shortest_us(250.1), Periods().shortest_us(250.1)
         (500.0, 250.1)
         """
         if not self.us:
@@ -336,7 +336,7 @@ class Periods(NamedTuple):
         return (*shorter, *self.us[bisect_right(self.us, period_us) :][:1])
 
     def refusal(self, period_us: float) -> str:
-        """Say that a period is none of them, and which are next to it.
+        """Say that the bus does not allow a period, and which are next to it.
 
         Examples
         --------
@@ -366,7 +366,7 @@ def period_limit(periods: Periods) -> Limit:
     return Limit(
         PERIOD_LIMIT,
         lambda network: periods.refusal(plain(network.period_us)),
-        lambda network: choose(periods.from_us(network.period_us) > network.period_us, 1, 0),
+        lambda network: choose(periods.shortest_us(network.period_us) > network.period_us, 1, 0),
         lambda _network: 0,
         way_out="a period that the bus allows will do",
         role="period",
@@ -375,7 +375,7 @@ def period_limit(periods: Periods) -> Limit:
 
 
 def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """Check of the rule that the bus must allow the period; it names the neighbours."""
+    """Check of a rule: the bus must allow the period; the problem names the next shorter and longer ones."""
     periods, period_us = subject.network.bus.periods, subject.profile.cycle.period_us
     if not periods.allows(period_us):
         yield RuleProblem("cycle.period_us", periods.refusal(period_us), *subject.cure())
@@ -386,14 +386,14 @@ NODE: Final = "node"
 
 
 def slow_groups(network: Network) -> Iterator[Group]:
-    """Groups of plain numbers whose nodes are not shown to finish within the period."""
+    """Groups whose nodes are not shown to finish within their period; of plain numbers."""
     for group in network.groups:
         if _busy_us(group) + COVERAGE * _busy_doubt_us(group) > network.period_us * group.every:
             yield group
 
 
 def busy_words(group: Group, network: Network) -> str:
-    """Say how much of each of its periods a node of a group executes; of plain numbers."""
+    """Say how long a node of a group executes, and its period; of plain numbers."""
     doubt_us = COVERAGE * plain(_busy_doubt_us(group))
     either_way = f" +/- {doubt_us:.1f}" if doubt_us else ""
     busy, most = told_apart(plain(_busy_us(group)), plain(network.period_us * group.every))
@@ -406,7 +406,7 @@ def _busy_us(group: Group) -> Number:
 
 
 def _busy_doubt_us(group: Group) -> Number:
-    """Standard uncertainty of that time: read and write are known in the same way, so they err together [us]."""
+    """Standard uncertainty of that time: read and write have the same source, so their errors add [us]."""
     return group.read_uncertainty_us + group.write_uncertainty_us
 
 
@@ -416,7 +416,7 @@ def _all_busy_words(network: Network) -> str:
 
 
 def _busiest_us(network: Network, coverage: int) -> Number:
-    """Execution time of the slowest nodes in a cycle with some standard uncertainties; one of n cycles has 1/n [us]."""
+    """Most execution time per cycle, divided by n for every n-th cycle, plus `coverage` standard uncertainties [us]."""
     if not network.groups:
         return 0.0
     busy_us = ((_busy_us(group) + coverage * _busy_doubt_us(group)) / group.every for group in network.groups)
@@ -426,7 +426,7 @@ def _busiest_us(network: Network, coverage: int) -> Number:
 NODE_LIMIT: Final = share_of_period(
     NODE,
     _all_busy_words,
-    us=lambda network: (_busiest_us(network, -COVERAGE) + _busiest_us(network, COVERAGE)) / 2,
+    us=lambda network: (_busiest_us(network, -COVERAGE) + _busiest_us(network, COVERAGE)) / 2,  # middle of its bounds
     share=lambda _network: 1,
     doubt=lambda network: (_busiest_us(network, COVERAGE) - _busiest_us(network, -COVERAGE)) / 2 / COVERAGE,
     way_out="a longer period or a faster node would do",

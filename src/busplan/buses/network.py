@@ -16,22 +16,22 @@ class Rate(NamedTuple):
     """Rate of a group whose data go in every n-th cycle; of plain numbers."""
 
     every: int
-    """n [1]."""
+    """n: one cycle in n has the data [1]."""
     first: int = 1
-    """First of its cycles, from 1 to n."""
+    """First cycle with the data, from 1 to n."""
 
     def is_due(self, number: int) -> bool:
-        """Whether its data go in a cycle, from 1."""
+        """Whether a cycle has the data; cycles are numbered from 1."""
         return (number - self.first) % self.every == 0
 
 
-def common_multiple(rates: Iterable[Rate]) -> int:
-    """Cycles until all groups meet again, however many [1]."""
+def hyperperiod(rates: Iterable[Rate]) -> int:
+    """Cycles after which the groups repeat: the hyperperiod [1]."""
     return lcm(*(rate.every for rate in rates))
 
 
 def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int, ...]]:
-    """Numbers of the cycles in which the same groups are due, within the common multiple of all rates.
+    """Cycles of the hyperperiod, by which groups are due in them.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def numbers_by_due(rates: Sequence[Rate]) -> Mapping[tuple[bool, ...], tuple[int
     {(True, False): (1, 3), (True, True): (2,)}
     """
     numbers: dict[tuple[bool, ...], list[int]] = {}
-    for number in range(1, common_multiple(rates) + 1):
+    for number in range(1, hyperperiod(rates) + 1):
         numbers.setdefault(tuple(rate.is_due(number) for rate in rates), []).append(number)
     return {due: tuple(cycles) for due, cycles in numbers.items()}
 
@@ -48,7 +48,7 @@ class Group(NamedTuple):
     """Nodes that are alike. The numbers may be of any sort."""
 
     members: tuple[ProfileGroup, ...]
-    """The profile's groups that it joins, side by side: one, or several that differ in name and number alone."""
+    """The profile's groups merged into this one: adjacent ones that differ only in name and number of nodes."""
     nodes: Number
     """Number of nodes [1]."""
     axes: Number
@@ -70,23 +70,23 @@ class Group(NamedTuple):
 
     @property
     def node(self) -> Any:
-        """A node of the group, of its kind's own model: how it executes and answers."""
+        """A node of the group, an object of the kind's own model: how it executes and answers."""
         return self.members[0].node
 
     @property
     def payload(self) -> Any:
-        """Payloads of a node, of its kind's own model."""
+        """Payloads of a node, an object of the kind's own model."""
         return self.members[0].payload
 
     @property
     def every(self) -> Number:
-        """Cycles from one with the data of the group to the next: n [1]."""
+        """n: the data of the group are in every n-th cycle [1]."""
         number: Number = getattr(self.payload, "every", 1)
         return number
 
     @property
     def is_slower(self) -> bool:
-        """Whether there are cycles without its data, at any point of an array."""
+        """Whether there are cycles without its data; of an array, at any point."""
         return not is_everywhere(self.every <= 1)
 
     @property
@@ -95,15 +95,15 @@ class Group(NamedTuple):
         return " and ".join(nodes.name for nodes in self.members)
 
     def key(self, name: str) -> str:
-        """Dotted key of a value of its nodes in the profile, by its key in [node], as "execution.worst_extra_us"."""
+        """Dotted key in the profile for a key of [node], such as "execution.worst_extra_us"."""
         return self.members[0].node_key(name)
 
 
 class Network(NamedTuple):
-    """A profile as its cycle sees it. The numbers may be of any sort: floats, arrays, traced numbers."""
+    """Inputs of the cycle of a profile. The numbers may be of any sort: floats, arrays, traced numbers."""
 
     profile: Any
-    """The profile, of its kind's own model. Its values may be numbers of any sort."""
+    """The profile, an object of the kind's own model. Its values may be numbers of any sort."""
     bus: "Bus"
     """The kind of bus."""
     groups: tuple[Group, ...]
@@ -146,7 +146,7 @@ class Network(NamedTuple):
         return next(group for group in groups if group.name == self.varied)
 
     def varying(self, name: str) -> "Network":
-        """The same network, where `with_nodes` changes a group of the profile.
+        """The same network, with the group of the profile chosen that `with_nodes` changes.
 
         Parameters
         ----------

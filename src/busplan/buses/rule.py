@@ -1,4 +1,4 @@
-"""Rules of the gate, and what a recording shows, as a kind of bus gives them."""
+"""What a kind of bus gives the gate and `measured`: rules, and figures of a recording."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
@@ -16,30 +16,30 @@ Severity = Literal["error", "warning"]
 
 
 class Mending(NamedTuple):
-    """Mending of a problem."""
+    """How to fix a problem."""
 
     help: str = ""
     """Advice in words."""
     cure: tuple[str, ...] = ()
-    """Lines of TOML, each a key with the value that mends it."""
+    """Lines of TOML, each a key with the value that fixes the problem."""
 
 
 class RuleProblem(NamedTuple):
-    """A problem that a rule reports: the dotted key that causes it, what is wrong, and how it is mended."""
+    """A problem that a rule reports: the dotted key that causes it, what is wrong, and how to fix it."""
 
     key: str
     message: str | Callable[[], str]
-    """The problem in words; or a function for them, where that takes long: a comment may suppress the problem."""
+    """The problem in words; or a function that writes them if that is slow, not called for a suppressed problem."""
     help: str = ""
     cure: tuple[str, ...] = ()
 
 
 RuleFigures: TypeAlias = Any
-"""Figures of `capacity` under a timing model, each an attribute by its key; those of the kind, too."""
+"""Figures of `capacity` under a timing model: each figure, also of the kind, is an attribute with its key."""
 
 
 class RuleSubject(Protocol):
-    """One profile with what the rules ask of it."""
+    """A profile, and all that rules may ask about it."""
 
     @property
     def profile(self) -> "Profile":
@@ -61,7 +61,7 @@ class RuleSubject(Protocol):
         """Capacity under the timing model that decides, with other values by dotted key."""
 
     def counts(self, changes: Mapping[str, "Value"] | None = None) -> Sequence[Any]:
-        """How many nodes of each group, or of all, fit and are shown to fit, with other values by dotted key."""
+        """How many nodes fit and are shown to fit, by group or in all, with other values by dotted key."""
 
     def limit_words(self, key: str) -> str:
         """Say by how much a limit of the bus is broken, or why it is not shown to be kept."""
@@ -71,7 +71,7 @@ class RuleSubject(Protocol):
 
 
 Check: TypeAlias = Callable[[RuleSubject], Iterator[RuleProblem]]
-"""Check of a profile that could be read: the problems that it has."""
+"""Check of a valid profile: gives its problems."""
 
 
 class Rule(NamedTuple):
@@ -83,20 +83,20 @@ class Rule(NamedTuple):
     summary: str
     """The problem in one line."""
     explanation: str
-    """Why it matters and how to mend it."""
+    """Why it matters and how to fix it."""
     check: Check | None = None
     """None where another part of the gate reports the problem."""
 
 
 def read_rules(package: str, checks: Mapping[str, Check]) -> tuple[Rule, ...]:
-    """Read the rules of a package from its `rules.toml`; a line break in an explanation is a space.
+    """Read the rules of a package from its `rules.toml`; line breaks in an explanation become spaces.
 
     Parameters
     ----------
     package
         The package.
     checks
-        Check of a rule by its code.
+        Checks by the code of their rule.
     """
     rules = read_toml(package, "rules.toml")
     for rule in rules.values():
@@ -107,7 +107,7 @@ def read_rules(package: str, checks: Mapping[str, Check]) -> tuple[Rule, ...]:
 def contradicts(fits: bool, figures: RuleFigures) -> bool:
     """Tell whether a timing model that does not decide contradicts the verdict.
 
-    A cycle that lacks only its reserve contradicts nothing, and a broken limit is no question of timing.
+    A cycle of the deciding model that lacks only room for U contradicts nothing; a broken limit is not about timing.
 
     Parameters
     ----------
@@ -168,13 +168,13 @@ CLOCK_TOLERANCE: Final = Sourced(
 _FIRST_DAY_NS: Final = 10 * 365 * 86400 * 1_000_000_000
 _LAST_DAY_NS: Final = 1 << 63
 _ROUNDING: Final = 1e-9
-"""Share of a figure that is rounding."""
+"""Relative rounding error of a figure."""
 SURE: Final = 3.29 / 2
-"""Expanded uncertainties (k = 2) from its plan on which a figure is outside it: k = 3.29, 99.9 % of a normal error."""
+"""Least excess over the plan, in expanded uncertainties (k = 2), that is outside: k = 3.29, 99.9 % of normal errors."""
 Sense = Literal["equal", "at most", "at least", "shown"]
-"""Way in which a recorded figure is within its plan; shown: nothing is planned."""
+"""Comparison that the recorded figure must pass against the planned one; shown: nothing is planned."""
 RecordedVerdict = Literal["within", "not shown", "outside"]
-"""Whether a figure is within its plan, beside it by no more than the doubt allows or hidden, or surely outside."""
+"""within: the plan is kept. not shown: the excess may be error, or the recording hides it. outside: surely not kept."""
 
 
 class RecordedFigure(NamedTuple):
@@ -190,33 +190,33 @@ class RecordedFigure(NamedTuple):
     """Expanded uncertainty (k = 2) of the difference; None where it is not known, or where nothing is planned."""
     sense: Sense
     events: int
-    """Number of events that it is taken from [1]."""
+    """Number of events that it is computed from [1]."""
     key: str = ""
-    """Dotted key of the profile that plans it."""
+    """Dotted key of the planned value in the profile."""
     note: str = ""
     is_mean: bool = False
-    """Whether it is the mean of its events, whatever the quantile."""
+    """Whether it is the mean of its events and not their quantile."""
     hidden: str = ""
     """Why the recording cannot show it, though something is planned; empty where it can."""
 
     @property
     def residual(self) -> float | None:
-        """Recorded less planned."""
+        """Recorded - planned."""
         return None if self.planned is None or self.recorded is None else self.recorded - self.planned
 
     @property
     def beyond(self) -> float | None:
-        """How far it is beside its plan, on the side that counts; negative within; None where nothing is planned."""
+        """Excess over the plan: the distance for "equal", else negative within; None where nothing is planned."""
         if self.residual is None or self.sense == "shown":
             return None
         return {"equal": abs(self.residual), "at most": self.residual, "at least": -self.residual}[self.sense]
 
     @property
     def verdict(self) -> RecordedVerdict | None:
-        """How it stands to its plan; None where nothing is planned.
+        """Verdict on the plan; None where nothing is planned.
 
-        A worst case that was recorded within the plan is within it; beyond by less than a doubt of 99.9 % it is not
-        shown. A mean, and what is to be equal, is within up to U.
+        A worst case is within without an excess; a mean, and a figure that must be equal, also with one of up to U. An
+        excess of more than `SURE` times U is outside; one between is not shown.
         """
         if self.hidden:
             return "not shown"
@@ -229,21 +229,21 @@ class RecordedFigure(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """A recording beside the plan."""
+    """A recording compared with the plan."""
 
     figures: tuple[RecordedFigure, ...]
     remarks: tuple[str, ...]
-    """Sentences on what the recording has beside that, and what it does not show."""
+    """Sentences on what else the recording has, and what it does not show."""
     edits: Mapping[str, object]
-    """New value by dotted key of what was measured; None removes a key."""
+    """New value of each measured key, by dotted key; None removes a key."""
     day: str
-    """Day of the first stamp in UTC, as 2026-11-23; empty where stamps do not say it."""
+    """Day of the first stamp in UTC, such as 2026-11-23; empty where stamps do not say it."""
     shows_nothing: tuple[str, ...] = ()
-    """Why the recording as a whole shows no machine within its plan, a sentence each; empty where it can."""
+    """Why the recording as a whole cannot show that the machine keeps its plan, a sentence each; empty where it can."""
 
 
 def day_of(time_ns: int) -> str:
-    """Day of a stamp, nanoseconds since 1970; empty of a clock that counts from its own start.
+    """Day of a stamp in nanoseconds since 1970; empty if the clock counts from another start.
 
     Examples
     --------

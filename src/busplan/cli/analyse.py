@@ -37,7 +37,7 @@ from busplan.cli.output import PlanFailsError, progress_bar, say
 from busplan.errors import BusplanError
 from busplan.files import document_bytes, new_file
 from busplan.forms import Form
-from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.profile.changes import NO_CHANGES, KeyChanges, change_options, period_option, shell_word
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Command
@@ -87,7 +87,6 @@ def capacity_command(
 def _next_commands(argument: str, result: "CapacityAnswer", changes: KeyChanges) -> "tuple[Command, ...]":
     """Commands to run next for the same profile."""
     from busplan.forms.blocks import Command
-    from busplan.questions.base.answer import change_options, period_option, shell_word
 
     profile_us, periods = result.profile.cycle.period_us, [verdict.period_us for verdict in result.verdicts]
     tried = period_option(periods[0]) if len(periods) == 1 and periods[0] != profile_us else ()

@@ -37,12 +37,12 @@ _SCHEMA: Final = 1
 MODELS: Final = 2
 """Version of the timing models that the figures come from; figures of another version are not compared."""
 MAX_BASELINE_BYTES: Final = 32_000_000
-"""At 200 bytes for each profile, enough for any repository; a larger file is something else."""
-_CURE: Final = "remove it, and record one with --update-baseline"
-"""A file that is not a baseline is never overwritten."""
+"""Enough for any repository at 200 bytes for each profile; a larger file is no baseline."""
+_REMEDY: Final = "remove it, and record one with --update-baseline"
+"""Remedy for a file that is not a baseline, which is never overwritten."""
 
-_WORDS: Final = ("schema_version", "name", "description")
-"""Keys that no figure depends on; they are not recorded."""
+_TEXT_KEYS: Final = ("schema_version", "name", "description")
+"""Keys of text, which no figure depends on; they are not recorded."""
 
 
 class Record(NamedTuple):
@@ -65,7 +65,7 @@ def figures_of(subject: Subject) -> dict[str, float]:
             for name in ("max_nodes", "safe_nodes"):
                 figures[f"{capacity.timing_model}.group.{group.name}.{name}"] = getattr(group, name)
         if not subject.profile.has_cycle:
-            for figure in _of_all(capacity.kind):
+            for figure in _loads(capacity.kind):
                 figures[f"{capacity.timing_model}.{figure.key}"] = capacity.values()[figure.key]
     return {name: value for name, value in figures.items() if value is not None}
 
@@ -73,11 +73,11 @@ def figures_of(subject: Subject) -> dict[str, float]:
 def keys_of(profile: Profile) -> dict[str, object]:
     """Values of a profile to record, by dotted key: those that its file sets."""
     values = flat(profile.model_dump(mode="json", exclude_unset=True))
-    return {key: value for key, value in values if key not in _WORDS}
+    return {key: value for key, value in values if key not in _TEXT_KEYS}
 
 
-def _of_all(kind: str) -> Iterable[Figure]:
-    """Figures of a kind of bus that are worse the larger they are, of all that is sent: a load."""
+def _loads(kind: str) -> Iterable[Figure]:
+    """Figures of a kind of bus that are worse when larger, such as the load."""
     return (figure for figure in kind_named(kind).figures.compared if figure.better == "less")
 
 
@@ -85,7 +85,7 @@ class Baseline(NamedTuple):
     """A recorded baseline."""
 
     profiles: dict[str, Record]
-    """By the path of the profile, relative to the folder of the baseline's file; a shipped profile by its name."""
+    """Records by the path of the profile, relative to the folder of the baseline's file; shipped profiles by name."""
     models: int
     """Version of the timing models."""
     path: Path | None = None
@@ -93,7 +93,7 @@ class Baseline(NamedTuple):
 
     @property
     def is_current(self) -> bool:
-        """Whether its figures may be compared with those of today."""
+        """Whether its figures come from the present timing models, so that they can be compared."""
         return self.models == MODELS
 
     def __str__(self) -> str:
@@ -103,7 +103,8 @@ class Baseline(NamedTuple):
         """Name of a profile's record, whatever the working folder is."""
         if source.is_shipped:
             return Path(source.name).stem
-        # Standard input is the file that it is called; every other name leads to its file.
+        # Links to folders are resolved, a link that is the file itself is not. Standard input counts as the file that
+        # it is named after.
         path = Path(source.name)
         return Path(os.path.relpath(os.path.realpath(path.parent) / Path(path.name), self._folder)).as_posix()
 
@@ -112,7 +113,7 @@ class Baseline(NamedTuple):
         return Path.cwd() if self.path is None else Path(os.path.realpath(self.path)).parent
 
     def without_profile(self, checked: Iterable[str]) -> list[str]:
-        """Names of the records, beside those of profiles that are checked, whose profile is gone."""
+        """Names of the records whose profile is gone; those of checked profiles are left out."""
         left = self.profiles.keys() - set(checked) - set(shipped_names())
         return sorted(name for name in left if not (self._folder / name).is_file() or not claims(self._folder / name))
 
@@ -122,9 +123,9 @@ class Baseline(NamedTuple):
         Parameters
         ----------
         profiles
-            Paths of the profiles without a record, as a message has them.
+            Paths of the profiles without a record, as the message names them.
         checked
-            Names of the records that are compared.
+            Names of the records of checked profiles.
         """
         records = self.without_profile(checked)
         counts = (
@@ -134,7 +135,7 @@ class Baseline(NamedTuple):
             if names
         )
         words = ", ".join(counts)
-        cure = "--update-baseline records and drops them, --pass-on-unmatched lets them pass"
+        cure = "--update-baseline adds or drops these records, --pass-on-unmatched lets them pass"
         return f"{self}: {words}; {cure}" if words else ""
 
 
@@ -170,15 +171,15 @@ def read_baseline(text: str, *, name: str) -> Baseline:
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
-        raise BusplanError(f"{name}: no JSON, so no baseline; {_CURE}") from None
+        raise BusplanError(f"{name}: no JSON, so no baseline; {_REMEDY}") from None
     if not isinstance(document, dict) or document.get("command") != "baseline" or document.get("schema") != _SCHEMA:
-        raise BusplanError(f"{name}: no baseline of this version; {_CURE}")
+        raise BusplanError(f"{name}: no baseline of this version; {_REMEDY}")
     profiles = document.get("profiles")
     if not isinstance(profiles, dict) or not all(map(_are_figures, profiles.values())):
-        raise BusplanError(f"{name}: a damaged baseline; {_CURE}")
+        raise BusplanError(f"{name}: a damaged baseline; {_REMEDY}")
     models, keys = document.get("models", 1), document.get("keys", {})
     if not isinstance(models, int) or isinstance(models, bool) or not _are_keys(keys):
-        raise BusplanError(f"{name}: a damaged baseline; {_CURE}")
+        raise BusplanError(f"{name}: a damaged baseline; {_REMEDY}")
     return Baseline({path: Record(figures, keys.get(path)) for path, figures in profiles.items()}, models)
 
 
@@ -223,7 +224,7 @@ _MOST_NAMED: Final = 3
 _LONGEST: Final = 30
 """Longest value that a finding repeats in full."""
 _MOST_FIGURES: Final = 3
-"""Most figures that a finding says; the diff of a new record shows all."""
+"""Most figures that a finding names; the diff of a new record shows all."""
 
 
 class ChangedValue(NamedTuple):
@@ -234,14 +235,14 @@ class ChangedValue(NamedTuple):
 
 
 def regression(subject: Subject, recorded: Record) -> Iterator[RuleProblem]:
-    """Say what a profile lost against its record, at the first key that costs it, or at its name.
+    """Say what a profile lost against its record, at the first changed key that explains it, or at its name.
 
     Parameters
     ----------
     subject
         The profile.
     recorded
-        Its record. One without keys cannot say which of them changed.
+        Its record. Without recorded keys, nothing can say which of them changed.
     """
     lost = worse(figures_of(subject), recorded.figures)
     if not lost:
@@ -256,7 +257,7 @@ def regression(subject: Subject, recorded: Record) -> Iterator[RuleProblem]:
 
 
 def worse(now: Mapping[str, float], before: Mapping[str, float]) -> dict[str, tuple[float, float | None]]:
-    """Recorded figures that have become worse, each as it was and as it is; None where it is no more."""
+    """Recorded figures that have become worse, each as it was and as it is; None if it no longer exists."""
     return {
         name: (value, now.get(name)) for name, value in before.items() if _is_worse(name, now.get(name), than=value)
     }
@@ -270,16 +271,16 @@ def _is_worse(name: str, value: float | None, *, than: float | None) -> bool:
 
 
 def _figure(name: str) -> Figure:
-    """The figure of a recorded name; one that no bus has any more is called by its key."""
+    """The figure of a recorded name; if no bus has it any more, one that is labelled by its key."""
     key = name.rpartition(".")[2]
     return _figures().get(key) or Figure(key, "", "", "", key.replace("_", " "))
 
 
 @cache
 def _figures() -> Mapping[str, Figure]:
-    """Figures of a baseline by key, in the order in which a finding says them."""
+    """Figures of a baseline by key, in the order in which a finding names them."""
     margins = (MARGIN_CORRECTED, SAFE_NODES, SAFE_AXES, MARGIN, MAX_NODES, MAX_AXES)
-    return by_key((*margins, *chain.from_iterable(map(_of_all, kind_names()))))
+    return by_key((*margins, *chain.from_iterable(map(_loads, kind_names()))))
 
 
 def _causes(subject: Subject, before: Mapping[str, object], lost: Mapping[str, object]) -> dict[str, ChangedValue]:
@@ -312,7 +313,7 @@ def _wins_back(subject: Subject, key: str, value: object, lost: Mapping[str, obj
 
 
 def _keys(changes: Mapping[str, ChangedValue]) -> str:
-    """Say how keys changed; the finding begins with the first of them."""
+    """Say how keys changed; the first is not named, because the finding begins with it."""
     first, *rest = (f"{_shown(value.now)}, was {_shown(value.before)}" for value in changes.values())
     named = [f"{key} = {words}" for key, words in zip(list(changes)[1:], rest, strict=True)][: _MOST_NAMED - 1]
     more = len(changes) - 1 - len(named)
@@ -340,7 +341,7 @@ def _words(lost: Mapping[str, tuple[float, float | None]], *, deciding: str) -> 
         figure, before = _figure(name), verb
         verb = " rose" if figure.better == "less" else " fell"
         by_model = "" if model == deciding else f" by the {model} timing"
-        # A figure says the verb for those behind it.
+        # The verb is written once for figures in a row that share it.
         phrases.append(
             f"{_label(path, figure)}{verb if verb != before else ''} {_change(figure, *lost[name])}{by_model}"
         )
@@ -350,7 +351,7 @@ def _words(lost: Mapping[str, tuple[float, float | None]], *, deciding: str) -> 
 
 
 def _label(path: str, figure: Figure) -> str:
-    """Name of a figure, and the group that it is of."""
+    """Name of a figure, and of its group."""
     section = path.rpartition(".")[0]
     return f"{figure.label} of {section.partition('.')[2]}" if section else figure.label
 

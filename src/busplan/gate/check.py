@@ -1,4 +1,4 @@
-"""`busplan.check`."""
+"""`busplan.check`: do profiles fit their bus, hold their circle and keep what a baseline recorded?"""
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -70,9 +70,9 @@ def check(
     Parameters
     ----------
     paths
-        One or several files, folders (every *.toml below with a `schema_version`), shipped names or a `Profile` each. A
-        `Profile` is checked as the file that `busplan` would write of it, NAME.toml. Or what
-        `busplan.profile.sources.collect` returns.
+        One or several files, folders (every *.toml below with a `schema_version`), shipped names or `Profile`s; or the
+        result of `busplan.profile.sources.collect`. A `Profile` is checked as the file that `busplan` would write of
+        it, NAME.toml.
     circle
         Run the circle test of profiles that ask for one.
     circle_steps
@@ -80,15 +80,15 @@ def check(
     changes
         New values by dotted key, in the key's unit, for every file; each must be valid without them.
     baseline
-        A file that `busplan check --update-baseline` recorded, or what stands in it: a profile that lost axes or margin
-        against it has an error. Profiles without a record and records without a profile are a `failure` of its file.
+        A file that `busplan check --update-baseline` recorded, or its content: a profile that lost axes or margin
+        against it has an error. Profiles without a record and records without a profile are a `failure` of this file.
     pass_on_unmatched
-        Let those pass; `unmatched` of the answer still says them.
+        Let those pass; `unmatched` of the answer still names them.
     record
         Also give the `figures` and `keys` of each file that a baseline records.
     recording
-        A recording of the machine, for a single profile: as `busplan.measured` takes it. What is outside the plan is an
-        error.
+        A recording of the machine, as `busplan.measured` takes it; for a single profile. A figure outside the plan is
+        an error.
     quantile
         Share of the events that worst cases of the recording hold for, 0.5..1.
     skip_others
@@ -108,7 +108,7 @@ def check(
     BusplanError
         No path, standard input, an invalid change, or no baseline of these timing models.
     Exception
-        What `executor` raises.
+        Anything that `executor` raises.
 
     Examples
     --------
@@ -134,7 +134,7 @@ def check(
     files: tuple[ProfileSource | Document, ...] = (*collection.sources, *in_memory)
     names = [_record_name(file, recorded) for file in files]
     records = [None if recorded is None else recorded.profiles.get(name) for name in names]
-    # Only this process has standard input and what is in memory.
+    # Only this process can read standard input and what is in memory.
     is_here = [executor is None or isinstance(file, Document) or str(file.path) == "-" for file in files]
     there = [pair for pair, here in zip(zip(files, records, strict=True), is_here, strict=True) if not here]
     checked = executor.map(check_file, *zip(*there, strict=True)) if executor is not None and there else iter(())

@@ -22,7 +22,7 @@ from busplan.profile.document import LoadedProfile, Spot
 from busplan.profile.edit import short_text
 from busplan.questions.base.inputs import Path
 from busplan.questions.fit.certainty import available_us, fits_in
-from busplan.questions.fit.circle_refusal import path_steps, refusals
+from busplan.questions.fit.circle_setup import path_steps, refusals
 from busplan.questions.fit.figures import FitFigures, GroupCapacity, figures, node_counts
 from busplan.questions.fit.network import PERIOD, changed, model_names, network_of
 from busplan.questions.plan.search import changeable, cure
@@ -44,11 +44,11 @@ class Finding(NamedTuple):
     line: int
     column: int
     marked_column: int
-    """First column of the value, or of what stands for it: a name, a comment."""
+    """First column of the value, or of the name or comment that is marked instead."""
     marked_end_column: int
-    """First column after it."""
+    """First column after the mark."""
     problem: str
-    """The problem."""
+    """The problem alone."""
     help: str | None = None
     """Remedy, in words."""
     cure: str | None = None
@@ -101,9 +101,9 @@ class Subject:
     loaded
         The profile and its text.
     changes
-        Changes of the profile, which the text does not show.
+        Changes already made to the profile, but not to its text.
     circle_steps
-        Most simulated steps of each axis of its circle; None for no circle.
+        Most simulated steps of each axis of its circle; None to run no circle.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class Subject:
 
     @property
     def others_fit(self) -> tuple[tuple[str, bool], ...]:
-        """The other timing models, each with whether the cycle fits; no figures are computed for that."""
+        """The other timing models, each with whether the cycle fits, found without all their figures."""
         given_us, bus = available_us(self.network), self.network.bus
         return tuple(
             (model, bool(fits_in(bus.cycle(self.network, model=model).required_us, available_us=given_us)))
@@ -165,8 +165,8 @@ MOST_STEPS: Final = 10_000_000
 def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
     """Run the circle test of a profile, and yield each broken rule with its problem.
 
-    A circle that cannot be run is a problem whether or not it was to be run. A cycle that does not fit breaks another
-    rule, and has no circle.
+    A circle that cannot be run is a problem even if circles are not to be run. A cycle that does not fit has no circle;
+    another rule reports it.
 
     Parameters
     ----------
@@ -190,10 +190,10 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
     first = result.to_attack
     attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
     for failure in result.failures:
-        if failure.is_of_bus:  # a cycle that is not shown to fit has a rule of its own
+        if failure.is_of_bus:  # another rule reports a cycle that is not shown to fit
             continue
         is_stability = failure.name in STABILITY
-        # A finding needs a key in the file: a default limit has none.
+        # A finding needs a key in the file; a default limit is not in it.
         is_set = failure.name in profile.tolerance.model_fields_set
         key = f"tolerance.{failure.name}" if is_set else "servo.position_gain_per_s"
         way_out = ""
@@ -207,13 +207,13 @@ def circle_problems(subject: Subject) -> Iterator[tuple[Rule, RuleProblem]]:
 def _refused(cause: Refused, profile: Profile) -> RuleProblem:
     """Why a circle cannot be run, at a key of the file."""
     key = _key_in_file(cause.name, *cause.beside, profile=profile)
-    # A key that is the cause says its name already.
+    # A finding begins with its key: then the message leaves the name out.
     words, _, way_out = (f"{cause.value}: {cause.right}" if key == cause.name else cause.message).partition("; ")
     return RuleProblem(key, words, way_out)
 
 
 def _key_in_file(*keys: str, profile: Profile) -> str:
-    """The first of some keys that the profile sets, or the nearest section."""
+    """The first of some keys that the profile sets; if it sets none, the section servo or circle."""
     for key in keys:
         section, _, name = key.rpartition(".")
         if name in value_at(profile, section).model_fields_set:
@@ -222,7 +222,7 @@ def _key_in_file(*keys: str, profile: Profile) -> str:
 
 
 def circle_rules_run(subject: Subject, problems: Iterable[tuple[Rule, RuleProblem]]) -> set[str]:
-    """Codes of the rules that were checked; without a test, only that of the rule that says why there is none."""
+    """Codes of the circle rules that were checked: all if the circle was run, else only the rule on why it was not."""
     not_run = {rule.code for rule, _ in problems if rule in (IMPOSSIBLE_CIRCLE, LONG_CIRCLE)}
     if not_run:
         return not_run
@@ -231,24 +231,24 @@ def circle_rules_run(subject: Subject, problems: Iterable[tuple[Rule, RuleProble
 
 
 _UNPLANNED: Final = "name"
-"""Key of a figure that no key plans: the first one of every profile that has the whole machine."""
+"""Key where a finding stands if no key plans its figure: every profile has a name."""
 
 
 class Recording(NamedTuple):
-    """A recording of the machine that a profile plans."""
+    """A recording of the machine that a profile describes."""
 
     path: Path
     quantile: float = 1.0
-    """Share of the events that worst cases hold for, 0.5..1."""
+    """Share of the events that a recorded worst case covers, 0.5..1."""
 
 
-def beside_plan(profile: Profile, recording: Recording) -> Iterator[tuple[Rule, RuleProblem]]:
-    """What a recording shows outside the plan, what it does not show to be within it, and where it shows nothing.
+def plan_problems(profile: Profile, recording: Recording) -> Iterator[tuple[Rule, RuleProblem]]:
+    """Compare a recording with the plan: what is outside it, what is not shown to be within, or why nothing is shown.
 
     Raises
     ------
     BusplanError
-        It cannot be read, or compared with the profile.
+        The recording cannot be read, or cannot be compared with the profile.
     """
     from busplan.questions.measured import measured
 

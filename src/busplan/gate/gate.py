@@ -13,14 +13,14 @@ from busplan.gate.finding import (
     Recording,
     Subject,
     Violation,
-    beside_plan,
     circle_problems,
     circle_rules_run,
     finding_of,
+    plan_problems,
 )
 from busplan.gate.rules import (
     BASELINE,
-    BY_KIND,
+    BY_PROBLEM,
     NEVER_SUPPRESSED,
     RECORDING,
     SUPPRESSION_WITHOUT_EFFECT,
@@ -34,12 +34,12 @@ from busplan.profile.kinds import path_of
 from busplan.profile.sources import ProfileSource
 
 MARK: Final = "busplan:"
-_ADDRESSED: Final = re.compile(r"#\s*busplan:")
-_COMMENT: Final = re.compile(r"#\s*busplan:\s*ignore\s*\[(?P<codes>[^\]\n]*)\](?P<reason>[^\n]*)")
+_MARKED_COMMENT: Final = re.compile(r"#\s*busplan:")
+_IGNORE_COMMENT: Final = re.compile(r"#\s*busplan:\s*ignore\s*\[(?P<codes>[^\]\n]*)\](?P<reason>[^\n]*)")
 
 
 class Suppression(NamedTuple):
-    """One comment, and the line that it applies to."""
+    """A comment that suppresses rules, and the line that it applies to."""
 
     codes: tuple[str, ...]
     """Rule codes; empty if the comment is not understood."""
@@ -53,9 +53,9 @@ def suppressions(document: Document) -> Iterator[Suppression]:
     if MARK not in document.text:
         return
     for offset in document.comments:
-        if not _ADDRESSED.match(document.text, offset):
+        if not _MARKED_COMMENT.match(document.text, offset):
             continue
-        match = _COMMENT.match(document.text, offset)
+        match = _IGNORE_COMMENT.match(document.text, offset)
         line, column = document.lines.line_and_column(offset)
         written = document.text[offset:].partition("\n")[0].rstrip()
         spot = Spot(line, column, column, column + len(written))
@@ -70,7 +70,7 @@ def suppressions(document: Document) -> Iterator[Suppression]:
 def suppress(
     violations: Iterable[Violation], document: Document, *, ran: set[str]
 ) -> tuple[list[Violation], list[Finding]]:
-    """Remove suppressed problems, and find what is wrong with the suppressions themselves.
+    """Remove suppressed problems, and find what is wrong with the suppressing comments themselves.
 
     Parameters
     ----------
@@ -79,19 +79,17 @@ def suppress(
     document
         The document.
     ran
-        Codes of the rules that have run; only their suppressions can have no effect.
+        Codes of the rules that were checked; only for these can a suppression be without effect.
     """
     left = list(violations)
     findings: list[Finding] = []
     for comment in suppressions(document):
         if not comment.codes:
-            way_out = "write # busplan: ignore[CODE] reason"
-            findings.append(_of_comment(SUPPRESSION_WITHOUT_EFFECT, comment, "the comment suppresses nothing", way_out))
+            words, way_out = "the comment suppresses nothing", "write # busplan: ignore[CODE] reason"
+            findings.append(_comment_finding(SUPPRESSION_WITHOUT_EFFECT, comment, words, way_out))
         elif not comment.reason:
-            way_out = "add the reason after the bracket"
-            findings.append(
-                _of_comment(SUPPRESSION_WITHOUT_REASON, comment, "the suppression gives no reason", way_out)
-            )
+            words, way_out = "the suppression gives no reason", "add the reason after the bracket"
+            findings.append(_comment_finding(SUPPRESSION_WITHOUT_REASON, comment, words, way_out))
         for code in comment.codes:
             hit = [broken for broken in left if broken.rule.code == code and broken.spot.line == comment.of_line]
             left = [broken for broken in left if broken not in hit]
@@ -103,11 +101,11 @@ def suppress(
                 message = f"{code} has nothing to suppress on line {comment.of_line}"
             else:
                 continue
-            findings.append(_of_comment(SUPPRESSION_WITHOUT_EFFECT, comment, message))
+            findings.append(_comment_finding(SUPPRESSION_WITHOUT_EFFECT, comment, message))
     return left, findings
 
 
-def _of_comment(rule: Rule, suppression: Suppression, words: str, way_out: str = "") -> Finding:
+def _comment_finding(rule: Rule, suppression: Suppression, words: str, way_out: str = "") -> Finding:
     return finding_of(rule, RuleProblem("", words, way_out), suppression.spot, words=words)
 
 
@@ -140,7 +138,7 @@ class FileResult(NamedTuple):
     failure: str | None = None
     """Why the file could not be checked; None if it was checked."""
     keys: Mapping[str, object] | None = None
-    """Keys for a baseline; None as the figures are empty."""
+    """Keys for a baseline; None where `figures` is empty."""
     fit: Fit | None = None
     """How the cycle fits; None if the profile cannot be read."""
     circle_not_run: bool = False
@@ -164,7 +162,7 @@ def check_source(
     source
         The file; if it cannot be read, the result has a failure.
     recorded
-        Its record in a baseline; None for none.
+        Its record in a baseline, or None.
     options
         Named arguments of `check_document`.
     """
@@ -206,11 +204,11 @@ def check_document(
     changes
         Changes of the profile; if its schema refuses them, the result has a failure.
     baseline
-        Record of the profile in a baseline; None for none.
+        Record of the profile in a baseline, or None.
     record
         Whether to give the figures that a baseline records.
     recording
-        Recording of its machine; if it cannot be compared, the result has a failure. None for none.
+        Recording of its machine, or None; if it cannot be compared, the result has a failure.
 
     Returns
     -------
@@ -220,8 +218,8 @@ def check_document(
     try:
         profile = validate(document)
     except PlacedError as error:
-        # These cannot be suppressed: nothing else of the file was checked.
-        return _result(document, None, list(_of_file(error)))
+        # Comments do not suppress these: they prevent all other checks.
+        return _result(document, None, list(_file_findings(error)))
     try:
         profile = changes.applied(profile)
     except BusplanError as error:
@@ -237,14 +235,14 @@ def check_document(
         ran.add(BASELINE.code)
     if recording is not None:
         try:
-            problems += beside_plan(profile, recording)
+            problems += plan_problems(profile, recording)
         except BusplanError as error:
             return FileResult(document.name, profile.name, (), {}, failure="; ".join(error.problems))
         ran.update(rule.code for rule in RECORDING)
     paths: dict[int, Any] = {}
     violations = [_placed(document, rule, problem, paths) for rule, problem in problems]
     if changes.entries:
-        # Comments were written for the file as it is: with changes, none counts as without effect.
+        # Comments were written for the file as it is; with changes, a suppression without effect is no fault.
         ran = set()
     left, of_comments = suppress(violations, document, ran=ran)
     findings = [*(_finding_of(violation, subject) for violation in left), *of_comments]
@@ -258,14 +256,14 @@ def check_document(
 def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
     """Make the result for a file that is not text."""
     lines = content.decode("utf-8-sig", errors="replace").split("\n")
-    findings = tuple(_of_file(error))
+    findings = tuple(_file_findings(error))
     return FileResult(name, None, findings, {}, tuple(lines[finding.line - 1] for finding in findings))
 
 
-def _of_file(error: PlacedError) -> Iterator[Finding]:
+def _file_findings(error: PlacedError) -> Iterator[Finding]:
     last = len(error.placed) - 1
     for number, problem in enumerate(error.placed):
-        rule = BY_KIND[problem.kind]
+        rule = BY_PROBLEM[problem.kind]
         more = f"; {error.hidden} more problems of this file are not listed" if error.hidden and number == last else ""
         spot = Spot(problem.line, problem.column, *(problem.marked or (problem.column, problem.column + 1)))
         words = problem.message + more
@@ -273,7 +271,7 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
 
 
 def _placed(document: Document, rule: Rule, problem: RuleProblem, paths: dict[int, Any]) -> Violation:
-    """Find the line of a problem's key, or of the table that should have it; `paths` as `path_of` takes it."""
+    """Find the line of a problem's key, or of the table that should have it; `paths` are the `arrays` of `path_of`."""
     path = path_of(document.data(), problem.key, paths) if problem.key.count(".") > 1 else (*problem.key.split("."),)
     return Violation(rule, problem, document.spot(path))
 

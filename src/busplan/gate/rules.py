@@ -34,10 +34,10 @@ def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
     if deciding.verdict != DOES_NOT_FIT:
         return
     broken = limits_behind(deciding, subject.network)
-    alone = [limit for limit in broken if not limit.has_rule]
-    for limit in alone:
+    unreported = [limit for limit in broken if not limit.has_rule]
+    for limit in unreported:
         yield RuleProblem("cycle.period_us", limit.words(subject.network), limit.way_out)
-    if not alone and (TIME in deciding.exceeded or not broken):
+    if not unreported and (TIME in deciding.exceeded or not broken):
         yield RuleProblem("cycle.period_us", f"the cycle {overrun(deciding)}", *subject.cure())
 
 
@@ -68,30 +68,30 @@ def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further nodes than [limits] requires."""
-    limit = subject.profile.limits.min_spare_nodes
-    if limit is None:
+    least = subject.profile.limits.min_spare_nodes
+    if least is None:
         return
     for counts in subject.counts():
         spare = (counts.safe_nodes or 0) - counts.nodes
-        if spare < limit:
-            yield RuleProblem("limits.min_spare_nodes", _spare(counts, spare, limit), *_room(subject, counts))
+        if spare < least:
+            yield RuleProblem("limits.min_spare_nodes", _spare(counts, spare, least), *_room(subject, counts))
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further axes than [limits] requires."""
-    limit = subject.profile.limits.min_spare_axes
-    if limit is None:
+    least = subject.profile.limits.min_spare_axes
+    if least is None:
         return
     for counts in subject.counts():
         spare = (counts.safe_axes or 0) - counts.axes
-        if counts.axes and spare < limit:
-            yield RuleProblem("limits.min_spare_axes", _spare(counts, spare, limit), *_room(subject, counts))
+        if counts.axes and spare < least:
+            yield RuleProblem("limits.min_spare_axes", _spare(counts, spare, least), *_room(subject, counts))
 
 
-def _spare(counts: Any, spare: int, limit: int) -> str:
+def _spare(counts: Any, spare: int, least: int) -> str:
     """Number of nodes or axes to spare, and the limit that binds."""
     group = f"group {counts.name}: " if counts.name else ""
-    words = f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
+    words = f"{max(spare, 0)} to spare that are shown to fit, {least} asked for"
     return f"{group}{words}; limited by {counts.safe_limited_by}"
 
 
@@ -114,9 +114,9 @@ def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """Much of the required time, or of its uncertainty, is an assumption."""
+    """A large share of the required time, or of its variance, rests on an assumption."""
     for assumption in heavy_assumptions(subject.deciding, subject.network):
-        noun = "an assumption" if len(assumption.keys) == 1 else "an assumption of several"
+        noun = "an assumption" if len(assumption.keys) == 1 else "one of several assumptions"
         for key in assumption.keys:
             place = f"{key}.grade" if assumption.is_execution else key
             yield RuleProblem(place, f"{noun}, which {assumption.carries}", "measure it")
@@ -134,7 +134,7 @@ CHECKS: Final[Mapping[str, Check]] = {
 """The check of each rule, by its code in `rules.toml`."""
 
 
-OWN: Final[Mapping[str, Rule]] = MappingProxyType({rule.code: rule for rule in read_rules("busplan.gate", CHECKS)})
+COMMON: Final[Mapping[str, Rule]] = MappingProxyType({rule.code: rule for rule in read_rules("busplan.gate", CHECKS)})
 """Rules common to all kinds of bus, by code."""
 _FILE_CODES: Final[Mapping[ProblemKind, str]] = {
     "syntax": "BP001",
@@ -145,15 +145,15 @@ _FILE_CODES: Final[Mapping[ProblemKind, str]] = {
     "inconsistent": "BP006",
     "execution-unknown": "BP007",
 }
-BY_KIND: Final = {kind: OWN[code] for kind, code in _FILE_CODES.items()}
-"""Rules of the file format, by what reading a profile finds."""
-BASELINE, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT = (OWN[code] for code in ("BP301", "BP901", "BP902"))
+BY_PROBLEM: Final = {kind: COMMON[code] for kind, code in _FILE_CODES.items()}
+"""Rules of the file format, by the kind of problem that reading a profile finds."""
+BASELINE, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT = map(COMMON.__getitem__, ("BP301", "BP901", "BP902"))
 CIRCLE = OF_CIRCLE, OF_STABILITY, IMPOSSIBLE_CIRCLE, LONG_CIRCLE = tuple(
-    OWN[code] for code in ("BP201", "BP202", "BP203", "BP204")
+    COMMON[code] for code in ("BP201", "BP202", "BP203", "BP204")
 )
-"""Rules of a circle."""
-RECORDING = OUTSIDE_PLAN, NOT_RECORDED, NOTHING_RECORDED = tuple(OWN[code] for code in ("BP401", "BP402", "BP403"))
-"""Rules of a recording of the machine."""
+"""Rules on the circle test."""
+RECORDING = OUTSIDE_PLAN, NOT_RECORDED, NOTHING_RECORDED = tuple(COMMON[code] for code in ("BP401", "BP402", "BP403"))
+"""Rules on a recording of the machine."""
 NEVER_SUPPRESSED: Final = frozenset((*_FILE_CODES.values(), "BP901", "BP902"))
 """Codes that cannot be suppressed: those of the file format and of suppressions."""
 
@@ -165,13 +165,13 @@ def all_rules() -> Mapping[str, Rule]:
 
 @cache
 def _by_code(kinds: tuple[Bus, ...]) -> Mapping[str, Rule]:
-    rules = (*OWN.values(), *(rule for kind in kinds for rule in kind.rules))
+    rules = (*COMMON.values(), *(rule for kind in kinds for rule in kind.rules))
     return MappingProxyType({rule.code: rule for rule in sorted(rules, key=lambda rule: rule.code)})
 
 
 def cycle_rules(kind: str) -> tuple[Rule, ...]:
-    """Rules for profiles of a kind of bus, sorted by code."""
-    return tuple(sorted((*map(OWN.__getitem__, CHECKS), *kind_named(kind).rules), key=lambda rule: rule.code))
+    """Rules on the cycle for profiles of a kind of bus, sorted by code."""
+    return tuple(sorted((*map(COMMON.__getitem__, CHECKS), *kind_named(kind).rules), key=lambda rule: rule.code))
 
 
 _COLUMNS: Final = (

@@ -1,11 +1,15 @@
-"""Changes of a profile by options: `--set KEY=VALUE`, --period, and the goal of `plan`."""
+"""Changes of a profile by options: `--set KEY=VALUE`, --period, and the goal of `plan`; and how to write them again."""
 
+import os
 import re
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from string import ascii_letters, digits
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from busplan.english import has_controls
 from busplan.errors import BusplanError, PlacedError
 
 if TYPE_CHECKING:
@@ -165,3 +169,39 @@ def _value(written: str, *, name: str) -> object:
         f"{name}: {written} is not a TOML value; expected a number without its unit, true or false, a word, "
         'text in quotes, as "two words", an array, as [4, 16], or a table, as {kind = "linear", base_us = 30}'
     )
+
+
+def shell_word(text: str) -> str:
+    """Quote an argument for a shell.
+
+    Examples
+    --------
+    >>> shell_word("line 1.toml"), shell_word("-x.toml"), shell_word("-")
+    ("'line 1.toml'", './-x.toml', '-')
+    """
+    if text.startswith("-") and text != "-":
+        # The program would take it for an option, whatever the quotes.
+        text = f"./{text}"
+    if not has_controls(text):
+        return shlex.quote(text)
+    # Control characters need $'...', which bash, zsh and POSIX 2024 support.
+    plain = f"{ascii_letters}{digits}/._-+ "
+    escaped = (chr(byte) if chr(byte) in plain else f"\\x{byte:02x}" for byte in os.fsencode(text))
+    return f"$'{''.join(escaped)}'"
+
+
+def period_option(period_us: float) -> tuple[str, str]:
+    """The --period option for exactly this period.
+
+    Examples
+    --------
+    >>> period_option(500.0), period_option(0.1)
+    (('--period', '500us'), ('--period', '0.1us'))
+    """
+    return "--period", f"{repr(period_us).removesuffix('.0')}us"
+
+
+def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
+    """Options of the changes, quoted for a shell; --period with the profile's period [us]."""
+    for change in changes.entries:
+        yield from period_option(period_us) if change.option == "--period" else (change.option, shell_word(change.text))

@@ -24,7 +24,7 @@ from busplan.forms.blocks import (
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_network, one_or_several, whole
 from busplan.questions.base.sentences import (
-    Owner,
+    FigureColumn,
     document,
     execution_sentence,
     figure_table,
@@ -248,11 +248,11 @@ def _tables(answer: LatencyAnswer) -> Iterator[Table]:
         return
     caption = Sentence((f"Phases in us, {answer.subject}",))
     for table in answer.tables:
-        owners = [
-            Owner(TableColumn(transaction.timing_model, group=_name(transaction)), transaction.phases)
+        columns = [
+            FigureColumn(TableColumn(transaction.timing_model, group=_name(transaction)), transaction.phases)
             for transaction in table
         ]
-        yield figure_table([(figure, 0) for figure in figures], owners, caption=caption, unit=False)
+        yield figure_table([(figure, 0) for figure in figures], columns, caption=caption, unit=False)
 
 
 _MOST_ROWS: Final = 30

@@ -1,4 +1,4 @@
-"""`busplan.measured`: a recording beside the plan, and its answer in blocks."""
+"""`busplan.measured`: a recording compared with the plan, and the report."""
 
 import os
 from collections import Counter
@@ -48,7 +48,7 @@ _COLUMNS: Final = (
 )
 _DECIMALS: Final = {"us": 3, "1": 0, "bytes": 0, "share": 2, "kbit/s": 1}
 _UNITS: Final = {"1": "", "share": "%"}
-"""How a unit is shown, where not as it is."""
+"""How a unit is shown, where it differs."""
 _WITHIN: Final[dict[RecordedVerdict | None, Cell]] = {
     None: "",
     "within": Words("yes", "passes"),
@@ -56,7 +56,7 @@ _WITHIN: Final[dict[RecordedVerdict | None, Cell]] = {
     "outside": Words("no", "fails"),
 }
 _SMALL_US: Final = 1.0
-"""A time below it has more decimals."""
+"""A time below this is shown with more decimals [us]."""
 _LEAST_QUANTILE = 0.5
 
 
@@ -71,17 +71,17 @@ class MeasuredAnswer(Answer):
     source
         Name of the recording.
     quantile
-        Share of the events that worst cases hold for, 0.5..1.
+        Quantile of the events for worst cases, 0.5..1.
     figures
-        Every figure planned beside the recorded one.
+        Every figure, planned and recorded.
     remarks
-        Sentences on what the recording has beside that, and what it does not show.
+        Sentences on what else the recording has, and what it does not show.
     edits
-        New value of each key that was measured, as `--apply` writes them; None removes a key.
+        New value of each measured key, as `--apply` writes it; None removes a key.
     day
-        Day of the recording in UTC, as 2026-11-23; empty where its stamps do not say it.
+        Day of the recording in UTC, such as 2026-11-23; empty where its stamps do not say it.
     shows_nothing
-        Why the recording as a whole shows no machine within its plan; empty where it can.
+        Why the recording as a whole cannot show that the machine keeps its plan; empty where it can.
     """
 
     profile: Profile
@@ -95,12 +95,12 @@ class MeasuredAnswer(Answer):
 
     @property
     def outside(self) -> tuple[RecordedFigure, ...]:
-        """Figures that lie outside their plan, by more than their doubt at 99.9 %."""
+        """Figures outside their plan, by more than a 99.9 % uncertainty."""
         return tuple(figure for figure in self.figures if figure.verdict == "outside")
 
     @property
     def notes(self) -> dict[str, str]:
-        """The comment that `--apply` writes above each section: how, how many, from which file, of which day."""
+        """The comment that `--apply` writes above each section: quantile, number of events, file and day."""
         return {section: self._origin(section) for section in {key.rpartition(".")[0]: None for key in self.edits}}
 
     def _origin(self, section: str) -> str:
@@ -134,7 +134,7 @@ class MeasuredAnswer(Answer):
 def measured(
     profile: ProfileLike, recording: Path, *, quantile: float = 1.0, progress: Progress | None = None
 ) -> MeasuredAnswer:
-    """Show what a machine does by a recording of its bus, beside what was planned.
+    """Compare a recording of a machine's bus with the plan.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def measured(
         A file of the profile's kind of bus. EtherCAT: a capture of the master's port, pcap or pcapng. CAN: a log of
         `candump -l`, ASC, BLF or TRC (with the extra `import`).
     quantile
-        Share of the events that jitter and times are to hold for, 0.5..1; 1 is the worst one recorded.
+        Quantile of the events for jitter and times, 0.5..1; 1 is the worst one recorded.
     progress
         Called with the bytes read and those of the file.
 

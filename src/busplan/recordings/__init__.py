@@ -1,1 +1,1 @@
-"""Readers of what a machine's bus recorded: captures of Ethernet ports, and logs of CAN; and their statistics."""
+"""Readers of recordings of a machine's bus: captures of Ethernet ports and CAN logs; and their statistics."""

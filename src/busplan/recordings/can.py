@@ -1,4 +1,4 @@
-"""Frames of CAN logs as arrays, and the bits that each had on the wire."""
+"""Frames of CAN logs as arrays, with the bits that each had on the wire."""
 
 import logging
 import zlib
@@ -23,31 +23,31 @@ _ROW: Final = Struct("<dIQBB")
 _ROW_FIELDS: Final = np.dtype(
     [("stamp_s", "<f8"), ("identifier", "<u4"), ("data", "<u8"), ("dlc", "u1"), ("flags", "u1")]
 )
-"""A frame while a log is read."""
+"""Row of a frame while a log is read."""
 _READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader", b"(": "CanutilsLogReader"}
 """Readers of python-can, by the first bytes of a file."""
 _FORMATS: Final = "candump -l, Vector's ASC and BLF, PEAK's TRC"
-_TURN: Final = 5000
+_REPORT_EVERY: Final = 5000
 """Frames between two reports of progress."""
 _CRC_15: Final = 0x4599
 _CRC_BITS: Final = 15
 _NEVER_STUFFED: Final = 13
-"""Bits behind the CRC: its delimiter, acknowledge, end of frame and interframe space."""
+"""Bits after the CRC: its delimiter, acknowledge, end of frame and interframe space."""
 _RUN: Final = 5
-"""Equal bits behind which the opposite one is stuffed."""
-_PIECE: Final = 50_000
+"""Equal bits after which the opposite one is stuffed."""
+_PIECE: Final = 50_000  # frames whose stuff bits are counted at once
 _CLASSICAL_BYTES: Final = 8
 _LONG_BYTES: Final = (16, 20, 24, 32, 48, 64)
-"""Length codes 10 to 15, as python-can gives them even of classical frames; they have 8 bytes in those."""
+"""Bytes of the DLC values 10 to 15, as python-can gives `dlc`, even for classical frames, which have 8 bytes."""
 _DAY_S: Final = 86_400.0
 _LONGEST_S: Final = _DAY_S
-"""Longest time from a frame to the next that is no damage [s]."""
+"""Longest time from a frame to the next in an undamaged log [s]."""
 _END_S: Final = float(1 << 33)
-"""Stamps from here on, in the year 2242, are no times [s]."""
+"""Stamps from here on, in the year 2242, are damage [s]."""
 _MOST_CONTAINER_BYTES: Final = 16_000_000
-"""Most data of a container of BLF; Vector's and python-can's have 131,072 bytes."""
+"""Most data of a BLF container; Vector's and python-can's have 131,072 bytes."""
 _BLF_OBJECT: Final = Struct("<4s4xII")
-"""Head of an object: signature, size and kind, as python-can has it."""
+"""Header of an object as python-can reads it: signature, size and kind."""
 _BLF_METHOD: Final = Struct("<H14x")
 _BLF_CONTAINER, _BLF_DEFLATED = 10, 2
 
@@ -56,24 +56,24 @@ class CanFrames(NamedTuple):
     """Frames of one channel, n of them in the order of the log."""
 
     start_s: float
-    """Stamp of the first, in seconds since 1970 where the log says it."""
+    """Stamp of the first frame, in seconds since 1970 where the log says it."""
     times_us: Floats
-    """From the first one [us]."""
+    """Stamps from the first one on [us]."""
     identifiers: npt.NDArray[np.int64]
     extended: npt.NDArray[np.bool_]
     sizes: npt.NDArray[np.int64]
-    """Data by the length code, whose values of 9 to 15 are 8 bytes in a classical frame [bytes]."""
+    """Data bytes by the DLC; 8 for a DLC of 9 to 15 in a classical frame [bytes]."""
     bits: npt.NDArray[np.int64]
-    """On the wire, interframe space included; 0 of a CAN FD frame [bits]."""
+    """Bits on the wire, interframe space included; 0 for a CAN FD frame [bits]."""
     is_fd: npt.NDArray[np.bool_]
     """Whether it is a CAN FD frame."""
     switched: npt.NDArray[np.bool_]
-    """Whether its data are at the data bit rate."""
+    """Whether its data are at the data bit rate (BRS)."""
     remote: int
     errors: int
-    """Frames that ask for data, and error frames; the latter are not among the frames."""
+    """Number of remote frames, which are among the n, and of error frames, which are not."""
     broken: str
-    """Why the log ends where it does; empty of a whole one."""
+    """Why the log ends early; empty for a whole one."""
 
 
 def read_can(path: Path, *, progress: Progress) -> CanFrames:
@@ -93,7 +93,7 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
         installed.
     """
     if path.is_fifo():
-        # Opening it may wait for ever, and it is opened twice.
+        # A pipe may block for ever, and the file is opened twice.
         raise BusplanError(f"{path}: is a named pipe; give a regular file")
     try:
         with path.open("rb") as file:
@@ -107,7 +107,7 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
     require_extra("can", extra="import", option=str(path), module="can")
     import can  # noqa: PLC0415 - an extra
 
-    # The frames that are missing tell what it warns of.
+    # Hide its warnings of frames that it skips: they are missing in the figures.
     logging.getLogger("can").addHandler(logging.NullHandler())
     log = _Log()
     reader: Any = None
@@ -126,11 +126,11 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
 
 
 class _DamageError(Exception):
-    """A log has what no bus can send; the text says what."""
+    """A log has something that no bus sends; the text says what."""
 
 
 def _bounded_blf() -> Any:
-    """The reader of BLF of python-can, which inflates a container no further than a bound."""
+    """The BLF reader of python-can, with a bound on the inflated size of a container."""
     from can.io import blf  # noqa: PLC0415 - as above
 
     class Reader(blf.BLFReader):  # type: ignore[misc,unused-ignore]
@@ -138,7 +138,7 @@ def _bounded_blf() -> Any:
             while head := self.file.read(_BLF_OBJECT.size):
                 signature, size, kind = _BLF_OBJECT.unpack(head)
                 if signature != b"LOBJ" or size < _BLF_OBJECT.size:
-                    raise _DamageError("what should be an object of the log is none")
+                    raise _DamageError("damaged data where an object of the log should begin")
                 content = self.file.read(size - _BLF_OBJECT.size)
                 self.file.read(size % 4)
                 if kind == _BLF_CONTAINER:
@@ -148,14 +148,14 @@ def _bounded_blf() -> Any:
 
 
 def _inflated(content: bytes, *, held: int) -> bytes:
-    """Data of a container, bounded together with what is held of the container before."""
+    """Data of a container; with the `held` bytes of the container before they must not exceed the bound."""
     (method,), data = _BLF_METHOD.unpack_from(content), content[_BLF_METHOD.size :]
     if method == 0:
         return data
     if method != _BLF_DEFLATED:
         raise _DamageError(f"a container that is compressed by method {method}")
     most = max(_MOST_CONTAINER_BYTES - held, 0)
-    # A byte more than there is room for tells that there is more.
+    # One byte more than allowed shows that there are more.
     data = zlib.decompressobj().decompress(data, most + 1)
     if len(data) > most:
         raise _DamageError(f"a container of over {_MOST_CONTAINER_BYTES:,} bytes")
@@ -176,7 +176,7 @@ class _Log:
         number, last_s = 0, None
         for message in messages:
             number += 1
-            if not number % _TURN:
+            if not number % _REPORT_EVERY:
                 with suppress(OSError, ValueError):
                     report()
             if message.is_error_frame:
@@ -186,7 +186,7 @@ class _Log:
             last_s = message.timestamp
             self._channels[message.channel] += 1
             is_fd = message.is_fd
-            # CAN FD has no remote frames: what a log marks so has data that it lost.
+            # CAN FD has no remote frames: one that a log marks so is a data frame whose data the log lost.
             is_remote = message.is_remote_frame and not is_fd
             is_switched = is_fd and message.bitrate_switch
             self._rows += _ROW.pack(
@@ -229,9 +229,9 @@ class _Log:
 
 
 def _require_frame(message: Any, before_s: float | None) -> None:
-    """Refuse what no frame can be, before any of it is taken."""
+    """Raise for a message that cannot be a frame, before any of it is stored."""
     stamp_s, identifier = message.timestamp, message.arbitration_id
-    if not 0 <= stamp_s < _END_S:  # which is so of no number, too
+    if not 0 <= stamp_s < _END_S:  # refuses NaN, too
         raise _DamageError(f"a stamp of {stamp_s:g} s")
     if before_s is not None and stamp_s - before_s > _LONGEST_S:
         raise _DamageError(f"a stamp {(stamp_s - before_s) / _DAY_S:,.1f} days after the one before")
@@ -254,10 +254,10 @@ def written_bits(
     Parameters
     ----------
     identifiers, extended, remote, sizes
-        Of n frames: identifier, whether it has 29 bits, whether it asks for data, and the length code, 0..15; codes
-        above 8 are 8 bytes.
+        Of n frames: identifier, whether it has 29 bits, whether it is a remote frame, and the DLC, 0..15; above 8 it
+        means 8 bytes.
     data
-        Up to 8 bytes, the first highest.
+        Up to 8 bytes of each, the first byte in the highest bits.
 
     References
     ----------
@@ -290,7 +290,7 @@ def _columns(
     is_remote: bool,
     size: int,
 ) -> list[npt.NDArray[np.uint8]]:
-    """Bits of frames of a sort from their start to the CRC, of all frames a bit at a time."""
+    """Bits of frames of one kind from the start of frame to the data, an array for each bit over all frames."""
 
     def constant(*bits: int) -> list[npt.NDArray[np.uint8]]:
         return [np.full(len(identifiers), bit, dtype=np.uint8) for bit in bits]
@@ -301,23 +301,23 @@ def _columns(
 
     data_bits = 0 if is_remote else 8 * min(size, _CLASSICAL_BYTES)
     return [
-        *constant(0),
+        *constant(0),  # start of frame
         *field(identifiers, 11, above=18 if is_extended else 0),
-        *(constant(1, 1) + field(identifiers, 18) if is_extended else ()),
-        *constant(is_remote, 0, 0, *(size >> place & 1 for place in (3, 2, 1, 0))),
+        *(constant(1, 1) + field(identifiers, 18) if is_extended else ()),  # SRR, IDE
+        *constant(is_remote, 0, 0, *(size >> bit & 1 for bit in (3, 2, 1, 0))),  # RTR, r1 or IDE, r0, DLC
         *field(data, data_bits, above=64 - data_bits),
     ]
 
 
 def _stuffed(columns: list[npt.NDArray[np.uint8]]) -> npt.NDArray[np.int64]:
-    """Bits of frames with their CRC, stuff bits and all that follows."""
+    """Number of bits of frames with CRC, stuff bits and all that follows."""
     register = np.zeros(len(columns[0]), dtype=np.int32)
     for bit in columns:
         register = (register << 1 & 0x7FFF) ^ (register >> 14 ^ bit) * _CRC_15
-    check = [(register >> place & 1).astype(np.uint8) for place in range(_CRC_BITS - 1, -1, -1)]
+    crc = [(register >> bit & 1).astype(np.uint8) for bit in range(_CRC_BITS - 1, -1, -1)]
     last, run = np.full(len(register), 2, dtype=np.uint8), np.zeros(len(register), dtype=np.uint8)
     stuffed = np.zeros(len(register), dtype=np.int64)
-    for bit in (*columns, *check):
+    for bit in (*columns, *crc):
         run = np.where(bit == last, run + np.uint8(1), np.uint8(1))
         is_full = run == _RUN
         stuffed += is_full

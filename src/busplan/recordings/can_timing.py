@@ -1,4 +1,4 @@
-"""Timing of a CAN log: its clock, the frames of each identifier, event models, and the least bit rate of the bus."""
+"""Timing of a CAN log: its clock, the frames of each identifier, event models, and the least possible bit rate."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
@@ -9,34 +9,34 @@ import numpy.typing as npt
 
 from busplan.english import plural
 from busplan.recordings.can import CanFrames
-from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, Quantile, ahead, grid
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, Quantile, ahead, periodic_events
 
 LISTED: Final = 6
 """Most identifiers that a sentence lists."""
-CAN_BIT_RATE: Final = 1000.0
-"""No classical bus is faster [kbit/s]."""
+MOST_BIT_RATE: Final = 1000.0
+"""Highest bit rate of classical CAN [kbit/s]."""
 _WINDOWS: Final = (10, 20, 30)
-"""Frames over which stamps show a bit rate: of two the stamps may be wrong."""
+"""Numbers of frames over which stamps show a bit rate: over only two, errors of stamps dominate."""
 _LATE_SHARE: Final = 0.05
-"""Share by which frames are closer than on any bus where a driver took several at once."""
+"""Relative excess over the highest bit rate at which a driver must have read several frames at once."""
 _LATEST_US: Final = 1000.0
-"""Latest stamp of a driver that takes several frames at once: later ones are stamps of no bus [us]."""
+"""Largest delay of a stamp by a driver that reads several frames at once; with more, stamps are not of a bus [us]."""
 _LATE_US: Final = 100.0
-"""Latest stamp of a driver that takes each frame by itself [us]."""
+"""Largest delay of a stamp by a driver that reads each frame by itself [us]."""
 _LEAST_US: Final = 1e-3
 _FEW: Final = 3
 _STEP_BACK_US: Final = -1000.0
-"""Neighbours are further out of order only where a clock was set [us]."""
+"""A stamp further before its predecessor means that the clock was set back [us]."""
 _PERIODIC: Final = 0.15
 """Largest standard deviation of a periodic message, as a share of its period."""
 _MISSING: Final = 0.1
-"""Most periods of a periodic message without a frame, as a share of its frames."""
+"""Most periods without a frame of a periodic message, as a share of its frames."""
 _ROUNDING: Final = 1e-9
-"""Share of a period that the rounding of floats may add to several."""
+"""Share of a period by which float rounding may lengthen a sum of periods."""
 
 
 class SentFrames(NamedTuple):
-    """Frames of an identifier."""
+    """All frames of an identifier."""
 
     identifier: int
     extended: bool
@@ -44,25 +44,25 @@ class SentFrames(NamedTuple):
     times_us: Floats
     most_bytes: int
     is_fd: bool
-    """Whether any of them is of CAN FD."""
+    """Whether any of them is a CAN FD frame."""
     switches: bool
-    """Whether all frames of CAN FD have their data at the data bit rate."""
-    grid: PeriodicEvents | None
-    """Its periods; None of a message that is not periodic."""
+    """Whether all of its CAN FD frames have their data at the data bit rate (BRS)."""
+    periods: PeriodicEvents | None
+    """Its periods; None for a message that is not periodic."""
 
     @property
     def mean(self) -> Quantile:
-        """Mean distance of its frames, two or more, lost frames of a periodic message counted [us]."""
+        """Mean distance of its frames, two or more; of a periodic message its period, lost frames counted [us]."""
         span_us = float(self.times_us[-1] - self.times_us[0])
-        if self.grid is None:
+        if self.periods is None:
             return Quantile(span_us / (len(self.times_us) - 1), None)
-        return mean_period(self.times_us, self.grid)
+        return mean_period(self.times_us, self.periods)
 
 
 def mean_period(times_us: Floats, periods: PeriodicEvents) -> Quantile:
-    """The period of events over all of a recording, with its standard uncertainty [us].
+    """Mean period from the first event to the last, with its standard uncertainty [us].
 
-    The first event and the last lie no further beside their places than all do.
+    The lateness of the first and the last differs by no more than the range over all events.
     """
     number = int(periods.places[-1])
     return Quantile(float(times_us[-1] - times_us[0]) / number, float(np.ptp(periods.late_us)) / number)
@@ -76,7 +76,7 @@ class EventModel(NamedTuple):
 
 
 def event_model(times_us: Floats, period_us: float, *, stamp_error_us: float, tolerance: float) -> EventModel:
-    """The least burst or jitter with which frames are those of a mean period.
+    """The event model of a period with the least burst or jitter that allows the recorded frames.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def event_model(times_us: Floats, period_us: float, *, stamp_error_us: float, to
     stamp_error_us
         Largest error of a stamp [us].
     tolerance
-        Share by which clocks may make the period shorter.
+        Largest relative error of the clocks, which may shorten the period.
 
     Examples
     --------
@@ -110,7 +110,7 @@ class ClockStretch(NamedTuple):
     """The longest part of a log in which its clock was not set back."""
 
     taken: npt.NDArray[np.int64]
-    """Places of its frames in the log, by their stamps."""
+    """Indexes of its frames in the log, in the order of their stamps."""
     times_us: Floats
     """Their stamps, ascending [us]."""
     steps_back: int
@@ -118,7 +118,7 @@ class ClockStretch(NamedTuple):
 
 
 def longest_stretch(frames: CanFrames) -> ClockStretch:
-    """The longest part in which the clock was not set back; queues may put neighbours out of order."""
+    """The longest part in which the clock was not set back; small steps back are frames from different queues."""
     steps_back = np.flatnonzero(np.diff(frames.times_us) < _STEP_BACK_US) + 1
     ends = np.concatenate(([0], steps_back, [len(frames.times_us)]))
     longest = int(np.argmax(np.diff(ends)))
@@ -127,15 +127,15 @@ def longest_stretch(frames: CanFrames) -> ClockStretch:
     return ClockStretch(taken, frames.times_us[taken], len(steps_back))
 
 
-def sent_messages(frames: CanFrames, stretch: ClockStretch) -> Mapping[tuple[int, bool], SentFrames]:
-    """Frames of each identifier, by it and whether it has 29 bits, ascending."""
+def frames_by_identifier(frames: CanFrames, stretch: ClockStretch) -> Mapping[tuple[int, bool], SentFrames]:
+    """Frames of each identifier, by identifier and whether it has 29 bits, ascending."""
     key = frames.identifiers[stretch.taken] * 2 + frames.extended[stretch.taken]
     order = np.argsort(key, kind="stable")
     messages = {}
     for places in np.split(order, np.flatnonzero(np.diff(key[order])) + 1):
         identifier, extended = divmod(int(key[places[0]]), 2)
         times_us, taken = stretch.times_us[places], stretch.taken[places]
-        periods = grid(times_us)
+        periods = periodic_events(times_us)
         if periods is not None and not _is_periodic(periods):
             periods = None
         messages[identifier, bool(extended)] = SentFrames(
@@ -156,9 +156,9 @@ def _is_periodic(periods: PeriodicEvents) -> bool:
 
 
 def step_us(stretch: ClockStretch) -> float:
-    """Step of the stamps: the time that all distances are multiples of [us].
+    """Step of the stamps, which logs write in microseconds: the greatest common divisor of their distances [us].
 
-    Few distances, none of them 0, are those of frames that come to the microsecond: it is then the step of logs, 1 us.
+    One or two different distances, none of them 0, show no step, but exactly periodic frames: the step is then 1 us.
     """
     apart_us = np.unique(np.diff(np.rint(stretch.times_us).astype(np.int64)))
     if len(apart_us) < _FEW and apart_us.all():
@@ -167,20 +167,20 @@ def step_us(stretch: ClockStretch) -> float:
 
 
 class LeastBitRate(NamedTuple):
-    """A bit rate below which a log is not possible [kbit/s]."""
+    """Lower bounds on the bit rate of the bus [kbit/s]."""
 
     likely: float
-    """With stamps as late as those of most drivers."""
+    """If stamps are as late as with most drivers."""
     surely: float
-    """With stamps up to a millisecond late."""
+    """If stamps may be a millisecond late."""
 
 
 def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
-    """The bit rate that a bus has at least, for frames do not overlap; 0 of too few frames.
+    """The least possible bit rate of the bus, since frames do not overlap; 0 for too few frames.
 
-    Frames are stamped at their ends, or by some controllers at their starts: the smaller sum of bits lies between both
-    stamps in either case. A stamp may be wrong by its step and by the delay of a driver: where frames come closer than
-    on any bus, a driver took several at once, the first of them late by as much as they take.
+    Frames are stamped at their ends or, by some controllers, at their starts: in either case at least the smaller sum
+    of bits lies between two stamps. A stamp may be wrong by its step and by the delay of a driver: where frames come
+    closer than on any bus, a driver read several at once, and the first stamp is late by as much as they take.
     """
     bits, times_us = frames.bits[stretch.taken].astype(np.float64), stretch.times_us
     sent, error_us = np.concatenate(([0.0], np.cumsum(bits))), step_us(stretch)
@@ -193,19 +193,19 @@ def least_bit_rate(frames: CanFrames, stretch: ClockStretch) -> LeastBitRate:
     def most(windows: Sequence[int], late_us: float) -> float:
         return max((float(rates(count, late_us).max()) for count in windows if len(bits) > count), default=0.0)
 
-    closer = rates(1, 0.0) > CAN_BIT_RATE * (1 + _LATE_SHARE) if len(bits) > 1 else np.zeros(0, dtype=np.bool_)
+    closer = rates(1, 0.0) > MOST_BIT_RATE * (1 + _LATE_SHARE) if len(bits) > 1 else np.zeros(0, dtype=np.bool_)
     if np.count_nonzero(closer) < LEAST_EVENTS:
         least = most((4, *_WINDOWS), _LATE_US)
     else:
         starts, ends = (np.flatnonzero(np.diff(np.concatenate(([0], closer, [0]))) == step) for step in (1, -1))
-        at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / CAN_BIT_RATE
+        at_once_us = float((sent[ends + 1] - sent[starts]).max()) * 1000 / MOST_BIT_RATE
         least = most(_WINDOWS, min(at_once_us, _LATEST_US))
     return LeastBitRate(least, most((4, *_WINDOWS), _LATEST_US))
 
 
 def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:
-    """Why stamps are not those of a bus, by its least bit rate; empty where they may be."""
-    if bit_rate_kbit_s <= CAN_BIT_RATE:
+    """Why a least bit rate shows that stamps are not those of a bus; empty where they may be."""
+    if bit_rate_kbit_s <= MOST_BIT_RATE:
         return ""
     return (
         f"its frames need {bit_rate_kbit_s:,.0f} kbit/s, more than a CAN bus has: the stamps are not those of the bus"
@@ -213,7 +213,7 @@ def stamps_of_no_bus(bit_rate_kbit_s: float) -> str:
 
 
 def faults(frames: CanFrames, stretch: ClockStretch) -> Iterator[str]:
-    """Sentences on a log that is damaged, and on its clock."""
+    """Sentences on damage of a log, and on its clock."""
     if frames.broken:
         yield f"The log is cut or damaged after frame {len(frames.times_us):,}, read up to there: {frames.broken}."
     if stretch.steps_back:

@@ -5,11 +5,11 @@ master. So the few fields of a record are read here.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from struct import Struct
-from typing import Any, BinaryIO, Final, NamedTuple
+from typing import BinaryIO, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,13 +21,13 @@ from busplan.progress import Progress
 Numbers = npt.NDArray[np.int64]
 _PIECE_BYTES: Final = 4_000_000
 _MOST_RECORD_BYTES: Final = 1_000_000
-"""Longest record that is no damage; a packet has 262,144 bytes at most."""
+"""Longest undamaged record; a packet has 262,144 bytes at most."""
 _ETHERNET: Final = 1
 _NS: Final = 1_000_000_000
 _END_NS: Final = (1 << 33) * _NS
-"""Stamps from here on, in the year 2242, are no times [ns]."""
+"""Stamps from here on, in the year 2242, are damage [ns]."""
 _LONGEST_NS: Final = 86_400 * _NS
-"""Longest time from one packet to the next that is no damage: a day [ns]."""
+"""Longest time from one packet to the next in an undamaged file: a day [ns]."""
 _PCAP: Final = {
     b"\xd4\xc3\xb2\xa1": ("<", 1000),
     b"\xa1\xb2\xc3\xd4": (">", 1000),
@@ -43,7 +43,7 @@ _RESOLUTION, _OFFSET = 9, 14
 _DROPPED: Final = {_PACKET: (4,), _STATISTICS: (5, 7)}
 """Options of a block that count dropped packets: before a packet; by the interface, and by the operating system."""
 _NOT_COUNTED: Final = 0xFFFF
-"""Dropped packets of an old packet block that does not know them."""
+"""Value of an old packet block that did not count dropped packets."""
 
 
 class CapturedPackets(NamedTuple):
@@ -51,24 +51,24 @@ class CapturedPackets(NamedTuple):
 
     content: npt.NDArray[np.uint8]
     starts: Numbers
-    """Where each begins in `content`."""
+    """Offset of each in `content`."""
     sizes: Numbers
-    """Recorded bytes of each [bytes]."""
+    """Recorded size of each [bytes]."""
     times_ns: Numbers
     """Stamps since 1970 [ns]."""
 
 
 @dataclass
 class CaptureNotes:
-    """What a file has beside its packets."""
+    """What a file has in addition to its packets."""
 
     packets: int = 0
     left_out: int = 0
-    """Packets of interfaces that are no Ethernet, without a stamp, or with a stamp that is no time."""
+    """Packets of interfaces other than Ethernet, without a stamp, or with a damaged one."""
     dropped: int = 0
     """Packets that the recorder says it dropped; a pcap file does not count them."""
     broken_at: int | None = None
-    """Byte of the file from which on nothing can be read; None of a whole file."""
+    """Offset of the damage in the file, from which nothing is read; None for a whole file."""
 
 
 def is_capture(head: bytes) -> bool:
@@ -103,6 +103,7 @@ def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[
 
 
 def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress) -> Iterator[CapturedPackets]:
+    """Packets of each piece of the file, up to its end or to the first damage."""
     total = path.stat().st_size
     head = file.read(24)
     walker: _Walker
@@ -118,13 +119,13 @@ def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress)
         rows, used = walker.walk(content)
         if rows:
             starts, sizes, times = np.array(rows, dtype=np.int64).T
-            late = np.flatnonzero(np.diff(times, prepend=times[0] if before is None else before) > _LONGEST_NS)
-            whole = slice(late[0] if len(late) else None)
-            notes.packets += len(starts[whole])
-            if len(starts[whole]):
-                yield CapturedPackets(np.frombuffer(content, dtype=np.uint8), starts[whole], sizes[whole], times[whole])
-            if len(late):
-                notes.broken_at = at + int(starts[late[0]])
+            leaps = np.flatnonzero(np.diff(times, prepend=times[0] if before is None else before) > _LONGEST_NS)
+            good = slice(leaps[0] if len(leaps) else None)
+            notes.packets += len(starts[good])
+            if len(starts[good]):
+                yield CapturedPackets(np.frombuffer(content, dtype=np.uint8), starts[good], sizes[good], times[good])
+            if len(leaps):
+                notes.broken_at = at + int(starts[leaps[0]])
                 return
             before = int(times[-1])
         at += used
@@ -146,7 +147,7 @@ class _Walker(ABC):
 
     @abstractmethod
     def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
-        """Start, size and stamp of each whole packet, and the bytes used."""
+        """Offset, size and stamp of each whole packet, and the number of bytes used."""
 
 
 class _Pcap(_Walker):
@@ -176,7 +177,7 @@ class _Pcap(_Walker):
 class _Interface(NamedTuple):
     link: int
     ticks: int
-    """Of its stamps in a second."""
+    """Ticks of its stamps in a second."""
     offset_ns: int
 
 
@@ -184,7 +185,7 @@ class _PcapNg(_Walker):
     _order: str
     _head: Struct
     _fields: Struct
-    """Byte order of a section, and kind and size of a block, and the fields of a packet, in it."""
+    """Byte order of the section; in it, the head of a block (kind, size) and the fields of a packet."""
 
     def __init__(self, notes: CaptureNotes) -> None:
         self._notes = notes
@@ -230,7 +231,7 @@ class _PcapNg(_Walker):
         elif kind == _INTERFACE and size >= 20:  # noqa: PLR2004 - its fields
             self._interfaces.append(self._interface(content[at + 8 : end]))
         elif kind == _STATISTICS:
-            # Each counts from the start of its interface, and what packets count is among it.
+            # A block of statistics counts all drops of its interface so far, also those that packets have counted.
             notes.dropped = max(notes.dropped, self._dropped(content[at + 20 : end], _STATISTICS))
 
     def _packet(self, rows: list[tuple[int, int, int]], number: int, ticks: int, at: int, size: int) -> None:
@@ -268,27 +269,3 @@ class _PcapNg(_Walker):
             elif code == _OFFSET and len(value) == 8:  # noqa: PLR2004 - a number of 64 bits
                 offset_ns = Struct(f"{self._order}q").unpack(value)[0] * _NS
         return _Interface(link, ticks, offset_ns)
-
-
-def interned(rows: npt.NDArray[Any], numbers: dict[bytes, int], on_new: Callable[[bytes], None]) -> Numbers:
-    """Number of each row of bytes: equal rows have the same; new rows are numbered on.
-
-    Parameters
-    ----------
-    rows
-        Bytes of each thing, of shape (n, width).
-    numbers
-        Number by the bytes of a row, of all pieces; new rows are added.
-    on_new
-        Called with the bytes of each new row, in the order of their numbers.
-    """
-    flat = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.shape[1]))).ravel()
-    unique, inverse = np.unique(flat, return_inverse=True)
-    of_unique = np.empty(len(unique), dtype=np.int64)
-    for place, row in enumerate(unique):
-        content = row.tobytes().rstrip(b"\0")
-        if content not in numbers:
-            numbers[content] = len(numbers)
-            on_new(content)
-        of_unique[place] = numbers[content]
-    return of_unique[inverse.ravel()]

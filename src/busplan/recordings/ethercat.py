@@ -1,8 +1,9 @@
 """EtherCAT frames of a capture: their stamps, datagrams and working counters, as arrays."""
 
+from collections.abc import Callable
 from pathlib import Path
 from struct import Struct
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -10,12 +11,12 @@ import numpy.typing as npt
 from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.progress import Progress
-from busplan.recordings.capture import CapturedPackets, CaptureNotes, Numbers, interned, packets
+from busplan.recordings.capture import CapturedPackets, CaptureNotes, Numbers, packets
 
 _TYPE: Final = 0x88A4
 _VLAN: Final = (0x8100, 0x88A8)
 _DATAGRAMS: Final = 1
-"""Type of an EtherCAT header before datagrams."""
+"""Type in the EtherCAT header of a frame of datagrams."""
 _DEVICES_BIT: Final = 0x02
 """Bit of the source address that devices set in a frame that returns."""
 LOGICAL: Final = {10: "LRD", 11: "LWR", 12: "LRW"}
@@ -25,38 +26,38 @@ COMMANDS: Final = {
     13: "ARMW",
     14: "FRMW",
 }
-_FIELDS: Final = 7
-"""Bytes that say what a datagram is: command + 1, logical address, size."""
-_HEADER_BYTES: Final = 12
+_FIELD_BYTES: Final = 7
+"""Bytes that describe a datagram: command + 1 (0 where there is no datagram), logical address, size."""
+_OVERHEAD_BYTES: Final = 12  # header, 10, and working counter, 2
 _APRD, _FPRD, _BRD, _BWR = 1, 4, 7, 8
 _PORT_TIMES: Final = range(0x0900, 0x0910)
-"""Registers of the receive times of ports 0 to 3, of 4 bytes each (ETG.1000.4, distributed clocks)."""
+"""Registers of the receive times of ports 0 to 3, 4 bytes each (ETG.1000.4, distributed clocks)."""
 _PORTS: Final = 4
 _HEAD: Final = Struct("<BBHHH")
 """Command, index, address of the device, register, and size with its flags."""
 
 
 class Datagram(NamedTuple):
-    """Datagram of a frame, without its index and working counter."""
+    """A datagram of a frame, without its index and working counter."""
 
     command: int
     address: int
-    """Logical address; 0 of other commands."""
+    """Logical address; 0 for other commands."""
     data_bytes: int
 
     @property
     def is_process_data(self) -> bool:
-        """Whether it is addressed to the process image."""
+        """Whether it has a logical address: that of the process image."""
         return self.command in LOGICAL
 
 
 class Latch(NamedTuple):
-    """A broadcast write that every device stamps at its ports, and the times that were read after it."""
+    """A broadcast write at which every device latches the receive times of its ports, and the times read after it."""
 
     devices: int
-    """Devices that the write passed: each adds 1 to its address."""
+    """Number of devices that the write passed: each adds 1 to its address."""
     ports_ns: dict[tuple[int, int], dict[int, int]]
-    """Time of each port by its number, by command and address of the read; modulo 2^32 [ns]."""
+    """By command and address of the read: receive time of each port, by its number; modulo 2^32 [ns]."""
 
 
 class EthercatFrames(NamedTuple):
@@ -64,23 +65,23 @@ class EthercatFrames(NamedTuple):
 
     times_ns: Numbers
     returned: npt.NDArray[np.bool_]
-    """Whether a device has had it."""
+    """Whether the frame had passed a device, which sets a bit of its source address."""
     layout: Numbers
-    """Number of its datagrams in `layouts`."""
+    """Index of its datagrams in `layouts`."""
     key: Numbers
-    """Number of its datagrams and their indexes: a frame returns with the key that it was sent with."""
+    """Key of its datagrams, their indexes included: a frame returns with the key that it was sent with."""
     counters: Numbers
-    """Number of its working counters: frames with the same counters have the same number."""
+    """Key of its working counters: frames with the same counters have the same key."""
     layouts: tuple[tuple[Datagram, ...], ...]
     notes: CaptureNotes
     others: int
-    """Packets that are no EtherCAT frame of datagrams."""
+    """Number of packets that are no EtherCAT frame of datagrams."""
     cut: int
-    """EtherCAT frames that are not whole."""
+    """Number of EtherCAT frames that the recorder cut."""
     latches: tuple[Latch, ...]
-    """Those whose port times were read."""
+    """Broadcast writes whose port receive times were read."""
     unlatched: int
-    """Reads of port times without a broadcast write before them."""
+    """Number of reads of port receive times without a broadcast write before."""
 
 
 def read_ethercat(path: Path, *, progress: Progress) -> EthercatFrames:
@@ -96,7 +97,7 @@ def read_ethercat(path: Path, *, progress: Progress) -> EthercatFrames:
     Raises
     ------
     BusplanError
-        The file cannot be read, has no EtherCAT frame, has frames of several masters, or does not say which are sent.
+        The file cannot be read, has no EtherCAT frame, has frames of several masters, or does not tell sent frames.
     """
     notes, reader = CaptureNotes(), _Reader()
     for piece in packets(path, notes, progress=progress):
@@ -120,7 +121,7 @@ class _Reader:
     def read(self, piece: CapturedPackets) -> None:
         """Take a piece in."""
         content, ends = piece.content, piece.starts + piece.sizes
-        # Zeros behind the end, so that a header may be looked at before it is known to be whole.
+        # Zeros after the end, so that a header can be read before it is known to be whole.
         content = np.concatenate((content, np.zeros(64, dtype=np.uint8)))
         at = piece.starts + 12
         kind = _word(content, at)
@@ -134,17 +135,17 @@ class _Reader:
         if not fits.any():
             return
         starts, at, ends, times = piece.starts[fits], at[fits] + 4, ends[fits], piece.times_ns[fits]
-        whole, key_rows, counter_rows, clocks = _datagrams(content, at, ends)
+        whole, key_rows, counter_rows, on_port_times = _datagrams(content, at, ends)
         self._cut += int(np.count_nonzero(~whole))
-        for frame, header in sorted(clocks):
+        for frame, header in sorted(on_port_times):
             if whole[frame] and content[starts[frame] + 6] & _DEVICES_BIT:
                 self._port_times(content[header:])
         starts, times, key_rows, counter_rows = starts[whole], times[whole], key_rows[whole], counter_rows[whole]
         if not len(starts):
             return
         returned = content[starts + 6] & _DEVICES_BIT != 0
-        keys = interned(key_rows, self._keys, self._new_key)
-        counters = interned(counter_rows, self._counters, lambda _: None)
+        keys = _row_numbers(key_rows, self._keys, self._new_key)
+        counters = _row_numbers(counter_rows, self._counters, lambda _: None)
         self._count_masters(content, starts[~returned])
         self._parts.append((times, returned, keys.astype(np.int32), counters.astype(np.int32)))
 
@@ -156,7 +157,7 @@ class _Reader:
             self._masters[int(value)] = self._masters.get(int(value), 0) + int(count)
 
     def _port_times(self, datagram: npt.NDArray[np.uint8]) -> None:
-        """Take in a returned datagram on the receive times of ports."""
+        """Take in a returned datagram that reads or latches port receive times."""
         command, _, address, register, size = _HEAD.unpack(datagram[: _HEAD.size].tobytes())
         size &= 0x7FF
         if command == _BWR:
@@ -176,8 +177,8 @@ class _Reader:
                 times_ns[port] = int.from_bytes(content[at : at + 4], "little")
 
     def _new_key(self, key: bytes) -> None:
-        """Number the datagrams without their indexes."""
-        size = _FIELDS + 1
+        """Record the layout of a new key: its datagrams without their indexes."""
+        size = _FIELD_BYTES + 1
         key += bytes(-len(key) % size)
         layout = b"".join(key[at + 1 : at + size] for at in range(0, len(key), size))
         self._layout_of_key.append(self._layouts.setdefault(layout, len(self._layouts)))
@@ -229,14 +230,14 @@ def _word(content: npt.NDArray[np.uint8], at: Numbers) -> Numbers:
 def _datagrams(
     content: npt.NDArray[np.uint8], at: Numbers, ends: Numbers
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.uint8], npt.NDArray[np.uint8], list[tuple[int, int]]]:
-    """Whether each frame is whole; index, command, address and size of its datagrams, and their working counters.
+    """Whether each frame is whole; index, command, address and size of its datagrams; and their working counters.
 
-    The last are frame and place of each datagram on the receive times of ports.
+    The fourth result: frame and offset of each datagram on port receive times.
     """
     whole, walking = np.ones(len(at), dtype=np.bool_), np.ones(len(at), dtype=np.bool_)
     last = len(content) - 16
     keys, counters = [], []
-    clocks: list[tuple[int, int]] = []
+    on_port_times: list[tuple[int, int]] = []
     while walking.any():
         header = np.minimum(at, last)
         command = content[header]
@@ -245,10 +246,10 @@ def _datagrams(
         fits = walking & (counter_at + 2 <= ends)
         whole &= fits | ~walking
         is_logical = fits & np.isin(command, tuple(LOGICAL))
-        is_clock = fits & ~is_logical & (content[header + 5] == _PORT_TIMES.start >> 8)
-        is_clock &= content[header + 4] < len(_PORT_TIMES)
-        clocks += [(int(frame), int(header[frame])) for frame in np.flatnonzero(is_clock)]
-        key = np.zeros((len(at), _FIELDS + 1), dtype=np.uint8)
+        is_port_time = fits & ~is_logical & (content[header + 5] == _PORT_TIMES.start >> 8)
+        is_port_time &= content[header + 4] < len(_PORT_TIMES)
+        on_port_times += [(int(frame), int(header[frame])) for frame in np.flatnonzero(is_port_time)]
+        key = np.zeros((len(at), _FIELD_BYTES + 1), dtype=np.uint8)
         key[:, 0] = content[header + 1]
         key[:, 1] = command + 1
         for byte in range(4):
@@ -260,12 +261,36 @@ def _datagrams(
         keys.append(key)
         counters.append(counter)
         walking = fits & (content[header + 7] & 0x80 != 0)
-        at = at + size + _HEADER_BYTES
-    return whole, np.concatenate(keys, axis=1), np.concatenate(counters, axis=1), clocks
+        at = at + size + _OVERHEAD_BYTES
+    return whole, np.concatenate(keys, axis=1), np.concatenate(counters, axis=1), on_port_times
+
+
+def _row_numbers(rows: npt.NDArray[Any], numbers: dict[bytes, int], on_new: Callable[[bytes], None]) -> Numbers:
+    """Number of each row of bytes: equal rows have the same number, and new rows get the next ones.
+
+    Parameters
+    ----------
+    rows
+        Rows of bytes, of shape (n, width).
+    numbers
+        Number by the bytes of a row, over all pieces of a file; new rows are added.
+    on_new
+        Called with the bytes of each new row, in the order of their numbers.
+    """
+    flat = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.shape[1]))).ravel()
+    unique, inverse = np.unique(flat, return_inverse=True)
+    of_unique = np.empty(len(unique), dtype=np.int64)
+    for index, row in enumerate(unique):
+        content = row.tobytes().rstrip(b"\0")
+        if content not in numbers:
+            numbers[content] = len(numbers)
+            on_new(content)
+        of_unique[index] = numbers[content]
+    return of_unique[inverse.ravel()]
 
 
 def _datagrams_of(layout: bytes) -> tuple[Datagram, ...]:
-    parts = (layout[at : at + _FIELDS] for at in range(0, len(layout), _FIELDS))
+    parts = (layout[at : at + _FIELD_BYTES] for at in range(0, len(layout), _FIELD_BYTES))
     return tuple(
         Datagram(part[0] - 1, int.from_bytes(part[1:5], "little"), int.from_bytes(part[5:7], "little"))
         for part in parts

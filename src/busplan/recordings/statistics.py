@@ -1,4 +1,4 @@
-"""Periods, lateness and quantiles of stamps."""
+"""Period, lateness and quantiles of events, from their stamps."""
 
 from math import ceil, hypot, inf, log, sqrt
 from typing import Final, NamedTuple
@@ -8,28 +8,28 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 LEAST_EVENTS: Final = 10
-"""Fewest events that have a period."""
+"""Fewest events for a period."""
 _BLOCK: Final = 500
-"""Events over which a clock runs evenly."""
+"""Events of a block, over which a clock counts as even."""
 _BLOCKS: Final = range(8, 513)
-"""Number of blocks."""
+"""Allowed numbers of blocks."""
 _ALONE: Final = 40
-"""Fewer events are blocks of one."""
+"""With fewer events, each is a block."""
 _FEW: Final = 6.0
-"""The scatter of n events is taken for larger by this over n, as a share: 99.9 % of n - 2 degrees of freedom."""
+"""The scatter of n events is enlarged by this / n, as a share: 99.9 % bound for n - 2 degrees of freedom."""
 _LEAST_ERROR_US: Final = 1e-6
 _DRIFT_SIGMAS: Final = 8.0
-"""Standard errors of the mean square of blocks about a line by which it is over 1 where the clock drifts."""
+"""A clock drifts if the reduced chi-square of the blocks about its line exceeds 1 by so many standard errors."""
 _REACH: Final = 4.0
-"""Standard errors of the period within which the kindest clock is looked for."""
+"""The most favourable clock is searched within so many standard errors of the period."""
 _THIRDS: Final = 25
-"""Steps of that search."""
+"""Steps of that search, each to two thirds of the range."""
 _EARLY_SHARE: Final = 0.999
-"""Share of the events that are no earlier than the earliest: the stamps of the others may be wrong."""
+"""Quantile that counts as the earliest event: the stamps of the few before it may be wrong."""
 _AHEAD: Final = 20
-"""Events behind a block that tell a late event at its end."""
+"""Events after a block that are read, too, so that a late event at its end is seen."""
 _COVERAGE: Final = 2
-"""Standard uncertainties of an expanded one."""
+"""Coverage factor k of an expanded uncertainty."""
 
 
 class Quantile(NamedTuple):
@@ -37,7 +37,7 @@ class Quantile(NamedTuple):
 
     value: float
     uncertainty: float | None
-    """Standard uncertainty; None where too few values lie beyond, as beyond the largest."""
+    """Standard uncertainty; None where too few values lie beyond the quantile, such as the largest."""
 
 
 class PeriodicEvents(NamedTuple):
@@ -47,9 +47,9 @@ class PeriodicEvents(NamedTuple):
     uncertainty_us: float
     """Standard uncertainty of the period, from the scatter of the events."""
     late_us: Floats
-    """Delay of each event after its place in the period, about 0, without the drift of clocks [us]."""
+    """Delay of each event against its period, about 0; drift of the clock is removed [us]."""
     doubt_us: float
-    """Standard uncertainty of the delays by clocks that drift; that of the period is not in it [us]."""
+    """Standard uncertainty of the delays due to drift of the clock; that of the period is not included [us]."""
     places: npt.NDArray[np.int64]
     """Number of the period of each event, from 0."""
 
@@ -60,14 +60,14 @@ class PeriodicEvents(NamedTuple):
 
 
 def quantile(values: Floats, share: float) -> Quantile:
-    """The value that a share of some values does not exceed, with the uncertainty of its rank.
+    """The value that a share of the values does not exceed, with the uncertainty due to its rank.
 
     Parameters
     ----------
     values
         Values, n of them, at least one.
     share
-        The share, 0..1; the quantile is one of the values, rounded up.
+        The share, 0..1; its rank is rounded up, so the quantile is one of the values.
 
     Examples
     --------
@@ -88,8 +88,8 @@ def quantile(values: Floats, share: float) -> Quantile:
 def lateness(events: PeriodicEvents, share: float) -> Quantile:
     """Delay of a quantile of the events after the earliest [us].
 
-    Of the even clocks that the events do not contradict the kindest counts, by which the delay is least: the
-    uncertainty has the others, and that of the rank where enough events lie beyond.
+    The period is uncertain: the most favourable one counts, which has the least delay. The uncertainty covers the other
+    periods, and the rank if enough events lie beyond the quantile.
     """
     at, early = events.places - float(np.mean(events.places)), max(share, _EARLY_SHARE)
 
@@ -107,8 +107,8 @@ def lateness(events: PeriodicEvents, share: float) -> Quantile:
     late = events.late_us - (low + high) / 2 * at
     latest, earliest = quantile(late, share), quantile(-late, early)
     value = latest.value + earliest.value
-    unkind = max(spread_us(sign * _COVERAGE * events.uncertainty_us) for sign in (-1, 1)) - value
-    parts = latest.uncertainty or 0.0, earliest.uncertainty or 0.0, max(unkind, 0.0) / _COVERAGE, events.doubt_us
+    others = max(spread_us(sign * _COVERAGE * events.uncertainty_us) for sign in (-1, 1)) - value
+    parts = latest.uncertainty or 0.0, earliest.uncertainty or 0.0, max(others, 0.0) / _COVERAGE, events.doubt_us
     return Quantile(value, hypot(*parts))
 
 
@@ -122,19 +122,19 @@ def _rank(count: int, share: float) -> int:
     return min(max(ceil(count * share - 1e-9), 1), count)
 
 
-def grid(times_us: Floats, near_us: float | None = None) -> PeriodicEvents | None:
-    """The period of events and the delay of each; None of too few events, or of several at once.
+def periodic_events(times_us: Floats, near_us: float | None = None) -> PeriodicEvents | None:
+    """The period of events and the delay of each; None for too few events, or for several at once.
 
     Parameters
     ----------
     times_us
         Ascending times, n of them [us].
     near_us
-        A time near the period [us]; by default the median distance.
+        Estimate of the period [us]; by default the median distance.
 
     Examples
     --------
-    >>> found = grid(np.array([0.0, 100, 200, 301, 400, 500, 600, 700, 900, 1000, 1100]))
+    >>> found = periodic_events(np.array([0.0, 100, 200, 301, 400, 500, 600, 700, 900, 1000, 1100]))
     >>> round(found.period_us, 1), found.missing
     (100.0, 1)
     """
@@ -150,9 +150,9 @@ def grid(times_us: Floats, near_us: float | None = None) -> PeriodicEvents | Non
 
 
 def ahead(times_us: Floats, period_us: float) -> Floats:
-    """Time by which each event comes sooner than whole periods after any event before it [us].
+    """Time by which each event comes too early: less than k periods after the event k before it [us].
 
-    The largest is the least jitter with which the events have the period.
+    The maximum is the least jitter for which the events fit the period.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def ahead(times_us: Floats, period_us: float) -> Floats:
 
 
 def _period(times_us: Floats, period_us: float) -> float:
-    """The period: medians over ever longer distances, each of which says how many periods the next one is."""
+    """The period, from medians over ever longer distances: each estimate tells how many periods the next one spans."""
     lag = 1
     while period_us > 0:
         lag = min(lag * 8, len(times_us) // 2)
@@ -187,29 +187,29 @@ def _period(times_us: Floats, period_us: float) -> float:
 
 
 def _places(times_us: Floats, period_us: float) -> npt.NDArray[np.int64]:
-    """Period of each event, from 0; blocks follow the drift of a clock."""
+    """Number of the period of each event, from 0, in blocks that follow the drift of the clock."""
     places = np.empty(len(times_us), dtype=np.int64)
     planned_us, number = float(times_us[0]), 0
     for first in range(0, len(times_us), _BLOCK):
-        ahead = times_us[first : first + _BLOCK + _AHEAD]
-        order = np.arange(len(ahead))
-        place = np.rint((ahead - planned_us) / period_us).astype(np.int64)
-        # Of two events with the same place the first is late by more than half a period: each has a place of its own.
+        some_us = times_us[first : first + _BLOCK + _AHEAD]
+        order = np.arange(len(some_us))
+        place = np.rint((some_us - planned_us) / period_us).astype(np.int64)
+        # Two events in one period: the first is late by more than half a period and belongs to the period before.
         place = np.maximum(np.minimum.accumulate((place - order)[::-1])[::-1] + order, order)[:_BLOCK]
         places[first : first + _BLOCK] = number + place
         behind = int(place[-1]) + 1
-        planned_us += float(np.median(ahead[:_BLOCK] - planned_us - place * period_us)) + behind * period_us
+        planned_us += float(np.median(some_us[:_BLOCK] - planned_us - place * period_us)) + behind * period_us
         number += behind
     return places
 
 
 class _Clock(NamedTuple):
-    """The clock of some events beside an even clock."""
+    """The clock of some events against an ideal clock."""
 
     at_us: Floats
-    """Difference at each event [us]."""
+    """Its difference at each event [us]."""
     slope_us: float
-    """Difference of a period [us]."""
+    """Its difference per period [us]."""
     error_us: float
     """Standard uncertainty of the slope [us]."""
     doubt_us: float
@@ -217,9 +217,9 @@ class _Clock(NamedTuple):
 
 
 def _clock(places: Floats, late: Floats) -> _Clock:
-    """A straight line through the means of blocks of events; of some pieces where the clock drifts.
+    """A line through the means of blocks of events, in several pieces where the clock drifts.
 
-    Outliers count as the end of the others. The scatter is that of neighbours, whatever the clock does.
+    Outliers are clipped. The scatter is that of consecutive events, which a drift does not change.
     """
     count = len(late)
     if count >= _ALONE:
@@ -248,24 +248,24 @@ def _clock(places: Floats, late: Floats) -> _Clock:
     length = float(knots[-1] - knots[0])
     slope_us = float(heights[-1] - heights[0]) / length
     error_us = sqrt(float(covariance[0, 0] + covariance[-1, -1] - 2 * covariance[0, -1])) / length
-    # What the pieces leave of the blocks, and the largest of so many normal errors.
+    # Residual of the blocks about the pieces, and the largest of so many normal errors.
     left_us = sqrt(max(misfit - 1.0, 0.0) * float(np.mean(weight**-2)))
     bent_us = sqrt(2 * log(pieces + 1) * float(covariance.diagonal().max())) if pieces > 1 else 0.0
     return _Clock(np.interp(places, knots, heights), slope_us, error_us, hypot(left_us, bent_us))
 
 
 def line(sizes: Floats, values: Floats, doubt: float) -> tuple[float, float] | None:
-    """Slope of the medians of values over their sizes, with its standard uncertainty; None of fewer than two sizes.
+    """Slope of the medians of values over their sizes, with its standard uncertainty; None for fewer than two sizes.
 
-    Sizes with fewer than ten values are left out. Where the medians scatter more about the line than by their errors,
-    the uncertainty is as much larger (Birge).
+    Sizes with fewer than ten values are left out. Where the medians scatter about the line more than their errors
+    explain, the uncertainty is enlarged by the Birge ratio.
 
     Parameters
     ----------
     sizes, values
-        Of n things.
+        Size and value of each of n things.
     doubt
-        Standard uncertainty that all values of a size share, in their unit.
+        Standard uncertainty common to all values of a size, in their unit.
     """
     rows = []
     for size in np.unique(sizes):
@@ -286,11 +286,11 @@ def line(sizes: Floats, values: Floats, doubt: float) -> tuple[float, float] | N
 
 
 def step(times_ns: npt.NDArray[np.int64]) -> float:
-    """Step of the stamps: the largest time that all distances are multiples of [us]."""
+    """Step of the stamps: the greatest common divisor of their distances [us]."""
     return int(np.gcd.reduce(np.abs(np.diff(times_ns)))) / 1000
 
 
 def expanded(*uncertainties: float | None) -> float | None:
-    """Expanded uncertainty, twice the root sum of squares; None where a part is not known."""
+    """Expanded uncertainty, twice the root sum of squares; None if a part is None."""
     total = sqrt(sum(inf if part is None else part**2 for part in uncertainties))
     return None if total == inf else _COVERAGE * total

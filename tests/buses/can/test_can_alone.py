@@ -102,7 +102,7 @@ class Sent(NamedTuple):
     jitter_us: float
 
 
-def sent_messages(own: Any) -> list[Sent]:
+def frames_by_identifier(own: Any) -> list[Sent]:
     frames_us = [each["frame_us"] for each in phases(own).values()]
     return [
         Sent(
@@ -123,7 +123,7 @@ def simulated(own: Any) -> list[float]:
     All messages of higher priorities are queued at once, as late as they may be and then as early, just after the
     longest frame of a lower priority has started.
     """
-    each = sent_messages(own)
+    each = frames_by_identifier(own)
     return [_simulated(message, each, 1000 / own.bus.bit_rate_kbit_s) for message in each]
 
 
@@ -342,7 +342,7 @@ def test_many_messages_are_answered_as_few_are(number: int) -> None:
         for own in range(number)
     ]
     own = network(*messages, bit_rate_kbit_s=1000)
-    each = sent_messages(own)
+    each = frames_by_identifier(own)
     assert sum(message.frame_us / message.period_us for message in each) < 1
     us = responses(own)
     for place in {0, number // 2, number - 1}:

@@ -346,7 +346,7 @@ def test_a_circle_with_very_many_periods_in_its_loop_is_not_simulated(run: Run, 
     options = ("--set", "servo.loop=host", "--set", "bus.pipeline_cycles=20")
     done = run("circle-test", "ethercat-servo-8", *options, cwd=tmp_path)
     assert done.returncode == 2
-    assert 'servo.loop = "host": the bus puts 21000 us into a loop over it' in done.stderr
+    assert 'servo.loop = "host": the bus puts 21000 us into a loop closed over it' in done.stderr
     assert "less bus.pipeline_cycles, now 20, or close the loop on the node" in done.stderr
     checked = run("check", "ethercat-servo-8", *options, cwd=tmp_path)
     assert checked.returncode == 1

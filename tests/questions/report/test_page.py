@@ -18,8 +18,7 @@ from busplan.buses import kind_named, kind_names
 from busplan.forms import render
 from busplan.forms.blocks import Chapter
 from busplan.forms.inks import INKS
-from busplan.profile.changes import NO_CHANGES
-from busplan.questions.base.answer import shell_word
+from busplan.profile.changes import NO_CHANGES, shell_word
 
 NAMES = (
     "</title><script>alert(1)</script> \"><img src=x onerror=alert(1)> ' autofocus onfocus='alert(1)",

@@ -24,14 +24,14 @@ from busplan.recordings.can_timing import (
     SentFrames,
     event_model,
     faults,
+    frames_by_identifier,
     least_bit_rate,
     longest_stretch,
     mean_period,
-    sent_messages,
     stamps_of_no_bus,
     step_us,
 )
-from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, grid, lateness, quantile
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, ahead, expanded, lateness, periodic_events, quantile
 
 _NOT_SHOWN: Final = (
     "Not shown by a log: the bit rate, frames that the recorder did not take, when a frame was queued, commands that "
@@ -162,7 +162,7 @@ class _Log:
         self.edits: dict[str, Any] = {}
         self.stretch = longest_stretch(frames)
         self.taken, self.times_us = self.stretch.taken, self.stretch.times_us
-        self.by_identifier = sent_messages(frames, self.stretch)
+        self.by_identifier = frames_by_identifier(frames, self.stretch)
         self.unplanned = dict(self.by_identifier)
         self.unseen: list[str] = []
         self.messages = {message.name: message for message in network.profile.message}
@@ -288,7 +288,7 @@ class _Log:
         sync, *others = sent_streams
         is_extended = sync.identifier_bits > BASE_BITS
         sent = self.by_identifier.get((sync.first, is_extended))
-        periods = None if sent is None else grid(sent.times_us)
+        periods = None if sent is None else periodic_events(sent.times_us)
         if sent is None or periods is None:
             few = f"SYNC comes {plural(0 if sent is None else len(sent.times_us), 'time')}"
             yield self._missed("cycles without SYNC", None, 0, hidden=few)
@@ -367,7 +367,7 @@ class _Log:
 
     def _sync(self, stream: Stream, sent: SentFrames, spread_us: float | None) -> Iterator[RecordedFigure]:
         """Period of SYNC, equal to that of the plan, and its jitter."""
-        periods, planned_us, count = grid(sent.times_us), plain(stream.period_us), len(sent.times_us)
+        periods, planned_us, count = periodic_events(sent.times_us), plain(stream.period_us), len(sent.times_us)
         period = RecordedFigure("SYNC: period", "us", planned_us, None, None, "equal", count, "cycle.period_us")
         if periods is None:
             yield period._replace(recorded=sent.mean.value if count > 1 else None, hidden=_TOO_FEW)
@@ -396,9 +396,9 @@ class _Log:
         often = min(repeated, key=lambda sent: sent.mean.value)
         count, mean = len(often.times_us), often.mean
         is_enough = count >= LEAST_EVENTS
-        notes = [identifier(often), "" if often.grid else "not periodic"]
-        if often.grid and often.grid.missing:
-            notes.append(f"{often.grid.missing:,} of {often.grid.places[-1] + 1:,} periods without a frame")
+        notes = [identifier(often), "" if often.periods else "not periodic"]
+        if often.periods and often.periods.missing:
+            notes.append(f"{often.periods.missing:,} of {often.periods.places[-1] + 1:,} periods without a frame")
         # At worst the first frame was the latest that it may be, and the last one the earliest.
         scatter_us = (planned_us if spread_us is None else spread_us) / (count - 1) / 2
         error_us = scatter_us if mean.uncertainty is None else mean.uncertainty

@@ -1,4 +1,4 @@
-"""The cycle: the master, all frames in sequence, their way through all devices and back, and the window."""
+"""The cycle: the master, all frames in sequence, their path through devices and back, and the non-periodic window."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, reduce
@@ -22,13 +22,13 @@ from busplan.buses.ethercat.frames import (
     Packing,
     cables_us,
     cycles_of,
-    delay_us,
     devices,
     devices_at,
     devices_doubts,
     devices_us,
     frames,
     has_rates,
+    hop_us,
     mailbox_frame_us,
     mean_wire_bytes,
     packing,
@@ -60,28 +60,28 @@ STRETCHES: Final = (
     EventKind("frame", "frames", "", "F", "out"),
     EventKind("way", "way through the devices", "", "W", "work"),
 )
-"""Stretches that several events make together."""
+"""Kinds of a sequence of events."""
 _LEFT_OUT: Final = {
     "bus.master_us": "the master's own time",
     "bus.master_jitter_us": "the master's jitter",
     "bus.mailbox_polls": "mailbox polls",
 }
-"""Keys of [bus] that a cycle lacks where they are 0."""
+"""Keys of [bus] whose part of the cycle is left out while they are 0."""
 
 
 def sync0_us(network: Network) -> Number:
-    """The first SYNC0 after the master's task; 0 without distributed clocks [us]."""
+    """Time from the master's task to the first SYNC0; 0 without distributed clocks [us]."""
     return sync0_share(network) * network.period_us if network.profile.bus.distributed_clocks else 0.0
 
 
 def sync0_share(network: Network) -> Number:
-    """The first SYNC0 as a share of the period: at the task itself it is the next SYNC0 that its frames meet [1]."""
+    """The same as a share of the period; 1 for a shift of 0, since frames come after the SYNC0 at the task [1]."""
     shift = network.profile.bus.sync_shift
     return choose(shift > 0, shift, 1)
 
 
 class EthercatCycle(BusCycle):
-    """The master's time and jitter, frames, devices and cables there and back, and the window."""
+    """The master's time and jitter, frames, devices and cables there and back, and the non-periodic window."""
 
     term_figures = TERMS
 
@@ -97,7 +97,7 @@ class EthercatCycle(BusCycle):
         return rates(self.network)
 
     def at(self, number: int) -> "EthercatCycle":
-        """A cycle of the common multiple of the rates."""
+        """A cycle of the hyperperiod."""
         return EthercatCycle(self.network, self.model, number)
 
     @property
@@ -111,13 +111,13 @@ class EthercatCycle(BusCycle):
 
     @cached_property
     def packing(self) -> Packing:
-        """All frames of process data."""
+        """The frames of process data."""
         return packing(self.network, self._devices)
 
     @cached_property
     def process_bytes(self) -> Number:
         """Process data of all devices [bytes]."""
-        return named(total(devices.number * devices.data_bytes for devices in self._devices), "process_bytes", "D")
+        return named(total(group.number * group.data_bytes for group in self._devices), "process_bytes", "D")
 
     @cached_property
     def _overhead_bytes(self) -> Number:
@@ -127,7 +127,7 @@ class EthercatCycle(BusCycle):
 
     @cached_property
     def _receive_us(self) -> Number:
-        """The last frame once more, where it is counted [us]."""
+        """Reception of the last frame, in the vendors' model [us]."""
         if not self.counts_reception:
             return 0.0
         is_empty = self.number is not None and not self.packing.frames
@@ -136,7 +136,7 @@ class EthercatCycle(BusCycle):
 
     @property
     def most_required_us(self) -> Number:
-        """Upper bound over all smaller node counts: a short last frame is received faster than the full frame."""
+        """Upper bound over all smaller node counts: a node more may open a short frame, which is received faster."""
         if not self.counts_reception:
             return self.required_us
         last_us, before_us = (
@@ -144,11 +144,12 @@ class EthercatCycle(BusCycle):
             for datagrams_bytes in (self.packing.last_bytes, self.packing.before_bytes)
         )
         polls = self.network.profile.bus.mailbox_polls
+        # Without that frame, neither its sending nor its reception counts, but the reception of the frame before.
         lost_us = choose(self.packing.before_bytes > 0, larger(before_us - 2 * last_us, 0.0), 0.0)
         return self.required_us + choose(polls > 0, 0.0, lost_us)
 
     def written(self) -> Iterator[BusEvent | Run]:
-        """The master, its frames, the last byte through all devices and back, and the window."""
+        """The master, its frames, the last byte through all devices and back, and the non-periodic window."""
         bus = self.network.profile.bus
         yield BusEvent("master", "cycle_master_us", bus.master_us, "master", rests_on="bus.master_us")
         late_us, late = bus.master_jitter_us, "latest start of the frames"
@@ -166,11 +167,11 @@ class EthercatCycle(BusCycle):
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
 
     def bias_us(self) -> Number:
-        """Time that process data take beyond the wire, about that of a copy in the host [us]."""
+        """Time of process data in addition to the wire: about a copy in the host [us]."""
         return self.process_bytes * BYTE_BIAS_US
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """The delays of devices, the master's own time, and what bytes take beyond the wire."""
+        """The delays of devices, the master's own time, and the time of bytes in addition to the wire."""
         return (
             *devices_doubts(self.network),
             Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
@@ -187,7 +188,7 @@ class EthercatCycle(BusCycle):
         return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in values.items() if not value)
 
     def _frames(self) -> Iterator[BusEvent]:
-        """Each frame: everything but its data, then the data of each device that it carries."""
+        """Each frame: its overhead, then the data of each device in it."""
         sizes = [plain(group.data_bytes) for group in self._devices for _ in range(int(plain(group.number)))]
         number = 0
         for run in frames(self.network, self._devices):
@@ -201,10 +202,10 @@ class EthercatCycle(BusCycle):
                     yield BusEvent("data", "cycle_data_us", us, f"data of device {device}", device, "frame")
 
     def _way(self) -> Iterator[BusEvent]:
-        """The last byte to each device and through it, and back."""
+        """The path of the last byte to each device and through it, and back."""
         way, device = [], 0
         for group in self.network.groups:
-            to_us, through_us = plain(cable_us(group.node.cable_m)) / 2, plain(delay_us(group)) / 2
+            to_us, through_us = plain(cable_us(group.node.cable_m)) / 2, plain(hop_us(group)) / 2
             for _ in range(int(plain(group.nodes))):
                 device += 1
                 way += [
@@ -215,7 +216,7 @@ class EthercatCycle(BusCycle):
         yield from (part._replace(label=part.label.replace("to", "back from", 1)) for part in reversed(way))
 
     def figures(self) -> Mapping[str, Number | None]:
-        """Frames, process data, when the last command is taken, when SYNC0 comes, and the mean load."""
+        """Frames, process data, time of the last command, time of SYNC0, and the mean load."""
         has_clocks = self.network.profile.bus.distributed_clocks
         return {
             "frames": self.packing.frames,
@@ -226,7 +227,7 @@ class EthercatCycle(BusCycle):
         }
 
     def card_lines(self) -> tuple[tuple[str, str], ...]:
-        """Where groups have rates of their own: the cycle of the verdict, and the mean of all."""
+        """For groups with rates of their own: the cycle of the verdict, and the mean cycle."""
         if not has_rates(self.network):
             return ()
         cycles = cycles_of(self.network)
@@ -250,17 +251,16 @@ class EthercatCycle(BusCycle):
         if not has_rates(network):
             return self.required_us
         polls: Number = network.profile.bus.mailbox_polls
-        is_last_again: Number = polls <= 0 if self.counts_reception else False
-        last_us = choose(is_last_again, self._receive_us, 0.0)
-        beside_us = self.required_us - process_us(network, self._devices) - last_us
-        return beside_us + sending_us(mean_wire_bytes(network, with_last=is_last_again))
+        receives_last: Number = polls <= 0 if self.counts_reception else False
+        last_us = choose(receives_last, self._receive_us, 0.0)
+        others_us = self.required_us - process_us(network, self._devices) - last_us
+        return others_us + sending_us(mean_wire_bytes(network, with_reception=receives_last))
 
     def arrival_us(self, node: int) -> float:
         """When a device has its command, from the start of a cycle of plain numbers [us].
 
-        It acts when the last byte of its frame has come: a check after the data says whether the frame is whole. The
-        frames are those of the fullest cycle, and start as late as the master's jitter lets them; a device that does
-        not go in it has its command with the last of them.
+        It takes its command at the end of its frame, after the check sequence. The frames are those of the fullest
+        cycle and start as late as the master's jitter allows; a device without data in them counts as in the last.
 
         Parameters
         ----------
@@ -278,14 +278,14 @@ class EthercatCycle(BusCycle):
         way_us, left = 0.0, node
         for group in network.groups:
             passed = min(left, int(plain(group.nodes)))
-            way_us += passed * plain(delay_us(group) + cable_us(group.node.cable_m)) / 2
+            way_us += passed * plain(hop_us(group) + cable_us(group.node.cable_m)) / 2
             left -= passed
         return sent_us + way_us
 
     def loop_periods(self, *, at_sync: bool) -> int:
-        """The master's pipeline, and the periods that feedback and command wait for a frame and for SYNC0 [1].
+        """The master's pipeline, and the periods that feedback waits for a frame and a command for SYNC0 [1].
 
-        The slowest group counts, groups at slower rates left out.
+        The slowest group counts; groups at slower rates are left out.
         """
         network, period_us = self.network, plain(self.network.period_us)
         shift_us = plain(sync0_us(network)) if at_sync else 0.0
@@ -315,12 +315,12 @@ class EthercatCycle(BusCycle):
 
     @property
     def last_command_us(self) -> Number:
-        """When the last device has taken its command at the latest, from the master's task [us]."""
+        """Latest time at which the last device has taken its command, from the master's task [us]."""
         return reduce(larger, map(self._taken_us, self.network.groups))
 
     @property
     def command_doubt_us(self) -> Number:
-        """Standard uncertainty of the last command: master, devices one way, bytes and slowest execution [us]."""
+        """Standard uncertainty of that: master, devices one way, bytes and slowest execution [us]."""
         execution_us = reduce(larger, (group.write_uncertainty_us for group in self.network.groups))
         parts = (
             self.network.profile.bus.master_doubt_us,
@@ -341,14 +341,14 @@ class EthercatCycle(BusCycle):
         return named(devices_us(self.network) + cables_us(self.network), "way_us", "way")
 
     def _taken_us(self, group: Group) -> Number:
-        """When the last device of a group may have taken its command, from the start of the cycle [us]."""
+        """Latest time at which a group has taken its command, as if at the end of the segment [us]."""
         bus = self.network.profile.bus
         on_wire_us = bus.master_us + bus.master_jitter_us + self._sent_us + self._way_us / 2
         taken_us = on_wire_us + group.write_execution_us + group.worst_extra_us
         return named(taken_us, "command_us", "t_cmd")
 
     def _command(self, group: Group) -> dict[str, Number]:
-        """From the cycle whose feedback it rests on to its effect."""
+        """Phases of a command: from the cycle with the feedback it is computed from, to its effect."""
         network, bus = self.network, self.network.profile.bus
         taken_us = self._taken_us(group)
         wait_us: Number = 0.0
@@ -367,14 +367,14 @@ class EthercatCycle(BusCycle):
         }
 
     def _feedback(self, group: Group) -> dict[str, Number]:
-        """From the sample to the start of the cycle whose frame takes it, and until the master has all frames."""
+        """Phases of feedback: from the sample through the wait for a frame, until the master has all frames."""
         network, bus = self.network, self.network.profile.bus
         ready_us = group.read_execution_us + group.worst_extra_us
-        behind_us = sync0_us(network) + ready_us
+        ready_at_us = sync0_us(network) + ready_us
         period_us = _period_us(group, network)
         return {
             "drive_us": ready_us,
-            "frame_wait_us": _until_taken(behind_us / period_us) * period_us - behind_us,
+            "frame_wait_us": _until_taken(ready_at_us / period_us) * period_us - ready_at_us,
             "pipeline_us": 0.0,
             "master_us": bus.master_us,
             "jitter_us": bus.master_jitter_us,
@@ -385,10 +385,10 @@ class EthercatCycle(BusCycle):
 
 
 def _period_us(group: Group, network: Network) -> Number:
-    """From a cycle with the group's data to the next [us]."""
+    """Time from a cycle with the group's data to the next [us]."""
     return group.every * network.period_us if group.is_slower else network.period_us
 
 
 def _until_taken(ready: Number) -> Number:
-    """Periods from a sample to the frame that takes it, ready after a share of them: no frame takes its own sample."""
+    """Periods from a cycle's task to the frame with its sample, ready after `ready` of them: never the cycle's own."""
     return larger(rounded_up(ready), 1)

@@ -79,12 +79,12 @@ def datagram_bytes(data_bytes: Number) -> Number:
 
 
 def overhead_bytes(like: Number) -> Number:
-    """Bytes of a frame on the wire beside its datagrams and padding: preamble, headers, check and gap [bytes].
+    """Bytes of a frame on the wire without datagrams and padding: preamble, headers, check and gap [bytes].
 
     Parameters
     ----------
     like
-        A number that they are computed with; they have its sort: float, array or traced.
+        A number whose sort the result takes: float, array or traced.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def overhead_bytes(like: Number) -> Number:
 
 
 def padding_bytes(datagrams_bytes: Number) -> Number:
-    """Bytes that fill a frame up to the shortest one; 0 of a frame that holds nothing [bytes].
+    """Bytes that fill a frame up to the shortest one; 0 for no frame [bytes].
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def room_bytes(datagrams: int) -> float:
     Parameters
     ----------
     datagrams
-        Number of datagrams that share them [1].
+        Number of its datagrams [1].
 
     Examples
     --------

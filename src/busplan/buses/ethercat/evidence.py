@@ -8,17 +8,17 @@ from busplan.elementwise import plain
 
 
 def room_bytes(_cycle: object, *, with_clocks: bool = False) -> float:
-    """Most process data of a frame of a datagram, alone or beside the datagram of the clocks [bytes]."""
+    """Most process data of a frame with one datagram, alone or with the datagram of the clocks [bytes]."""
     return equations.room_bytes(1) - (plain(CLOCK_BYTES["SOEM"]) if with_clocks else 0)
 
 
 def frame_bytes(_cycle: object, *, data_bytes: int) -> float:
-    """A frame of a datagram on the wire [bytes]."""
+    """A frame with one datagram on the wire [bytes]."""
     return plain(equations.frame_bytes(equations.datagram_bytes(data_bytes)))
 
 
 def on_the_wire_us(_cycle: object, *, wire_bytes: int, devices: int, cable_m: float) -> float:
-    """A frame through E-bus devices and back, each behind a cable [us]."""
+    """Time of a frame through E-bus devices and back, each with a cable before it [us]."""
     hop_us = plain(equations.device_us(DELAY_US["E-bus"])) + plain(equations.cable_us(cable_m))
     return plain(equations.sending_us(wire_bytes)) + devices * hop_us
 

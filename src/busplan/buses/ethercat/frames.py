@@ -50,23 +50,23 @@ from busplan.errors import BusplanError
 
 
 class Devices(NamedTuple):
-    """Devices with the same process data, side by side. The numbers may be of any sort."""
+    """Adjacent devices with the same process data. The numbers may be of any sort."""
 
     number: Number
     """Number of devices [1]."""
     data_bytes: Number
-    """Bytes of each in a frame [bytes]."""
+    """Process data of each device [bytes]."""
 
 
 class Packing(NamedTuple):
-    """All frames of the process data. The numbers may be of any sort."""
+    """The frames of process data of a cycle. The numbers may be of any sort."""
 
     frames: Number
     """Number of frames [1]."""
     datagrams_bytes: Number
-    """All their datagrams, headers and data [bytes]."""
+    """Datagrams of all frames, headers and data [bytes]."""
     padding_bytes: Number
-    """Filling of short frames [bytes]."""
+    """Padding of short frames [bytes]."""
     last_bytes: Number
     """Datagrams of the last frame [bytes]."""
     before_bytes: Number
@@ -79,21 +79,21 @@ class Packing(NamedTuple):
 
 
 def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> Packing:
-    """Share out devices among frames.
+    """Pack devices into frames, in their order.
 
     Parameters
     ----------
     devices
         Groups of devices in their order, at least one.
     datagrams
-        Datagrams of process data in a frame that holds any: 1 of LRW, 2 of LRD and LWR [1].
+        Datagrams of process data in a frame that holds any: 1 for LRW, 2 for LRD and LWR [1].
     first_bytes
         The master's own datagrams, which open the first frame; 0 for none [bytes].
 
     Returns
     -------
     Packing
-        A device that no frame has room for counts as a frame by itself: a limit is broken then.
+        A device too large for a frame counts as one frame: a limit is broken then.
 
     Examples
     --------
@@ -103,36 +103,36 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> 
     devices = [_with_data(group) for group in devices if not is_everywhere(group.data_bytes <= 0)] or [Devices(0, 1)]
     room = room_bytes(datagrams)
     headers = total([traced_with(DATAGRAM_BYTES, devices[0].number)] * datagrams)
-    free: Number = 0.0
+    free: Number = 0.0  # bytes for data in the open frame, which is the last so far
     frames: Number = 0
-    present: Number = 0.0
-    whole: Number = first_bytes
+    last: Number = 0.0
+    datagrams_bytes: Number = first_bytes
     padding: Number = 0.0
     before: Number = 0.0
     if not is_off(first_bytes):
-        # The first device may have no room beside it, and then it goes alone.
+        # The master's datagrams go alone where the first device has no room after them.
         has_room = room - first_bytes - _first_device_bytes(devices) >= 0
         free = choose(has_room, room - first_bytes, 0.0)
-        present = first_bytes + choose(has_room, headers, 0.0)
-        whole = present
+        last = first_bytes + choose(has_room, headers, 0.0)
+        datagrams_bytes = last
         frames = 1
     for group in devices:
-        beside = smaller(group.number, rounded_down(free / group.data_bytes))
-        behind = group.number - beside
-        present, free = present + beside * group.data_bytes, free - beside * group.data_bytes
-        in_frame = larger(rounded_down(room / group.data_bytes), 1)
-        new = rounded_up(behind / in_frame)
-        in_last = (behind - (larger(new, 1) - 1) * in_frame) * group.data_bytes
-        opens = behind > 0
-        before = choose(opens, choose(new > 1, headers + in_frame * group.data_bytes, present), before)
-        padding = padding + choose(opens, padding_bytes(present), 0.0)
-        present, free = choose(opens, headers + in_last, present), choose(opens, larger(room - in_last, 0.0), free)
-        frames, whole = frames + new, whole + new * headers + group.number * group.data_bytes
-    return Packing(frames, whole, padding + padding_bytes(present), present, before)
+        fitting = smaller(group.number, rounded_down(free / group.data_bytes))
+        rest = group.number - fitting
+        last, free = last + fitting * group.data_bytes, free - fitting * group.data_bytes
+        per_frame = larger(rounded_down(room / group.data_bytes), 1)
+        new = rounded_up(rest / per_frame)
+        in_last = (rest - (larger(new, 1) - 1) * per_frame) * group.data_bytes
+        opens = rest > 0
+        before = choose(opens, choose(new > 1, headers + per_frame * group.data_bytes, last), before)
+        padding = padding + choose(opens, padding_bytes(last), 0.0)
+        last, free = choose(opens, headers + in_last, last), choose(opens, larger(room - in_last, 0.0), free)
+        frames, datagrams_bytes = frames + new, datagrams_bytes + new * headers + group.number * group.data_bytes
+    return Packing(frames, datagrams_bytes, padding + padding_bytes(last), last, before)
 
 
 def _with_data(devices: Devices) -> Devices:
-    """The same devices; at points of an array where they have no data, and are in no frame, as none of a byte."""
+    """The same devices; points of an array without data, which are in no frame, become 0 devices of 1 byte."""
     if is_everywhere(devices.data_bytes > 0):
         return devices
     number = choose(devices.data_bytes > 0, devices.number, 0)
@@ -140,7 +140,7 @@ def _with_data(devices: Devices) -> Devices:
 
 
 def _first_device_bytes(devices: Sequence[Devices]) -> Number:
-    """Data of the first device; at points of an array the first groups may be empty [bytes]."""
+    """Data of the first device [bytes]; of an array, points may have empty first groups."""
     first: Number = devices[-1].data_bytes
     for group in reversed(devices[:-1]):
         is_there = group.number > 0
@@ -148,27 +148,27 @@ def _first_device_bytes(devices: Sequence[Devices]) -> Number:
     return first
 
 
-class Frames(NamedTuple):
-    """Frames in sequence that hold as many devices of the same size, of plain numbers."""
+class FrameRun(NamedTuple):
+    """Equal frames in sequence, each with the same number of devices; of plain numbers."""
 
     first: int
-    """First device of the first of them, from 1."""
+    """First device in the first frame, from 1."""
     devices: int
-    """Devices in each; 0 where only the master's own datagrams had room."""
+    """Devices in each frame; 0 where only the master's own datagrams had room."""
     datagrams_bytes: float
-    """Datagrams of each [bytes]."""
+    """Datagrams of each frame [bytes]."""
     frames: int = 1
     """Number of frames [1]."""
 
     def by_frame(self) -> Iterator[range]:
-        """Devices of each frame."""
+        """Numbers of the devices in each frame."""
         for frame in range(self.frames):
             first = self.first + frame * self.devices
             yield range(first, first + self.devices)
 
 
-def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Iterator[Frames]:
-    """The frames that `pack` counts, in their order, of plain numbers: a few entries for a group of any size.
+def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Iterator[FrameRun]:
+    """The frames that `pack` counts, in their order: a few runs for a group of any size; of plain numbers.
 
     Parameters
     ----------
@@ -179,41 +179,41 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
     first, held, opened, filled = 1, 0, first_bytes, 0.0
     for group in devices:
         size, left = plain(group.data_bytes), int(plain(group.number))
-        # Couplers have no data, and room in any frame.
+        # Couplers have no data and fit into any frame.
         fitting = max(int((room - opened - filled) // size), 0 if held or opened else 1) if size else left
-        beside = min(left, fitting)
-        held, filled, left = held + beside, filled + beside * size, left - beside
+        added = min(left, fitting)
+        held, filled, left = held + added, filled + added * size, left - added
         if left:
-            yield Frames(first, held, opened + bool(filled) * headers + filled)
+            yield FrameRun(first, held, opened + bool(filled) * headers + filled)
             first, in_frame = first + held, max(int(room // size), 1)
             full = (left - 1) // in_frame
             if full:
-                yield Frames(first, in_frame, headers + in_frame * size, full)
+                yield FrameRun(first, in_frame, headers + in_frame * size, full)
             first, held, opened = first + full * in_frame, left - full * in_frame, 0.0
             filled = held * size
     if opened or filled:
-        yield Frames(first, held, opened + bool(filled) * headers + filled)
+        yield FrameRun(first, held, opened + bool(filled) * headers + filled)
 
 
 MOST_CYCLES: Final = 1000
-"""Longest common multiple of the rates that is looked through [1]."""
+"""Longest hyperperiod that is computed [1]."""
 
 
 class Unit(NamedTuple):
-    """The devices of a group, whose process data go in every n-th cycle; of plain numbers."""
+    """The devices of a group, as a unit whose process data are in every n-th cycle; of plain numbers."""
 
     every: int
     """n [1]."""
     devices: int
     data_bytes: float
-    """Bytes of each in a frame [bytes]."""
+    """Process data of each device [bytes]."""
 
 
 class UnitCycle(NamedTuple):
-    """Cycles of the common multiple with the same units in them; of plain numbers."""
+    """Cycles of the hyperperiod with the same units in them; of plain numbers."""
 
     due: tuple[bool, ...]
-    """Whether each unit goes."""
+    """Whether each unit is in them."""
     numbers: tuple[int, ...]
     """Their numbers, from 1."""
     wire_bytes: float
@@ -224,13 +224,13 @@ class UnitCycle(NamedTuple):
     """All process data [bytes]."""
 
 
-def common_multiple(rates: Sequence[int]) -> int:
-    """Cycles until all units meet again [1].
+def checked_hyperperiod(rates: Sequence[int]) -> int:
+    """Cycles after which all units repeat [1].
 
     Raises
     ------
     BusplanError
-        More than are looked through.
+        More than `MOST_CYCLES`.
     """
     cycles = lcm(*rates)
     if cycles > MOST_CYCLES:
@@ -242,8 +242,8 @@ def common_multiple(rates: Sequence[int]) -> int:
 def unit_rates(units: Sequence[Unit], *, is_spread: bool) -> tuple[Rate, ...]:
     """The rate of each unit with its first cycle.
 
-    Spread, the faster unit is placed first, of one rate the larger, each where the fullest of its cycles has the fewest
-    bytes so far. Together, all start in the first.
+    Spread: units are placed fastest first, then largest first, each at the start that leaves the fullest of its cycles
+    with the fewest bytes so far. Together: all start in cycle 1.
 
     Examples
     --------
@@ -252,14 +252,14 @@ def unit_rates(units: Sequence[Unit], *, is_spread: bool) -> tuple[Rate, ...]:
     [1, 1, 2, 4]
     """
     starts = [0] * len(units)
-    filled_bytes = [0.0] * common_multiple([unit.every for unit in units])
+    filled_bytes = [0.0] * checked_hyperperiod([unit.every for unit in units])
     sizes_bytes = [unit.devices * unit.data_bytes for unit in units]
-    for place in sorted(range(len(units)), key=lambda place: (units[place].every, -sizes_bytes[place])):
-        every = units[place].every
+    for index in sorted(range(len(units)), key=lambda index: (units[index].every, -sizes_bytes[index])):
+        every = units[index].every
         if is_spread:
-            starts[place] = min(range(every), key=lambda start: max(filled_bytes[start::every]))
-        for cycle in range(starts[place], len(filled_bytes), every):
-            filled_bytes[cycle] += sizes_bytes[place]
+            starts[index] = min(range(every), key=lambda start: max(filled_bytes[start::every]))
+        for cycle in range(starts[index], len(filled_bytes), every):
+            filled_bytes[cycle] += sizes_bytes[index]
     return tuple(Rate(unit.every, start + 1) for unit, start in zip(units, starts, strict=True))
 
 
@@ -267,33 +267,33 @@ def unit_rates(units: Sequence[Unit], *, is_spread: bool) -> tuple[Rate, ...]:
 def unit_cycles(
     units: tuple[Unit, ...], *, is_spread: bool, datagrams: int, first_bytes: float
 ) -> tuple[UnitCycle, ...]:
-    """The cycles of the common multiple that differ, the fullest first.
+    """The distinct cycles of the hyperperiod, the fullest first.
 
     Parameters
     ----------
     units
         In the order of the segment.
     is_spread
-        Whether units at slower rates go in different cycles as evenly as possible; otherwise they meet.
+        Whether slower units are spread over the cycles as evenly as possible; otherwise they share a cycle.
     datagrams, first_bytes
         As `pack` takes them.
 
     Raises
     ------
     BusplanError
-        The rates meet too seldom.
+        The hyperperiod is longer than `MOST_CYCLES`.
     """
     cycles = []
     for due, numbers in numbers_by_due(unit_rates(units, is_spread=is_spread)).items():
         present = [Devices(unit.devices, unit.data_bytes * is_due) for unit, is_due in zip(units, due, strict=True)]
-        frames = pack(present, datagrams=datagrams, first_bytes=first_bytes)
-        data_bytes = plain(sum(devices.number * devices.data_bytes for devices in present))
-        cycles.append(UnitCycle(due, numbers, plain(frames.wire_bytes), plain(frames.last_bytes), data_bytes))
+        packed = pack(present, datagrams=datagrams, first_bytes=first_bytes)
+        data_bytes = plain(sum(group.number * group.data_bytes for group in present))
+        cycles.append(UnitCycle(due, numbers, plain(packed.wire_bytes), plain(packed.last_bytes), data_bytes))
     return tuple(sorted(cycles, key=lambda cycle: (-cycle.wire_bytes, -cycle.data_bytes)))
 
 
 def layout(network: Network) -> ProcessData:
-    """Layout of the process data: as the profile says, else as its master has it."""
+    """Layout of the process data: that of the profile, else that of its master."""
     bus = network.profile.bus
     return bus.process_data or LAYOUTS[bus.master or UNNAMED]
 
@@ -304,67 +304,67 @@ def datagrams(network: Network) -> int:
 
 
 def data_bytes(group: Group, network: Network) -> Number:
-    """Bytes of a device in a frame: the larger of input and output where they share bytes, else both [bytes]."""
+    """Process data of a device: the larger of input and output where they share bytes, else their sum [bytes]."""
     both = group.read_bytes, group.write_bytes
     size_bytes = larger(*both) if layout(network) == SHARED else total(both)
     return named(size_bytes, "device_bytes", f"d{group.name and f',{group.name}'}")
 
 
 def has_rates(network: Network) -> bool:
-    """Whether a group does not go in every cycle."""
+    """Whether the data of a group are not in every cycle."""
     return any(group.is_slower for group in network.groups)
 
 
 def rates(network: Network) -> tuple[Rate, ...]:
     """The rate of each group with its first cycle; of plain numbers."""
-    units, _ = _units(map(plain, _numbers(network, _all_devices(network))))
+    units, _ = _units(map(plain, _cycle_inputs(network, _all_devices(network))))
     return unit_rates(units, is_spread=network.profile.bus.units == "spread")
 
 
 def cycles_of(network: Network) -> tuple[UnitCycle, ...]:
-    """The cycles of the common multiple that differ, the fullest first; of plain numbers."""
-    return _cycles(network, map(plain, _numbers(network, _all_devices(network))))
+    """The distinct cycles of the hyperperiod, the fullest first; of plain numbers."""
+    return _cycles(network, map(plain, _cycle_inputs(network, _all_devices(network))))
 
 
 def devices(network: Network) -> tuple[Devices, ...]:
-    """All devices in their order, as the fullest cycle has them: a device that does not go in it has no data."""
+    """All devices in their order, with their data in the fullest cycle: 0 for those that are not in it."""
     whole = _all_devices(network)
     if not has_rates(network):
         return whole
-    numbers = _numbers(network, whole)
+    numbers = _cycle_inputs(network, whole)
 
-    def goes(place: int) -> Number:
+    def is_in(index: int) -> Number:
         words = "whether the group goes in the fullest cycle"
-        return pointwise(lambda *numbers: float(_cycles(network, numbers)[0].due[place]), *numbers, words=words)
+        return pointwise(lambda *numbers: float(_cycles(network, numbers)[0].due[index]), *numbers, words=words)
 
     return tuple(
-        devices._replace(data_bytes=choose(goes(place) > 0, devices.data_bytes, 0)) if group.is_slower else devices
-        for place, (devices, group) in enumerate(zip(whole, network.groups, strict=True))
+        entry._replace(data_bytes=choose(is_in(index) > 0, entry.data_bytes, 0)) if group.is_slower else entry
+        for index, (entry, group) in enumerate(zip(whole, network.groups, strict=True))
     )
 
 
 def devices_at(network: Network, number: int) -> tuple[Devices, ...]:
-    """All devices in their order, as a cycle of the common multiple has them, from 1; of plain numbers."""
+    """All devices in their order, with their data in a cycle of the hyperperiod, from 1; of plain numbers."""
     return tuple(
-        devices if rate.is_due(number) else devices._replace(data_bytes=0)
-        for devices, rate in zip(_all_devices(network), rates(network), strict=True)
+        group if rate.is_due(number) else group._replace(data_bytes=0)
+        for group, rate in zip(_all_devices(network), rates(network), strict=True)
     )
 
 
-def mean_wire_bytes(network: Network, *, with_last: Number) -> Number:
-    """Frames of process data of the mean cycle, with the last frame of each once more where that holds [bytes]."""
+def mean_wire_bytes(network: Network, *, with_reception: Number) -> Number:
+    """Frames of process data of the mean cycle; with reception, the last frame of each cycle counts twice [bytes]."""
 
-    def at_point(with_last: float, *numbers: float) -> float:
+    def at_point(with_reception: float, *numbers: float) -> float:
         sum_bytes = cycles = 0.0
         for cycle in _cycles(network, numbers):
             # A cycle without process data may have no frame.
-            last_bytes = plain(frame_bytes(cycle.last_bytes)) if with_last and cycle.last_bytes else 0.0
+            last_bytes = plain(frame_bytes(cycle.last_bytes)) if with_reception and cycle.last_bytes else 0.0
             sum_bytes += len(cycle.numbers) * (cycle.wire_bytes + last_bytes)
             cycles += len(cycle.numbers)
         return sum_bytes / cycles
 
     words = "the mean over the common multiple of the rates"
-    return pointwise(at_point, with_last, *_numbers(network, _all_devices(network)), words=words)
+    return pointwise(at_point, with_reception, *_cycle_inputs(network, _all_devices(network)), words=words)
 
 
 def _all_devices(network: Network) -> tuple[Devices, ...]:
@@ -372,28 +372,28 @@ def _all_devices(network: Network) -> tuple[Devices, ...]:
     return tuple(Devices(group.nodes, data_bytes(group, network)) for group in network.groups)
 
 
-def _numbers(network: Network, whole: Sequence[Devices]) -> tuple[Number, ...]:
-    """What the cycles rest on: the master's own datagrams; rate, devices and bytes of each group."""
+def _cycle_inputs(network: Network, whole: Sequence[Devices]) -> tuple[Number, ...]:
+    """Inputs of the cycles, flat for `pointwise`: the master's datagrams; rate, devices and bytes of each group."""
     units = ((group.every, *devices) for group, devices in zip(network.groups, whole, strict=True))
     return (housekeeping_bytes(network), *chain.from_iterable(units))
 
 
 def _units(numbers: Iterable[float]) -> tuple[tuple[Unit, ...], float]:
-    """The units, and the master's own datagrams [bytes], of `_numbers`."""
+    """The units, and the master's own datagrams [bytes], from the flat inputs of `_cycle_inputs`."""
     first_bytes, *of_units = numbers
     columns = zip(of_units[::3], of_units[1::3], of_units[2::3], strict=True)
     return tuple(Unit(int(every), int(nodes), data_bytes) for every, nodes, data_bytes in columns), first_bytes
 
 
 def _cycles(network: Network, numbers: Iterable[float]) -> tuple[UnitCycle, ...]:
-    """The cycles of `_numbers`."""
+    """The distinct cycles, from the inputs of `_cycle_inputs`."""
     units, first_bytes = _units(numbers)
     is_spread = network.profile.bus.units == "spread"
     return unit_cycles(units, is_spread=is_spread, datagrams=datagrams(network), first_bytes=first_bytes)
 
 
 def housekeeping_bytes(network: Network) -> Number:
-    """The datagrams that the master adds to the first frame, those of distributed clocks among them [bytes]."""
+    """Datagrams that the master adds to the first frame, that of distributed clocks included [bytes]."""
     bus = network.profile.bus
     if bus.housekeeping_bytes is not None:
         return total(datagram_bytes(traced_with(size, network.nodes)) for size in bus.housekeeping_bytes)
@@ -403,13 +403,13 @@ def housekeeping_bytes(network: Network) -> Number:
     ]
     if bus.master in STATE_CHECK_BYTES:
         checks_bytes = network.nodes * STATE_CHECK_BYTES[bus.master]
-        # Those of many devices fill frames of their own, whose headers count here.
+        # State checks of many devices fill frames of their own: their overhead counts here.
         added += [checks_bytes, rounded_down(checks_bytes / room_bytes(0)) * overhead_bytes(network.nodes)]
     return total(added)
 
 
 def packing(network: Network, present: Sequence[Devices]) -> Packing:
-    """All frames of process data of all devices."""
+    """The frames of process data of some devices."""
     packed = pack(present, datagrams=datagrams(network), first_bytes=housekeeping_bytes(network))
     return packed._replace(
         frames=named(packed.frames, "frames", "F"),
@@ -418,31 +418,31 @@ def packing(network: Network, present: Sequence[Devices]) -> Packing:
     )
 
 
-def frames(network: Network, present: Sequence[Devices]) -> tuple[Frames, ...]:
-    """The same frames in their order, of plain numbers."""
+def frames(network: Network, present: Sequence[Devices]) -> tuple[FrameRun, ...]:
+    """The same frames in their order; of plain numbers."""
     first_bytes = plain(housekeeping_bytes(network))
     return tuple(frames_of(present, datagrams=datagrams(network), first_bytes=first_bytes))
 
 
 def process_us(network: Network, present: Sequence[Devices]) -> Number:
-    """All frames of process data on the wire, of all devices [us]."""
+    """Time of the frames of process data of some devices on the wire [us]."""
     return named(sending_us(packing(network, present).wire_bytes), "sending_us", "sending")
 
 
 def mailbox_frame_us(network: Network) -> Number:
-    """Frame of a mailbox poll [us]."""
+    """Time of the frame of a mailbox poll on the wire [us]."""
     return sending_us(frame_bytes(datagram_bytes(network.profile.bus.mailbox_bytes)))
 
 
-def delay_us(group: Group) -> Number:
-    """Delay of a device of a group, there and back [us]."""
+def hop_us(group: Group) -> Number:
+    """Delay of a device of a group, there and back: twice its `delay_us` [us]."""
     node = group.node
     return device_us(traced_with(DELAY_US[node.port], group.nodes) if node.delay_us is None else node.delay_us)
 
 
 def devices_us(network: Network) -> Number:
     """Delay of all devices there and back [us]."""
-    return total(group.nodes * delay_us(group) for group in network.groups)
+    return total(group.nodes * hop_us(group) for group in network.groups)
 
 
 def cables_us(network: Network) -> Number:
@@ -451,7 +451,7 @@ def cables_us(network: Network) -> Number:
 
 
 def devices_doubts(network: Network) -> Iterator[Doubt]:
-    """Uncertainties of the delays there and back: those of a port err together, measured delays each by itself."""
+    """Uncertainties of the delays there and back: fully correlated for a port type, independent for measured delays."""
     for port, uncertainty_us in DELAY_UNCERTAINTY_US.items():
         of_port = [group for group in network.groups if group.node.delay_us is None and group.node.port == port]
         if of_port:

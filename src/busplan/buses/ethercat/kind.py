@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 
 def _late_command_us(network: Network) -> Number:
-    """When the last device has taken its command, with what bytes take beyond the wire; 0 without clocks [us]."""
+    """Latest time at which the last device has taken its command, bias included; 0 without clocks [us]."""
     if not network.profile.bus.distributed_clocks:
         return 0.0
     cycle = EthercatCycle(network, LAST_BYTE)
@@ -59,28 +59,28 @@ def _late_command_us(network: Network) -> Number:
 
 
 def _late_command_doubt_us(network: Network) -> Number:
-    """Standard uncertainty of that [us]."""
+    """Standard uncertainty of that time [us]."""
     return EthercatCycle(network, LAST_BYTE).command_doubt_us if network.profile.bus.distributed_clocks else 0.0
 
 
-def _words(network: Network) -> str:
-    """Say when the last command comes, and whether it is late only if all of the master's time is before the wire."""
+def _late_command_words(network: Network) -> str:
+    """Say when the last command comes, and if it is late only where all of bus.master_us is spent before the frame."""
     value_us, doubt_us, most_us = (
         plain(us) for us in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
     )
-    is_split = SYNC0.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
-    where = ", all of bus.master_us before the wire" if is_split else ""
+    depends = SYNC0.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
+    where = ", all of bus.master_us before the wire" if depends else ""
     return f"the last command comes at {value_us:.1f} +/- {doubt_us:.1f} us{where}, SYNC0 at {most_us:.1f} us"
 
 
 SYNC0: Final = share_of_period(
     "sync0",
-    _words,
+    _late_command_words,
     us=_late_command_us,
     share=sync0_share,
     doubt=_late_command_doubt_us,
     perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
-    way_out="a larger bus.sync_shift moves SYNC0 back",
+    way_out="a larger bus.sync_shift moves SYNC0 later",
 )
 """A command must be in every device before SYNC0."""
 LIMITS: Final = (
@@ -104,14 +104,14 @@ LIMITS: Final = (
         "a cable of {value:g} m is over the {most:g} m of 100BASE-TX",
         lambda network: reduce(larger, (group.node.cable_m for group in network.groups)),
         lambda _network: MOST_CABLE_M,
-        way_out="a device between would do",
+        way_out="a device in between would do",
     ),
     SYNC0,
 )
 
 
 def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """A circle is to be tested, and no clock makes its axes act at the same time."""
+    """A circle test is asked for, but no clock makes the axes act at the same time."""
     profile = subject.profile
     if profile.asks_for_circle and not profile.bus.distributed_clocks:
         yield RuleProblem(
@@ -145,7 +145,7 @@ _MASTER_STEP_US = 10.0
 
 
 def _host(us: int, source: str) -> str:
-    """Lines of [bus] for a host that nobody has measured."""
+    """Lines of [bus] for a host whose time is assumed."""
     time = f"master_us = {us}".ljust(26)
     return f"""\
 {time} # assumed: {source}; measure it
@@ -218,11 +218,11 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         return f"worst case of a command, of feedback and of a loop over both, {cycles}, {clocks}"
 
     def has_execution(self, network: Network, *, of_latency: bool = False) -> bool:  # noqa: ARG002 - of every network
-        """No device keeps a frame waiting: their own time is in latencies alone."""
+        """Execution counts in latencies only: no device delays a frame for it."""
         return of_latency
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """SYNC0 later in the cycle, for commands that come after it."""
+        """A plan may shift SYNC0 to a later time, for commands that come after it."""
         bus = network.profile.bus
         if not (bus.distributed_clocks and bus.sync_shift):
             return ()
@@ -230,7 +230,7 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         return (Setting("sync_shift", "shift of SYNC0", Cost.REGISTER, ("bus.sync_shift",), tuple(later)),)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """A mailbox poll more, a slower master, bytes that are not shared, and distributed clocks."""
+        """One mailbox poll more, a slower master, separate inputs and outputs, and distributed clocks."""
         bus: Any = network.profile.bus
         return (
             Perturbation("one mailbox poll more", {"bus.mailbox_polls": bus.mailbox_polls + 1}),
@@ -248,13 +248,13 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         )
 
     def setpoints_every(self, network: Network) -> tuple[str, int]:
-        """Those of the group with axes whose process data go most often."""
+        """Cycles between set-points of the fastest group with axes, and the key that sets them."""
         with_axes = [group for group in network.groups if plain(group.axes)] or network.groups
         fastest = min(with_axes, key=lambda group: plain(group.every))
         return fastest.key("every"), int(plain(fastest.every))
 
     def payloads(self, network: Network) -> PayloadRange:
-        """Whole bytes up to those of a frame."""
+        """Whole bytes, up to what a frame holds."""
         each = 1 if layout(network) == SHARED else 2
         return PayloadRange(1, int(room_bytes(datagrams(network)) / each), carrier="a frame")
 

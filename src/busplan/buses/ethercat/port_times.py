@@ -1,4 +1,4 @@
-"""Delays of the devices of a line, by the port times that a master reads at its start."""
+"""Delays of devices in a line, from the port receive times (0x0900) that a master reads at its start."""
 
 from collections.abc import Iterator, Mapping
 from itertools import accumulate, pairwise
@@ -15,27 +15,27 @@ from busplan.sections.machine import ProfileGroup
 
 _WRAP_NS: Final = 1 << 32
 _PORTS_OF_LINE: Final = 2
-"""Most ports with a link of a device within a line."""
+"""Most ports with a link that a device in a line has."""
 
 
 class _NoLineError(Exception):
-    """Port times are not those of a line; its text says why."""
+    """The port receive times do not belong to a line; the text says why."""
 
 
 class LineDelays(NamedTuple):
-    """Delay of each device of a line and of the cable to it, by port times."""
+    """Delay of each device in a line with the cable before it, from port receive times."""
 
     hops_us: tuple[float, ...]
-    """One way, of the second device and all behind it [us]."""
+    """Delay one way of each device from the second on [us]."""
     latches: int
-    """Number of broadcast writes that they are the mean of [1]."""
+    """Number of broadcast writes that the delays are the mean of [1]."""
     remarks: tuple[str, ...]
-    """What the port times do not say, and why."""
+    """What the port receive times do not show, and why."""
 
     def figures(self, network: Network) -> Iterator[RecordedFigure]:
-        """Each delay beside the planned one, and the mean of each group of the plan.
+        """The recorded delay of each device, and the mean of each group of the plan.
 
-        The plan says a mean, so this alone is judged; nothing is planned where it has another number of devices.
+        The plan gives means, so only means have a verdict; none has if the plan has another number of devices.
         """
         groups = self._groups(network)
         if not groups:
@@ -48,7 +48,7 @@ class LineDelays(NamedTuple):
                 yield self._figure(numbers, nodes)
 
     def edits(self, network: Network) -> Mapping[str, float]:
-        """Mean delay one way of the devices of each group, cable taken off [us], by its key."""
+        """Mean delay one way of the devices of each group, without the cable [us], by dotted key."""
         edits: dict[str, float] = {}
         for nodes, numbers in self._groups(network):
             mean_us = self._mean_us(numbers) - _cable_us(nodes) if numbers else 0.0
@@ -57,7 +57,7 @@ class LineDelays(NamedTuple):
         return edits
 
     def more_us(self, network: Network) -> float:
-        """What the devices take there and back beyond the plan, by what `edits` say [us]."""
+        """Delay of the devices there and back with the values of `edits`, less that of the plan [us]."""
         edits = self.edits(network)
         return sum(
             2 * plain(nodes.nodes) * (edits[key] - _planned_us(nodes))
@@ -66,9 +66,9 @@ class LineDelays(NamedTuple):
         )
 
     def _groups(self, network: Network) -> list[tuple[ProfileGroup, range]]:
-        """Each group of the plan, and its devices by number, from 1; the first of all has no delay by port times.
+        """Each group of the plan with the numbers of its devices, from 2: port receive times show no delay of device 1.
 
-        None where the plan has another number of devices.
+        Empty where the plan has another number of devices.
         """
         ends = list(accumulate(int(plain(nodes.nodes)) for nodes in network.profile.node_groups))
         if ends[-1] != len(self.hops_us) + 1:
@@ -80,7 +80,7 @@ class LineDelays(NamedTuple):
         return sum(self.hops_us[number - 2] for number in numbers) / len(numbers)
 
     def _figure(self, numbers: range, nodes: ProfileGroup | None = None) -> RecordedFigure:
-        """Mean delay of some devices, beside that of the group that the plan has them in."""
+        """Mean delay of some devices, with that of their group in the plan."""
         name = f"delay of device {numbers[0]}"
         if len(numbers) > 1:
             name = f"mean delay of devices {numbers[0]} to {numbers[-1]}"
@@ -108,17 +108,17 @@ class LineDelays(NamedTuple):
 
 
 def line_delays(latches: tuple[Latch, ...], unlatched: int) -> LineDelays:
-    """The delays that port times say of a line.
+    """Delays of the devices in a line, from port receive times.
 
-    A frame passes a device, all behind it, and the device again: half the difference of its two port times less that
-    of the next device is the delay one way. The difference falls from device to device, which gives their order.
+    A frame passes a device, all those after it, and the device again: half the difference of its two port times, less
+    that of the next device, is the delay one way. The difference falls from device to device: this gives their order.
 
     Parameters
     ----------
     latches
-        The broadcast writes, each with the port times behind it.
+        The broadcast writes, each with the port receive times read after it.
     unlatched
-        Reads of port times without such a write before them.
+        Number of reads of port receive times without such a write before.
 
     References
     ----------
@@ -138,7 +138,7 @@ def line_delays(latches: tuple[Latch, ...], unlatched: int) -> LineDelays:
         except _NoLineError as error:
             reasons[str(error)] = None
     remarks += [f"No delays of devices by port times: {reason}." for reason in reasons]
-    # The machine may have been changed between: only lines as long as the last one are of the same machine.
+    # The machine may have changed in between: only lines as long as the last one count.
     lines = [hops for hops in lines if len(hops) == len(lines[-1])]
     means_us = tuple(sum(hops) / len(hops) for hops in zip(*lines, strict=True))
     if means_us:
@@ -147,12 +147,12 @@ def line_delays(latches: tuple[Latch, ...], unlatched: int) -> LineDelays:
 
 
 def _spans_ns(latch: Latch) -> list[int]:
-    """From the first to the last port time of each device of a line, in their order.
+    """From the first to the last port receive time of each device in a line, in their order [ns].
 
     Raises
     ------
     _NoLineError
-        The times are those of no line.
+        The devices are not in a line.
     """
     read = len(latch.ports_ns)
     if read != latch.devices:
@@ -169,7 +169,7 @@ def _spans_ns(latch: Latch) -> list[int]:
 
 
 def _span_ns(times_ns: Mapping[int, int]) -> int:
-    # A port without a link has no time.
+    # A port without a link has no receive time.
     linked = {port: time for port, time in times_ns.items() if time}
     if 0 not in linked:
         raise _NoLineError("a device has no time of its port 0")

@@ -1,4 +1,4 @@
-"""A capture of the master's port beside the plan: period, jitter, round trips, bytes, and what got lost."""
+"""A capture of the master's port compared with the plan: period, jitter, round trips, bytes, and lost frames."""
 
 from collections.abc import Iterator, Sequence
 from math import ceil
@@ -27,7 +27,7 @@ from busplan.buses.ethercat.frames import (
     housekeeping_bytes,
 )
 from busplan.buses.ethercat.port_times import line_delays
-from busplan.buses.ethercat.recorded_cycles import Places, SeenCycles, seen_cycles
+from busplan.buses.ethercat.recorded_cycles import Ints, SeenCycles, seen_cycles
 from busplan.buses.network import Network
 from busplan.buses.rule import CLOCK_TOLERANCE, Recorded, RecordedFigure, day_of
 from busplan.elementwise import plain
@@ -42,43 +42,43 @@ _MASTER: Final = "bus.master_us"
 _JITTER: Final = "bus.master_jitter_us"
 _MISSED: Final = "limits.missed_cycles"
 _STEP_BACK_NS: Final = 50_000
-"""Stamps of neighbours are so far out of order only where a clock was set; less is the order of two queues [ns]."""
+"""A stamp further before its predecessor means that the clock was set back; less may be two capture queues [ns]."""
 _GAP_US: Final = plain(sending_us(GAP_BYTES))
 _TWO_STAMPS: Final = 0.5
-"""Standard uncertainty of the largest distances of two stamps, in their step: none is off by more than a step."""
+"""Standard uncertainty of the longest of many differences of two stamps, in steps: their error is a step at most."""
 _LEAST_SPAN_BYTES: Final = 200
-"""Least range of frame sizes that shows the time of a byte: the host's time differs by size, too [bytes]."""
+"""Least range of frame sizes that shows the time of a byte: the host's time depends on the size, too [bytes]."""
 _STRAY: Final = 0.01
-"""Share of the frames whose stamps may be wrong, or that may be taken for others."""
+"""Share of the frames that may have a wrong stamp or a wrong partner."""
 
 
 class _Trips(NamedTuple):
-    """Frames that were sent, each with the frame that returned."""
+    """Frames paired with their return: indexes into the recording."""
 
-    sent: Places
-    returned: Places
-    """Places of both in the recording."""
-    lost: Places
-    """Places of frames that did not return."""
+    sent: Ints
+    returned: Ints
+    """The same frames on their return."""
+    lost: Ints
+    """Frames that did not return."""
     unsent: int
-    """Returned frames that were not seen to be sent."""
+    """Number of returned frames that were not seen when sent."""
 
 
-class _Cycles(NamedTuple):
-    """What each cycle with process data has, n of them."""
+class _CycleValues(NamedTuple):
+    """Values of each of n cycles with process data."""
 
-    frames: Places
-    """Number of its frames of process data [1]."""
+    frames: Ints
+    """Number of frames of process data [1]."""
     is_back: npt.NDArray[np.bool_]
-    """Whether all have returned."""
+    """Whether all frames returned."""
     trips_us: Floats
-    """From the first one sent to the last one returned [us]."""
+    """Round trip: from the first frame sent to the last one returned [us]."""
     host_us: Floats
-    """What that is without the wire, the devices and cables of the plan, and the copy of the bytes [us]."""
+    """Round trip less wire, bias of the bytes, and devices and cables of the plan: the master's own time [us]."""
     data_bytes: npt.NDArray[Any]
     """Process data [bytes]."""
     datagrams_bytes: npt.NDArray[Any]
-    """All their datagrams [bytes]."""
+    """All datagrams [bytes]."""
 
 
 def recorded(network: Network, path: Path, *, share: float, progress: Progress) -> Recorded:
@@ -91,14 +91,14 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
     path
         A pcap or pcapng file, recorded at the master's port.
     share
-        Share of the cycles that jitter and the master's time are to hold for, 0.5..1.
+        Quantile of the cycles for jitter and the master's time, 0.5..1.
     progress
         Called with the bytes read and those of the file.
 
     Raises
     ------
     BusplanError
-        No capture, or nothing of EtherCAT that can be compared in it.
+        The file is no capture, or has no EtherCAT frames that can be compared.
     """
     frames = read_ethercat(path, progress=progress)
     if not frames.returned.any():
@@ -112,7 +112,7 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
 
 
 class _Seen:
-    """A recording, with what is derived of it once."""
+    """A recording, and the values that several figures derive from it."""
 
     def __init__(self, network: Network, frames: EthercatFrames, share: float) -> None:
         self.network, self.frames, self.share = network, frames, share
@@ -123,7 +123,7 @@ class _Seen:
         self.trips_us = (frames.times_ns[self.trips.returned] - frames.times_ns[self.trips.sent]) / 1000
         self.delays = line_delays(frames.latches, frames.unlatched)
         self.dropped = frames.notes.dropped + frames.cut
-        """Packets that the recorder says it dropped, or that it cut."""
+        """Number of packets that the recorder says it dropped, or that it cut."""
         process = [tuple(part for part in layout if part.is_process_data) for layout in frames.layouts]
         datagrams = np.array([_datagrams_bytes(layout) for layout in frames.layouts])
         wire_us = np.array([plain(sending_us(frame_bytes(size))) for size in datagrams.tolist()])
@@ -133,7 +133,7 @@ class _Seen:
         self.cycles: SeenCycles | None = None
         sent = np.flatnonzero(self.is_data & ~frames.returned)
         if len(sent):
-            # Of several stretches of the clock the longest is taken.
+            # Where the clock was set back, only the longest stretch between counts.
             stretch = np.concatenate(([0], np.cumsum(steps_back)))[sent]
             sent = sent[stretch == np.bincount(stretch).argmax()]
             sent = sent[np.argsort(frames.times_ns[sent], kind="stable")]
@@ -141,23 +141,23 @@ class _Seen:
             numbers = {parts: number for number, parts in enumerate(dict.fromkeys(process))}
             kinds = np.array([numbers[parts] for parts in process])[frames.layout[sent]]
             self.cycles = seen_cycles(sent, times_us, kinds, self.data_bytes[sent], network)
-        self.bad_stamps = self._bad_stamps()
-        """Why the stamps cannot say what takes how long; empty where they can."""
+        self.bad_stamps = self._why_bad_stamps()
+        """Why durations cannot be taken from the stamps; empty where they can."""
         self.jitter: Quantile | None = None
         self.master: Quantile | None = None
         self.master_bytes: list[int] | None = None
-        """Data of the master's own datagrams, where they are not as planned [bytes]."""
+        """Data of the master's own datagrams, if not as planned [bytes]."""
 
-    def _bad_stamps(self) -> str:
+    def _why_bad_stamps(self) -> str:
         count = len(self.trips_us)
         if not count:
             return "no frame that it has as sent is among those that returned"
         typical_us = quantile(self.trips_us, 0.5).value
         if self.cycles is not None and self.cycles.in_bursts:
             return "the frames were stamped in bursts, and not as they passed the port"
-        if self.short > _STRAY * count:
+        if self.early > _STRAY * count:
             return (
-                f"{self.short:,} of {plural(count, 'frame')} returned sooner than it takes to send them: the stamps "
+                f"{self.early:,} of {plural(count, 'frame')} returned sooner than it takes to send them: the stamps "
                 "were not taken at the master's port"
             )
         if typical_us <= self.stamp_us:
@@ -165,20 +165,20 @@ class _Seen:
         return ""
 
     @property
-    def short(self) -> int:
-        """Frames that returned sooner than they can be sent."""
+    def early(self) -> int:
+        """Number of frames that returned sooner than it takes to send them."""
         least_us = self.wire_us[self.trips.sent] - _GAP_US - 2 * self.stamp_us
         return int(np.count_nonzero(self.trips_us < least_us))
 
     @property
     def too_few(self) -> str:
-        """Why the recording has no period; empty where it has one."""
+        """Why the recording has too few cycles for a period; empty where it has enough, or stamps in bursts."""
         if self.cycles is None or self.cycles.periods is not None or self.cycles.in_bursts:
             return ""
         return f"{plural(len(self.cycles.first), 'cycle')}, and a period takes {LEAST_EVENTS}"
 
     def shows_nothing(self) -> tuple[str, ...]:
-        """Why the recording shows no machine within its plan."""
+        """Why the recording cannot show that the machine keeps its plan."""
         reasons = (
             "" if self.cycles else "it has no frame of process data (LRD, LWR, LRW)",
             self.too_few and f"it has {self.too_few}",
@@ -201,7 +201,7 @@ class _Seen:
         yield from self.delays.figures(self.network)
 
     def _period(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
-        """Period and starts of the cycles."""
+        """Period, and latest start of a cycle."""
         periods, count = cycles.periods, len(cycles.first)
         period_us, jitter_us = plain(self.network.period_us), plain(self.network.profile.bus.master_jitter_us)
         period = RecordedFigure("period", "us", period_us, None, None, "equal", count, _PERIOD)
@@ -225,26 +225,26 @@ class _Seen:
         )
 
     def _cycles(self, cycles: SeenCycles) -> Iterator[RecordedFigure]:
-        """What is missing, and each sort of cycle beside that of the plan."""
-        held = self._held(cycles)
+        """Missing cycles, then times and layout of each kind of cycle."""
+        per_cycle = self._values(cycles)
         if cycles.periods is None:
-            yield from self._times(cycles.sorts[0], "", held.trips_us, (held.host_us,))
+            yield from self._times(cycles.sorts[0], "", per_cycle.trips_us, (per_cycle.host_us,))
             return
-        frames, data_bytes = (_usual(values, cycles.sort) for values in (held.frames, held.data_bytes))
-        has_less = (held.frames < frames) | (held.data_bytes < data_bytes)
+        frames, data_bytes = (_usual(values, cycles.sort) for values in (per_cycle.frames, per_cycle.data_bytes))
+        has_less = (per_cycle.frames < frames) | (per_cycle.data_bytes < data_bytes)
         yield self._without_frame(cycles, int(np.count_nonzero(has_less)))
-        whole = held.is_back & (held.frames == frames) & (held.data_bytes == data_bytes)
-        for place, sort in enumerate(cycles.sorts):
+        whole = per_cycle.is_back & (per_cycle.frames == frames) & (per_cycle.data_bytes == data_bytes)
+        for index, sort in enumerate(cycles.sorts):
             names = [group.name for group, is_due in zip(self.network.groups, sort.due, strict=True) if is_due]
             with_names = f" with {' and '.join(names) or 'no group'}" if has_rates(self.network) else ""
-            of_sort = np.flatnonzero(whole & (cycles.sort == place))
+            of_sort = np.flatnonzero(whole & (cycles.sort == index))
             if sort.data_bytes:
-                host_us = () if place else (held.host_us[of_sort], held.host_us[whole])
-                yield from self._times(sort, with_names, held.trips_us[of_sort], host_us)
-            yield from self._layout(sort, with_names, cycles, of_sort, held)
+                host_us = () if index else (per_cycle.host_us[of_sort], per_cycle.host_us[whole])
+                yield from self._times(sort, with_names, per_cycle.trips_us[of_sort], host_us)
+            yield from self._layout(sort, with_names, cycles, of_sort, per_cycle)
 
-    def _held(self, cycles: SeenCycles) -> _Cycles:
-        """What each cycle has."""
+    def _values(self, cycles: SeenCycles) -> _CycleValues:
+        """Values of each cycle."""
         times_ns, number, count = self.frames.times_ns, cycles.number, len(cycles.first)
         back = np.full(len(times_ns), -1)
         back[self.trips.sent] = self.trips.returned
@@ -260,10 +260,10 @@ class _Seen:
         )
         way_us = plain(devices_us(self.network)) + plain(cables_us(self.network)) + self.delays.more_us(self.network)
         host_us = trips_us - wire_us - data_bytes * BYTE_BIAS_US - way_us
-        return _Cycles(frames, is_back, trips_us, host_us, data_bytes, datagrams_bytes)
+        return _CycleValues(frames, is_back, trips_us, host_us, data_bytes, datagrams_bytes)
 
     def _without_frame(self, cycles: SeenCycles, with_less: int) -> RecordedFigure:
-        """Cycles that have no frame, or less in their frames than most of their sort."""
+        """Cycles without a frame, or with less in their frames than most cycles of their kind."""
         longest, missing = int(cycles.gaps.max(initial=0)), int(cycles.gaps.sum())
         notes = []
         if longest > 1:
@@ -277,7 +277,7 @@ class _Seen:
         return self._missed("cycles without a frame", missing + with_less, events, ", ".join(notes), self._dropped)
 
     def _missed(self, quantity: str, number: int, events: int, note: str, hides: str = "") -> RecordedFigure:
-        """What counts against the limit; hidden where dropped packets may be all that is beyond it."""
+        """A number that counts against `limits.missed_cycles`; hidden where dropped packets may explain the excess."""
         limit = self.network.profile.limits.missed_cycles
         hidden = hides if number - self.dropped <= limit else ""
         return RecordedFigure(quantity, "1", limit, number, None, "at most", events, _MISSED, note, hidden=hidden)
@@ -285,7 +285,7 @@ class _Seen:
     def _times(
         self, sort: UnitCycle, with_names: str, trips_us: Floats, host_us: tuple[Floats, ...]
     ) -> Iterator[RecordedFigure]:
-        """Round trip of a sort of cycle, and the master's time: the largest that some sets of cycles say, if any."""
+        """Round trip of a kind of cycle, and the master's time: the largest of the sets in `host_us`, if any."""
         bus, count = self.network.profile.bus, len(trips_us)
         planned = EthercatCycle(self.network, LAST_BYTE, sort.numbers[0])
         in_trip = ("cycle_master_us", "cycle_frames_us", "cycle_data_us", "cycle_devices_us", "cycle_cable_us")
@@ -321,20 +321,20 @@ class _Seen:
             )
 
     def _layout(
-        self, sort: UnitCycle, with_names: str, cycles: SeenCycles, of_sort: Places, held: _Cycles
+        self, sort: UnitCycle, with_names: str, cycles: SeenCycles, of_sort: Ints, per_cycle: _CycleValues
     ) -> Iterator[RecordedFigure]:
-        """Frames of a sort of cycle, and their datagrams."""
+        """Frames of a kind of cycle, and their datagrams."""
         count, planned = len(of_sort), EthercatCycle(self.network, LAST_BYTE, sort.numbers[0]).packing
         if sort.data_bytes:
-            name, frames = f"frames in a cycle{with_names}", int(held.frames[of_sort[0]]) if count else None
+            name, frames = f"frames in a cycle{with_names}", int(per_cycle.frames[of_sort[0]]) if count else None
             hidden = "" if count else "no such cycle is in the recording"
             yield RecordedFigure(name, "1", plain(planned.frames), frames, None, "equal", count, hidden=hidden)
         if not count:
             return
-        # Of the cycles as most are, the middle: now and then a master adds a datagram.
-        sizes, often = np.unique(held.datagrams_bytes[of_sort], return_counts=True)
+        # Show the middle one of the most frequent cycles: now and then a master adds a datagram.
+        sizes, often = np.unique(per_cycle.datagrams_bytes[of_sort], return_counts=True)
         usual_bytes = sizes[often.argmax()]
-        usual = of_sort[held.datagrams_bytes[of_sort] == usual_bytes]
+        usual = of_sort[per_cycle.datagrams_bytes[of_sort] == usual_bytes]
         places = cycles.frames[cycles.number == usual[len(usual) // 2]]
         layouts = [self.frames.layouts[layout] for layout in self.frames.layout[places]]
         yield RecordedFigure(
@@ -355,7 +355,7 @@ class _Seen:
             self.master_bytes = [part.data_bytes for part in added]
 
     def _lost(self) -> Iterator[RecordedFigure]:
-        """Frames that did not return, or with a wrong working counter."""
+        """Frames that did not return, and frames with a wrong working counter."""
         frames, trips = self.frames, self.trips
         sent = int(np.count_nonzero(~frames.returned))
         yield self._missed("lost frames", len(trips.lost), sent, "", self._dropped)
@@ -366,7 +366,7 @@ class _Seen:
             yield self._missed("wrong working counters", wrong, len(back), "the most frequent ones are taken for right")
 
     def _byte(self) -> Iterator[RecordedFigure]:
-        """The time of a byte, of frames that are alone on the way: others wait for those before them."""
+        """Time of a byte, from frames that were alone on the ring: others wait for those before them."""
         if self.bad_stamps:
             return
         sent_ns, back_ns = self.frames.times_ns[self.trips.sent], self.frames.times_ns[self.trips.returned]
@@ -396,7 +396,7 @@ class _Seen:
         )
 
     def remarks(self) -> Iterator[str]:
-        """What the recording has beside the figures."""
+        """Sentences on what else the recording has, and what it does not show."""
         frames, notes = self.frames, self.frames.notes
         if notes.broken_at is not None:
             yield f"The file is cut or damaged from byte {notes.broken_at:,} on: read up to there."
@@ -404,8 +404,8 @@ class _Seen:
             yield (f"Its clock was set back {plural(self.steps_back, 'time')}: the longest stretch between is taken.")
         if self.cycles is not None and self.cycles.left_out:
             yield (
-                f"{plural(self.cycles.left_out, 'frame')} of process data at its ends are left out: of the master's "
-                "start or end, where more cycles are missing than are there, or of cycles that the capture has in part."
+                f"{plural(self.cycles.left_out, 'frame')} of process data at its ends are left out: the master was "
+                "starting or stopping, and more cycles are missing than present, or a cycle is only partly captured."
             )
         if self.trips.unsent:
             yield f"{plural(self.trips.unsent, 'frame')} returned without having been seen to be sent."
@@ -413,13 +413,13 @@ class _Seen:
             yield f"Left out: {plural(frames.cut, 'EtherCAT frame')} that the recorder cut; record whole packets."
         if left_out := frames.others + notes.left_out:
             yield f"Left out: {plural(left_out, 'packet')} of other protocols or interfaces, or without a time."
-        if not self.bad_stamps and self.short:
+        if not self.bad_stamps and self.early:
             yield (
-                f"{plural(self.short, 'frame')} returned sooner than it takes to send them: their stamps were not "
+                f"{plural(self.early, 'frame')} returned sooner than it takes to send them: their stamps were not "
                 "taken at the master's port."
             )
         if self.master is not None and self.master.value < 0:
-            yield "The machine is faster than wire and devices of the profile, which has more of them than it."
+            yield "Round trips are shorter than with the profile's devices: the machine has fewer or faster ones."
         yield from self.delays.remarks
         yield f"Stamps have steps of {self.stamp_us:g} us."
         yield (
@@ -428,12 +428,12 @@ class _Seen:
         )
 
     def edits(self) -> dict[str, object]:
-        """New value of each key that was measured; None removes one."""
+        """New value of each measured key; None removes a key."""
         edits: dict[str, object] = {**self.delays.edits(self.network)}
         if self.master is not None and self.master.value > 0:
             edits[_MASTER] = _up(self.master.value)
             edits["bus.master_grade"] = "measured"
-            # What the delays of devices leave open is an uncertainty of the cycle already.
+            # The cycle already counts the uncertainty of the devices' delays.
             doubt = expanded(self.master.uncertainty, self.stamp_us * _TWO_STAMPS)
             edits["bus.master_uncertainty_us"] = None if doubt is None else round(doubt / 2, 4)
         if self.jitter is not None:
@@ -443,8 +443,8 @@ class _Seen:
         return edits
 
 
-def _usual(values: npt.NDArray[Any], sort: Places) -> npt.NDArray[Any]:
-    """For each of n things the value that most of its sort have."""
+def _usual(values: npt.NDArray[Any], sort: Ints) -> npt.NDArray[Any]:
+    """For each of n values, the most frequent value in the same kind of cycle or frame."""
     usual = np.zeros_like(values)
     for number in np.unique(sort):
         distinct, often = np.unique(values[sort == number], return_counts=True)
@@ -453,7 +453,7 @@ def _usual(values: npt.NDArray[Any], sort: Places) -> npt.NDArray[Any]:
 
 
 def _up(us: float) -> float:
-    """A time that is to hold what was measured, to a nanosecond [us]."""
+    """A time rounded up to a nanosecond, so that it covers what was measured [us]."""
     return ceil(us * 1000) / 1000
 
 
@@ -462,10 +462,10 @@ def _datagrams_bytes(parts: Sequence[Datagram]) -> float:
 
 
 def _trips(frames: EthercatFrames) -> _Trips:
-    """Tell which frame returned as which.
+    """Pair sent frames with returned ones.
 
-    Frames keep their order on the ring, so those of the same datagrams and indexes return in the order in which they
-    were sent. Of more frames that were sent than returned before the next was sent, the earliest are lost.
+    Frames keep their order on the ring, so frames with equal datagrams and indexes return in the order in which they
+    were sent. If some were sent in a row and fewer returned before the next was sent, the earliest are lost.
     """
     order = np.argsort(frames.key, kind="stable")
     key, returned = frames.key[order], frames.returned[order]
@@ -482,7 +482,7 @@ def _trips(frames: EthercatFrames) -> _Trips:
     is_paired = np.zeros(len(order), dtype=np.bool_)
     is_paired[sent_at] = is_paired[back_at] = True
     lost = np.flatnonzero(~is_paired & ~frames.returned)
-    # Frames behind the last one that returned may still be on their way.
+    # Frames sent after the last return may still be on their way.
     lost = lost[lost < (back_at.max() if len(back_at) else 0)]
     unsent = int(np.count_nonzero(~is_paired & frames.returned))
     kept = frames.times_ns[back_at] >= frames.times_ns[sent_at]

@@ -1,4 +1,4 @@
-"""The cycles of a capture: which frames make a cycle, and which cycle of the plan each is."""
+"""The cycles of a capture: which frames make a cycle, and which cycle of the plan each one is."""
 
 from math import inf, log
 from typing import Any, Final, NamedTuple
@@ -9,51 +9,51 @@ import numpy.typing as npt
 from busplan.buses.ethercat.frames import UnitCycle, cycles_of
 from busplan.buses.network import Network
 from busplan.elementwise import plain
-from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, grid
+from busplan.recordings.statistics import LEAST_EVENTS, Floats, PeriodicEvents, periodic_events
 
-Places = npt.NDArray[np.int64]
+Ints = npt.NDArray[np.int64]
 _JUMP: Final = 1.01
-"""Least ratio of a pause between cycles to one within a cycle."""
+"""Least ratio of two usual distances of frames between which a bound is tried."""
 _FARTHEST: Final = log(8)
-"""Logarithm of the largest ratio of a recorded period to the planned one that pauses are looked for with."""
+"""Largest |log(recorded period / planned period)| at which frames are divided into cycles."""
 _SAME: Final = 0.1
-"""Difference of logarithms of periods that are taken for the same."""
+"""Largest difference of these logarithms at which two periods count as the same."""
 _BURST: Final = 1 / 20
-"""Share of the planned period that is no distance of cycles, but of frames that were stamped in bursts."""
+"""Share of the planned period: cycles closer than that mean that frames were stamped in bursts."""
 
 
 class PlannedCycles:
-    """The cycles of the common multiple of the rates; a single one without rates."""
+    """The cycles of the hyperperiod (the common multiple of the rates); one cycle if all rates are 1."""
 
     def __init__(self, network: Network) -> None:
         self.sorts = cycles_of(network)
-        """The cycles that differ, the fullest first."""
+        """The distinct cycles, the fullest first."""
         self.sort = np.zeros(sum(len(sort.numbers) for sort in self.sorts), dtype=np.int64)
-        """Place in `sorts` of each cycle."""
-        for place, sort in enumerate(self.sorts):
-            self.sort[np.array(sort.numbers) - 1] = place
+        """Index in `sorts` of each cycle."""
+        for index, sort in enumerate(self.sorts):
+            self.sort[np.array(sort.numbers) - 1] = index
         self.data_bytes = np.array([float(sort.data_bytes) for sort in self.sorts])[self.sort]
         """Process data of each cycle [bytes]."""
         self._filled = np.concatenate(([0], np.cumsum(self.data_bytes > 0)))
         filled = np.flatnonzero(self.data_bytes)
         apart = np.diff(filled, append=filled[:1] + len(self.sort)) if len(filled) else np.ones(1, dtype=np.int64)
         self.least_apart = int(apart.min())
-        """Least distance of two cycles with process data, in cycles."""
+        """Least distance from a cycle with process data to the next, in cycles."""
         self.least_share = float(np.mean(apart == self.least_apart))
-        """Share of such distances that are no longer."""
+        """Share of these distances that are as short."""
 
-    def filled_before(self, number: Places) -> Places:
-        """How many cycles before one, from 0, have process data; the common multiple repeats itself."""
+    def filled_before(self, number: Ints) -> Ints:
+        """Number of cycles with process data before a cycle, from 0; it may be beyond the first hyperperiod."""
         whole, rest = np.divmod(number, len(self.sort))
         return np.asarray(whole * self._filled[-1] + self._filled[rest])
 
-    def phase(self, places: Places, data_bytes: npt.NDArray[Any]) -> int:
-        """The cycle of the common multiple that place 0 is, so that process data match best.
+    def phase(self, places: Ints, data_bytes: npt.NDArray[Any]) -> int:
+        """The cycle of the hyperperiod that period 0 of a recording is: the one with the best match of process data.
 
         Parameters
         ----------
         places, data_bytes
-            Places of n cycles in a recording, by periods, and their process data [bytes].
+            Periods of n cycles in the recording, from 0, and their process data [bytes].
         """
         count = len(self.sort)
         pairs, often = np.unique(np.stack((places % count, data_bytes), axis=1), axis=0, return_counts=True)
@@ -62,37 +62,37 @@ class PlannedCycles:
 
 
 class SeenCycles(NamedTuple):
-    """Cycles with process data, n of them."""
+    """The n cycles with process data in a recording."""
 
-    frames: Places
-    """Places of all their frames in the recording."""
-    number: Places
+    frames: Ints
+    """Indexes of all their frames in the recording."""
+    number: Ints
     """Cycle that each frame belongs to, from 0."""
-    first: Places
-    """Places of their first frames."""
+    first: Ints
+    """Indexes of their first frames."""
     periods: PeriodicEvents | None
-    """When they begin; None of too few cycles, or of stamps in bursts."""
+    """When they begin; None for too few cycles, or for stamps in bursts."""
     in_bursts: bool
     """Whether stamps come in bursts, which have no period."""
     sorts: tuple[UnitCycle, ...]
-    """The cycles of the plan that differ, the fullest first."""
-    sort: Places
-    """Place in `sorts` of each cycle."""
-    gaps: Places
-    """Cycles of the plan with process data that are missing between each cycle and the next."""
+    """The distinct cycles of the plan, the fullest first."""
+    sort: Ints
+    """Index in `sorts` of each cycle."""
+    gaps: Ints
+    """Number of planned cycles with process data that are missing between each cycle and the next."""
     left_out: int
-    """Frames of the master's start and end, where more cycles are missing than there are, and of cycles in part."""
+    """Number of frames left out at the ends: the master starting or stopping, and incomplete cycles."""
 
 
-def seen_cycles(frames: Places, times_us: Floats, kinds: Places, data_bytes: Floats, network: Network) -> SeenCycles:
-    """Tell which frames make a cycle, and number the cycles by their times and their process data.
+def seen_cycles(frames: Ints, times_us: Floats, kinds: Ints, data_bytes: Floats, network: Network) -> SeenCycles:
+    """Divide frames into cycles, and find the planned cycle of each from its time and process data.
 
     Parameters
     ----------
     frames
-        Places of the frames of process data in the recording, in the order of their times, at least one.
+        Indexes of the frames of process data in the recording, in the order of their times, at least one.
     times_us, kinds, data_bytes
-        When each was sent, what tells its process data apart, and its process data [bytes].
+        Of each: time sent, number of its datagrams of process data (equal ones have the same), process data [bytes].
     network
         The plan, of plain numbers.
     """
@@ -101,11 +101,11 @@ def seen_cycles(frames: Places, times_us: Floats, kinds: Places, data_bytes: Flo
     starts, near_us = _starts(times_us, kinds, plan, period_us)
     in_bursts = len(starts) > 1 and float(np.median(np.diff(times_us[starts]))) < _BURST * period_us
     begin, end = 0, len(starts)
-    while True:
+    while True:  # until no more cycles have to be left out at the ends
         kept = slice(int(starts[begin]), int(np.append(starts, len(frames))[end]))
         first = starts[begin:end]
         number = np.searchsorted(first, np.arange(kept.start, kept.stop), side="right") - 1
-        periods = None if in_bursts else grid(times_us[first], near_us)
+        periods = None if in_bursts else periodic_events(times_us[first], near_us)
         of_plan, gaps = np.zeros(len(first), dtype=np.int64), np.zeros(len(first) - 1, dtype=np.int64)
         if periods is not None:
             in_cycle_bytes = np.bincount(number, weights=data_bytes[kept]).astype(np.float64)
@@ -121,13 +121,12 @@ def seen_cycles(frames: Places, times_us: Floats, kinds: Places, data_bytes: Flo
         begin, end = begin + taken[0], begin + taken[1]
 
 
-def _starts(times_us: Floats, kinds: Places, plan: PlannedCycles, period_us: float) -> tuple[Places, float]:
-    """Frames that begin a cycle, and about the period of the master's task [us].
+def _starts(times_us: Floats, kinds: Ints, plan: PlannedCycles, period_us: float) -> tuple[Ints, float]:
+    """Indexes of the frames that begin a cycle, and the approximate period of the master's task [us].
 
-    Frames with the same process data behind the same others come at a usual distance. Where it is longer than a bound,
-    the frame begins a cycle. Bounds are tried at each jump of the usual distances: that with the period nearest to the
-    planned one is taken, of those with the same period the one that the fewest frames contradict, as cycles closer to
-    each other than half the period, and frames of a cycle farther apart.
+    Two consecutive kinds of frame have a usual distance, the median. If it exceeds a bound, the second begins a cycle.
+    A bound is tried at each jump of the sorted distances. The best has the period nearest to the planned one; of equal
+    periods, the fewest contradictions: cycles closer than half a period, or frames of one cycle farther apart.
     """
     apart_us = np.diff(times_us)
     _, pair = np.unique(kinds[:-1] * (int(kinds.max()) + 1) + kinds[1:], return_inverse=True)
@@ -143,21 +142,21 @@ def _starts(times_us: Floats, kinds: Places, plan: PlannedCycles, period_us: flo
         least_us = float(np.quantile(between_us, plan.least_share / 2)) if len(between_us) else 0.0
         for cycles in range(1, plan.least_apart + 1):
             near_us = least_us / cycles
-            beside = abs(log(near_us / period_us)) if near_us > 0 else inf
+            off = abs(log(near_us / period_us)) if near_us > 0 else inf
             close, far = between_us < near_us / 2, apart_us[~begins[1:]] > near_us / 2
-            tried.append((beside, int(np.count_nonzero(close) + np.count_nonzero(far)), starts, near_us))
-    least = min(beside for beside, *_ in tried)
+            tried.append((off, int(np.count_nonzero(close) + np.count_nonzero(far)), starts, near_us))
+    least = min(off for off, *_ in tried)
     if least > _FARTHEST:
         return tried[0][2:]
     return min((bound for bound in tried if bound[0] <= least + _SAME), key=lambda bound: bound[1])[2:]
 
 
-def _numbered(plan: PlannedCycles, places: Places, data_bytes: npt.NDArray[Any]) -> tuple[Places, Places]:
-    """Cycle of the common multiple of each recorded one, and how many with process data are missing behind it."""
+def _numbered(plan: PlannedCycles, places: Ints, data_bytes: npt.NDArray[Any]) -> tuple[Ints, Ints]:
+    """Cycle of the hyperperiod for each recorded one, and the number of those missing after it, with process data."""
     count, apart = len(plan.sort), np.diff(places)
     phase = plan.phase(places, data_bytes)
     of_plan = (places + phase) % count
-    # A master that leaves out a cycle may go on with the next one of its own count.
+    # A master that skips a period may not skip a number of its own count: find the phase again after each gap.
     for part in np.split(np.arange(len(places)), np.flatnonzero(apart > plan.least_apart) + 1):
         if np.any(data_bytes[part] != plan.data_bytes[(places[part] + phase) % count]):
             phase = plan.phase(places[part], data_bytes[part])
@@ -166,22 +165,22 @@ def _numbered(plan: PlannedCycles, places: Places, data_bytes: npt.NDArray[Any])
     return of_plan, gaps
 
 
-def _in_operation(gaps: Places) -> tuple[int, int]:
-    """The first cycle and the one behind the last, without the master's start and end.
+def _in_operation(gaps: Ints) -> tuple[int, int]:
+    """The first cycle and the end of the last, without those while the master starts or stops.
 
-    They lie before the first and behind the last ten cycles in a row, where more cycles are missing than there are.
+    Those lie before the first ten or after the last ten cycles in a row, if more cycles are missing there than present.
     """
     in_a_row = np.convolve(np.append(gaps, 1) == 0, np.ones(LEAST_EVENTS - 1), "full")[LEAST_EVENTS - 2 :]
     rows = np.flatnonzero(in_a_row == LEAST_EVENTS - 1)
     if not len(rows):
         return 0, len(gaps) + 1
     first, last = int(rows[0]), int(rows[-1]) + LEAST_EVENTS
-    before, behind = int(gaps[:first].sum()), int(gaps[last - 1 :].sum())
-    return first if before > first else 0, last if behind > len(gaps) + 1 - last else len(gaps) + 1
+    before, after = int(gaps[:first].sum()), int(gaps[last - 1 :].sum())
+    return first if before > first else 0, last if after > len(gaps) + 1 - last else len(gaps) + 1
 
 
-def _whole(frames: Places, sort: Places) -> tuple[int, int]:
-    """The first cycle and the one behind the last, without those that the capture begins or ends within.
+def _whole(frames: Ints, sort: Ints) -> tuple[int, int]:
+    """The first cycle and the end of the last, without cycles that the capture has only in part.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from busplan.buses.ethercat.equations import (
     ProcessData,
     room_bytes,
 )
-from busplan.buses.ethercat.frames import MOST_CYCLES, common_multiple
+from busplan.buses.ethercat.frames import MOST_CYCLES, checked_hyperperiod
 from busplan.elementwise import Number
 from busplan.errors import BusplanError
 from busplan.sections.base import MAX_COUNT, MISSING, Bytes, Count, Problem, TimeUs, refused
@@ -33,7 +33,7 @@ from busplan.sections.profile import Profile
 
 HousekeepingBytes = Annotated[int, Field(ge=0, le=int(room_bytes(1)))]
 _LONGEST_CABLE_M = 1e5
-_MOST_CYCLES = 1000
+_MOST_PIPELINE_CYCLES = 1000
 
 
 class EthercatBus(BusSection):
@@ -93,7 +93,7 @@ class EthercatBus(BusSection):
         examples=[5],
     )
     master_jitter_us: TimeUs = Field(default=0.0, description="How late the frames may start [us]", examples=[20])
-    pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
+    pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_PIPELINE_CYCLES)] = Field(
         default=int(PIPELINE_CYCLES),
         description="Cycles from the frame that brings feedback to the one that takes the command computed from it; "
         "used in latencies and in a loop on the host",
@@ -140,8 +140,8 @@ class EthercatNode(NodeSection):
     )
 
 
-def _at_once(group: dict[str, Any]) -> dict[str, Any] | None:
-    """Execution time of devices without axes; None of others."""
+def _no_time_without_axes(group: dict[str, Any]) -> dict[str, Any] | None:
+    """Default execution of a group: no time for devices without axes; None for others, which must give it."""
     if group.get("axes", 1):
         return None
     return {"kind": "linear", "grade": "assumed", "base_us": 0.0, "per_byte_us": 0.0}
@@ -155,7 +155,7 @@ class EthercatGroup(EthercatNode, GroupSection):
         default=1, description="The group's process data go in every n-th cycle [1]", examples=[4]
     )
     execution: Execution = Field(
-        default_factory=_at_once,
+        default_factory=_no_time_without_axes,
         validate_default=True,
         description="Execution time T_exec in the device, measured; without axes it may be left out: couplers and "
         "terminals take the data of their frame at once, which is assumed",
@@ -169,14 +169,14 @@ class EthercatGroup(EthercatNode, GroupSection):
 
     @field_validator("execution", mode="before")
     @classmethod
-    def _drives_execute(cls, value: object) -> object:
+    def _has_execution(cls, value: object) -> object:
         if value is None:
             raise refused(Problem(MISSING, kind="missing-key"))
         return value
 
     @model_validator(mode="after")
     def _has_payloads(self) -> Self:
-        """Couplers have no data, and most terminals have inputs or outputs alone."""
+        """Replaces the check of the parent: couplers have no data, and most terminals only inputs or only outputs."""
         return self
 
 
@@ -193,9 +193,9 @@ class EthercatProfile(Profile):
     @model_validator(mode="after")
     def _rates_meet(self) -> Self:
         try:
-            common_multiple([group.every for group in self.group])
+            checked_hyperperiod([group.every for group in self.group])
         except BusplanError as error:
-            slowest = max(range(len(self.group)), key=lambda place: self.group[place].every)
+            slowest = max(range(len(self.group)), key=lambda index: self.group[index].every)
             raise refused(Problem(str(error), key=f"group.{slowest}.every", kind="inconsistent")) from None
         return self
 

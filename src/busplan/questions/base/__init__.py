@@ -1,1 +1,1 @@
-"""Shared by public functions: the base of answers, and profiles as arguments."""
+"""What public functions share: the base class of answers, arguments and sentences."""

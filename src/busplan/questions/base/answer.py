@@ -2,16 +2,13 @@
 
 import json
 import os
-import shlex
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from string import ascii_letters, digits
 from types import MappingProxyType
 from typing import Any, Final
 
-from busplan.english import has_controls
 from busplan.errors import BusplanError
 from busplan.extras import require_pyarrow, require_resvg
 from busplan.files import document_bytes, write_file
@@ -19,47 +16,9 @@ from busplan.forms import ENDINGS, Form, ending_expected, render
 from busplan.forms.blocks import Report, first_drawing
 from busplan.forms.charts import Drawing
 from busplan.forms.terminal import block_lines
-from busplan.profile.changes import KeyChanges
-
-
-def shell_word(text: str) -> str:
-    """Quote an argument for a shell.
-
-    Examples
-    --------
-    >>> shell_word("line 1.toml"), shell_word("-x.toml"), shell_word("-")
-    ("'line 1.toml'", './-x.toml', '-')
-    """
-    if text.startswith("-") and text != "-":
-        # The program would take it for an option, whatever the quotes.
-        text = f"./{text}"
-    if not has_controls(text):
-        return shlex.quote(text)
-    # Control characters need $'...', which bash, zsh and POSIX 2024 support.
-    plain = f"{ascii_letters}{digits}/._-+ "
-    escaped = (chr(byte) if chr(byte) in plain else f"\\x{byte:02x}" for byte in os.fsencode(text))
-    return f"$'{''.join(escaped)}'"
-
-
-def period_option(period_us: float) -> tuple[str, str]:
-    """The --period option for exactly this period.
-
-    Examples
-    --------
-    >>> period_option(500.0), period_option(0.1)
-    (('--period', '500us'), ('--period', '0.1us'))
-    """
-    return "--period", f"{repr(period_us).removesuffix('.0')}us"
-
-
-def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
-    """Options of the changes, quoted for a shell; --period with the profile's period [us]."""
-    for change in changes.entries:
-        yield from period_option(period_us) if change.option == "--period" else (change.option, shell_word(change.text))
-
 
 _LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
-"""Check that the library for a file is installed, by ending."""
+"""Function that refuses a file whose library is not installed, by ending."""
 
 
 class Answer(ABC):
@@ -86,7 +45,7 @@ class Answer(ABC):
         return render(self.report(), "html")
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the answer to a file in the form of its ending; an old file is whole until the new one replaces it.
+        """Write the answer to a file in the form that its ending names; an old file is replaced atomically.
 
         Parameters
         ----------
@@ -107,7 +66,7 @@ class Answer(ABC):
         write_file(Path(path), document_bytes(contents[ending]()), overwrite=True)
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
-        """Makers of a file's content, by ending."""
+        """Functions that make the content of a file, by ending."""
         texts = {ending: partial(self._text, form) for ending, form in ENDINGS.items()}
         return {**texts, ".svg": self.svg, ".png": self._png}
 
@@ -154,10 +113,10 @@ class Answer(ABC):
 
     @abstractmethod
     def report(self) -> Report:
-        """The answer in blocks, from which every form but JSON and CSV is made."""
+        """The answer in blocks, from which every form but JSON and CSV is written."""
 
     def _shown(self) -> Report:
-        """The report for a reader in Python."""
+        """The report with a pointer to `to_dict()`, where the command line points to an option."""
         return self.report()._replace(whole_by="to_dict() has all figures.")
 
     def _headline(self) -> str:

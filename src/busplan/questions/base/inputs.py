@@ -1,4 +1,4 @@
-"""Arguments of the Python interface: profiles, and values as lists, ranges or NumPy arrays."""
+"""Arguments of the Python interface: profiles, and values as lists, ranges or NumPy arrays, all checked."""
 
 import os
 import sys
@@ -66,26 +66,26 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
 
 
 def load_network(profile: ProfileLike) -> Network:
-    """Read and check a profile as `load_profile` does, as the network that questions take."""
+    """Read and check a profile as `load_profile` does, and make the network that is computed."""
     return network_of(load_profile(profile))
 
 
-def with_cycle(profile: Profile, *, question: str, instead: str = "") -> Profile:
-    """The profile, where it has a cycle.
+def require_cycle(profile: Profile, *, question: str, instead: str = "") -> Profile:
+    """Return a profile that has a cycle; refuse one of messages alone.
 
     Parameters
     ----------
     profile
-        The network.
+        The profile.
     question
-        What asks for a cycle, in words.
+        What needs the cycle, for the message.
     instead
-        Advice; by default the commands that judge messages.
+        Advice for the message; by default the commands that judge messages.
 
     Raises
     ------
     BusplanError
-        A network of messages alone.
+        The profile has messages alone.
     """
     if profile.has_cycle:
         return profile
@@ -99,7 +99,7 @@ def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str
     Raises
     ------
     BusplanError
-        Not a mapping, or a key that is no text.
+        The values are no mapping, or a key is no text.
     """
     if not isinstance(values, Mapping | None):
         raise BusplanError(f'{name} {values!r}: expected new values by key, as {{"bus.nodes": 3}}')
@@ -110,12 +110,12 @@ def values_by_key(values: Mapping[str, object] | None, *, name: str) -> dict[str
 
 
 def argument(path: Path) -> str:
-    """PROFILE argument of the command line for a path.
+    """Write a path as the PROFILE argument of the command line.
 
     Raises
     ------
     BusplanError
-        Standard input, or not a path.
+        It is standard input, or not a path.
     """
     if not isinstance(path, str | os.PathLike):
         raise BusplanError(f"{path!r}: expected a path, the name of a shipped profile, or a Profile")
@@ -135,7 +135,7 @@ def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
     Raises
     ------
     BusplanError
-        A single value, or no values.
+        There is a single value, or none.
     """
     plain_values = from_numpy(values)
     if isinstance(plain_values, str) or not isinstance(plain_values, Iterable):
@@ -152,7 +152,7 @@ def one_or_several(values: Any, *, name: str) -> list[Any]:
     Raises
     ------
     BusplanError
-        No values.
+        There are no values.
     """
     plain_values = from_numpy(values)
     is_one = isinstance(plain_values, str | os.PathLike) or not isinstance(plain_values, Iterable)
@@ -160,7 +160,7 @@ def one_or_several(values: Any, *, name: str) -> list[Any]:
 
 
 def checked_models(timing_model: Models | None, network: Network) -> tuple[str, ...]:
-    """Check the name of a timing model, or of several; None means all of the profile's kind of bus.
+    """Check the name of a timing model, or of several; None means all that can express the network.
 
     Raises
     ------
@@ -175,10 +175,10 @@ def checked_models(timing_model: Models | None, network: Network) -> tuple[str, 
         raise BusplanError(
             f"timing_model {timing_model!r}: expected {listed([*map(repr, names)], 'or')}, or a list of them, each once"
         )
-    return tuple(known_model(network, model, name="timing_model") for model in models)
+    return tuple(checked_model(network, model, name="timing_model") for model in models)
 
 
-def known_model(network: Network, model: str, *, name: str) -> str:
+def checked_model(network: Network, model: str, *, name: str) -> str:
     """Check the name of a timing model.
 
     Parameters
@@ -188,7 +188,7 @@ def known_model(network: Network, model: str, *, name: str) -> str:
     model
         The name.
     name
-        Name of the parameter, for messages.
+        Name of the parameter, for the message.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def finite(value: object, *, name: str) -> float:
         NaN, infinite, a bool, or not a number.
     """
     number = from_numpy(value)
-    # Comparing first: float() of a huge int would raise OverflowError.
+    # The range is checked first: float() of a huge int would raise OverflowError.
     if type(number) not in (int, float) or not -MOST_FLOAT <= number <= MOST_FLOAT:
         raise BusplanError(f"{name} {number!r}: expected a finite number")
     return float(number)
@@ -251,8 +251,8 @@ def origin_of(profile: Profile) -> Origin:
     Returns
     -------
     tuple
-        The shipped profile of its name, with the changes that make them equal; or NAME.toml without changes, where
-        there is no such shipped profile or no option can make a change.
+        The shipped profile of the same name, with the changes that turn it into this one; or NAME.toml without changes,
+        if there is no such shipped profile or no option can make a change.
 
     Examples
     --------
@@ -271,7 +271,7 @@ def key_changes(values: Mapping[str, object]) -> KeyChanges:
     Raises
     ------
     BusplanError
-        Not new values by key, two keys overlap, or TOML cannot write a value.
+        The changes are not new values by key, two keys overlap, or TOML cannot write a value.
     """
     changes = []
     for key, value in values_by_key(values, name="changes").items():
@@ -283,7 +283,7 @@ def key_changes(values: Mapping[str, object]) -> KeyChanges:
 
 
 def _changes_of_shipped(profile: Profile) -> KeyChanges | None:
-    """Changes from the shipped profile of the same name; None if none lead to it."""
+    """Changes that turn the shipped profile of the same name into this one; None if no changes do."""
     shipped = load(profile.name).profile
     old, new = dotted_keys(shipped), dotted_keys(profile)
     differing = {key: place.value for key, place in new.items() if key not in old or old[key].value != place.value}

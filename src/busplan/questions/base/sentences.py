@@ -45,7 +45,7 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes
     changes
         The new values.
     meanings
-        Note on a change, by key, for keys that need one.
+        What a change means on the machine, by key, for keys that do not say so.
     quotes
         If True, text values are quoted, as in a profile.
     """
@@ -62,20 +62,20 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes
 
 
 def change_meanings(bus: "Bus") -> dict[str, str]:
-    """Meaning of a change on the machine, by key, for keys that do not say so."""
+    """What a change means on the machine, by key, for keys that do not say so."""
     return {name: key.meaning for name, key in bus.keys.items() if key.meaning}
 
 
 def warning_sentences(network: Network) -> Iterator[Sentence]:
-    """Warnings of a network's own number of nodes, whatever the verdict."""
+    """Warnings for a network with its own number of nodes; they hold whatever the verdict."""
     warnings = network.bus.warnings(network, nodes=[int(plain(network.nodes))])
     return (Sentence((f"Warning: {words}.",), "warns") for words in warnings)
 
 
 def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterator[Sentence]:
-    """Say how the execution time behind the figures is known; nothing without a grade, or where none is in them.
+    """Say the grade of the execution time in the figures; nothing if it has no grade, or if they contain none.
 
-    Where groups differ, each grade stands with the groups that have it.
+    If groups differ, each grade is named with its groups.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def execution_sentence(network: Network, *, of_latency: bool = False) -> Iterato
 
 
 def checked_against(bus: "Bus", *, has_cycle: bool = True) -> str:
-    """Parts of a kind's model that published figures test, and those that none does."""
+    """Parts of a bus model that published figures test, and those that were never measured."""
     tested = parts_tested(bus.evidence_data)
     parts = ", ".join(f"{part} ({by})" for part, by in tested.parts.items())
     never = f"never measured: {', '.join(tested.untested)}" if tested.untested and has_cycle else ""
@@ -112,8 +112,8 @@ def reset_sentence(after: FitFigures | None, network: Network) -> Iterator[Sente
         yield sentence(text, state="warns")
 
 
-def story(figures: FitFigures, network: Network) -> tuple[Part, ...]:
-    """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict."""
+def margin_words(figures: FitFigures, network: Network) -> tuple[Part, ...]:
+    """The margin of a cycle under one timing model, or the limits that it breaks; no verdict."""
     available = attribute_value(AVAILABLE, figures)
     if figures.fits:
         used = attribute_value(UTILISATION, figures)._replace(decimals=1)
@@ -126,13 +126,13 @@ def story(figures: FitFigures, network: Network) -> tuple[Part, ...]:
 
 
 def margin_parts(figures: FitFigures) -> tuple[Part, ...]:
-    """The corrected margin under the model that decides, with its uncertainty as far as that is known."""
+    """The corrected margin under the model that decides, with its uncertainty if that is known."""
     margin, doubt = (attribute_value(figure, figures) for figure in (MARGIN_CORRECTED, UNCERTAINTY))
     return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
 
 
 def safety_record(figures: FitFigures, network: Network) -> Record:
-    """Whether the settings of the bus are safe, by the key of its kind; empty if the kind has none."""
+    """Whether the settings of the bus are safe, under the key that its kind has for that; empty if it has none."""
     safety = network.bus.safety.figure
     return {} if safety is None else {safety.key: figures.safe}
 
@@ -146,7 +146,7 @@ def document(command: str, **content: object) -> JsonDocument:
 
 
 def fields(owner: object, *names: str) -> Record:
-    """Attributes by name as plain data: a tuple becomes a list, and all are None where there is no owner."""
+    """Attributes by name as plain data: a tuple becomes a list; all are None if the owner is None."""
     values = {name: getattr(owner, name) if owner is not None else None for name in names}
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
@@ -157,12 +157,12 @@ def with_profile(name: str, records: Sequence[Record]) -> list[Record]:
 
 
 def parts_by(parts: Mapping[str, str]) -> list[Record]:
-    """Parts of a kind's model that published figures set or test, each with those figures."""
+    """Parts of a bus model that published figures set or test, each with those figures."""
     return [{"part": part, "by": words} for part, words in parts.items()]
 
 
 def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDocument:
-    """Add the new values by --set to a document, as `changes`; `diff` has other `changes` already."""
+    """Add the new values of --set to a document, as `changes`; in `diff`, which has others, as `changes_of_both`."""
     if not changes.by_set:
         return dict(content)
     name = "changes" if "changes" not in content else "changes_of_both"
@@ -179,26 +179,26 @@ def changed_report(report: Report, changes: KeyChanges) -> Report:
 
 
 def changes_sentences(changes: KeyChanges) -> list[Sentence]:
-    """Name the --set options in a sentence, because what is computed is not what the file says; empty without them."""
+    """Name the --set options in a sentence, because the figures are not those of the file; empty without them."""
     options = [Sentence((Code(change.typed),)) for change in changes.by_set]
     return [joined(Sentence(("With ",)), joined(*options, by=" and "), Sentence((".",)), by="")] if options else []
 
 
-_FIRST_TO_LEAVE: Final = 9
-"""Rank of the column of equations, which leaves a narrow terminal before the figures do."""
+_DROPPED_FIRST: Final = 9
+"""Rank of the column of equations: a narrow terminal drops it before the figures."""
 
 
-class Owner(NamedTuple):
-    """An object with figures: one column."""
+class FigureColumn(NamedTuple):
+    """A column of figures."""
 
-    column: TableColumn
+    head: TableColumn
     figures: object
-    """Object with the figures as attributes."""
+    """Figures by key, or an object with the figures as attributes."""
 
 
 def figure_table(
     rows: Iterable[tuple[Figure, int]],
-    owners: Sequence[Owner],
+    columns: Sequence[FigureColumn],
     *,
     caption: Sentence,
     unit: bool = True,
@@ -206,37 +206,37 @@ def figure_table(
     is_detail: Callable[[Figure], bool] = lambda _figure: False,
     state: Callable[[Figure, Any], State] = lambda _figure, _figures: "neutral",
 ) -> Table:
-    """Table of figures, the owners side by side.
+    """Table with a row for each figure.
 
     Parameters
     ----------
     rows
         Figures with their levels.
-    owners
-        One for each column.
+    columns
+        One for each period, model or transaction that has the figures.
     caption
         Caption of the table.
     unit
         If False, the column of units is left out: the caption says the unit.
     hides_equations
-        If True, the column of equations and sources is shown only in a whole answer.
+        If True, the column of equations and sources is shown only with `--all`.
     is_detail
-        Whether the row of a figure is shown only in a whole answer.
+        Whether the row of a figure is shown only with `--all`.
     state
-        State of a figure of an owner's object, beside that of a truth.
+        State of a figure, from the figure and the figures of its column; "neutral" keeps the state of the value.
     """
-    equation = TableColumn("eq", kind="words", rank=_FIRST_TO_LEAVE, is_detail=hides_equations)
+    equation = TableColumn("eq", kind="words", rank=_DROPPED_FIRST, is_detail=hides_equations)
     head = [TableColumn("figure", kind="words"), equation]
     head += [TableColumn("unit", kind="words")] if unit else []
     shown = []
     for figure, level in rows:
         words = (figure.label, figure.reference, figure.column or figure.unit)[: len(head)]
-        values = (_value(figure, owner, state) for owner in owners)
+        values = (_value(figure, column, state) for column in columns)
         shown.append(TableRow((*words, *values), level, is_detail=is_detail(figure)))
-    # Each panel of a narrow terminal says the unit again.
-    return Table((*head, *(owner.column for owner in owners)), tuple(shown), caption, heads=len(head))
+    # A narrow terminal splits the table into panels, each with the first columns again.
+    return Table((*head, *(column.head for column in columns)), tuple(shown), caption, heads=len(head))
 
 
-def _value(figure: Figure, owner: Owner, state: Callable[[Figure, Any], State]) -> ShownValue:
-    value, judged = attribute_value(figure, owner.figures), state(figure, owner.figures)
+def _value(figure: Figure, column: FigureColumn, state: Callable[[Figure, Any], State]) -> ShownValue:
+    value, judged = attribute_value(figure, column.figures), state(figure, column.figures)
     return value if judged == "neutral" else value._replace(state=judged)

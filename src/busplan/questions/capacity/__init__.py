@@ -1,4 +1,4 @@
-"""`busplan.capacity`."""
+"""`busplan.capacity`: does the cycle fit its period, and how many axes does the bus carry?"""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
@@ -13,9 +13,9 @@ from busplan.questions.base.inputs import (
     checked_models,
     load_network,
     one_or_several,
-    with_cycle,
+    require_cycle,
 )
-from busplan.questions.capacity.lines import Verdict, verdict_of
+from busplan.questions.capacity.verdict import Verdict, verdict_of
 from busplan.questions.fit.certainty import FITS, VerdictWord
 from busplan.questions.fit.figures import CapacityFigures, capacity_figures
 from busplan.questions.fit.network import at_periods, model_names
@@ -32,7 +32,7 @@ class CapacityAnswer(Answer):
     Parameters
     ----------
     profile
-        The network.
+        The profile.
     periods
         Figures of each period, one set for each timing model.
     verdicts
@@ -48,17 +48,17 @@ class CapacityAnswer(Answer):
 
     @property
     def verdict(self) -> VerdictWord:
-        """The verdict on a single period, by the timing model that decides."""
+        """The verdict on the only period, by the timing model that decides."""
         return cast("VerdictWord", self._deciding.verdict)
 
     @property
     def fits(self) -> bool:
-        """Whether the cycle is shown to fit a single period: `verdict` is "fits"."""
+        """Whether the cycle is shown to fit the only period: `verdict` is "fits"."""
         return self.verdict == FITS
 
     @property
     def margin_us(self) -> float:
-        """Free time of a single period's slice, less the bias: `margin_corrected_us` of the model that decides [us]."""
+        """Free time in the slice of the only period less the bias: `margin_corrected_us` of the deciding model [us]."""
         return cast("float", self._deciding.margin_corrected_us)
 
     @property
@@ -141,7 +141,7 @@ def capacity(
     """
     network = load_network(profile)
     if sensitivity:
-        with_cycle(network.profile, question="the effect of small changes on its margin")
+        require_cycle(network.profile, question="the effect of small changes on its margin")
     models = checked_models(timing_model, network) or model_names(network)
     networks = at_periods(network, None if period_us is None else one_or_several(period_us, name="period_us"))
     periods = tuple(tuple(capacity_figures(at, model=model) for model in models) for at in networks)

@@ -23,16 +23,16 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import period, sentence_text
-from busplan.questions.base.sentences import Owner, document, fields, figure_table, safety_record, with_profile
+from busplan.questions.base.sentences import FigureColumn, document, fields, figure_table, safety_record, with_profile
 from busplan.questions.capacity import CapacityAnswer
-from busplan.questions.capacity.lines import Verdict, card, uncertainty_parts
+from busplan.questions.capacity.verdict import Verdict, card, uncertainty_parts
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.figures import COUNTS
 from busplan.questions.fit.network import leading_model
 
 
 def capacity_report(answer: CapacityAnswer) -> Report:
-    """Report of `capacity`; figures of a group are in the columns of CSV that have its name."""
+    """Report of `capacity`; in CSV, figures of a group have columns with its name."""
     name = answer.profile.name
     results, records = [], []
     for figures in answer.results:
@@ -58,16 +58,14 @@ def _blocks(answer: CapacityAnswer) -> Iterator[Block]:
         yield _groups_table(answer)
 
 
-_GROUP_SAFE: Final[tuple[Figure, ...]] = (figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY)
-"""Figures of a group under the timing model that decides."""
-_GROUP: Final[tuple[Figure, ...]] = (figure.MAX_NODES, figure.LIMITED_BY)
-"""Under another timing model."""
-_VERDICT: Final = (
-    *(figure.VERDICT, figure.FITS, figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS),
-    *_GROUP_SAFE,
-)
-_DECIDES: Final = frozenset(row.key for row in (*_VERDICT, figure.AVAILABLE, figure.REQUIRED, figure.MARGIN))
-"""Figures that are no detail; beside them the terms that take time."""
+_GROUP_BY_DECIDING: Final[tuple[Figure, ...]] = (figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY)
+"""Figures of a group by the timing model that decides."""
+_GROUP_BY_OTHER: Final[tuple[Figure, ...]] = (figure.MAX_NODES, figure.LIMITED_BY)
+"""Figures of a group by another timing model."""
+_CERTAINTY: Final = (figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS)
+_VERDICT: Final = (figure.VERDICT, figure.FITS, *_CERTAINTY, *_GROUP_BY_DECIDING)
+_ALWAYS_SHOWN: Final = frozenset(row.key for row in (*_VERDICT, figure.AVAILABLE, figure.REQUIRED, figure.MARGIN))
+"""Keys of the figures that are always shown, as are the terms that take time; all others are details."""
 
 
 def _table(answer: CapacityAnswer) -> Table:
@@ -80,15 +78,15 @@ def _table(answer: CapacityAnswer) -> Table:
         f"{', '.join(f'{{}} {nouns(number, noun)}' for number, noun in counts)}{setup and f'; {setup}'}",
         *(count_value(number, nouns(2, noun)) for number, noun in counts),
     )
-    rows, shown = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)], _DECIDES
+    rows = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)]
+    shown = _ALWAYS_SHOWN | {term.key for figures in answer.results for term in figures.terms if term.us}
     if not profile.has_cycle:
         results = [figures.values() for figures in answer.results]
         rows = [row for row in rows if any(values[row[0].key] is not None for values in results)]
         shown |= {figure.key for figure in bus.figures.table}
-    shown |= {term.key for figures in answer.results for term in figures.terms if term.us}
     return figure_table(
         rows,
-        list(_owners(answer)),
+        list(_columns(answer)),
         caption=caption,
         hides_equations=True,
         is_detail=lambda figure: figure.key not in shown,
@@ -110,7 +108,7 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
     return [*((row, 0) for row in above), *((term, 1) for term in bus.figures.terms), *((row, 0) for row in below)]
 
 
-def _owners(answer: CapacityAnswer) -> Iterator[Owner]:
+def _columns(answer: CapacityAnswer) -> Iterator[FigureColumn]:
     """A column for each period and timing model, the profile's own model first."""
     network = answer.verdicts[0].network
     leading, deciding = leading_model(network), network.bus.deciding_model
@@ -119,12 +117,12 @@ def _owners(answer: CapacityAnswer) -> Iterator[Owner]:
         group = period(results[0].period_us) if several else ""
         for figures in sorted(results, key=lambda figures: figures.timing_model != leading):
             rank = 1 if several and len(results) > 1 and figures.timing_model != deciding else 0
-            yield Owner(TableColumn(figures.timing_model, group=group, rank=rank), figures.values())
+            yield FigureColumn(TableColumn(figures.timing_model, group=group, rank=rank), figures.values())
 
 
-def _state(key: Figure, values: Mapping[str, Any]) -> State:
+def _state(row: Figure, values: Mapping[str, Any]) -> State:
     """State of a figure that, by itself, decides whether the cycle fits."""
-    match key:
+    match row:
         case figure.VERDICT:
             return "neutral" if values["verdict"] is None else state_of(values["verdict"] == FITS)
         case figure.MARGIN_CORRECTED:
@@ -139,28 +137,30 @@ def _state(key: Figure, values: Mapping[str, Any]) -> State:
 def _groups_table(answer: CapacityAnswer) -> Table:
     """How many nodes of each group fit each period, the other groups as they are."""
     columns = [TableColumn("group", kind="words"), TableColumn("nodes"), TableColumn("axes")]
-    shown = [(figures, _GROUP if figures.verdict is None else _GROUP_SAFE) for figures in answer.results]
-    for figures, keys in shown:
+    shown = [
+        (figures, _GROUP_BY_OTHER if figures.verdict is None else _GROUP_BY_DECIDING) for figures in answer.results
+    ]
+    for figures, chosen in shown:
         at = f"{period(figures.period_us)}, " if len(answer.periods) > 1 else ""
         columns += (
             TableColumn(
-                key.label, kind="words" if key.sort == "word" else "figures", group=f"{at}{figures.timing_model}"
+                column.label, kind="words" if column.sort == "word" else "figures", group=f"{at}{figures.timing_model}"
             )
-            for key in keys
+            for column in chosen
         )
     rows = []
     for place, group in enumerate(answer.results[0].groups):
         head = (Code(group.name), count_value(group.nodes, "nodes"), count_value(group.axes, "axes"))
-        cells = (attribute_value(key, figures.groups[place]) for figures, keys in shown for key in keys)
+        cells = (attribute_value(column, figures.groups[place]) for figures, chosen in shown for column in chosen)
         rows.append(TableRow((*head, *cells)))
     return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, the others as they are",)))
 
 
 def _verdict(verdict: Verdict) -> Record:
     change, figures, bus = verdict.change, verdict.deciding, verdict.network.bus
-    unable = {model.name: bus.cannot_express(verdict.network, model=model.name) for model in bus.timing_models}
-    words = card(verdict)
-    lines = [(label, sentence_text(line)) for label, line in words.lines]
+    missing = {model.name: bus.cannot_express(verdict.network, model=model.name) for model in bus.timing_models}
+    summary = card(verdict)
+    lines = [(label, sentence_text(line)) for label, line in summary.lines]
     text = "; ".join(f"{label}: {line}" for label, line in lines)
     return {
         "period_us": verdict.period_us,
@@ -170,11 +170,11 @@ def _verdict(verdict: Verdict) -> Record:
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **safety_record(figures, verdict.network),
         **fields(figures, "available_us", "required_us", "margin_us"),
-        **fields(figures, *(key.key for key in figure.CERTAINTY if key is not figure.VERDICT)),
+        **fields(figures, *(row.key for row in figure.CERTAINTY if row is not figure.VERDICT)),
         "uncertainty_parts": uncertainty_parts(figures),
         "reserve": verdict.network.profile.limits.reserve,
         "not_in_it": [part.key for part in verdict.left_out],
-        "not_applicable": {model: list(keys) for model, keys in unable.items() if keys},
+        "not_applicable": {model: list(keys) for model, keys in missing.items() if keys},
         "cheapest_change": change
         and {
             "changes": change.changes,
@@ -183,6 +183,6 @@ def _verdict(verdict: Verdict) -> Record:
         },
         "fastest_period_us": verdict.fastest and verdict.fastest.us,
         "warnings": list(verdict.warnings),
-        "text": f"{sentence_text(words.subject)}: {words.verdict.text}. {text}.",
+        "text": f"{sentence_text(summary.subject)}: {summary.verdict.text}. {text}.",
         "lines": [{"label": label, "text": line} for label, line in lines],
     }

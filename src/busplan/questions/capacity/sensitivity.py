@@ -39,16 +39,16 @@ class NextBottleneck(NamedTuple):
     binding_term: Term
     """The largest term of the cycle."""
     next_binding_term: Term
-    """The largest of the other terms, in a cycle without the largest where something takes that out."""
+    """The next term: the largest of a cycle without the largest term, or the second largest if nothing takes it out."""
     next_margin_corrected_us: float | None
-    """Corrected margin without the largest term; None where nothing takes it out."""
+    """Corrected margin without the largest term; None if nothing takes it out."""
 
 
 def next_bottleneck(network: Network) -> NextBottleneck:
     """Find what binds a network once its first bottleneck is gone.
 
-    A term is taken out at its cause, and the cycle is computed anew: without execution, for
-    example, the bus is idle for longer.
+    A term is taken out at its cause, and the cycle is computed anew: without execution, for example, the bus is idle
+    for longer.
 
     Parameters
     ----------
@@ -58,12 +58,12 @@ def next_bottleneck(network: Network) -> NextBottleneck:
     bus = network.bus
     cycle = bus.cycle(network, model=bus.deciding_model)
     binding = _largest(cycle)
-    relieved = (
+    without_causes = (
         network._replace(groups=tuple(map(at_once, network.groups))),
         network._replace(nonperiodic_us=0.0),
         *(trial(network, changes) for changes in bus.term_removals),
     )
-    cycles = (bus.cycle(without_cause, model=bus.deciding_model) for without_cause in relieved)
+    cycles = (bus.cycle(without_cause, model=bus.deciding_model) for without_cause in without_causes)
     without = next(
         (cycle for cycle in cycles if not any(plain(term.us) for term in cycle.terms if term.key == binding.key)), None
     )
@@ -83,7 +83,7 @@ def _largest(cycle: BusCycle, *, but: str = "") -> Term:
     return max((term for term in cycle.terms if term.key != but), key=lambda term: plain(term.us))
 
 
-_EXECUTION_SHARE: Final = 0.1
+_MORE_EXECUTION: Final = 0.1
 _PAYLOAD_STEP_BYTES: Final = 4
 """A quadlet: payloads are padded to it."""
 
@@ -95,19 +95,19 @@ class Perturbed(NamedTuple):
     key: str
     """Key of the profile, or figure of `latency`, that changes."""
     before: Any
-    """Value of the key before; None where groups differ."""
+    """Value of the key before; None if groups differ."""
     after: Any
     network: Network | None
     """None where the change cannot be made."""
     note: str
-    """Why it cannot be made, or why the margin stays as it is, where it does."""
+    """Why the change cannot be made, or why the margin stays as it is if it does."""
 
 
 def perturbed(network: Network) -> Iterator[Perturbed]:
     """Make every small change of a network, one at a time.
 
-    Every kind of bus has 10 % more execution time, one node and one axis more of each group, four bytes more of every
-    payload, and a bus reset; changes of one kind alone come before the reset.
+    For every kind of bus: 10 % more execution time, one more node and one more axis in each group, four more bytes in
+    every payload. Then the changes that a single kind of bus has, and a bus reset if it changes settings.
     """
     bus = network.bus
     yield _slower(network)
@@ -121,33 +121,33 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
 
 
 def _slower(network: Network) -> Perturbed:
-    factor = 1 + _EXECUTION_SHARE
+    factor = 1 + _MORE_EXECUTION
     groups = []
     for group in network.groups:
         read_us, write_us = factor * group.read_execution_us, factor * group.write_execution_us
-        doubt_us = group.node.execution.standard_uncertainty_us
+        read_u_us, write_u_us = map(group.node.execution.standard_uncertainty_us, (read_us, write_us))
         slower = group._replace(read_execution_us=read_us, write_execution_us=write_us)
-        groups.append(slower._replace(read_uncertainty_us=doubt_us(read_us), write_uncertainty_us=doubt_us(write_us)))
-    then = network._replace(groups=tuple(groups))
+        groups.append(slower._replace(read_uncertainty_us=read_u_us, write_uncertainty_us=write_u_us))
+    slowed = network._replace(groups=tuple(groups))
     before, after = (
         _common_value(us for group in at.groups for us in (group.read_execution_us, group.write_execution_us))
-        for at in (network, then)
+        for at in (network, slowed)
     )
     note = "" if network.bus.has_execution(network) else "no execution time is on the bus"
-    return Perturbed(f"execution time +{_EXECUTION_SHARE:.0%}", "execution_us", before, after, then, note)
+    return Perturbed(f"execution time +{_MORE_EXECUTION:.0%}", "execution_us", before, after, slowed, note)
 
 
 def _one_node_more(network: Network, group: ProfileGroup) -> Perturbed:
     more = group.nodes + 1
-    then = network.varying(group.name).with_nodes(more)
-    return Perturbed(f"one node more{_in(group)}", group.nodes_key, group.nodes, more, then, "")
+    grown = network.varying(group.name).with_nodes(more)
+    return Perturbed(f"one node more{_in(group)}", group.nodes_key, group.nodes, more, grown, "")
 
 
 def _one_axis_more(network: Network, group: ProfileGroup) -> Perturbed:
     key, axes = group.node_key("axes"), group.node.axes + 1
-    then, unknown = _if_known(lambda: trial(network, {key: axes}))
+    grown, unknown = _if_known(lambda: trial(network, {key: axes}))
     note = unknown or ("" if group.payload.follows_axes else "no payload follows the axes")
-    return Perturbed(f"one axis more per node{_in(group)}", key, axes - 1, axes, then, note)
+    return Perturbed(f"one axis more per node{_in(group)}", key, axes - 1, axes, grown, note)
 
 
 def _more_bytes(network: Network) -> Perturbed:
@@ -156,22 +156,22 @@ def _more_bytes(network: Network) -> Perturbed:
         (read_bytes + _PAYLOAD_STEP_BYTES, write_bytes + _PAYLOAD_STEP_BYTES) for read_bytes, write_bytes in sizes
     ]
     before, after = (_common_value(chain.from_iterable(pairs)) for pairs in (sizes, longer))
-    then, unknown = _if_known(lambda: with_payloads(network, longer))
-    return Perturbed(f"payload +{_PAYLOAD_STEP_BYTES} bytes", "payload_bytes", before, after, then, unknown)
+    grown, unknown = _if_known(lambda: with_payloads(network, longer))
+    return Perturbed(f"payload +{_PAYLOAD_STEP_BYTES} bytes", "payload_bytes", before, after, grown, unknown)
 
 
 def _with_keys(network: Network, perturbation: Perturbation) -> Perturbed:
-    """A change that a kind of bus names by keys of the profile."""
+    """Make a change that a kind of bus gives as new values by key of the profile."""
     key = ", ".join(perturbation.changes)
     after = perturbation.changes.get(key)
     before = None if after is None else value_at(network.profile, key)
     if perturbation.why_not:
         return Perturbed(perturbation.label, key, before, None, None, perturbation.why_not)
     try:
-        then = changed(network, perturbation.changes)
+        set_anew = changed(network, perturbation.changes)
     except BusplanError as error:
         return Perturbed(perturbation.label, key, before, after, None, "; ".join(error.problems))
-    return Perturbed(perturbation.label, key, before, after, then, perturbation.if_nothing)
+    return Perturbed(perturbation.label, key, before, after, set_anew, perturbation.if_nothing)
 
 
 def _if_known(change: Callable[[], Network]) -> tuple[Network | None, str]:
@@ -200,14 +200,14 @@ class Effect(NamedTuple):
     key: str
     """A key of the profile, or a figure of `latency`."""
     before: Any
-    """Value of the key before, in the key's unit; None where groups differ."""
+    """Value of the key before, in the key's unit; None if groups differ."""
     after: Any
     margin_change_us: float | None
-    """By how much the corrected margin grows; None where the change cannot be made."""
+    """By how much the corrected margin grows; None if the change cannot be made."""
     then: FitFigures | None
-    """Whether the network with the change fits."""
+    """Figures of the network with the change; None if it cannot be made."""
     note: str
-    """Why the change cannot be made, or why the margin stays as it is, and which limits come nearer then."""
+    """Why the change cannot be made; or why the margin stays as it is, and how much nearer other limits come."""
 
 
 class Sensitivity(NamedTuple):
@@ -218,7 +218,7 @@ class Sensitivity(NamedTuple):
     timing_model: str
     now: FitFigures
     effects: tuple[Effect, ...]
-    """The largest first; changes that cannot be made are the last."""
+    """The largest first; changes that cannot be made come last."""
     next_bottleneck: NextBottleneck
 
 
@@ -248,7 +248,7 @@ def _effect(cause: Perturbed, now: FitFigures, network: Network) -> Effect:
 
 
 def _nearer(network: Network, changed: Network) -> Iterator[str]:
-    """Say how much nearer a change comes to limits that are times, each with its doubt as a shown verdict has it."""
+    """Say how much nearer a change comes to each limit that is a time; the distance is from its value plus U."""
     for limit in network.bus.limits:
         if limit.doubt is None:
             continue

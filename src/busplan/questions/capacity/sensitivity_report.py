@@ -33,8 +33,8 @@ from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import FitFigures, limits_behind
 
 _DECIMALS: Final = 3
-_DIGITS: Final = 4
-"""Digits of what changes: enough to see a tenth of it."""
+_CHANGE_DIGITS: Final = 4
+"""Significant digits of a changed value: enough to show a change of 10 %."""
 
 
 def sensitivity_report(answer: CapacityAnswer) -> Report:
@@ -73,7 +73,7 @@ def _record(effect: Effect, network: Network) -> Record:
 
 
 def _bottleneck_record(bottleneck: NextBottleneck, network: Network) -> Record:
-    """What binds now and next, with the sentence that says it; limits of groups are a list."""
+    """What binds now and next, as data and as a sentence; with groups, their limits are a list."""
     limits = [
         {
             "safe_limited_by": limit.limited_by,
@@ -83,18 +83,18 @@ def _bottleneck_record(bottleneck: NextBottleneck, network: Network) -> Record:
         }
         for limit in bottleneck.limits
     ]
-    whole: Record = limits[0]
+    counts: Record = limits[0]
     if bottleneck.limits[0].group:
         names = [{"name": limit.group} for limit in bottleneck.limits]
         groups = [{**name, **record} for name, record in zip(names, limits, strict=True)]
-        whole = {**dict.fromkeys(whole), "groups": groups}
+        counts = {**dict.fromkeys(counts), "groups": groups}
     return {
         "binding_term": bottleneck.binding_term.name,
         "binding_term_us": bottleneck.binding_term.us,
         "next_binding_term": bottleneck.next_binding_term.name,
         "next_binding_term_us": bottleneck.next_binding_term.us,
         "next_margin_corrected_us": bottleneck.next_margin_corrected_us,
-        **whole,
+        **counts,
         "text": sentence_text(_bottleneck_sentence(bottleneck, network)),
     }
 
@@ -142,16 +142,16 @@ def _table(sensitivity: Sensitivity) -> Table:
 
 
 def _step(effect: Effect) -> Cell:
-    """From which value to which; nothing where the change has no single one."""
+    """The value before and after; nothing if the change has no single value."""
     if effect.before is None or effect.after is None:
         return ""
-    before = ShownValue(effect.before, effect.key, digits=_DIGITS)
-    after = ShownValue(effect.after, effect.key, unit_of(effect.key), digits=_DIGITS)
+    before = ShownValue(effect.before, effect.key, digits=_CHANGE_DIGITS)
+    after = ShownValue(effect.after, effect.key, unit_of(effect.key), digits=_CHANGE_DIGITS)
     return sentence("{} -> {}", before, after)
 
 
 def _verdict(then: FitFigures | None, network: Network) -> Cell:
-    """The verdict with the limits that are broken, or that the bus is unsafe."""
+    """The verdict with the broken limits, or with the setting that is unsafe."""
     if then is None:
         return figure_value(VERDICT, None)
     why = [limit.key for limit in limits_behind(then, network)]
@@ -189,7 +189,7 @@ def _bar(us: float) -> Iterator[Span]:
 
 
 def _headline(sensitivity: Sensitivity) -> Sentence:
-    """Say which change moves the margin most, and after which ones all is no longer well."""
+    """Say which change moves the margin most, and after which ones the cycle no longer fits or the bus is unsafe."""
     first = sensitivity.effects[0]
     if not first.margin_change_us:
         return Sentence(("None of these changes moves the margin.",))
@@ -202,7 +202,7 @@ def _headline(sensitivity: Sensitivity) -> Sentence:
 
 
 def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
-    """Say what becomes of a cycle that is shown to fit."""
+    """Say after which changes a cycle that is shown to fit no longer is, or its bus is unsafe."""
     if sensitivity.now.verdict != FITS:
         return
     made = [(effect.change, effect.then) for effect in sensitivity.effects if effect.then is not None]
@@ -218,20 +218,20 @@ def _after_each(sensitivity: Sensitivity) -> Iterator[Sentence]:
 
 def _bottleneck_sentence(bottleneck: NextBottleneck, network: Network) -> Sentence:
     """Say what binds once the largest term, or the limit of the nodes, is gone."""
-    now, behind = bottleneck.binding_term, bottleneck.next_binding_term
+    now, next_term = bottleneck.binding_term, bottleneck.next_binding_term
     labels = by_key(network.bus.figures.terms)
-    label, label_behind = labels[now.key].label, labels[behind.key].label
+    label, next_label = labels[now.key].label, labels[next_term.key].label
     us = ShownValue(now.us, "binding_term_us", "us", _DECIMALS)
-    us_behind = ShownValue(behind.us, "next_binding_term_us", "us", _DECIMALS)
+    next_us = ShownValue(next_term.us, "next_binding_term_us", "us", _DECIMALS)
     if bottleneck.next_margin_corrected_us is not None:
         margin = ShownValue(bottleneck.next_margin_corrected_us, "next_margin_corrected_us", "us", _DECIMALS)
         text = (
-            f"Next bottleneck: without {label}, now {{}}, the largest term is {label_behind}, {{}}, and the margin {{}}"
+            f"Next bottleneck: without {label}, now {{}}, the largest term is {next_label}, {{}}, and the margin {{}}"
         )
-        of_term = sentence(text, us, us_behind, margin)
+        of_term = sentence(text, us, next_us, margin)
     else:
-        then = f"which no key takes away, comes {label_behind}, {{}}"
-        of_term = sentence(f"Next bottleneck: after {label}, {{}}, {then}", us, us_behind)
+        then = f"which no key takes away, comes {next_label}, {{}}"
+        of_term = sentence(f"Next bottleneck: after {label}, {{}}, {then}", us, next_us)
     return joined(joined(of_term, *map(_limit, bottleneck.limits), by="; "), Sentence((".",)), by="")
 
 

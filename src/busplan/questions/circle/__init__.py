@@ -1,4 +1,4 @@
-"""`busplan.circle_test`."""
+"""`busplan.circle_test`: is a circle still round at this period? Figures and answer; roundness.py runs the test."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from busplan.servo.circle import CircleRun
 
 NEGLIGIBLE_MM: Final = 1e-4
-"""Contour error below which nothing of the profile makes a circle what it is: chosen, far below any machine [mm]."""
+"""Contour error below which no error source of the profile matters; chosen, far below that of any machine [mm]."""
 _CYCLE: Final = by(time_slice_us, required_time_slice_us)
 _ISO: Final = "ISO 230-4"
 
@@ -28,7 +28,7 @@ JITTER: Final = Figure(
     "jitter_us",
     "J",
     "profile",
-    "jitter of the synchronous packet, either way of its mean: delivery.jitter_us and what the bus adds",
+    "jitter of the synchronous packet, +/- about its mean: delivery.jitter_us and what the bus adds",
     "jitter of the packet",
 )
 CIRCLE_FIGURES: Final = (
@@ -158,7 +158,7 @@ CIRCLE_FIGURES: Final = (
         "sources_matter",
         "matter",
         "simulation",
-        "whether a measure with a tolerance, or without any the largest error, is 0.1 um or more; null without a turn",
+        "whether any measure with a tolerance, else the largest error, is 0.1 um or more; null if nothing was measured",
     ),
     Figure(
         "passed",
@@ -182,13 +182,13 @@ class Contribution(NamedTuple):
 
     source: str
     max_contour_error_mm: float
-    """Largest contour error when this source is removed [mm]."""
+    """Largest contour error without this source [mm]."""
     removed_mm: float
-    """Decrease of the largest contour error by its removal [mm]; negative if it hides another source."""
+    """How much larger the largest contour error is with it [mm]; negative if it hides another source."""
     mean_contour_error_mm: float
-    """Mean contour error when this source is removed [mm]."""
+    """Mean contour error without this source [mm]."""
     circular_deviation_mm: float | None
-    """Circular deviation G when this source is removed [mm]; None on a trapezoid."""
+    """Circular deviation G without this source [mm]; None on a trapezoid."""
 
     @property
     def words(self) -> str:
@@ -216,7 +216,7 @@ class CircleFigures(NamedTuple):
     delay_x_us: float
     delay_y_us: float
     jitter_us: float
-    """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds."""
+    """Jitter of the synchronous packet, +/- about its mean: the profile's own and what the bus adds."""
     timing_model: str
     """Timing model that decided whether the bus fits."""
     bus_fits: bool
@@ -237,7 +237,7 @@ class CircleFigures(NamedTuple):
     crossover_hz: float | None
     """Crossover of the axis with the smaller phase margin."""
     settled: bool | None
-    """Whether the loops had settled before the measured turn; None on a trapezoid. Without it no measure is given."""
+    """Whether the loops settle before the measured turn, None on a trapezoid. If they do not, every measure is None."""
     mean_contour_error_mm: float | None
     max_contour_error_mm: float | None
     radial_deviation_min_mm: float | None
@@ -249,13 +249,13 @@ class CircleFigures(NamedTuple):
     constant_speed_deg: float | None
     """Arc at constant speed from which F, G, radius and centre are taken: 360 on a turn."""
     sources_matter: bool | None
-    """Whether a judged measure, or without any the largest error, is 0.1 um or more: below, the profile has no error
-    source that matters, which says nothing of how round a machine is. None if none was measured."""
+    """Whether a measure with a tolerance, or the largest error if none has one, is 0.1 um or more. If not, no error
+    source of the profile matters, and the test says nothing about a machine. None if nothing was measured."""
     passed: bool | None
-    """None if nothing fails, and the profile has no contour tolerance or no error source matters: it is not judged."""
+    """None, not judged, if nothing fails, and the profile has no contour tolerance or no error source matters."""
     failures: "tuple[Failure, ...]"
     contributions: tuple[Contribution, ...] | None
-    """Largest first; None if they were not requested and no contour measure failed."""
+    """Largest first; None if they were not asked for and no contour measure failed."""
 
     @property
     def verdict_word(self) -> str:
@@ -274,9 +274,9 @@ class CircleFigures(NamedTuple):
 
     @property
     def to_attack(self) -> tuple[Contribution, float] | None:
-        """The source without which the failed measure is smallest, and how much less it is [mm].
+        """The source to remove first: without it the failed measure is smallest; and by how much [mm].
 
-        None if no contour measure fails, contributions were not requested, or no removal reduces the measure.
+        None if no contour measure fails, contributions were not asked for, or no removal reduces the measure.
         """
         measure = self.failed_measure
         if measure is None or not self.contributions:
@@ -291,7 +291,7 @@ class CircleTestAnswer(Answer):
     """Answer of `circle_test`: `results` and `runs`, one for each period.
 
     Figures of a simulation that did not run are None, as is the run of a cycle that does not fit the bus. Answers are
-    equal to themselves alone: traces are arrays, which have no single truth.
+    compared by identity, because traces are arrays.
 
     Parameters
     ----------
@@ -328,7 +328,7 @@ class CircleTestAnswer(Answer):
         Parameters
         ----------
         every
-            One of so many steps is a row [1].
+            n, to write every n-th step [1].
 
         Returns
         -------
@@ -338,7 +338,7 @@ class CircleTestAnswer(Answer):
         Raises
         ------
         BusplanError
-            `every` is no whole number from 1 on.
+            `every` is not a whole number above zero.
         """
         from busplan.forms.csv_rows import csv_blocks
         from busplan.questions.circle.report import TRACE_COLUMNS, trace_records
@@ -388,8 +388,7 @@ def circle_test(
     Raises
     ------
     BusplanError
-        Not a profile, a feed that the drive cannot reach, or a circle too
-        short for its ramps.
+        Not a profile, a feed that the drive cannot reach, or a circle too short for its ramps.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""The circle with its error magnified, as in ballbar reports."""
+"""The circle with its error magnified, as in ballbar reports, its error over time, and the ranked error sources."""
 
 from collections.abc import Sequence
 from math import ceil, floor
@@ -34,9 +34,9 @@ from busplan.servo.path import Direction
 _ERROR_SHARE: Final = 0.25
 """Largest drawn error as a share of the drawn radius."""
 _WIDEST: Final = 3.0
-"""A tolerance is drawn up to this multiple of the largest error: a larger ring would flatten the error."""
+"""A tolerance is drawn only up to this multiple of the largest error: a larger ring would flatten the error."""
 _FLAT: Final = 0.1
-"""Errors whose spread is a smaller share of the largest would look like one line above zero."""
+"""Smallest spread of the errors, as a share of the largest, that is drawn with zero: less would look like one line."""
 _NANOMETRES_BELOW_UM: Final = 0.1
 TOLERANCE: Final = Entry("tolerance", "tolerance of the largest error", shape="line")
 
@@ -76,7 +76,7 @@ def contour_profile(run: CircleRun) -> ContourProfile:
         error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
         turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
         sector = np.minimum((turn * CONTOUR_SECTORS).astype(np.int64), CONTOUR_SECTORS - 1)
-        # Neighbouring points are mostly in the same sector: only the extremes of each stay are looked at one by one.
+        # Neighbouring points are mostly in the same sector: each run of them is reduced to its extremes first.
         entered = np.flatnonzero(np.diff(sector, prepend=-1))
         np.minimum.at(low, sector[entered], np.minimum.reduceat(error_mm, entered))
         np.maximum.at(high, sector[entered], np.maximum.reduceat(error_mm, entered))
@@ -99,7 +99,7 @@ class LengthUnit(NamedTuple):
 
 
 def length_unit(largest_um: float) -> LengthUnit:
-    """Choose a unit in which a small length is no row of zeros.
+    """Choose a unit in which a small length is not a row of zeros.
 
     Examples
     --------
@@ -117,10 +117,10 @@ class Magnified(NamedTuple):
     ring_um: float
     """Distance between rings."""
     tolerance_mm: float | None
-    """Ring of the tolerance; None if there is none or it lies far outside."""
+    """Tolerance to draw as a ring; None if there is none or it lies far outside."""
 
-    def times(self, radius_mm: float) -> float:
-        """Magnification of the error relative to the circle."""
+    def magnification(self, radius_mm: float) -> float:
+        """How much larger the error is drawn than the circle."""
         return _ERROR_SHARE / self.largest_mm * radius_mm
 
     def radius(self, error_mm: float) -> float:
@@ -186,7 +186,7 @@ class ErrorRange(NamedTuple):
 
 
 def error_range(low_um: float, high_um: float) -> ErrorRange:
-    """Range from the smallest to the largest error and zero; without zero if the errors would look like one line.
+    """Range of the errors with zero in it; without zero if the errors would look like one line.
 
     Parameters
     ----------
@@ -234,8 +234,8 @@ _MAX_POINTS: Final = 2000
 """Most points of one curve: more would not be visible."""
 
 
-class _Stretch(NamedTuple):
-    """A part of the move. Of many points, the smallest and the largest error of each stretch are kept."""
+class _Part(NamedTuple):
+    """A part of the move: points of its error curve, reduced to their extremes if they are many."""
 
     time_s: Floats
     error_um: Floats
@@ -247,11 +247,11 @@ class _Row(NamedTuple):
 
     result: CircleFigures
     run: CircleRun
-    curves: tuple[_Stretch, ...]
+    parts: tuple[_Part, ...]
 
 
 class _Scales(NamedTuple):
-    """_Scales and limits that all rows share, so that they compare."""
+    """Scales and limits that all rows share, so that they can be compared."""
 
     circle: Magnified | None
     """None if there is no error to show."""
@@ -261,13 +261,13 @@ class _Scales(NamedTuple):
 
 
 def _common_scales(rows: Sequence[_Row], tolerance: ToleranceSection) -> _Scales:
-    """_Scales of all rows. A row whose table left the circle counts only if there is no other."""
+    """Scales of all rows. A row whose table left the circle counts only if there is no other."""
     shown = [row for row in rows if not row.run.diverged] or rows
-    measured = [curve.error_um for row in shown for curve in row.curves if curve.measured]
+    measured = [part.error_um for row in shown for part in row.parts if part.measured]
     # Mean and largest error of a trapezoid are those of the whole move.
     judged = measured
     if rows[0].result.path == "trapezoid":
-        judged = [curve.error_um for row in shown for curve in row.curves]
+        judged = [part.error_um for row in shown for part in row.parts]
     radius_um = rows[0].result.radius_mm * 1e3
     low_um, high_um = (float(np.clip(end, -radius_um, radius_um)) for end in _ends(judged))
     largest_mm = min(max(map(abs, _ends(measured))), radius_um) / 1e3
@@ -283,17 +283,17 @@ def _ends(errors: Sequence[Floats]) -> tuple[float, float]:
     return min(float(error_um.min()) for error_um in errors), max(float(error_um.max()) for error_um in errors)
 
 
-def _curves(run: CircleRun) -> tuple[_Stretch, ...]:
-    """The measured part, and what lies before and after it; neighbours share a point."""
+def _parts(run: CircleRun) -> tuple[_Part, ...]:
+    """The parts before, in and after the measured turn or arc; neighbours share a point."""
     error_um = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm) * 1e3
     start, stop = run.measured.start, min(run.measured.stop, run.steps)
-    parts = ((0, start + 1, False), (start, stop, True), (stop - 1, run.steps, False))
-    curves = []
-    for first, end, measured in parts:
+    ranges = ((0, start + 1, False), (start, stop, True), (stop - 1, run.steps, False))
+    parts = []
+    for first, end, measured in ranges:
         kept = first + extremes(error_um[first:end], most=_MAX_POINTS)
         time_s = (kept + 1).astype(np.float64) * (run.timing.step_us / 1e6)
-        curves.append(_Stretch(time_s, error_um[kept], measured))
-    return tuple(curves)
+        parts.append(_Part(time_s, error_um[kept], measured))
+    return tuple(parts)
 
 
 def extremes(values: Floats, *, most: int) -> NDArray[np.int64]:
@@ -342,7 +342,7 @@ def circle_drawing(test: CircleTestAnswer) -> Drawing:
         The circle test, with at least one simulated period.
     """
     pairs = zip(test.results, test.runs, strict=True)
-    rows = [_Row(result, run, _curves(run)) for result, run in pairs if run is not None]
+    rows = [_Row(result, run, _parts(run)) for result, run in pairs if run is not None]
     scales = _common_scales(rows, test.profile.tolerance)
     servo = "ideal drive" if test.results[0].ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(result.period_us) for result, run in zip(test.results, test.runs, strict=True) if run is None]
@@ -375,7 +375,7 @@ def _shown(row: _Row, scales: _Scales) -> str:
         return f"circle not drawn: the {'table left the circle' if row.result.stable else 'loop is unstable'}"
     if scales.circle is None:
         return "no contour error"
-    times = decimals_of(scales.circle.times(row.result.radius_mm), 0)
+    times = decimals_of(scales.circle.magnification(row.result.radius_mm), 0)
     return f"{scales.circle.ring_text} a ring, {times} times magnified"
 
 
@@ -397,30 +397,30 @@ def _errors(row: _Row, scales: _Scales) -> Panel:
     guides = [] if errors.zero_outside else [Guide(Entry("zero"), y=0.0)]
     limits = () if limit_mm is None else (-limit_mm * 1e3 * per_um, limit_mm * 1e3 * per_um)
     guides += [Guide(TOLERANCE, y=limit) for limit in limits if up.low <= limit <= up.high]
-    curves = tuple(_curve(curve, up, row, per_um=per_um) for curve in row.curves)
-    during = (Shade(Entry("during"), *curve.time_s[[0, -1]].tolist()) for curve in row.curves if curve.measured)
-    across = numbers("time [s]", 0.0, float(row.curves[-1].time_s[-1]))
+    curves = tuple(_curve(part, up, row, per_um=per_um) for part in row.parts)
+    during = (Shade(Entry("during"), *part.time_s[[0, -1]].tolist()) for part in row.parts if part.measured)
+    across = numbers("time [s]", 0.0, float(row.parts[-1].time_s[-1]))
     return Panel(Curves(across, up, curves, tuple(guides), tuple(during)), f"mean {mean}, max {largest}")
 
 
-def _curve(curve: _Stretch, up: Ruler, row: _Row, *, per_um: float) -> Curve:
-    """A part of the move; far outside, where no huge coordinate can be drawn, the place does not matter."""
+def _curve(part: _Part, up: Ruler, row: _Row, *, per_um: float) -> Curve:
+    """The error curve of a part of the move; errors far off the scale are clipped: nothing draws huge numbers."""
     spread, is_turn = up.high - up.low, row.result.path != "trapezoid"
-    errors = np.clip(curve.error_um * per_um, up.low - spread, up.high + spread)
-    if curve.measured:
+    errors = np.clip(part.error_um * per_um, up.low - spread, up.high + spread)
+    if part.measured:
         entry = Entry(
             "first", "measured: one whole turn" if is_turn else "measured: arc at constant speed", shape="line"
         )
     else:
         words = "the rest: lead-in and ramps" if is_turn else "the rest: ramps and settling"
         entry = Entry("apart", words, shape="line")
-    return Curve(entry, tuple(zip(curve.time_s.tolist(), errors.tolist(), strict=True)))
+    return Curve(entry, tuple(zip(part.time_s.tolist(), errors.tolist(), strict=True)))
 
 
 def _ranking(row: _Row, rows: Sequence[_Row], scales: _Scales) -> Panel | None:
-    """Part of the largest error that each source takes, the largest part first.
+    """What each error source adds to the largest error, the largest first.
 
-    Periods whose table followed the circle share a scale; the others share a second.
+    Periods whose table followed the circle share one scale, all others a second.
     """
     if not row.result.contributions:
         return None

@@ -15,11 +15,11 @@ from busplan.servo.circle import FULL_TURN_DEG, CircleRun
 from busplan.servo.runnable import LONGEST_SETTLING_US
 
 MARGINS: Final = {"min_phase_margin_deg": "deg", "min_gain_margin_db": "dB"}
-"""Least margins of the loop by key, with their unit; they have defaults, so that they are always asked for."""
+"""Smallest allowed margins of the loop by key, with their unit. They have defaults, so they are always judged."""
 STABILITY: Final = ("stability", *MARGINS)
 """Failures of the loop itself."""
 _WITHOUT_TURN: Final = "circular_deviation_without_turn"
-_NEXT_SYNC: Final = (
+_NEXT_SYNC_HINT: Final = (
     ' (servo.update = "next_sync" puts one period inside the loop; "on_arrival" is for nodes that apply a command when '
     "it comes)"
 )
@@ -49,12 +49,12 @@ class _Message(NamedTuple):
     unit: str = "um"
     decimals: int = 3
     key: str = ""
-    """The figure that fails, if it is not the name of the failure without min_."""
+    """Key of the figure that fails; empty if it is the name of the failure, less a min_."""
     limit_key: str = ""
-    """Key of the limit, if it is not the name of the failure."""
+    """Key of the limit; empty if it is the name of the failure."""
     limit_decimals: int | None = None
     limit_unit: str = ""
-    """Unit of the limit, if it is not that of the figure."""
+    """Unit of the limit; empty if it is that of the figure."""
 
 
 _FAILURES: Final[dict[str, _Message]] = {
@@ -92,13 +92,14 @@ _FAILURES: Final[dict[str, _Message]] = {
     ),
     "circular_deviation_mm": _Message("the circular deviation G of {value} is {beyond} over its {limit}"),
 }
-_OF_TIME: Final = ("required_us", "safe_required_us")
+_TIME_FAILURES: Final = ("required_us", "safe_required_us")
 
 
 class Failure(NamedTuple):
-    """One failure of the test: a tolerance by its key, a limit of the bus, or stability."""
+    """One failure of the test: a tolerance or a limit of the bus that is not held, or instability."""
 
     name: str
+    """Key of the tolerance or of the limit, or a word for what else fails."""
     value: float | None
     limit: float | None
     limit_words: str = ""
@@ -106,15 +107,15 @@ class Failure(NamedTuple):
     is_default: bool = False
     """Whether the limit is the default of its key, not set in the profile."""
     more: str = ""
-    """End of the message."""
+    """Hint at the end of the message."""
 
     @property
     def is_of_bus(self) -> bool:
         """Whether a limit of the bus fails, not the circle."""
-        return bool(self.limit_words) or self.name in _OF_TIME
+        return bool(self.limit_words) or self.name in _TIME_FAILURES
 
     def document(self) -> dict[str, Any]:
-        """Return it as in the JSON document; a value that does not exist is null, and the text says why."""
+        """The failure as in the JSON document; a value that does not exist is null, and the text says why."""
         numbers = {"value": self.value, "limit": self.limit, "limit_is_default": self.is_default}
         return {"name": self.name, **numbers, "text": self.text}
 
@@ -158,41 +159,36 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
     return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
 
 
-def bus_failures(network: Network, capacity: FitFigures) -> tuple[Failure, ...]:
-    """Limits of the bus that a cycle breaks, or that it is not shown to fit."""
-    broken = limits_behind(capacity, network)
-    late: tuple[Failure, ...] = ()
-    if TIME in capacity.exceeded:
-        late = (Failure("required_us", capacity.required_us, capacity.available_us),)
-    elif not broken and capacity.verdict != FITS:
-        late = (Failure("safe_required_us", capacity.safe_required_us, capacity.available_us),)
+def bus_failures(network: Network, fit: FitFigures) -> tuple[Failure, ...]:
+    """Limits of the bus that a cycle breaks, or that it is not shown to keep."""
+    broken = limits_behind(fit, network)
+    of_time: tuple[Failure, ...] = ()
+    if TIME in fit.exceeded:
+        of_time = (Failure("required_us", fit.required_us, fit.available_us),)
+    elif not broken and fit.verdict != FITS:
+        of_time = (Failure("safe_required_us", fit.safe_required_us, fit.available_us),)
     return (
         *(
-            Failure(
-                limit.key,
-                existing(limit.value(network)),
-                existing(limit.most(network)),
-                limit.words(network),
-            )
+            Failure(limit.key, existing(limit.value(network)), existing(limit.most(network)), limit.words(network))
             for limit in broken
         ),
-        *late,
+        *of_time,
     )
 
 
 def circle_failures(profile: Profile, run: CircleRun, *, settled: bool) -> tuple[Failure, ...]:
     """Failures of a simulated circle: stability first, then settling, the turn, the margins and the contour."""
     tolerance = profile.tolerance
-    late = _NEXT_SYNC if profile.servo.loop == "host" and profile.servo.update == "next_sync" else ""
+    hint = _NEXT_SYNC_HINT if profile.servo.loop == "host" and profile.servo.update == "next_sync" else ""
     if not (run.margins_x.stable and run.margins_y.stable):
-        return (Failure("stability", None, None, more=late),)
+        return (Failure("stability", None, None, more=hint),)
     low = [
         Failure(name, value, limit, is_default=name not in tolerance.model_fields_set)
         for name, value in zip(MARGINS, tightest_margins(run), strict=False)
         if value is not None and value < (limit := getattr(tolerance, name))
     ]
     if low:
-        low[-1] = low[-1]._replace(more=late)
+        low[-1] = low[-1]._replace(more=hint)
     measured = ((name, getattr(run.contour, name), getattr(tolerance, name)) for name in CONTOUR_MEASURES if settled)
     contour = (
         Failure(name, value, limit)
@@ -201,8 +197,8 @@ def circle_failures(profile: Profile, run: CircleRun, *, settled: bool) -> tuple
     )
     return (
         *(() if settled else (Failure("not_settled", None, LONGEST_SETTLING_US / 1e6),)),
-        # Radial errors do not show this: a table that stands still on the circle has none. Nothing is known of a turn
-        # before the loops have settled.
+        # A table that stands still on the circle has no radial error, so the turn itself is judged, too; but only once
+        # the loops have settled.
         *(() if run.follows or not settled else (Failure("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)),
         *low,
         *contour,

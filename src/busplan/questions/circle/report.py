@@ -26,7 +26,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.charts import Drawing, Panel
 from busplan.forms.numbers import period, period_value
-from busplan.questions.base.sentences import Owner, document, figure_table, with_profile
+from busplan.questions.base.sentences import FigureColumn, document, figure_table, with_profile
 from busplan.questions.circle import CIRCLE_BY_KEY, JITTER, NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer
 from busplan.questions.circle.drawing import contour_profile, dial, magnified
 from busplan.questions.circle.failures import MARGINS
@@ -35,7 +35,7 @@ from busplan.servo.circle import CircleRun
 
 
 def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
-    """The limits that the circle holds or breaks, and the error source to attack first."""
+    """The tolerances and limits that the circle holds or breaks, and the error source to attack first."""
     period, feed = _setup_values(result)
     subject = (Code(profile.name), " at ", period, " and ", feed)
     is_open = result.passed is None and result.stable is not None
@@ -69,7 +69,7 @@ def _circle_sentences(profile: Profile, result: CircleFigures) -> Iterator[Sente
 
 
 def _unjudged(result: CircleFigures) -> tuple[Part, ...]:
-    """The measure to set a tolerance of, and its key: G of a whole turn, else the largest contour error."""
+    """The measure that needs a tolerance, and its key: G of a whole turn, else the largest contour error."""
     key = "max_contour_error_mm" if result.circular_deviation_mm is None else "circular_deviation_mm"
     measure = CIRCLE_BY_KEY[key]
     value = attribute_value(measure, result)
@@ -99,7 +99,7 @@ def _setup_values(result: CircleFigures) -> tuple[ShownValue, ShownValue]:
 
 
 def _failure_words(result: CircleFigures) -> Sentence:
-    """Limits that the circle breaks, in words, without a full stop."""
+    """Tolerances and limits that the circle breaks, in words, without a full stop."""
     phrases = (
         Sentence(tuple(part if isinstance(part, str) else ShownValue(*part) for part in failure.parts()))
         for failure in result.failures
@@ -108,7 +108,7 @@ def _failure_words(result: CircleFigures) -> Sentence:
 
 
 def _servo_sentence(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
-    """How the servo values behind the figures are known; nothing without a simulation."""
+    """The grade of the servo values behind the figures; nothing without a simulation."""
     if result.stable is None:
         return
     if result.ideal_drive:
@@ -126,8 +126,8 @@ _SHOWN: Final = (
     *("stable", "passed"),
 )
 """Figures of the table, in order."""
-_OF_HOST: Final = ("update", "delay_us")
-"""Rows of the table for loops on the host."""
+_HOST_ROWS: Final = ("update", "delay_us")
+"""Rows of the table that only loops on the host have."""
 ACT_TOGETHER: Final = Sentence(
     ("Sources act together: what they take one by one need not add up. A negative one hides another.",)
 )
@@ -153,9 +153,9 @@ def _blocks(test: CircleTestAnswer) -> Iterator[Block]:
     yield _circle_table(test.results)
     if test.with_contributions:
         ranked = [result for result in test.results if result.contributions is not None]
-        yield from (_contributions_table(source) for source in ranked if source.contributions)
+        yield from (_contributions_table(result) for result in ranked if result.contributions)
         if ranked:
-            yield ACT_TOGETHER if any(source.contributions for source in ranked) else NO_SOURCES
+            yield ACT_TOGETHER if any(result.contributions for result in ranked) else NO_SOURCES
     for result, run in zip(test.results, test.runs, strict=True):
         # A cycle that does not fit has no circle; the verdict says why.
         if run is not None:
@@ -164,11 +164,11 @@ def _blocks(test: CircleTestAnswer) -> Iterator[Block]:
 
 def _circle_table(results: Sequence[CircleFigures]) -> Table:
     """Figures of the circle test, the periods side by side."""
-    owners = [Owner(TableColumn(period(result.period_us)), result) for result in results]
-    of_host = () if any(result.loop == "host" for result in results) else _OF_HOST
-    hidden = of_host if any(result.jitter_us for result in results) else (*of_host, JITTER.key)
+    columns = [FigureColumn(TableColumn(period(result.period_us)), result) for result in results]
+    hidden = () if any(result.loop == "host" for result in results) else _HOST_ROWS
+    hidden = hidden if any(result.jitter_us for result in results) else (*hidden, JITTER.key)
     rows = ((CIRCLE_BY_KEY[key], 0) for key in _SHOWN if key not in hidden)
-    return figure_table(rows, owners, caption=Sentence(("Figures of the circle test",)))
+    return figure_table(rows, columns, caption=Sentence(("Figures of the circle test",)))
 
 
 def _contributions_table(result: CircleFigures) -> Table:
@@ -222,7 +222,7 @@ def _circle_chart(run: CircleRun, result: CircleFigures, profile: Profile) -> Ch
     times = sentence(
         "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; the dot is the start of "
         "the turn, the arrow its direction; ",
-        ShownValue(scale.times(result.radius_mm), decimals=0),
+        ShownValue(scale.magnification(result.radius_mm), decimals=0),
         ShownValue(scale.ring_um * scale.unit.per_um, unit=scale.unit.name),
     )
     drawing = Drawing(
@@ -232,7 +232,7 @@ def _circle_chart(run: CircleRun, result: CircleFigures, profile: Profile) -> Ch
 
 
 def circle_records(test: CircleTestAnswer) -> list[Record]:
-    """One flat row for each period: the centre in two columns, failures by name, a column for each error source."""
+    """A flat row for each period: the centre in two columns, failures by name, a column for each error source."""
     sources = sorted({part.source for result in test.results for part in result.contributions or ()})
     records = []
     for result in test.results:

@@ -15,7 +15,7 @@ from busplan.buses.network import Network
 from busplan.progress import Progress
 from busplan.questions.circle import NEGLIGIBLE_MM, CircleFigures, CircleTestAnswer, Contribution
 from busplan.questions.circle.failures import bus_failures, circle_failures, tightest_margins
-from busplan.questions.fit.circle_refusal import (
+from busplan.questions.fit.circle_setup import (
     delivery_of,
     jitter_us,
     loop_axes,
@@ -46,7 +46,7 @@ class Setup(NamedTuple):
     delivery: Delivery
     mechanics: Mechanics
     settled: bool = True
-    """Whether the loops settle before the measured turn; a trapezoid has none."""
+    """Whether the loops settle before the measured turn; True on a trapezoid, which has no such turn."""
 
     @property
     def steps(self) -> int:
@@ -59,9 +59,9 @@ class Setup(NamedTuple):
 
 
 def _with_setpoints_every_step(setup: Setup) -> Setup:
-    """Return the setup with a set-point at every step; unchanged if the period has other effects than chords."""
+    """Return the setup with a set-point at every step; unchanged if the period has effects beyond the path's chords."""
     path, timing, delivery = setup.path, setup.timing, setup.delivery
-    # A host's loop, jitter, skew and losses act once per period, so that another period would change them.
+    # A host's loop, jitter, skew and losses act once per period: a shorter period would change these, too.
     irregular = delivery.jitter_us or delivery.skew_us or delivery.loss_probability
     if timing.loop == "host" or irregular or timing.steps_per_period == 1 or setup.steps >= MAX_SETPOINTS:
         return setup
@@ -97,20 +97,20 @@ _REMOVALS: Mapping[str, Callable[[Setup], Setup]] = {
     "scale": lambda setup: setup._replace(mechanics=replace(setup.mechanics, scale_x_ppm=0.0, scale_y_ppm=0.0)),
     "squareness": lambda setup: setup._replace(mechanics=replace(setup.mechanics, squareness_um_per_m=0.0)),
 }
-"""How to remove each source. A velocity feed-forward of 1 has no error of its own."""
+"""Function that removes each error source. A velocity feed-forward of 1 has no error of its own."""
 
 
-def sources(whole: Setup) -> dict[str, Setup]:
+def sources(setup: Setup) -> dict[str, Setup]:
     """Error sources of a setup, each with the setup without it."""
-    without = {source: remove(whole) for source, remove in _REMOVALS.items()}
-    if whole.timing.loop == "host":
+    without = {source: remove(setup) for source, remove in _REMOVALS.items()}
+    if setup.timing.loop == "host":
         # A host's loop holds its command between periods: interpolation does not apply.
         del without["hold"]
-    return {source: setup for source, setup in without.items() if setup != whole}
+    return {source: left for source, left in without.items() if left != setup}
 
 
-def setup(network: Network) -> Setup:
-    """Input of the circle simulation of a network, whose circle can be run."""
+def setup_of(network: Network) -> Setup:
+    """Input of the circle simulation of a network; its circle must be one that can be run."""
     profile, settling_us = network.profile, path_settling_us(network)
     circle = profile.circle
     x, y = loop_axes(network)
@@ -151,19 +151,19 @@ class Estimate(NamedTuple):
     memory_bytes: float
 
 
-def estimate(kept: Sequence[Setup], passing: Iterable[Setup] = ()) -> Estimate:
+def estimate(kept: Sequence[Setup], only_measured: Iterable[Setup] = ()) -> Estimate:
     """Estimate what simulations cost.
 
     Parameters
     ----------
     kept
         Simulations whose positions are kept, one for each period.
-    passing
-        Simulations that are only measured.
+    only_measured
+        Simulations whose positions are dropped after their measures are taken.
     """
     rate_us = _STEP_US[compiled_kernel("auto") is not None]
-    # Setups that pass may be made one by one: each takes memory.
-    sizes = [(setup.steps, setup.path.setpoints) for setup in chain(kept, passing)]
+    # Only their sizes are held: each setup takes memory, and an iterator makes them one by one.
+    sizes = [(setup.steps, setup.path.setpoints) for setup in chain(kept, only_measured)]
     memory_bytes = [_STEP_BYTES * steps + _SETPOINT_BYTES * setpoints for steps, setpoints in sizes]
     return Estimate(
         steps=_AXES * sum(steps for steps, _ in sizes),
@@ -173,7 +173,7 @@ def estimate(kept: Sequence[Setup], passing: Iterable[Setup] = ()) -> Estimate:
 
 
 def announce(cost: Estimate) -> None:
-    """Say what a long run costs; without a handler of its own, `logging` writes it to standard error."""
+    """Log what a long run costs; without a handler, `logging` writes it to standard error."""
     if cost.time_s > _LONG_S:
         engine = "" if compiled_kernel("auto") else ", in plain Python"
         words = f"about {cost.time_s:.0f} s and {cost.memory_bytes / 1e9:.2g} GB{engine}"
@@ -204,14 +204,14 @@ def run_circles(
     with_contributions
         If True, rank the error sources, which takes one more simulation for each.
     explain
-        If True, a failed contour tolerance ranks the error sources, too.
+        If True, the error sources are also ranked where a contour tolerance fails.
     progress
-        Called now and then with the steps simulated so far and those known to be needed.
+        Called from time to time with the steps simulated and the steps known to be needed.
 
     Raises
     ------
     BusplanError
-        A circle that cannot be run: the drive cannot reach the feed, say.
+        A circle cannot be run; for example, the drive cannot reach the feed.
 
     References
     ----------
@@ -223,16 +223,16 @@ def run_circles(
     # needs no path.
     for variant in variants:
         require_circle(variant)
-    capacities = [figures(variant, model=variant.bus.deciding_model) for variant in variants]
-    setups = [setup(variant) if capacity.fits else None for variant, capacity in zip(variants, capacities, strict=True)]
-    simulated = [prepared for prepared in setups if prepared]
-    ranked = [sources(prepared) if with_contributions and prepared else {} for prepared in setups]
-    passing = [source for without in ranked for source in without.values()]
-    counter.expect(*simulated, *passing)
-    announce(estimate(simulated, passing))
+    fits = [figures(variant, model=variant.bus.deciding_model) for variant in variants]
+    setups = [setup_of(variant) if fit.fits else None for variant, fit in zip(variants, fits, strict=True)]
+    simulated = [setup for setup in setups if setup]
+    to_rank = [sources(setup) if with_contributions and setup else {} for setup in setups]
+    without_one = [setup for without in to_rank for setup in without.values()]
+    counter.expect(*simulated, *without_one)
+    announce(estimate(simulated, without_one))
     pairs = [
-        _test(variant, capacity, prepared, without if with_contributions else None, explain=explain, counter=counter)
-        for variant, capacity, prepared, without in zip(variants, capacities, setups, ranked, strict=True)
+        _test(variant, fit, setup, without if with_contributions else None, explain=explain, counter=counter)
+        for variant, fit, setup, without in zip(variants, fits, setups, to_rank, strict=True)
     ]
     return CircleTestAnswer(
         network.profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs), with_contributions
@@ -240,7 +240,7 @@ def run_circles(
 
 
 class _Counter:
-    """Adds up the steps of many runs as one progress."""
+    """Adds up the steps of several simulations and reports them as one progress."""
 
     def __init__(self, progress: Progress | None) -> None:
         self._progress = progress
@@ -248,7 +248,7 @@ class _Counter:
         self._done = 0
 
     def expect(self, *setups: Setup) -> None:
-        self._expected += sum(2 * prepared.steps for prepared in setups)
+        self._expected += sum(_AXES * setup.steps for setup in setups)
 
     def run(self, setup: Setup) -> CircleRun:
         before = self._done
@@ -267,26 +267,26 @@ class _Counter:
             mechanics=setup.mechanics,
             progress=report,
         )
-        self._done = before + 2 * setup.steps
+        self._done = before + _AXES * setup.steps
         return run
 
 
 def _test(
     network: Network,
-    capacity: FitFigures,
-    prepared: Setup | None,
+    fit: FitFigures,
+    setup: Setup | None,
     without: Mapping[str, Setup] | None,
     *,
     explain: bool,
     counter: _Counter,
 ) -> tuple[CircleFigures, CircleRun | None]:
     """Test one period; `without` has the setup without each error source, if they are to be ranked."""
-    if prepared is None:
-        return _figures(network, capacity, None, settled=True), None
-    run = counter.run(prepared)
-    result = _figures(network, capacity, run, settled=prepared.settled)
+    if setup is None:
+        return _figures(network, fit, None, settled=True), None
+    run = counter.run(setup)
+    result = _figures(network, fit, run, settled=setup.settled)
     if without is None and explain and result.failed_measure:
-        without = sources(prepared)
+        without = sources(setup)
         counter.expect(*without.values())
         announce(estimate((), tuple(without.values())))
     if without is not None:
@@ -295,9 +295,9 @@ def _test(
 
 
 def _ranked(run: CircleRun, without: Mapping[str, Setup], *, counter: _Counter) -> tuple[Contribution, ...]:
-    """The error sources of a circle, the largest part first.
+    """The contribution of each error source of a circle, the largest first.
 
-    Sources interact: their single contributions need not add up to the whole error.
+    Sources interact: their contributions need not add up to the whole error.
     """
     contributions = []
     for source, setup in without.items():
@@ -315,21 +315,21 @@ def _ranked(run: CircleRun, without: Mapping[str, Setup], *, counter: _Counter) 
     return tuple(sorted(contributions, key=lambda contribution: -contribution.removed_mm))
 
 
-def _figures(network: Network, capacity: FitFigures, run: CircleRun | None, *, settled: bool) -> CircleFigures:
+def _figures(network: Network, fit: FitFigures, run: CircleRun | None, *, settled: bool) -> CircleFigures:
     profile, timing = network.profile, loop_timing(network.profile)
     phase_deg, gain_db, crossover_hz = tightest_margins(run) if run else (None, None, None)
     contour = run.contour if run and settled else None
     is_turn = profile.circle.path != "trapezoid"
     # The least-squares centre of a short arc is meaningless.
-    round_ = contour if run and run.constant_speed_deg >= _LEAST_ARC_DEG else None
+    long_arc = contour if run and run.constant_speed_deg >= _LEAST_ARC_DEG else None
     delay_x_us, delay_y_us = loop_delays_us(network)
     circle = profile.circle
     setpoints = path_setpoints(network)
     judged = profile.tolerance.judged
     measures = [getattr(contour, key) for key in judged or ("max_contour_error_mm",)] if contour else []
     matter = any(value is None or value >= NEGLIGIBLE_MM for value in measures) if contour else None
-    circle_fails = () if run is None else circle_failures(profile, run, settled=settled)
-    failures = (*bus_failures(network, capacity), *circle_fails)
+    of_circle = () if run is None else circle_failures(profile, run, settled=settled)
+    failures = (*bus_failures(network, fit), *of_circle)
     return CircleFigures(
         period_us=profile.cycle.period_us,
         feed_mm_per_min=circle.feed_mm_per_min,
@@ -345,11 +345,11 @@ def _figures(network: Network, capacity: FitFigures, run: CircleRun | None, *, s
         delay_x_us=delay_x_us,
         delay_y_us=delay_y_us,
         jitter_us=jitter_us(network),
-        timing_model=capacity.timing_model,
-        bus_fits=capacity.fits,
-        verdict=capacity.verdict or "",
-        required_us=capacity.required_us,
-        available_us=capacity.available_us,
+        timing_model=fit.timing_model,
+        bus_fits=fit.fits,
+        verdict=fit.verdict or "",
+        required_us=fit.required_us,
+        available_us=fit.available_us,
         servo_grade=profile.servo.grades_given[0],
         ideal_drive="servo" not in profile.model_fields_set,
         stable=run.margins_x.stable and run.margins_y.stable if run else None,
@@ -358,8 +358,8 @@ def _figures(network: Network, capacity: FitFigures, run: CircleRun | None, *, s
         crossover_hz=crossover_hz,
         settled=settled if run and is_turn else None,
         **{key: getattr(contour, key, None) for key in _CONTOUR_FIGURES},
-        radius_deviation_mm=round_.radius_deviation_mm if round_ else None,
-        centre_offset_mm=round_.centre_offset_mm if round_ else None,
+        radius_deviation_mm=long_arc.radius_deviation_mm if long_arc else None,
+        centre_offset_mm=long_arc.centre_offset_mm if long_arc else None,
         constant_speed_deg=run.constant_speed_deg if run else None,
         sources_matter=matter,
         passed=False if failures else True if judged and matter else None,

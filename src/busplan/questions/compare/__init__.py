@@ -14,7 +14,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.charts import Drawing
 from busplan.profile.conversion import AssumedKey, converted
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, with_cycle
+from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several, require_cycle
 from busplan.questions.fit.certainty import FITS
 from busplan.questions.fit.figures import FitFigures, after_reset, figures, safe_nodes
 from busplan.questions.fit.inputs import assumed_rates, given
@@ -188,7 +188,7 @@ def compare(
     >>> [term.key for term in answer.on("can").assumed if term.source == "new profile"]
     ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
-    network = network_of(with_cycle(load_profile(profile), question="compare"))
+    network = network_of(require_cycle(load_profile(profile), question="compare"))
     kinds = kind_names()
     names = (network.bus.kind, *kinds) if buses is None else [str(kind) for kind in one_or_several(buses, name="buses")]
     for name in names:

@@ -40,7 +40,7 @@ class MostNodes(NamedTuple):
 
 
 def safe_nodes(network: Network, *, group: str = "", without: str | None = None) -> tuple[int, str]:
-    """Find the largest number of nodes that is shown to fit, with the reserve, on a bus that is set safely for them.
+    """Find the largest number of nodes that is shown to fit, with the reserve, on a bus with safe settings for them.
 
     Each number of nodes is tried with its own cycle, bias, uncertainty and limits, and its own "optimal" gap count.
 
@@ -63,13 +63,13 @@ def safe_nodes(network: Network, *, group: str = "", without: str | None = None)
 
 
 def _nodes_within(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:
-    """As `most_nodes`, of plain numbers: the number of nodes, and the key of the limit."""
+    """The result of `most_nodes` in plain numbers: the number of nodes, and the key of the limit."""
     most = most_nodes(network, limits)
     return int(plain(most.nodes)), limits[int(plain(most.limit))].key
 
 
 def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_COUNT) -> MostNodes:
-    """Find the largest number of nodes within some limits; where several limits give it, the first is named.
+    """Find the largest number of nodes that keeps every limit; of several limits that set it, the first is named.
 
     Each limit is tried by itself, cheap ones first, and only up to what the limits before it allow.
 
@@ -83,13 +83,13 @@ def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_
         No answer is larger [1].
     """
     nodes: Number = ceiling
-    # Limits with the same ceiling share one network, whose parts are computed once.
+    # Limits tried at the same ceiling share one network, whose parts are computed once.
     cached_network = lru_cache(maxsize=1)(network.with_nodes)
     most: dict[int, Number] = {}
     for index in sorted(range(len(limits)), key=lambda index: limits[index].is_slow):
         # One above the ceiling, so that a limit that allows the ceiling is not taken for the limit that sets it.
-        most_left = int(nodes.max() if hasattr(nodes, "max") else plain(nodes))
-        most[index] = _most_within(limits[index], network, cached_network, most_left + 1)
+        still_allowed = int(nodes.max() if hasattr(nodes, "max") else plain(nodes))
+        most[index] = _most_within(limits[index], network, cached_network, still_allowed + 1)
         nodes = smaller(nodes, most[index])
     first: Number = len(limits) - 1  # time, if no limit binds
     for index in reversed(range(len(limits))):
@@ -102,10 +102,10 @@ _VALUE_COST: Final = 30
 
 
 def _most_within(limit: Limit, network: Network, cached_network: Callable[[int], Network], ceiling: int) -> Number:
-    """The most nodes within one limit, which further nodes keep broken.
+    """The largest number of nodes that keeps one limit; every larger number breaks it.
 
-    There are two ways, and the cheaper is taken. A value that varies over few axes of an array is computed for every
-    number of nodes, and the numbers within the limit are counted. Otherwise the numbers of nodes are bisected.
+    The cheaper of two ways is taken. A value that varies along few dimensions of an array is computed for every number
+    of nodes, and the numbers that keep the limit are counted. Otherwise the number of nodes is found by bisection.
     """
     over = limit.is_broken(cached_network(ceiling))
     elements = _size(over)
@@ -130,7 +130,7 @@ def _size(number: Number) -> int:
 
 
 COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
-"""Figures of each group; where all nodes are alike, figures of the whole."""
+"""Keys of the node counts: figures of each group, or of the network where all nodes are alike."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class GroupCapacity:
     limited_by: str
     """Key of the limit that keeps `max_nodes` from being more."""
     safe_nodes: int | None
-    """Most nodes that are shown to fit; this and the figures below exist for the timing model that decides."""
+    """Most nodes that are shown to fit. This and the figures below are None under a model that does not decide."""
     safe_axes: int | None
     """Their axes."""
     safe_limited_by: str | None
@@ -181,14 +181,14 @@ class FitFigures:
     binding_term: str | None
     """Name of the largest term."""
     min_period_us: float | None
-    """This and `safe_min_period_us` are None where no period that the bus allows is long enough."""
+    """This and `safe_min_period_us` are None if no period that the bus allows is long enough."""
     min_slice_ratio: float
     exceeded: tuple[str, ...]
     """Keys of the limits that are broken."""
     fits: bool
     """Whether no limit is broken, time among them: required <= available, without bias and uncertainty."""
     bias_us: float | None
-    """This and the figures below exist for the timing model that decides."""
+    """This and the figures down to `verdict` are None under a timing model that does not decide."""
     margin_corrected_us: float | None
     uncertainty_us: float | None
     """None also where U is unknown."""
@@ -198,14 +198,14 @@ class FitFigures:
     """Keys of the limits that are neither broken nor shown to be kept, time among them."""
     verdict: VerdictWord | None
     doubts: tuple[Doubt, ...]
-    """Parts of the uncertainty."""
+    """Components of the uncertainty; empty under a timing model that does not decide."""
     safe: bool
-    """Whether every safety limit of the bus is kept, as a gap count that is safe for the hops."""
+    """Whether every safety limit of the bus is kept, such as a gap count that is safe for the hops."""
     own: Mapping[str, float | str | None]
-    """Figures that only this kind of bus has, and its terms, by key."""
+    """Figures and terms that only this kind of bus has, by key."""
 
     def values(self) -> dict[str, Any]:
-        """All figures by their keys in the register, whether every bus has them or only this kind."""
+        """All figures by the keys of their `Figure`s, whether every bus has them or only this kind."""
         return {**self.own, **vars(self)}
 
 
@@ -218,7 +218,7 @@ class CapacityFigures(FitFigures):
     groups: tuple[GroupCapacity, ...] = ()
     """One for each [[group]] of the profile."""
     max_nodes: int | None = None
-    """Most nodes that fit; None with groups, as are all figures below."""
+    """Most nodes that fit. This and the figures below are None for a profile with groups."""
     max_axes: int | None = None
     limited_by: str | None = None
     """Key of the limit that keeps `max_nodes` from being more."""
@@ -228,7 +228,7 @@ class CapacityFigures(FitFigures):
     safe_limited_by: str | None = None
 
     def by_key(self) -> dict[str, Any]:
-        """The figures of the document by key, in its order."""
+        """The figures of the JSON document by key, in its order."""
         values = self.values()
         named = {figure.key: values[figure.key] for figure in kind_named(self.kind).figures.capacity}
         return {key: list(value) if isinstance(value, tuple) else value for key, value in named.items()}
@@ -264,70 +264,70 @@ def figures(network: Network, *, model: str) -> FitFigures:
     cycle = bus.cycle(network, model=model)
     terms = cycle.terms if has_cycle else ()
     numbers: dict[str, Number | None] = {**numeric_figures(cycle)}
-    late = has_cycle and not fits_in(cycle.required_us, available_us=available_us(network))
+    is_too_long = has_cycle and not fits_in(cycle.required_us, available_us=available_us(network))
     codes = limit_codes(network)
-    exceeded = tuple(key for key, code in codes.items() if code == BROKEN) + ((TIME,) if late else ())
+    exceeded = tuple(key for key, code in codes.items() if code == BROKEN) + ((TIME,) if is_too_long else ())
     decided: dict[str, Any] = {"not_shown": None, "verdict": None, "doubts": ()}
     if model == bus.deciding_model:
-        weighed = certainty(cycle)
-        codes[TIME] = time_code(weighed, network)
-        numbers |= certainty_numbers(weighed, cycle)
+        certain = certainty(cycle)
+        codes[TIME] = time_code(certain, network)
+        numbers |= certainty_numbers(certain, cycle)
         decided = {
             "not_shown": tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
             "verdict": VERDICTS[int(verdict_code(codes))],
-            "doubts": weighed.doubts,
+            "doubts": certain.doubts,
         }
     else:
-        numbers |= dict.fromkeys(_OF_CERTAINTY)
+        numbers |= dict.fromkeys(_CERTAINTY_KEYS)
     own = {**cycle.figures(), **dict.fromkeys(figure.key for figure in bus.figures.terms)}
     return FitFigures(
         kind=bus.kind,
         timing_model=model,
-        **_existing(numbers),
+        **_plain_or_none(numbers),
         **decided,
         terms=terms,
         binding_term=max(terms, key=lambda term: plain(term.us)).name if terms else None,
         exceeded=exceeded,
         fits=not exceeded,
         safe=bus.is_safe(network),
-        own=_existing(own | {term.key: term.us for term in terms}),
+        own=_plain_or_none(own | {term.key: term.us for term in terms}),
     )
 
 
-def _existing(numbers: Mapping[str, Number | None]) -> dict[str, Any]:
-    """The numbers as plain ones; None for what does not exist."""
+def _plain_or_none(numbers: Mapping[str, Number | None]) -> dict[str, Any]:
+    """The numbers as plain ones; None for an infinite one, which does not exist."""
     return {key: None if number is None else existing(number) for key, number in numbers.items()}
 
 
-_OF_CERTAINTY: Final = ("bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us", "safe_min_period_us")
-"""Figures that only the timing model that decides has, and only of a cycle."""
+_CERTAINTY_KEYS: Final = ("bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us", "safe_min_period_us")
+"""Figures of a cycle that only the timing model that decides has."""
 
 
-def certainty_numbers(weighed: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
-    """Figures of how sure the verdict is that follow by operators alone.
+def certainty_numbers(certain: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
+    """Figures that say how certain the verdict is, computed elementwise.
 
     Parameters
     ----------
-    weighed
-        The certainty of the cycle. Its numbers may be of any sort.
+    certain
+        The certainty of the cycle. Its numbers may be arrays or traced numbers.
     cycle
         The cycle under the timing model that decides.
     """
     if not cycle.network.groups:
-        return dict.fromkeys(_OF_CERTAINTY)
-    uncertainty_us = weighed.uncertainty_us
-    if weighed.bias_us is None:  # nothing is known where there is no doubt either
+        return dict.fromkeys(_CERTAINTY_KEYS)
+    uncertainty_us = certain.uncertainty_us
+    if certain.bias_us is None:  # with neither a bias nor an uncertainty, U is unknown
         uncertainty_us = choose(uncertainty_us > 0, uncertainty_us, inf)
     return {
-        "bias_us": weighed.bias_us,
-        "margin_corrected_us": weighed.margin_corrected_us,
+        "bias_us": certain.bias_us,
+        "margin_corrected_us": certain.margin_corrected_us,
         "uncertainty_us": uncertainty_us,
-        "safe_required_us": weighed.safe_required_us,
-        "safe_min_period_us": shortest_period_us(cycle.network, weighed.safe_required_us, is_shown=True),
+        "safe_required_us": certain.safe_required_us,
+        "safe_min_period_us": shortest_period_us(cycle.network, certain.safe_required_us, is_shown=True),
     }
 
 
-_OF_CYCLE: Final = (
+_CYCLE_KEYS: Final = (
     *("period_us", "available_us", "required_us", "time_slice_us", "required_time_slice_us"),
     *("utilisation", "margin_us", "min_period_us", "min_slice_ratio"),
 )
@@ -335,20 +335,20 @@ _OF_CYCLE: Final = (
 
 
 def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
-    """Figures of every kind of bus that follow from a cycle by operators alone.
+    """Figures that every kind of bus has, computed from a cycle elementwise.
 
     Parameters
     ----------
     cycle
-        The cycle of the network's own number of nodes. Its numbers may be of any sort.
+        The cycle of the network's own number of nodes. Its numbers may be arrays or traced numbers.
 
     Returns
     -------
     dict
-        By the names of `CapacityFigures`; infinite what does not exist, as figures of a cycle without nodes.
+        Keyed as in `CapacityFigures`; infinite where a figure does not exist, such as the period without a cycle.
     """
     if not cycle.network.groups:
-        return {"nodes": 0, "axes": 0, **dict.fromkeys(_OF_CYCLE, inf)}
+        return {"nodes": 0, "axes": 0, **dict.fromkeys(_CYCLE_KEYS, inf)}
     network = cycle.network
     period_us, ratio, nodes = network.period_us, network.slice_ratio, network.nodes
     given_us, required_us = available_us(network), cycle.required_us
@@ -368,9 +368,9 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
 
 
 def margin_us(required_us: Number, *, available_us: Number) -> Number:
-    """What a cycle leaves of its share of the period [us]."""
+    """Margin of a cycle: the available time less the required time [us]."""
     spare_us = available_us - required_us
-    # What fits by rounding alone has no margin, and no negative one either.
+    # A cycle that fits only within rounding has a margin of 0, not a negative one.
     fits = fits_in(required_us, available_us=available_us)
     return choose(spare_us < 0, choose(fits, 0.0, spare_us), spare_us)
 
@@ -381,23 +381,23 @@ def shortest_period_us(network: Network, needed_us: Number, *, is_shown: bool = 
     Parameters
     ----------
     network
-        The network; its own period plays no part. Its numbers may be of any sort.
+        The network; its own period plays no part. Its numbers may be arrays or traced numbers.
     needed_us
         Time that the cycle needs [us].
     is_shown
-        Whether limits must be shown to be kept; otherwise the uncertainty of their values plays no part.
+        Whether the period must keep the other limits with their uncertainty; otherwise at nominal values.
     """
     bus = network.bus
-    period_us = bus.periods.from_us(needed_us / network.slice_ratio)
+    period_us = bus.periods.shortest_us(needed_us / network.slice_ratio)
     for limit in bus.limits:
         if limit.period is not None and not limit.is_slow:
             kept = limit.shown if is_shown else limit.nominal
-            period_us = larger(period_us, bus.periods.from_us(kept.shortest_period_us(network)))
+            period_us = larger(period_us, bus.periods.shortest_us(kept.shortest_period_us(network)))
     return period_us
 
 
 def limits_behind(figures: FitFigures, network: Network) -> tuple[Limit, ...]:
-    """The limits of the bus that a verdict rests on, time left out: broken, or not shown to be kept."""
+    """The limits of the bus behind a verdict, without time: those broken, or those not shown to be kept."""
     keys = (figures.not_shown or ()) if figures.verdict == NOT_SHOWN else figures.exceeded
     return tuple(limit for limit in network.bus.limits if limit.key in keys)
 

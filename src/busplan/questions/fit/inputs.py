@@ -1,4 +1,4 @@
-"""Keys of a profile as inputs of a derivation, each with its grade and source."""
+"""Keys of a profile as inputs of a derivation with grade and source, and the assumptions that a verdict rests on."""
 
 from collections.abc import Iterator, Sequence
 from types import MappingProxyType
@@ -38,13 +38,14 @@ def given(profile: Profile, key: str) -> Input:
     profile
         The profile.
     key
-        Dotted key, as "cycle.period_us".
+        Dotted key, such as "cycle.period_us".
 
     Returns
     -------
     Input
-        Its grade is the one beside it, as bus.master_grade of bus.master_us; that of its section, if the section has
-        one; that of a sourced figure, if the value is that figure; that of its comment in the file; otherwise "given".
+        Its grade is the first of these: that of its sourced default, if it has that value; the key beside it, such as
+        bus.master_grade for bus.master_us; the grade of its section; its comment in the file; "given". A grade that the
+        kind of bus sets for the key replaces all but that of a comment.
     """
     *sections, name = key.split(".")
     section: Any = profile
@@ -54,18 +55,18 @@ def given(profile: Profile, key: str) -> Input:
         section = value_at(profile, ".".join(sections[:number]))
         if getattr(section, "grade", None):
             own_grade, graded_by = section.grade, f"; graded by {'.'.join(sections[:number])}.grade"
-    beside = f"{name.removesuffix('_us')}_grade"
-    if getattr(section, beside, None):
-        own_grade, graded_by = getattr(section, beside), f"; graded by {'.'.join(sections)}.{beside}"
+    grade_name = f"{name.removesuffix('_us')}_grade"
+    if getattr(section, grade_name, None):
+        own_grade, graded_by = getattr(section, grade_name), f"; graded by {'.'.join(sections)}.{grade_name}"
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
     bus = bus_of(profile)
-    # A default of zero is no measurement, nor is a word that chooses a formula.
-    is_no_measurement = (not is_set and not value) or _chooses(profile, key)
+    # A default of zero and a word that selects a formula are not measured: a grade beside them does not apply.
+    is_no_measurement = (not is_set and not value) or _selects_formula(profile, key)
     grade = "given" if own_grade is None or is_no_measurement else own_grade
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
-    common_key, group = _of_one_table(profile, key)
+    common_key, group = _common_key(profile, key)
     bus_key = bus.keys.get(common_key, Key())
     default = bus_key.default
     if default is not None and value == default:
@@ -92,7 +93,7 @@ def traced_network(network: Network) -> Network:
     for key in cycle_keys(profile):
         value = value_at(profile, key)
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if is_number or (isinstance(value, str) and _chooses(profile, key)):
+        if is_number or (isinstance(value, str) and _selects_formula(profile, key)):
             values[key] = Traced(value, given=given(profile, key))
     for group in profile.node_groups:
         execution, key = group.node.execution, group.node_key(_TABLE)
@@ -104,21 +105,21 @@ def traced_network(network: Network) -> Network:
     return trial(network, values)
 
 
-def _chooses(profile: Profile, key: str) -> bool:
-    """Whether a key is text-valued and selects a formula."""
+def _selects_formula(profile: Profile, key: str) -> bool:
+    """Whether the value of a key is a word that selects a formula."""
     names = choosing_keys(bus_of(profile))
     return any(key == group.node_key(name) for group in profile.node_groups for name in names)
 
 
 def choosing_keys(bus: Bus) -> tuple[str, ...]:
-    """Text-valued keys of a node that select a formula."""
+    """Keys of a node whose value is a word that selects a formula."""
     return ("execution.grade", *(name.removeprefix("node.") for name, key in bus.keys.items() if key.chooses))
 
 
-def _of_one_table(profile: Profile, key: str) -> tuple[str, str]:
+def _common_key(profile: Profile, key: str) -> tuple[str, str]:
     """The key without the name of its table, and that name.
 
-    A key of a group becomes the key of a profile whose nodes are all alike.
+    The key of a group becomes that of a profile whose nodes are all alike.
     """
     section, _, rest = key.partition(".")
     if not isinstance(getattr(profile, section), tuple):
@@ -132,27 +133,27 @@ def _of_one_table(profile: Profile, key: str) -> tuple[str, str]:
     return f"{'payload' if name in payload.model_fields else 'node'}.{name}", group
 
 
-_MUCH: Final = Sourced(
+_HEAVY_SHARE: Final = Sourced(
     0.25,
     unit="1",
     grade="assumed",
     source="chosen",
-    meaning="share of the variance, or of the required time, from which on a verdict rests on a key",
+    meaning="share of the variance, or of the required time, above which a verdict rests on a key",
 )
 _EXECUTION: Final = "execution"
-_ENDLESS: Final = 1e12
-"""A bit rate at which nothing takes time [kbit/s]."""
+_INFINITE_KBIT_S: Final = 1e12
+"""A bit rate so high that sending takes no time [kbit/s]."""
 _Share = tuple[tuple[str, ...], float, str]
-"""Keys, the share that they carry [1], and the whole."""
+"""Keys, the share that they carry [1], and of what."""
 
 
 class HeavyAssumption(NamedTuple):
-    """An assumed key, or the assumed execution times together, which carry much of a cycle."""
+    """An assumed key, or the assumed execution times together, with a large share of the time or of the variance."""
 
     keys: tuple[str, ...]
     """Dotted keys: one, or the section of each group's execution time, as these err together."""
     carries: str
-    """The shares in words, with the verb first."""
+    """The shares in words, beginning with the verb."""
 
     @property
     def is_execution(self) -> bool:
@@ -180,13 +181,13 @@ def heavy_assumptions(figures: RuleFigures, network: Network) -> tuple[HeavyAssu
         ((doubt.key,), float(doubt.us) ** 2 / variance, "the variance") for doubt in figures.doubts if variance
     ]
     shares += [((term.rests_on,), plain(term.us) / figures.required_us, "the required time") for term in figures.terms]
-    # Only keys have a grade; execution times are no term or doubt of one key.
-    shares = [share for share in shares if share[1] > _MUCH and _is_assumed(profile, share[0][0])]
-    shares += _of_execution(figures, network, variance)
-    shares += _of_rates(figures, network)
+    # Only keys of the profile have a grade. Execution times come below: they share terms and uncertainty components.
+    shares = [share for share in shares if share[1] > _HEAVY_SHARE and _is_assumed(profile, share[0][0])]
+    shares += _execution_shares(figures, network, variance)
+    shares += _rate_shares(figures, network)
     carried: dict[tuple[str, ...], list[str]] = {}
     for keys, share, whole in shares:
-        if share > _MUCH:
+        if share > _HEAVY_SHARE:
             carried.setdefault(keys, []).append(f"{share:.0%} of {whole}")
     verbs = {keys: "carries" if len(keys) == 1 else "together carry" for keys in carried}
     return tuple(HeavyAssumption(keys, f"{verbs[keys]} {' and '.join(words)}") for keys, words in carried.items())
@@ -196,8 +197,8 @@ def _is_assumed(profile: Profile, key: str) -> bool:
     return isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed"
 
 
-def _of_execution(figures: RuleFigures, network: Network, variance: float) -> list[_Share]:
-    """Shares of the assumed execution times: the time that the terms lose without them, and their variance."""
+def _execution_shares(figures: RuleFigures, network: Network, variance: float) -> list[_Share]:
+    """Shares of the assumed execution times in the variance, and in the required time: terms shrink without them."""
     network, bus = network._replace(period_us=figures.period_us), network.bus
     assumed = [
         group
@@ -208,9 +209,9 @@ def _of_execution(figures: RuleFigures, network: Network, variance: float) -> li
         return []
     without = network._replace(groups=tuple(at_once(group) if group in assumed else group for group in network.groups))
     cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(group.key(_EXECUTION) for group in assumed)
-    whole_us, rest_us = (_doubt_us(doubts) for doubts in (figures.doubts, cycle.doubts()))
+    whole_us, rest_us = (_execution_uncertainty_us(doubts) for doubts in (figures.doubts, cycle.doubts()))
     rest = {term.key: plain(term.us) for term in cycle.terms}
-    # A term that grows without execution times, as the wait for a gap does, is not carried by them.
+    # A term that grows without execution times, such as the wait for a gap, is not due to them.
     carried_us = sum(max(0.0, plain(term.us) - rest[term.key]) for term in figures.terms)
     of_time = (keys, carried_us / figures.required_us, "the required time")
     return [(keys, whole_us * (whole_us - rest_us) / variance, "the variance"), of_time] if variance else [of_time]
@@ -221,18 +222,18 @@ def assumed_rates(network: Network) -> tuple[str, ...]:
     return tuple(key for key in network.bus.rate_keys if _is_assumed(network.profile, key))
 
 
-def _of_rates(figures: RuleFigures, network: Network) -> Iterator[_Share]:
-    """Shares of the assumed bit rates: the required time, or without a cycle the load, that an endless rate saves."""
+def _rate_shares(figures: RuleFigures, network: Network) -> Iterator[_Share]:
+    """For each assumed bit rate, what an infinite one saves of the required time, or of the load without a cycle."""
     bus = network.bus
     for key in assumed_rates(network):
-        endless = trial(network, {key: _ENDLESS})
+        unlimited = trial(network, {key: _INFINITE_KBIT_S})
         if network.groups:
-            cycle = bus.cycle(endless._replace(period_us=figures.period_us), model=figures.timing_model)
+            cycle = bus.cycle(unlimited._replace(period_us=figures.period_us), model=figures.timing_model)
             yield (key,), 1 - plain(cycle.required_us) / figures.required_us, "the required time"
         elif (load := bus.limit("load")) is not None:
-            yield (key,), 1 - plain(load.value(endless)) / plain(load.value(network)), "the load"
+            yield (key,), 1 - plain(load.value(unlimited)) / plain(load.value(network)), "the load"
 
 
-def _doubt_us(doubts: Sequence[Any]) -> float:
-    """The standard uncertainty that all execution times give a cycle [us]."""
+def _execution_uncertainty_us(doubts: Sequence[Any]) -> float:
+    """Standard uncertainty of a cycle by all execution times together [us]."""
     return sum(float(doubt.us) for doubt in doubts if doubt.key.endswith(f".{_EXECUTION}"))

@@ -21,7 +21,7 @@ def bus_of(profile: Profile) -> Bus:
 
 
 def varied_nodes(profile: Profile) -> ProfileGroup:
-    """The nodes whose number varies when axes are counted: all that are alike, or the group of the most axes."""
+    """The nodes whose number varies when axes are counted: all of them, or the group with the most axes."""
     return max(profile.node_groups, key=lambda group: int(group.nodes * group.node.axes))
 
 
@@ -34,7 +34,7 @@ def network_of(profile: Profile) -> Network:
         The profile. Its values may be numbers, arrays or traced numbers.
     """
     cycle = profile.cycle
-    groups = tuple(_group(members) for members in _side_by_side(profile.node_groups))
+    groups = tuple(_group(members) for members in _runs_of_alike(profile.node_groups))
     varied = None if profile.group else ""
     return Network(profile, bus_of(profile), groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us, varied)
 
@@ -58,11 +58,11 @@ def _group(members: Sequence[ProfileGroup]) -> Group:
     )
 
 
-def _side_by_side(groups: Sequence[ProfileGroup]) -> list[list[ProfileGroup]]:
+def _runs_of_alike(groups: Sequence[ProfileGroup]) -> list[list[ProfileGroup]]:
     """Join neighbours that differ only in name and number, so that their cycle is that of a uniform bus."""
     runs: list[list[ProfileGroup]] = []
     for group in groups:
-        # Groups at slower rates go in cycles of their own.
+        # A group that sends at a slower rate has cycles of its own.
         is_in_every = is_everywhere(getattr(group.payload, "every", 1) <= 1)
         if runs and is_in_every and _is_alike(runs[-1][0].node, group.node):
             runs[-1].append(group)
@@ -71,13 +71,13 @@ def _side_by_side(groups: Sequence[ProfileGroup]) -> list[list[ProfileGroup]]:
     return runs
 
 
-_OF_ONE_GROUP: Final = ("name", "nodes")
+_NOT_COMPARED: Final = ("name", "nodes")
 
 
 def _is_alike(left: object, right: object) -> bool:
     """Whether two groups, sections or values are equal; an array equals only itself."""
     if isinstance(left, Section) and type(left) is type(right):
-        keys = (key for key in type(left).model_fields if key not in _OF_ONE_GROUP)
+        keys = (key for key in type(left).model_fields if key not in _NOT_COMPARED)
         return all(_is_alike(getattr(left, key), getattr(right, key)) for key in keys)
     return left is right or (isinstance(left, _COMPARED) and isinstance(right, _COMPARED) and bool(left == right))
 
@@ -86,7 +86,7 @@ _COMPARED: Final = (int, float, str, tuple, Traced)
 
 
 def trial(network: Network, values: Mapping[str, object]) -> Network:
-    """The network with other values by dotted key, which its profile may have: nothing is checked.
+    """The network with other values by dotted key, unchecked: only for values that are known to be valid.
 
     Raises
     ------
@@ -97,12 +97,12 @@ def trial(network: Network, values: Mapping[str, object]) -> Network:
 
 
 def at_period(network: Network, period_us: Number) -> Network:
-    """The same network at another communication period that its profile may have [us]."""
+    """The network at another communication period, unchecked [us]."""
     return network._replace(profile=with_unchecked(network.profile, PERIOD, period_us), period_us=period_us)
 
 
 def with_payloads(network: Network, sizes_bytes: Iterable[tuple[Number, Number]]) -> Network:
-    """The network with another payload of the read and of the write of each group of the profile [bytes].
+    """The network with other payloads for the read and the write of each group of the profile [bytes].
 
     Raises
     ------
@@ -118,25 +118,25 @@ def with_payloads(network: Network, sizes_bytes: Iterable[tuple[Number, Number]]
 
 
 def at_once(group: Group) -> Group:
-    """The same nodes, known to execute in no time."""
+    """The same nodes with an execution time of exactly zero."""
     return group._replace(
         read_execution_us=0.0, write_execution_us=0.0, read_uncertainty_us=0.0, write_uncertainty_us=0.0
     )
 
 
 def changed(network: Network, changes: Mapping[str, object]) -> Network:
-    """The network with other values by dotted key, where a profile can have them.
+    """The network with other values by dotted key, checked by the profile's schema.
 
     Raises
     ------
     BusplanError
-        The profile's schema refuses them.
+        The schema refuses them.
     """
     return network_of(override(network.profile, dict(changes)))
 
 
 def at_periods(network: Network, periods_us: Sequence[float] | None) -> list[Network]:
-    """A network at each of some communication periods [us]; without them, as it is.
+    """A network at each of several communication periods [us]; for None, at its own.
 
     Raises
     ------
@@ -158,6 +158,6 @@ def model_names(network: Network) -> tuple[str, ...]:
 
 
 def leading_model(network: Network) -> str:
-    """Name of the timing model whose figures lead: the profile's own, or the one that decides where that cannot."""
+    """Timing model shown first, by name: the profile's own, or the deciding one if that cannot express the network."""
     model: str = network.profile.bus.timing_model
     return model if model in model_names(network) else network.bus.deciding_model

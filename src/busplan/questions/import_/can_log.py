@@ -22,9 +22,9 @@ from busplan.recordings.can_timing import (
     SentFrames,
     event_model,
     faults,
+    frames_by_identifier,
     least_bit_rate,
     longest_stretch,
-    sent_messages,
     stamps_of_no_bus,
     step_us,
 )
@@ -79,7 +79,7 @@ def read(path: Path, name: str, *, progress: Progress) -> Reading:
     """
     frames = read_can(path, progress=progress)
     stretch = longest_stretch(frames)
-    messages = sent_messages(frames, stretch).values()
+    messages = frames_by_identifier(frames, stretch).values()
     least = least_bit_rate(frames, stretch).likely
     _require_times(stretch, messages, least, name)
     machine = Reading("can", "CAN log", name, rank=2, lists_all=False, is_log=True)
@@ -116,7 +116,7 @@ def _require_times(stretch: ClockStretch, messages: Iterable[SentFrames], least_
 
 def _timing(sent: SentFrames, length_us: float, stamp_error_us: float) -> _Timing:
     """Period, jitter and burst that hold all frames of an identifier."""
-    if sent.grid is not None:
+    if sent.periods is not None:
         period_us, error_us = sent.mean
         doubt = expanded(error_us, CLOCK_TOLERANCE * period_us / 3**0.5) or 0.0
         period_us = _roundest(period_us, doubt / 2)

@@ -1,4 +1,4 @@
-"""`busplan.map_`."""
+"""`busplan.map_`: where does a design fit as two keys vary, and what limits it elsewhere?"""
 
 from bisect import bisect_right
 from collections import Counter
@@ -19,10 +19,10 @@ from busplan.forms.scale import round_numbers
 from busplan.profile.edit import whole
 from busplan.progress import Progress, ignored
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, load_network, with_cycle
+from busplan.questions.base.inputs import ProfileLike, load_network, require_cycle
 from busplan.questions.circle import CircleFigures
 from busplan.questions.fit.certainty import DOES_NOT_FIT, FITS, TIME, VerdictWord, certainty
-from busplan.questions.fit.circle_refusal import refusals
+from busplan.questions.fit.circle_setup import refusals
 from busplan.questions.fit.figures import figures, limits_behind, safe_nodes, shortest_period_us
 from busplan.questions.fit.network import PERIOD, at_period, changed, varied_nodes
 from busplan.questions.sweep import axis_values
@@ -37,9 +37,9 @@ from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, value_at
 from busplan.sections.profile import Profile
 
 AXES: Final = "axes"
-"""Key of the direction along the axes of all nodes. No key of a profile: it sets the number of nodes."""
+"""Key of a direction along the number of motion axes. It is no key of a profile: it sets the number of nodes."""
 MOST_VALUES: Final = 64
-"""Most values of a direction, as many as gap counts: more do not fit into 80 columns."""
+"""Most values of a direction, enough for every gap count of IEEE 1394: more do not fit into 80 columns."""
 
 Along = Mapping[str, str | Iterable[object]]
 """One key, and its values as `sweep` takes them."""
@@ -51,7 +51,7 @@ class Direction(NamedTuple):
     key: str
     """Dotted key of the profile, or `AXES`."""
     values: tuple[Value, ...]
-    """In the unit of the key; numbers ascend."""
+    """Values in the unit of the key; numbers ascend."""
 
 
 State = Literal[
@@ -64,7 +64,7 @@ State = Literal[
     "does not fit",
 ]
 STATES: Final[tuple[State, ...]] = get_args(State)
-"""In the order of reports."""
+"""States in the order of reports."""
 
 
 class Cell(NamedTuple):
@@ -76,18 +76,18 @@ class Cell(NamedTuple):
     axes: int
     state: State
     limited_by: tuple[str, ...]
-    """Limits that are broken; for a circle that fails, its failures; for a circle that cannot be run, the keys that
-    prevent it; empty where the cell fits."""
+    """Limits that are broken, or not shown to be kept; of a circle, its failures or the keys that prevent its run;
+    empty if the cell fits."""
     binding_term: str | None
     """The largest term of the cycle."""
     verdict: VerdictWord
     margin_corrected_us: float | None
-    """None of messages alone."""
+    """None for messages alone."""
     uncertainty_us: float | None
-    """None where it is unknown."""
+    """None if it is unknown."""
     is_safe: bool
     circle_passed: bool | None = None
-    """None where no circle was run, or no tolerance judges it."""
+    """None if no circle was run, or the circle is not judged."""
 
 
 class NotDrawn(NamedTuple):
@@ -110,12 +110,12 @@ class Region(NamedTuple):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MapAnswer(Answer):
-    """Answer of `map_`: where over two keys a design fits, which a notebook draws.
+    """Answer of `map_`: where a design fits as two keys vary. A notebook shows it as a picture.
 
     Parameters
     ----------
     network
-        The network: this design.
+        The network of the profile itself: this design.
     x, y
         The directions.
     rows
@@ -148,7 +148,7 @@ class MapAnswer(Answer):
 
     @property
     def design_place(self) -> tuple[int, int] | None:
-        """Row and column of the profile's setting; None if it is not on the map."""
+        """Row and column of the profile's own values; None if they are not on the map."""
         x, y = (design_value(direction.key, self.network) for direction in (self.x, self.y))
         if x not in self.x.values or y not in self.y.values:
             return None
@@ -156,7 +156,7 @@ class MapAnswer(Answer):
 
     @property
     def design(self) -> Cell | None:
-        """Cell of the profile's setting; None if it is not on the map."""
+        """Cell of the profile's own values; None if they are not on the map."""
         if self.design_place is None:
             return None
         row, column = self.design_place
@@ -165,7 +165,7 @@ class MapAnswer(Answer):
 
     @property
     def regions(self) -> tuple[Region, ...]:
-        """Cells by state and limit: the states in the order of `STATES`, of each the largest region first."""
+        """Cells by state and limit: states in the order of `STATES`, the largest region of each first."""
         counts = Counter(
             (cell.state, cell.limited_by, cell.binding_term if cell.limited_by == (TIME,) else None)
             for cell in self.cells
@@ -189,7 +189,7 @@ def map_(
     progress: Progress = ignored,
     executor: Executor | None = None,
 ) -> MapAnswer:
-    """Tell where over two keys a design fits, and what limits it elsewhere: `busplan map`.
+    """Tell where a design fits as two keys vary, and what limits it elsewhere: `busplan map`.
 
     Parameters
     ----------
@@ -229,7 +229,9 @@ def map_(
     require_executor(executor, circle=circle)
     network = load_network(profile)
     if x is None or y is None:
-        with_cycle(network.profile, question="a map of period and axes", instead="give x and y, each a key with values")
+        require_cycle(
+            network.profile, question="a map of period and axes", instead="give x and y, each a key with values"
+        )
     across, up = _directions(network, x, y, with_circle=circle)
     settings = {
         (row, column): _setting(network, {across.key: value_x, up.key: value_y})
@@ -264,7 +266,7 @@ def _directions(
     Raises
     ------
     BusplanError
-        Not one key and its values, or both directions vary one key.
+        A direction is not one key and its values, or both vary the same key.
     """
     profile = network.profile
     # Messages alone have no nodes whose number could vary.
@@ -284,7 +286,7 @@ def _directions(
 
 
 def _direction(profile: Profile, along: Along, *, name: str, with_circle: bool) -> Direction:
-    """A direction, its key and the number of its values checked: a setting that the schema refuses is not drawn."""
+    """Check the key of a direction and the number of its values; values that the schema refuses are not drawn later."""
     if not isinstance(along, Mapping) or len(along) != 1 or not all(isinstance(key, str) for key in along):
         raise BusplanError(f'{name} {along!r}: expected one key and its values, as {{"bus.nodes": range(1, 17)}}')
     ((key, given),) = along.items()
@@ -301,18 +303,20 @@ def _direction(profile: Profile, along: Along, *, name: str, with_circle: bool) 
 
 _FACTORS: Final = ((1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 2, 5), (1,))
 """Round numbers of a decade, the finest choice first."""
-_MOST: Final = 20
-"""Most values of a direction, but for the design's."""
+_MOST_BY_DEFAULT: Final = 20
+"""Most values of a default direction, not counting the design's own."""
 _BEYOND: Final = 2
 """Nodes drawn beyond the most that fit."""
 
 
 def _default_direction(key: str, network: Network) -> Direction:
-    """The values of `AXES` or of `PERIOD` about what fits."""
+    """A direction along `AXES` or `PERIOD` that shows where the design stops fitting."""
     varied = varied_nodes(network.profile)
     design_us, design_nodes = network.profile.cycle.period_us, int(varied.nodes)
-    # A cycle of no node that fits shows the design's period alone.
+    # If not even one node fits at any period, the range follows from the design's period alone.
     fit_us = _periods_of_nodes(network, varied.name) or [design_us]
+    # Chosen: the largest of twice the design's period; what its nodes need, and a quarter more; and what the most nodes
+    # need, and a quarter more, but four times the design's period at most.
     to_us = max(2 * design_us, 1.25 * fit_us[min(design_nodes, len(fit_us)) - 1], min(4 * design_us, 1.25 * fit_us[-1]))
     from_us = min(design_us, fit_us[0], to_us / 4) / 1.25
     if key == AXES:
@@ -320,20 +324,20 @@ def _default_direction(key: str, network: Network) -> Direction:
         counts, node_axes = _counts(design_nodes, most), int(varied.node.axes)
         if not node_axes:  # nodes without axes are counted themselves
             return Direction(varied.nodes_key, counts)
-        axes_beside = design_value(AXES, network) - design_nodes * node_axes
-        return Direction(AXES, tuple(axes_beside + count * node_axes for count in counts))
+        other_axes = design_value(AXES, network) - design_nodes * node_axes
+        return Direction(AXES, tuple(other_axes + count * node_axes for count in counts))
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
     allowed = [us for us in network.bus.periods.us if least_us <= us <= most_us]
     periods_us = (
-        allowed[:: ceil(len(allowed) / _MOST)]
+        allowed[:: ceil(len(allowed) / _MOST_BY_DEFAULT)]
         if allowed
-        else round_numbers(least_us, most_us, most=_MOST, decades=_FACTORS)
+        else round_numbers(least_us, most_us, most=_MOST_BY_DEFAULT, decades=_FACTORS)
     )
     return Direction(PERIOD, tuple(sorted({*periods_us, design_us})))
 
 
 def _periods_of_nodes(network: Network, group: str) -> list[float]:
-    """Shortest periods at which 1, 2, ... nodes of a group are shown to fit; of no more than fit any period [us]."""
+    """Shortest periods at which 1, 2, ... nodes of a group are shown to fit, up to the most that ever fit [us]."""
     bus = network.bus
     most, _ = safe_nodes(at_period(network, min(MAX_TIME_US, bus.periods.longest_us)), group=group)
     counts = np.arange(1, most + 1)
@@ -346,19 +350,19 @@ def _periods_of_nodes(network: Network, group: str) -> list[float]:
 def _counts(design: int, most: int) -> tuple[int, ...]:
     """Numbers of nodes, from one to some beyond the most that fit the longest period drawn.
 
-    Steps of one size about this design, to twice its nodes; beyond, steps that grow.
+    Steps are equal up to twice the nodes of this design, and grow beyond.
     """
     last = min(max(design + 1, most + _BEYOND), MAX_COUNT)
-    near = last if last <= _MOST else min(2 * design, last)
-    most = _MOST if near == last else _MOST // 2
-    step = next(size for size in (f * 10**p for p in range(7) for f in (1, 2, 5)) if near <= most * size)
-    about = range(design % step or step, near + 1, step)
-    beyond = round_numbers(near, last, most=_MOST - len(about), decades=_FACTORS) if near < last else []
-    return tuple(sorted({1, *about, *(ceil(nodes) for nodes in beyond), last}))
+    near = last if last <= _MOST_BY_DEFAULT else min(2 * design, last)
+    values = _MOST_BY_DEFAULT if near == last else _MOST_BY_DEFAULT // 2
+    step = next(size for size in (f * 10**p for p in range(7) for f in (1, 2, 5)) if near <= values * size)
+    even = range(design % step or step, near + 1, step)
+    growing = round_numbers(near, last, most=_MOST_BY_DEFAULT - len(even), decades=_FACTORS) if near < last else []
+    return tuple(sorted({1, *even, *(ceil(nodes) for nodes in growing), last}))
 
 
 def design_value(key: str, network: Network) -> Any:
-    """The profile's value along a direction; None if it has none."""
+    """The profile's own value along a direction; None if it has none."""
     return int(plain(network.axes)) if key == AXES else value_at(network.profile, key)
 
 
@@ -376,7 +380,7 @@ def _setting(network: Network, values: Mapping[str, Value]) -> _Setting | str:
     changes: Point = {key: value for key, value in values.items() if key != AXES}
     try:
         if AXES in values:
-            # How many nodes have so many axes may depend on the other value.
+            # The other value may change how many nodes it takes for these axes.
             nodes_key = varied_nodes(network.profile).nodes_key
             changes[nodes_key] = _nodes_with(values[AXES], changed(network, changes), nodes_key=nodes_key)
         return _Setting(changes, changed(network, changes))
@@ -385,7 +389,7 @@ def _setting(network: Network, values: Mapping[str, Value]) -> _Setting | str:
 
 
 def _nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
-    """Number of nodes with which all nodes have so many axes [1].
+    """Number of varied nodes with which the whole network has so many axes [1].
 
     Raises
     ------
@@ -394,10 +398,10 @@ def _nodes_with(axes: Value, network: Network, *, nodes_key: str) -> int:
     """
     varied = next(nodes for nodes in network.profile.node_groups if nodes.nodes_key == nodes_key)
     node_axes = int(varied.node.axes)
-    axes_beside = int(plain(network.axes)) - int(varied.nodes) * node_axes
-    varied_axes = axes - axes_beside if isinstance(axes, int) else 0
+    other_axes = int(plain(network.axes)) - int(varied.nodes) * node_axes
+    varied_axes = axes - other_axes if isinstance(axes, int) else 0
     if varied_axes < max(node_axes, 1) or not node_axes or varied_axes % node_axes:
-        beside = f" beside {axes_beside} others" if axes_beside else ""
+        beside = f" beside {other_axes} others" if other_axes else ""
         raise BusplanError(f"axes = {axes}: no whole number of nodes, with {node_axes} axes each{beside}")
     return varied_axes // node_axes
 
@@ -410,7 +414,7 @@ def _cell(network: Network, *, x: Value, y: Value) -> Cell:
     state: State = verdict
     behind = tuple(limit.key for limit in limits_behind(fit, network))
     limits: tuple[str, ...] = () if verdict == FITS else behind or (TIME,)
-    # "Does not fit" goes before "unsafe", and both before "not shown".
+    # "does not fit" outranks "unsafe", which outranks "not shown to fit".
     if unsafe and verdict != DOES_NOT_FIT:
         state, limits = "unsafe", unsafe
     return Cell(
@@ -440,7 +444,7 @@ def _with_circles(
     executor: Executor | None,
     progress: Progress,
 ) -> dict[_Place, Cell]:
-    """Cells of settings that fit, with what their circles say."""
+    """Cells of settings that fit, with the results of their circle tests."""
     if len(settings) > MOST_CIRCLES_UNASKED:
         raise BusplanError(
             f"{len(settings):,} settings fit, and a map runs up to {MOST_CIRCLES_UNASKED:,} circle tests; "

@@ -43,7 +43,7 @@ class Look(NamedTuple):
     """How a state is drawn."""
 
     mark: str
-    """Its character; a limit of the bus that is broken has a letter of its own."""
+    """Its character. Where a limit of the bus is broken, the letter of that limit replaces it."""
     ink: Ink
     tone: Tone
     """Its colour on a terminal."""
@@ -89,7 +89,7 @@ def _blocks(answer: MapAnswer) -> Iterator[Block]:
 
 
 def _headline(answer: MapAnswer) -> Sentence:
-    """How many settings fit, and what this design does."""
+    """How many settings fit, and whether this design does."""
     fitting, drawn = _counts(answer)
     circle = " with a circle that passes" if answer.with_circle else ""
     words = f"{{}}: {{}} of {{}} {nouns(len(answer.cells), 'setting')} are shown to fit{circle}."
@@ -165,7 +165,7 @@ def _cell(answer: MapAnswer, cell: Cell | NotDrawn, looks: _Looks) -> ChartCell 
 
 
 def _regions_table(answer: MapAnswer, looks: _Looks) -> Table:
-    """How many cells each region has, and what limits it; the legend of the picture."""
+    """State, limit and number of settings of each region."""
     columns = (
         TableColumn("state", kind="words"),
         TableColumn("limited by", kind="words", wraps=True),
@@ -208,14 +208,14 @@ def _limit_words(answer: MapAnswer, region: Region | Cell) -> str:
 
 
 def _title(direction: Direction, profile: Profile) -> str:
-    """Name of a direction."""
+    """Name of a direction in words."""
     if direction.key == AXES:
         return f"axes ({varied_nodes(profile).nodes_key})"
     return "period" if direction.key == PERIOD else direction.key
 
 
 def _value_text(direction: Direction, value: Value) -> str:
-    """Write a value of a direction in few characters: a period with its unit, any other in the unit of its key."""
+    """Write a value of a direction in few characters: only a period has its unit, any other is in that of its key."""
     if isinstance(value, str | bool):
         return str(value).lower() if isinstance(value, bool) else value
     shown = period_value(value) if direction.key == PERIOD else ShownValue(value)

@@ -18,9 +18,9 @@ from busplan.questions.base.inputs import (
     from_numpy,
     items,
     load_profile,
+    require_cycle,
     values_by_key,
     whole,
-    with_cycle,
 )
 from busplan.questions.fit.figures import CapacityFigures, FitFigures, after_reset, capacity_figures, figures
 from busplan.questions.fit.network import PERIOD, changed, model_names, network_of
@@ -208,7 +208,7 @@ def plan(
     """
     loaded = load_profile(profile)
     if nodes is not None or axes is not None:
-        with_cycle(loaded, question=f"a plan for {'nodes' if axes is None else 'axes'}")
+        require_cycle(loaded, question=f"a plan for {'nodes' if axes is None else 'axes'}")
     if nodes is not None and axes is not None:
         raise BusplanError(f"nodes {nodes} and axes {axes}: give one of them")
     given = {

@@ -207,7 +207,7 @@ def smallest_period(network: Network, *, is_safe: bool = True, with_limits: bool
 
 def _allowed_us(network: Network, least_us: float) -> float:
     """The shortest period of at least a time that a bus allows; infinite where there is none [us]."""
-    return float(plain(network.bus.periods.from_us(max(MIN_STEP_US, least_us))))
+    return float(plain(network.bus.periods.shortest_us(max(MIN_STEP_US, least_us))))
 
 
 Changes: TypeAlias = Mapping[str, Value]

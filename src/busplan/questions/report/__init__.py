@@ -26,16 +26,16 @@ from busplan.forms.blocks import (
     TableRow,
     attribute_value,
 )
-from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.profile.changes import NO_CHANGES, KeyChanges, change_options, shell_word
 from busplan.progress import Progress, part_of
-from busplan.questions.base.answer import Answer, change_options, shell_word
+from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Origin, ProfileLike, load_profile, one_or_several, origin_of
 from busplan.questions.base.sentences import changed_report, document
 from busplan.questions.capacity import capacity
-from busplan.questions.capacity.lines import Verdict, card
+from busplan.questions.capacity.verdict import Verdict, card
 from busplan.questions.circle import circle_test
 from busplan.questions.explain import explain
-from busplan.questions.fit.circle_refusal import refusals
+from busplan.questions.fit.circle_setup import refusals
 from busplan.questions.fit.network import network_of
 from busplan.questions.latency import latency
 from busplan.questions.map import map_

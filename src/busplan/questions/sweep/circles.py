@@ -16,8 +16,8 @@ from busplan.errors import BusplanError
 from busplan.profile.document import override
 from busplan.progress import Progress
 from busplan.questions.circle import CIRCLE_BY_KEY, CircleFigures
-from busplan.questions.circle.roundness import Estimate, announce, estimate, run_circles, setup
-from busplan.questions.fit.circle_refusal import refusals
+from busplan.questions.circle.roundness import Estimate, announce, estimate, run_circles, setup_of
+from busplan.questions.fit.circle_setup import refusals
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import network_of
 from busplan.questions.sweep.grid import Array, Columns, Grid
@@ -106,7 +106,7 @@ def cost_of(profile: Profile, points: Sequence[Point]) -> Estimate:
     some = np.random.default_rng(0).permutation(len(points))[:_ESTIMATED]
     variants = (network_of(override(profile, points[number])) for number in some)
     fitting = (network for network in variants if figures(network, model=network.bus.deciding_model).fits)
-    cost = estimate((), map(setup, fitting))
+    cost = estimate((), map(setup_of, fitting))
     times = len(points) / len(some)
     return cost._replace(steps=round(times * cost.steps), time_s=times * cost.time_s)
 

@@ -18,7 +18,7 @@ from busplan.errors import BusplanError
 from busplan.profile.document import override
 from busplan.profile.edit import whole
 from busplan.profile.kinds import cycle_keys, named_tables, words_of
-from busplan.questions.base.inputs import items, known_model
+from busplan.questions.base.inputs import checked_model, items
 from busplan.questions.fit.network import changed, model_names
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
@@ -181,7 +181,7 @@ def grid_models(network: Network, grid: Grid, models: Sequence[str] | None) -> t
     if models is not None:
         for model in models:
             for variant in variants:
-                known_model(variant, model, name="timing_model")
+                checked_model(variant, model, name="timing_model")
         return tuple(models)
     return tuple(model for model in model_names(network) if all(model in model_names(variant) for variant in variants))
 

@@ -1,4 +1,4 @@
-"""`busplan.timeline`."""
+"""`busplan.timeline`: one communication cycle as events, in a window."""
 
 import re
 from typing import Final
@@ -8,7 +8,7 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole, with_cycle
+from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, require_cycle, whole
 from busplan.questions.fit.network import network_of
 from busplan.questions.timeline.events import Schedule, Total, schedule, totals, zoom
 
@@ -16,7 +16,7 @@ _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9
 
 
 class TimelineAnswer(Answer, Schedule):
-    """Answer of `timeline`: the `events` inside the window, and of the whole cycle."""
+    """Answer of `timeline`: the `events` inside the window, and `cycle_events` of the whole cycle."""
 
     __slots__ = ()
 
@@ -54,8 +54,8 @@ def timeline(
     transaction
         One transaction of one node with its gaps: ("read", 1) or "read:1".
     cycle
-        Number of a cycle of the common multiple of the rates of groups, from 1; beyond it they repeat. By default the
-        fullest, which the verdict is for.
+        Number of a cycle, from 1; cycles repeat after the hyperperiod (the common multiple of the rates of groups). By
+        default the fullest, which the verdict is for.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def timeline(
     >>> [(event.kind, round(event.duration_us, 3)) for event in answer.events][1:4]
     [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.733)]
     """
-    network = network_of(with_cycle(load_profile(profile), question="timeline"))
+    network = network_of(require_cycle(load_profile(profile), question="timeline"))
     model = None if timing_model is None else checked_models([timing_model], network)[0]
     window = zoom(
         schedule(network, model=model, number=None if cycle is None else whole(cycle, name="cycle")),
@@ -90,7 +90,7 @@ def timeline(
 
 
 def _transaction(given: object, network: Network) -> tuple[str, int]:
-    """Kind and node of a transaction of the profile's bus."""
+    """Kind and node of a transaction, checked against the profile's bus."""
     match given:
         case str() as text:
             written = _TRANSACTION.fullmatch(text)

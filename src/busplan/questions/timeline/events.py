@@ -1,7 +1,7 @@
 """One communication cycle as a schedule: each event begins where the one before it ends.
 
-`capacity` counts the events of the cycle by runs; here they are laid out and added one by one, and the end of the last
-one must be the same.
+`capacity` sums the events of the cycle by runs; here they are laid out and added one by one, and must end at the same
+time.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 from busplan.buses.cycle import BusCycle, BusEvent
 from busplan.buses.figure import Figure
 from busplan.buses.limits import IDLE
-from busplan.buses.network import Group, Network, common_multiple, numbers_by_due
+from busplan.buses.network import Group, Network, hyperperiod, numbers_by_due
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.questions.fit.certainty import fits_in
@@ -24,6 +24,8 @@ MOST_NODES: Final = 1000
 """Most nodes laid out one by one: far more than a bus may have, so that a profile beyond its limit can be shown."""
 MOST_EVENTS: Final = 50_000
 """Most events: those of so many nodes, and more retries or cycle starts than anyone can look at."""
+MOST_LISTED: Final = 64
+"""Longest hyperperiod whose cycles are listed [1]."""
 
 EVENTS: Final = Figure("events", "n", "schedule", "events of one kind in the window", "events", sort="count")
 TOTAL: Final = Figure("total_us", "t", "schedule", "what the events of one kind take together", "time")
@@ -60,7 +62,7 @@ class Schedule(NamedTuple):
     figures: FitFigures
     """Closed form of the cycle that the verdict is for: time needed, time available, and whether it fits."""
     cycle_events: tuple[Event, ...]
-    """Events of the whole cycle, and the idle rest of its slice."""
+    """Events of the whole cycle, and the idle rest of its slice, if any."""
     from_us: float
     """Start of the window [us]."""
     to_us: float
@@ -68,9 +70,9 @@ class Schedule(NamedTuple):
     required_us: float
     """Closed form of the time that the cycle needs [us]."""
     number: int | None
-    """Which cycle of the common multiple of the rates was asked for, from 1; None for that of the verdict."""
+    """Number of the cycle that was asked for, from 1; None for that of the verdict."""
     cycles: int
-    """Cycles until all groups meet again [1]."""
+    """Hyperperiod: cycles after which the groups repeat [1]."""
 
     @property
     def profile(self) -> Profile:
@@ -122,7 +124,7 @@ class Total(NamedTuple):
 def schedule(network: Network, *, model: str | None = None, number: int | None = None) -> Schedule:
     """Lay out one communication cycle, node by node.
 
-    The events of the bus, then the idle rest of the slice. There are no events of zero duration.
+    First come the events of the bus, then the idle rest of the slice. No event has zero duration.
 
     Parameters
     ----------
@@ -131,7 +133,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
     model
         Timing model; without it the one whose figures lead.
     number
-        Cycle of the common multiple of the rates of groups, from 1; without it the cycle that the verdict is for.
+        Number of the cycle, from 1; by default the cycle that the verdict is for.
 
     Raises
     ------
@@ -175,7 +177,7 @@ def schedule(network: Network, *, model: str | None = None, number: int | None =
         to_us=events[-1].end_us,
         required_us=plain(cycle.required_us),
         number=number,
-        cycles=common_multiple(cycle.rates),
+        cycles=hyperperiod(cycle.rates),
     )
 
 
@@ -186,7 +188,7 @@ def zoom(
     to_us: float | None = None,
     transaction: tuple[str, int] | None = None,
 ) -> Schedule:
-    """Narrow the window of a schedule to the intersection of all given limits.
+    """Narrow the window of a schedule to what all given bounds have in common.
 
     Parameters
     ----------
@@ -221,7 +223,7 @@ def zoom(
 
 
 def totals(laid_out: Schedule) -> tuple[Total, ...]:
-    """Sum the events of a window by kind, in order of first appearance."""
+    """Sums of the events of a window by kind, in order of first appearance."""
     sums: dict[str, list[float]] = {}
     for event in laid_out.events:
         sums.setdefault(event.kind, []).append(event.duration_us)
@@ -246,15 +248,11 @@ def _laid_out(parts: Iterable[BusEvent]) -> Iterator[Event]:
             start_us = end_us
 
 
-MOST_LISTED: Final = 64
-"""Cycles of a common multiple that are listed [1]."""
-
-
 class DistinctCycle(NamedTuple):
     """Cycles in which the same groups are due."""
 
     numbers: tuple[int, ...]
-    """Which of the common multiple, from 1."""
+    """Their numbers in the hyperperiod, from 1."""
     groups: tuple[str, ...]
     """Names of the groups that are due; empty where all nodes are alike."""
     nodes: int
@@ -264,20 +262,20 @@ class DistinctCycle(NamedTuple):
 
 
 def cycle_of(network: Network, model: str, number: int | None) -> BusCycle:
-    """The cycle of a number under a timing model; without a number the one that the verdict is for."""
+    """The cycle with a number under a timing model; None for the one that the verdict is for."""
     cycle = network.bus.cycle(network, model=model)
     return cycle if number is None else cycle.at(number)
 
 
-def drawn_number(laid_out: Schedule) -> int | None:
-    """Which cycle of the common multiple is laid out, from 1; None where it is a bound on several."""
+def drawn_number(laid_out: Schedule) -> int:
+    """Number in the hyperperiod of the cycle that is laid out, from 1."""
     if laid_out.number is None:
         return cycle_of(laid_out.network, laid_out.figures.timing_model, None).fullest
     return (laid_out.number - 1) % laid_out.cycles + 1
 
 
 def distinct_cycles(laid_out: Schedule) -> tuple[DistinctCycle, ...] | None:
-    """The cycles of the common multiple that differ, the longest first; None where more are than can be listed."""
+    """The distinct cycles of the hyperperiod, the longest first; None for more than can be listed."""
     if laid_out.cycles > MOST_LISTED:
         return None
     cycle = cycle_of(laid_out.network, laid_out.figures.timing_model, None)
@@ -294,12 +292,12 @@ def distinct_cycles(laid_out: Schedule) -> tuple[DistinctCycle, ...] | None:
 
 
 def due_groups(laid_out: Schedule, number: int) -> list[Group]:
-    """Groups whose data go in a cycle of the common multiple."""
+    """Groups whose data are in a cycle of the hyperperiod."""
     cycle = cycle_of(laid_out.network, laid_out.figures.timing_model, None)
     pairs = zip(cycle.network.groups, cycle.rates, strict=True)
     return [group for group, rate in pairs if rate.is_due(number)]
 
 
 def group_names(groups: Sequence[Group]) -> tuple[str, ...]:
-    """Names of groups of the profile."""
+    """Names of the profile's groups that some groups merge."""
     return tuple(member.name for group in groups for member in group.members if member.name)

@@ -1,4 +1,4 @@
-"""Answer of `busplan timeline`."""
+"""Report of `busplan timeline`: text, drawing, table and JSON."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
@@ -31,7 +31,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.charts import Drawing, Entry, Guide, Lane, Lanes, Panel, Span, numbers
 from busplan.forms.numbers import figure_text, period_value, sentence_text, with_unit
-from busplan.questions.base.sentences import document, fields, safety_record, story, warning_sentences
+from busplan.questions.base.sentences import document, fields, margin_words, safety_record, warning_sentences
 from busplan.questions.fit.certainty import FITS, fits_in
 from busplan.questions.fit.figures import margin_us
 from busplan.questions.fit.network import model_names
@@ -53,11 +53,11 @@ from busplan.questions.timeline.events import (
 )
 
 _MOST_EVENT_LANES: Final = 20
-"""Up to this many events have a lane each; more are drawn in a lane for each node. A cycle of one node has 20."""
+"""Most events with a lane each; more are drawn in a lane for each node. A cycle of one node has 20."""
 _MOST_LANES: Final = 128
-"""Most lanes of nodes; of more nodes, neighbours share one."""
+"""Most lanes of nodes; with more nodes, neighbours share a lane."""
 _MOST_BARS: Final = 400
-"""Most bars on a scale: of more events, a bar is a transaction; of more transactions, a bar is a share of the scale."""
+"""Most bars on a scale: beyond it, a bar is a whole transaction; if these are too many, a step of the scale."""
 _NEEDED: Final = Entry("long-gap", "needed", "#")
 _LEFT: Final = Entry("fits", "margin", ".")
 _BEYOND: Final = Entry("late", "beyond the slice", "!")
@@ -85,7 +85,7 @@ def timeline_report(schedule: Schedule) -> Report:
 
 
 class ModelNeeds(NamedTuple):
-    """Time of the slice that a timing model needs for the cycle that is drawn."""
+    """Time that the drawn cycle needs under a timing model."""
 
     timing_model: str
     required_us: float
@@ -93,7 +93,7 @@ class ModelNeeds(NamedTuple):
 
 
 def model_needs(schedule: Schedule) -> tuple[ModelNeeds, ...]:
-    """Time of the slice that each timing model needs which can express the profile."""
+    """Time that the drawn cycle needs under each timing model that applies."""
     needs, available_us = [], schedule.figures.available_us
     for model in model_names(schedule.network):
         required_us = plain(cycle_of(schedule.network, model, schedule.number).required_us)
@@ -102,11 +102,11 @@ def model_needs(schedule: Schedule) -> tuple[ModelNeeds, ...]:
 
 
 def _headline(schedule: Schedule) -> Sentence:
-    """Say what the fullest cycle leaves of its slice by its timing model, and the verdict if this model decides."""
+    """Say what the fullest cycle leaves of its slice under the leading model, and the verdict if that model decides."""
     figures = schedule.figures
     parts: tuple[Part, ...] = (
         *(Code(schedule.profile.name), " at ", period_value(figures.period_us), ": "),
-        *story(figures, schedule.network),
+        *margin_words(figures, schedule.network),
         f" by the {figures.timing_model} model",
         " in the fullest cycle" if schedule.number is not None and schedule.cycles > 1 else "",
     )
@@ -126,7 +126,7 @@ def _margins(needs: Sequence[ModelNeeds]) -> Sentence:
 
 
 def _cycle_words(schedule: Schedule, distinct: Sequence[DistinctCycle] | None) -> Iterator[str]:
-    """Say which cycle is drawn, and what each needs; nothing where all are alike and none was asked for."""
+    """Say which cycle is drawn, and what each needs; nothing if all are alike and none was asked for."""
     number, is_uniform = drawn_number(schedule), schedule.network.is_uniform
 
     def due_words(names: Sequence[str], due: int) -> str:
@@ -139,7 +139,7 @@ def _cycle_words(schedule: Schedule, distinct: Sequence[DistinctCycle] | None) -
             yield "All cycles are alike."
         return
     drawn = "the fullest"
-    if schedule.number is not None and number is not None:
+    if schedule.number is not None:
         due = due_groups(schedule, number)
         drawn = f"cycle {number}, with {due_words(group_names(due), len(due))}"
         if schedule.number != number:
@@ -160,14 +160,14 @@ def _chart(schedule: Schedule, needs: Sequence[ModelNeeds], *, title: str) -> Ch
     """The whole period to scale, and below it the window or, without one, the cycle without its idle rest."""
     window = schedule._replace(to_us=schedule.used_us) if schedule.is_whole else schedule
     lanes, legend = _lanes(window)
-    words = _charged(window)
+    words = _window_words(window)
     text = sentence_text(words)
     drawing = Drawing(title, (_period(schedule, needs), lanes), (text,), text, has_characters=True)
-    return Chart(drawing, joined(_most(window), words, by="; "), Sentence((legend,)) if legend else None)
+    return Chart(drawing, joined(_longest_kind(window), words, by="; "), Sentence((legend,)) if legend else None)
 
 
-def _most(window: Schedule) -> Sentence:
-    """Say what takes most of the window."""
+def _longest_kind(window: Schedule) -> Sentence:
+    """Say which kind of event takes most of the window."""
     model = f"by the {window.figures.timing_model} model"
     busy = [total for total in totals(window) if total.kind != IDLE.key]
     if not busy:
@@ -177,8 +177,8 @@ def _most(window: Schedule) -> Sentence:
     return sentence(f"Mostly {label}, {{}} {model}", ShownValue(most.total_us, TOTAL.key, "us", TOTAL.decimals))
 
 
-def _charged(window: Schedule) -> Sentence:
-    """Say what is shown, and which distance on the wire each node is charged with."""
+def _window_words(window: Schedule) -> Sentence:
+    """Say which nodes and which part of the cycle are shown, and which distance on the wire each node counts."""
     network, nodes, cycle = window.network, window.figures.nodes, "the cycle"
     if window.number is not None and window.cycles > 1:
         cycle = f"cycle {drawn_number(window)} of {window.cycles}"
@@ -196,7 +196,7 @@ def _period(schedule: Schedule, needs: Sequence[ModelNeeds]) -> Panel:
     figures, end_us = schedule.figures, schedule.end_us
     slice_us, period_us = figures.available_us, figures.period_us
     scale_us = max(period_us, end_us, *(model.required_us for model in needs))
-    spans, _ = _bounded([list(_transactions(schedule, schedule.cycle_events))], 0.0, scale_us)
+    spans, _ = _few_bars([list(_transactions(schedule, schedule.cycle_events))], 0.0, scale_us)
     lanes = [Lane("cycle", (*spans[0], *_part(_REST, end_us, period_us)))]
     for model in needs:
         parts = (
@@ -221,7 +221,7 @@ def _period(schedule: Schedule, needs: Sequence[ModelNeeds]) -> Panel:
 
 
 def _lanes(window: Schedule) -> tuple[Panel, str]:
-    """The window: a lane for each event where they are few, else for the bus and the nodes; and what a bar is."""
+    """The window, and what a bar is: a lane for each event if they are few, else one for the bus and for each node."""
     title, events, legend = f"{_time(window.from_us)} to {_time(window.to_us)} us", window.events, ""
     has_each = len(events) <= _MOST_EVENT_LANES
     if has_each:
@@ -249,8 +249,8 @@ def _lanes(window: Schedule) -> tuple[Panel, str]:
         draw = _events
         if len(events) > _MOST_BARS:
             draw, legend = _transactions, "A bar is a whole transaction."
-        spans, is_cut = _bounded([list(draw(window, own)) for own in of_lane], window.from_us, window.to_us)
-        if is_cut:
+        spans, is_merged = _few_bars([list(draw(window, own)) for own in of_lane], window.from_us, window.to_us)
+        if is_merged:
             legend = f"A bar is what takes most of a {_MOST_BARS}th of the scale."
         labels = ["bus", *(f"node {n[0]}" if len(n) == 1 else f"nodes {n[0]} to {n[-1]}" for n in shared)]
         lanes = [Lane(label, bars) for label, bars in zip(labels, spans, strict=True) if bars]
@@ -309,26 +309,26 @@ def _bar(schedule: Schedule, kind: str, title: str, start_us: float, end_us: flo
     return Span(Entry(look.ink, look.label, look.mark), start_us, end_us, _tip(title, start_us, end_us))
 
 
-def _bounded(lanes: Sequence[Sequence[Span]], start_us: float, end_us: float) -> tuple[list[tuple[Span, ...]], bool]:
-    """The bars of lanes on one scale; where they are too many, those whose middles are in one share of it together.
+def _few_bars(lanes: Sequence[Sequence[Span]], start_us: float, end_us: float) -> tuple[list[tuple[Span, ...]], bool]:
+    """The bars of lanes on one scale; if they are too many, bars with their middles in the same step become one.
 
     Returns
     -------
     tuple
-        The bars of each lane, and whether any stand for several.
+        The bars of each lane, and whether bars were merged.
     """
-    share_us = (end_us - start_us) / _MOST_BARS
-    if sum(map(len, lanes)) <= _MOST_BARS or share_us <= 0:
+    step_us = (end_us - start_us) / _MOST_BARS
+    if sum(map(len, lanes)) <= _MOST_BARS or step_us <= 0:
         return [tuple(bars) for bars in lanes], False
 
-    def place(bar: Span) -> int:
-        return int(((bar.start + bar.end) / 2 - start_us) / share_us)
+    def step(bar: Span) -> int:
+        return int(((bar.start + bar.end) / 2 - start_us) / step_us)
 
-    return [tuple(_together(list(bars)) for _, bars in groupby(lane, place)) for lane in lanes], True
+    return [tuple(_together(list(bars)) for _, bars in groupby(lane, step)) for lane in lanes], True
 
 
 def _together(bars: Sequence[Span]) -> Span:
-    """One bar for several side by side, of the kind that takes most of their time."""
+    """One bar for several adjacent ones, of the kind that takes most of their time."""
     if len(bars) == 1:
         return bars[0]
     times_us: dict[Entry, float] = {}
@@ -339,7 +339,7 @@ def _together(bars: Sequence[Span]) -> Span:
 
 
 def _title(event: Event) -> str:
-    """Name of an event with its transaction."""
+    """Label of an event, with its transaction."""
     return event.label if event.node is None else f"{event.transaction} of node {event.node}: {event.label}"
 
 

@@ -1,4 +1,4 @@
-"""The verdict in words, line by line: the card of every form."""
+"""The verdict on one period, and its card: the lines that sum it up in every form of output."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -31,14 +31,14 @@ from busplan.sections.base import MAX_COUNT
 
 @dataclass(frozen=True)
 class Change:
-    """A change of a network, and its effect."""
+    """A change of a network, and what it achieves."""
 
     changes: Changes
     """New value by dotted key, the dearest change first."""
     nodes: int
-    """Nodes that the change is made for."""
+    """Number of nodes after the change."""
     figures: FitFigures
-    """Whether it fits after it, under the model that decides."""
+    """Figures after the change, under the model that decides."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Verdict:
     network: Network
     """The network at its period."""
     period_us: float
-    """None of a network without a cycle."""
+    """None for a network without a cycle."""
     deciding: CapacityFigures
     """Figures of the timing model that decides, asked for or not."""
     others: tuple[CapacityFigures, ...]
@@ -56,26 +56,26 @@ class Verdict:
     broken_limits: tuple[str, ...]
     """By how much each limit of the bus is broken, or why it is not shown to be kept."""
     missed_limits: tuple[tuple[str, str], ...]
-    """Keys of [limits] that the slice does not hold, each with why."""
+    """Keys of [limits] that the network does not keep, each with the reason."""
     fastest: SmallestPeriod | None
-    """The shortest period at which the verdict is that it fits; None of a network without a cycle."""
+    """The shortest period with the verdict "fits"; None for a network without a cycle."""
     after_reset: FitFigures | None
     """Figures after a bus reset; None unless the cycle is shown to fit now and not after the reset."""
     assumptions: tuple[HeavyAssumption, ...]
-    """Assumptions that carry much of the cycle or of its uncertainty."""
+    """Assumptions with a large share of the required time or of its variance."""
     left_out: tuple[LeftOut, ...]
     """Keys not set that could add time to the cycle."""
     premises: tuple[str, ...]
-    """Premises of the verdict that no key says."""
+    """Premises of the verdict that no key of the profile states."""
     bus_lines: tuple[tuple[str, str], ...]
-    """Lines of a card that only this kind of bus has."""
+    """Lines of the card that only this kind of bus has: label and words."""
     warnings: tuple[str, ...]
     """Warnings that hold whatever the verdict."""
     change: Change | None
-    """The change that mends what is wrong, or that carries one more node where the bus is full; None where there is
-    room, or no change is enough."""
+    """The change that mends what is wrong, or that makes room for one more node on a full bus; None if there is room,
+    or if no change is enough."""
     no_change: str
-    """Why there is no change, where one was looked for."""
+    """Why there is no change, if one was looked for."""
 
     @property
     def models_agree(self) -> bool | None:
@@ -132,13 +132,13 @@ def verdict_of(network: Network, results: tuple[CapacityFigures, ...]) -> Verdic
 
 
 def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple[Change | None, str]:
-    """The change that mends what is wrong or, where a bus is full, carries another node; and why there is none."""
+    """The change that mends what is wrong or makes room on a full bus for one more node, or why there is none."""
     if now.verdict != FITS or not now.safe or is_missed:
         target = network
     elif now.safe_nodes is None or now.safe_nodes > now.nodes:
         return None, ""  # there is room, or nobody said which of the groups is to grow
     elif now.safe_nodes == MAX_COUNT:
-        return None, f"{MAX_COUNT} nodes are the most of a profile"
+        return None, f"{MAX_COUNT} nodes are the most that a profile can have"
     else:
         try:
             target = changed(network, {NODES: now.safe_nodes + 1})
@@ -151,15 +151,15 @@ def _change(network: Network, now: CapacityFigures, *, is_missed: bool) -> tuple
     return Change(mending.changes, int(plain(target.nodes)), after), ""
 
 
-_FIGURES: Final = 3
-"""Digits of a time whose uncertainty is unknown."""
+_DIGITS: Final = 3
+"""Significant digits of a time whose uncertainty is unknown."""
 _MOST_DECIMALS: Final = 6
-"""Decimals of a time in us: what is below a picosecond is float rounding."""
+"""Most decimals of a time in us: below a picosecond there is only float rounding."""
 _Line = tuple[str, Sentence]
 
 
 def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
-    """Say the verdict, how full the period is, what is free, what would fit, and what the verdict rests on.
+    """Sum up the verdict, how full the period is, what is free, what would fit, and what the verdict rests on.
 
     Parameters
     ----------
@@ -180,8 +180,8 @@ def card(verdict: Verdict, *, is_brief: bool = False) -> Card:
         *_room(verdict),
     ]
     if not is_brief:
-        lines += _rests_on(verdict)
-    lines += _but(verdict)
+        lines += _basis(verdict)
+    lines += _caveats(verdict)
     return Card(subject, _word(verdict), _gauge(verdict), tuple(lines))
 
 
@@ -218,7 +218,7 @@ def _used_us(figures: CapacityFigures) -> float:
 
 
 def _reasons(verdict: Verdict) -> Iterator[_Line]:
-    """Reasons beside time why the machine does not run as the profile has it."""
+    """Reasons other than time why the machine does not run as the profile has it."""
     for words in verdict.broken_limits:
         yield "limit", Sentence((words,), "fails" if verdict.deciding.verdict == DOES_NOT_FIT else "warns")
     if not verdict.deciding.safe:
@@ -228,34 +228,35 @@ def _reasons(verdict: Verdict) -> Iterator[_Line]:
 
 
 def _times(verdict: Verdict) -> Iterator[_Line]:
-    figures, network = verdict.deciding, verdict.network
-    doubt_us, margin_us, given_us = figures.uncertainty_us, figures.margin_corrected_us or 0.0, figures.available_us
-    used_us, of = _used_us(figures), _us(given_us, None)
-    of = of if network.slice_ratio == 1 else f"the {of} that the bus may use"
+    figures, network, given_us = verdict.deciding, verdict.network, verdict.deciding.available_us
+    uncertainty_us, margin_us = figures.uncertainty_us, figures.margin_corrected_us or 0.0
+    used_us, whole = _used_us(figures), _us(given_us, None)
+    whole = whole if network.slice_ratio == 1 else f"the {whole} that the bus may use"
     bias = f", {_us(figures.bias_us, None)} of it bias of the model" if figures.bias_us else ""
-    yield "used", Sentence((f"{_us(used_us, doubt_us)} us of {of}, {_percent(used_us / given_us)}{bias}",))
-    doubt = "" if doubt_us is None else f", +/- {_us(doubt_us, doubt_us)}"
-    kept_us = given_us * network.profile.limits.reserve
-    kept = f"; {_us(kept_us, doubt_us)} must stay free" if kept_us else ""
-    yield ("short by" if margin_us < 0 else "free"), Sentence((f"{_us(abs(margin_us), doubt_us)} us{doubt}{kept}",))
+    yield "used", Sentence((f"{_us(used_us, uncertainty_us)} us of {whole}, {_percent(used_us / given_us)}{bias}",))
+    doubt = "" if uncertainty_us is None else f", +/- {_us(uncertainty_us, uncertainty_us)}"
+    reserve_us = given_us * network.profile.limits.reserve
+    reserve = f"; {_us(reserve_us, uncertainty_us)} must stay free" if reserve_us else ""
+    margin = f"{_us(abs(margin_us), uncertainty_us)} us{doubt}"
+    yield ("short by" if margin_us < 0 else "free"), Sentence((f"{margin}{reserve}",))
     yield "fastest period", _fastest(verdict)
 
 
 def _fastest(verdict: Verdict) -> Sentence:
-    fastest, doubt_us = verdict.fastest, verdict.deciding.uncertainty_us
+    fastest, uncertainty_us = verdict.fastest, verdict.deciding.uncertainty_us
     if fastest is None or fastest.us is None:
         return Sentence((f"none: {fastest.need.why if fastest else ''}",), "fails")
     limited = "" if fastest.need.key == TIME else f", limited by {fastest.need.key}"
     period_us = fastest.us
     if not verdict.network.bus.periods.us:
-        # Rounded up to the digits that its doubt allows; a listed period stays as it is.
-        scale = 10.0 ** _decimals(period_us, doubt_us)
+        # Rounded up to the digits that its uncertainty allows; a period from the bus's list stays as it is.
+        scale = 10.0 ** _decimals(period_us, uncertainty_us)
         period_us = ceil(period_us * scale * (1 - FIT_ROUNDING)) / scale
     return Sentence((f"{period(period_us)}{limited}",))
 
 
 def _room(verdict: Verdict) -> Iterator[_Line]:
-    """Room for more nodes; without it the change that makes room, or that mends what is wrong."""
+    """Room for more nodes; if there is none, the change that makes room, or that mends what is wrong."""
     figures = verdict.deciding
     if verdict.all_well and verdict.has_room:
         spare = {count.name: (count.safe_nodes or 0) - count.nodes for count in figures.counts}
@@ -280,8 +281,8 @@ def _room(verdict: Verdict) -> Iterator[_Line]:
     yield label, joined(settings, Sentence((left,)), by="")
 
 
-def _rests_on(verdict: Verdict) -> Iterator[_Line]:
-    """The largest part, and what the verdict assumes, leaves out, or rests on without a test."""
+def _basis(verdict: Verdict) -> Iterator[_Line]:
+    """The largest part, and what the verdict assumes, leaves out, and was checked against."""
     figures, network, bus = verdict.deciding, verdict.network, verdict.network.bus
     if figures.terms:
         largest = max(figures.terms, key=lambda term: plain(term.us))
@@ -307,14 +308,14 @@ def _rests_on(verdict: Verdict) -> Iterator[_Line]:
             yield f"{model.name} model", Sentence((f"not applicable: it has no {', '.join(missing)}",))
 
 
-def _but(verdict: Verdict) -> Iterator[_Line]:
+def _caveats(verdict: Verdict) -> Iterator[_Line]:
     """What speaks against the verdict at its period: another model, a bus reset, a warning."""
     deciding = verdict.deciding
-    for opposed in verdict.others:
-        if contradicts(opposed.fits, deciding):
-            needed_us = _us(opposed.required_us, deciding.uncertainty_us)
-            words = f"says otherwise, {needed_us} us needed of {_us(opposed.available_us, None)}, but does not decide"
-            yield f"{opposed.timing_model} model", Sentence((words,), "warns")
+    for other in verdict.others:
+        if contradicts(other.fits, deciding):
+            needed_us = _us(other.required_us, deciding.uncertainty_us)
+            words = f"says otherwise, {needed_us} us needed of {_us(other.available_us, None)}, but does not decide"
+            yield f"{other.timing_model} model", Sentence((words,), "warns")
     if verdict.after_reset is not None:
         keys = ", ".join(f"{key} = {value}" for key, value in verdict.network.bus.safety.after_reset.items())
         yield "bus reset", Sentence((f"{verdict.after_reset.verdict} while it leaves {keys}",), "warns")
@@ -322,7 +323,7 @@ def _but(verdict: Verdict) -> Iterator[_Line]:
 
 
 def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
-    """Parts of the uncertainty, the largest first."""
+    """Components of the uncertainty, the largest first."""
     whole = sum(float(doubt.us) ** 2 for doubt in figures.doubts)
     return [
         {
@@ -339,15 +340,15 @@ def _percent(share: float) -> str:
     return f"{share:.0%}".replace("%", " %")
 
 
-def _us(us: float, doubt_us: float | None) -> str:
-    """A time in digits that its doubt allows."""
-    return f"{us:.{_decimals(us, doubt_us)}f}"
+def _us(us: float, uncertainty_us: float | None) -> str:
+    """A time with as many digits as its uncertainty allows."""
+    return f"{us:.{_decimals(us, uncertainty_us)}f}"
 
 
-def _decimals(us: float, doubt_us: float | None) -> int:
-    """Decimals down to the first digit of the doubt, or of three digits without one."""
-    if doubt_us and isfinite(doubt_us):
-        decimals = -floor(log10(doubt_us))
+def _decimals(us: float, uncertainty_us: float | None) -> int:
+    """Decimals down to the first digit of the uncertainty; without one, for `_DIGITS` significant digits."""
+    if uncertainty_us and isfinite(uncertainty_us):
+        decimals = -floor(log10(uncertainty_us))
     else:
-        decimals = _FIGURES - 1 - floor(log10(abs(us))) if us else 0
+        decimals = _DIGITS - 1 - floor(log10(abs(us))) if us else 0
     return min(max(0, decimals), _MOST_DECIMALS)

@@ -1,4 +1,4 @@
-"""The circle that a profile asks for, without simulating it: why it cannot be run, its loops and its length."""
+"""Setup of a profile's circle test: delays, skew and jitter by the bus, why it cannot be run, inputs and length."""
 
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
@@ -26,12 +26,12 @@ from busplan.servo.runnable import (
 
 
 def loop_delays_us(network: Network) -> tuple[float, float]:
-    """Bus delay inside the loops of x and y: none on a node [us].
+    """Bus delay inside the position loops of x and y; 0 for loops on the node [us].
 
-    On the host it is one period, for the synchronous packet triggers both the sample and the update with the last
-    command; more where the kind of bus says so. Where nodes apply their commands on arrival it lasts from the sample to
-    the end of the command's execution: x is taken to be on the first node of the cycle with axes and y on the last,
-    which differ most.
+    The bus delay of a loop on the host is one period, because the synchronous packet triggers both the sample and the
+    update with the last command; it is longer on some kinds of bus. If nodes apply their commands on arrival, the delay
+    lasts from the sample to the end of the command's execution. Then x is taken to be on the first node with axes and y
+    on the last, which differ most.
 
     References
     ----------
@@ -45,40 +45,40 @@ def loop_delays_us(network: Network) -> tuple[float, float]:
     if at_sync:
         return whole_us, whole_us
     since_us = whole_us - cycle.sampled_us()
-    first_us, last_us = _first_and_last_us(cycle)
+    first_us, last_us = _command_effects_us(cycle)
     return since_us + first_us, since_us + last_us
 
 
 def skew_us(network: Network) -> float:
-    """How much later the last node with axes takes its set-point than the first, where no clock is common to them [us].
+    """Skew: how much later the last node with axes takes its set-point than the first [us].
 
-    A loop on the host has it in its delays.
+    0 unless the profile says that nodes have no common clock; 0 for a loop on the host, whose delays include it.
     """
     clock = network.bus.key_of("clock")
     if network.profile.servo.loop == "host" or not clock or value_at(network.profile, clock):
         return 0.0
-    first_us, last_us = _first_and_last_us(deciding_cycle(network))
+    first_us, last_us = _command_effects_us(deciding_cycle(network))
     return last_us - first_us
 
 
 def jitter_us(network: Network) -> float:
-    """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds [us]."""
+    """Jitter of the synchronous packet, +/- about its mean: the profile's own and what the bus adds [us]."""
     return plain(network.profile.delivery.jitter_us + deciding_cycle(network).sync_jitter_us())
 
 
-def _first_and_last_us(cycle: BusCycle) -> tuple[float, float]:
+def _command_effects_us(cycle: BusCycle) -> tuple[float, float]:
     """When the commands of the first and the last node with axes take effect, from the start of the cycle [us]."""
     network = cycle.network
     ends = list(accumulate(int(plain(group.nodes)) for group in network.groups))
     with_axes = [place for place, group in enumerate(network.groups) if group.axes] or range(len(ends))
-    moved = [place for place in with_axes if not network.groups[place].is_slower] or with_axes
+    in_every_cycle = [place for place in with_axes if not network.groups[place].is_slower] or with_axes
 
     def effect_us(place: int, node: int) -> float:
         # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
         return min(cycle.arrival_us(node), plain(network.period_us)) + cycle.taking_us(network.groups[place])
 
-    first = moved[0]
-    return effect_us(first, [0, *ends][first] + 1), effect_us(moved[-1], ends[moved[-1]])
+    first, last = in_every_cycle[0], in_every_cycle[-1]
+    return effect_us(first, [0, *ends][first] + 1), effect_us(last, ends[last])
 
 
 AxisName = Literal["x", "y"]
@@ -86,17 +86,17 @@ AXIS_NAMES: Final[tuple[AxisName, ...]] = ("x", "y")
 
 
 def refusals(network: Network) -> tuple[Refused, ...]:
-    """Why the circle of a network cannot be run, each cause by its dotted key; empty if it can.
+    """Reasons why the circle of a network cannot be run, each with its dotted key; empty if it can.
 
-    A cycle that does not fit its bus has no circle: then nothing is asked of drives, delivery and move.
+    A cycle that does not fit its bus has no circle: then drives, delivery and move are not checked.
     """
     if not network.groups:
         return (Refused("bus.nodes", "none", "messages alone have no axes that could move"),)
-    causes = (*_setpoints_of_several_cycles(network), *_loop_over_the_bus(network))
+    causes = (*_slow_setpoints(network), *_long_bus_delay(network))
     fits = fits_in(deciding_cycle(network).required_us, available_us=available_us(network))
     if not fits or network.bus.broken(network):
         return causes
-    return (*causes, *_of_run(network, is_loop_refused=bool(causes)))
+    return (*causes, *_servo_refusals(network, is_loop_refused=bool(causes)))
 
 
 def require_circle(network: Network) -> None:
@@ -112,8 +112,8 @@ def require_circle(network: Network) -> None:
         raise ParameterError(*causes)
 
 
-def _of_run(network: Network, *, is_loop_refused: bool) -> tuple[Refused, ...]:
-    """Why the drives, the delivery or the move of a profile cannot be simulated."""
+def _servo_refusals(network: Network, *, is_loop_refused: bool) -> tuple[Refused, ...]:
+    """Reasons why the drives, the delivery or the move of a profile cannot be simulated."""
     profile = network.profile
     causes: list[Refused] = []
     axes: list[Axis] = []
@@ -126,62 +126,61 @@ def _of_run(network: Network, *, is_loop_refused: bool) -> tuple[Refused, ...]:
         causes += (_at_key(cause, profile, name) for cause in refused)
     causes += _out_of_order(network)
     if not (causes or is_loop_refused):
-        causes += _move(network, axes)
+        causes += _unfit_move(network, axes)
     # Both axes may refuse one key.
     return tuple({cause.name: cause for cause in reversed(causes)}.values())[::-1]
 
 
-def _setpoints_of_several_cycles(network: Network) -> Iterator[Refused]:
-    """Refuse axes whose set-points do not come in every cycle."""
+def _slow_setpoints(network: Network) -> Iterator[Refused]:
+    """Refuse axes that do not get a set-point in every cycle."""
     key, every = network.bus.setpoints_every(network)
     if every > 1:
-        whole = f"a period of {every * network.profile.cycle.period_us:g} us with 1 has the same set-points"
-        yield Refused(key, every, f"the circle test has a set-point in every cycle; {whole}")
+        same = f"1 with a period of {every * network.profile.cycle.period_us:g} us gives the same set-points"
+        yield Refused(key, every, f"the circle test has a set-point in every cycle; {same}")
 
 
-def _loop_over_the_bus(network: Network) -> Iterator[Refused]:
-    """Refuse a loop on the host with more of the bus in it than its controller is made for."""
+def _long_bus_delay(network: Network) -> Iterator[Refused]:
+    """Refuse a loop on the host with a longer bus delay than the circle test models."""
     period_us, delay_us = network.profile.cycle.period_us, max(loop_delays_us(network))
     most_us = LONGEST_DELAY_PERIODS * period_us
     if delay_us > most_us:
-        most = f"{LONGEST_DELAY_PERIODS} periods, {most_us:g} us, at most"
-        why = f"the bus puts {delay_us:g} us into a loop over it, and the circle test knows {most}"
+        most = f"at most {LONGEST_DELAY_PERIODS} periods, {most_us:g} us"
+        why = f"the bus puts {delay_us:g} us into a loop closed over it, and the circle test models {most}"
         key, profile = network.bus.key_of("pipeline"), network.profile
         less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
-        right = f'{why}; {less}close the loop on the node, servo.loop = "node"'
-        yield Refused("servo.loop", '"host"', right)
+        yield Refused("servo.loop", '"host"', f'{why}; {less}close the loop on the node, servo.loop = "node"')
 
 
 def _out_of_order(network: Network) -> Iterator[Refused]:
-    """Refuse set-points that would change their order: by what the bus adds, where only that does it."""
+    """Refuse jitter and skew that would change the order of set-points: the profile's own, then with the bus's."""
     profile, period_us = network.profile, network.profile.cycle.period_us
     delivery = Delivery(**parameters_in(profile.delivery, Delivery))
     causes = [*unfit_delivery(delivery, period_us=period_us)]
     if causes:
         yield from (_at_key(cause, profile) for cause in causes)
     elif any(unfit_delivery(delivery_of(network), period_us=period_us)):
-        most = f"which the circle test knows up to half the period, {period_us / 2:g} us, with jitter and skew"
+        most = f"and the circle test models jitter and skew up to half the period, {period_us / 2:g} us, together"
         if apart_us := skew_us(network):
-            right = f"the last axis then takes its set-points {apart_us:g} us after the first, {most}"
-            yield Refused(network.bus.key_of("clock"), "false", f"{right}; set it true if the drives have a clock")
+            why = f"the last axis then takes its set-points {apart_us:g} us after the first, {most}"
+            yield Refused(network.bus.key_of("clock"), "false", f"{why}; set it true if the drives have a clock")
         else:
             added_us = jitter_us(network) - delivery.jitter_us
-            right = f"the bus adds {added_us:g} us of jitter either way, {most}; a longer period has room"
-            yield Refused("cycle.period_us", period_us, right)
+            why = f"the bus adds +/- {added_us:g} us of jitter, {most}; a longer period has room"
+            yield Refused("cycle.period_us", period_us, why)
 
 
-def _move(network: Network, axes: Sequence[Axis]) -> list[Refused]:
+def _unfit_move(network: Network, axes: Sequence[Axis]) -> list[Refused]:
     """Refuse a move that is too short for its feed or too long for memory; a lead-in makes it longer."""
     profile = network.profile
     is_turn = profile.circle.path != "trapezoid"
-    least = [*_unfit(profile, axes, 0.0 if is_turn else None)]
-    if least or not is_turn or not any(_unfit(profile, axes, LONGEST_SETTLING_US)):
-        return least
-    return [*_unfit(profile, axes, path_settling_us(network))]
+    without_lead_in = [*_unfit_with(profile, axes, 0.0 if is_turn else None)]
+    if without_lead_in or not is_turn or not any(_unfit_with(profile, axes, LONGEST_SETTLING_US)):
+        return without_lead_in
+    return [*_unfit_with(profile, axes, path_settling_us(network))]
 
 
-def _unfit(profile: Profile, axes: Sequence[Axis], settling_us: float | None) -> Iterator[Refused]:
-    """Reasons why the move of a lead-in cannot be made."""
+def _unfit_with(profile: Profile, axes: Sequence[Axis], settling_us: float | None) -> Iterator[Refused]:
+    """Reasons why the move with a lead-in of this time cannot be made."""
     move, radius_mm = move_of(profile, settling_us), profile.circle.radius_mm
     timing = LoopTiming(period_us=profile.cycle.period_us, step_us=step_us(profile))
     yield from (_at_key(cause, profile) for cause in unfit_move(move, radius_mm=radius_mm))
@@ -191,7 +190,7 @@ def _unfit(profile: Profile, axes: Sequence[Axis], settling_us: float | None) ->
 
 
 def _at_key(cause: Refused, profile: Profile, axis: AxisName | None = None) -> Refused:
-    """A cause by the dotted keys of its parameters; a key that an axis sets is the key of the axis."""
+    """The cause with dotted keys instead of parameter names, such as servo.x.dac_bits where the x axis sets it."""
 
     def key(parameter: str) -> str:
         if axis is not None and parameter in getattr(profile.servo, axis).model_fields_set:
@@ -202,7 +201,7 @@ def _at_key(cause: Refused, profile: Profile, axis: AxisName | None = None) -> R
     return cause._replace(name=key(cause.name), beside=tuple(map(key, cause.beside)))
 
 
-# --- parts of the simulation that need no numpy -----------------------------------------------------------------
+# --- inputs of the simulation, without numpy --------------------------------------------------------------------
 
 
 def delivery_of(network: Network) -> Delivery:
@@ -220,9 +219,9 @@ def move_of(profile: Profile, settling_us: float | None) -> Move:
     Parameters
     ----------
     profile
-        The network.
+        The profile.
     settling_us
-        Time of its lead-in: None on a trapezoid; infinite if the loops do not settle, and none is waited for [us].
+        Time of its lead-in: None on a trapezoid; infinite if the loops do not settle, which takes no lead-in [us].
     """
     circle = profile.circle
     return move_along(
@@ -235,12 +234,12 @@ def move_of(profile: Profile, settling_us: float | None) -> Move:
 
 
 def parameters_in(section: Section, of: type) -> dict[str, Any]:
-    """The parameters of the servo core in a section, to which a kind of bus may have added keys."""
+    """The parameters of the servo core in a section, without keys that a kind of bus adds."""
     return section.model_dump(include={parameter.name for parameter in parameters(of)})
 
 
 _REST_SHARE: Final = 1e-3
-"""Rest after settling, as a share of the smallest contour tolerance."""
+"""Residual error after settling, as a share of the smallest contour tolerance."""
 
 
 def step_us(profile: Profile) -> float:
@@ -252,7 +251,7 @@ def step_us(profile: Profile) -> float:
 
 
 def loop_timing(profile: Profile) -> LoopTiming:
-    """Timing of a profile's position loops, in a circle that can be run."""
+    """Timing of a profile's position loops; its circle must be one that can be run."""
     servo = profile.servo
     return LoopTiming(
         period_us=profile.cycle.period_us, step_us=step_us(profile), loop=servo.loop, interpolation=servo.interpolation
@@ -260,7 +259,7 @@ def loop_timing(profile: Profile) -> LoopTiming:
 
 
 def loop_axes(network: Network) -> tuple[Axis, Axis]:
-    """Both axes of a profile with the delays of their loops, in a circle that can be run."""
+    """Both axes of a profile with the delays of their loops; its circle must be one that can be run."""
     keys, (x_us, y_us) = network.profile.servo.axis_keys, loop_delays_us(network)
     return Axis(**keys("x"), delay_us=x_us), Axis(**keys("y"), delay_us=y_us)
 
@@ -278,7 +277,7 @@ def path_steps(network: Network) -> int:
 
 
 def path_setpoints(network: Network) -> int:
-    """Count the set-points of a profile's circle, which can be run [1]."""
+    """Count the set-points of a profile's circle; it must be one that can be run [1]."""
     return move_of(network.profile, path_settling_us(network)).setpoints
 
 
@@ -287,7 +286,7 @@ def path_settling_us(network: Network) -> float | None:
     profile = network.profile
     if profile.circle.path == "trapezoid":
         return None
-    from busplan.servo.measured_part import REST_MM, settling_time_us  # only what the lead-in decides loads numpy
+    from busplan.servo.measured_part import REST_MM, settling_time_us  # loads numpy, which only a lead-in needs
 
     tolerances_mm = [getattr(profile.tolerance, name) for name in CONTOUR_MEASURES]
     least_mm = min((tolerance_mm for tolerance_mm in tolerances_mm if tolerance_mm), default=None)
