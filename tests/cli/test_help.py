@@ -100,6 +100,16 @@ def test_its_example_runs_as_it_stands(shell: Run, name: str, example: str, tmp_
     assert run.stdout or list(tmp_path.iterdir()) or (is_gate and run.stderr)
 
 
+@EVERY_COMMAND
+def test_no_line_is_wider_than_the_terminal(name: str) -> None:
+    usual = len(shown(name, columns=80))
+    for columns in (60, 80, 100, 200):
+        lines = shown(name, columns=columns)
+        assert max(map(len, lines)) <= min(columns, 100)
+        # Not a column of words one below the other either: meanings keep room.
+        assert len(lines) < 2 * usual
+
+
 def test_commands_stand_in_groups_with_their_sentences_whole_and_init_comes_first() -> None:
     lines = shown("", columns=80)
     titles = [lines.index(f"{title}:") for title in ("Design", "Analyse", "Gate", "Learn", "Options")]
@@ -108,6 +118,18 @@ def test_commands_stand_in_groups_with_their_sentences_whole_and_init_comes_firs
     said = " ".join(" ".join(lines).split())
     for name in COMMANDS:
         assert f"{name} {paragraphs(name)[0]}" in said
+
+
+@EVERY_COMMAND
+def test_it_speaks_of_no_types_of_python(name: str) -> None:
+    text = "\n".join(shown(name, columns=100))
+    assert not re.search(r"<(str|int|float|bool|path|list\[|.* range)|[{}]", text)
+    usage = text.partition("\n\n")[0]
+    here = context(name)
+    for param in here.command.params:
+        if param.param_type_name == "argument":
+            assert param.metavar in usage
+            assert param.metavar == param.metavar.upper()
 
 
 @EVERY_COMMAND
@@ -123,3 +145,20 @@ def test_every_parameter_says_what_it_is_its_unit_its_default_and_what_may_stand
         assert is_switch or re.search(r"[\[ ]default: [^\]]|[\[ ]required\]", said), said
         if is_option and not param.is_flag:
             assert param.metavar or param.type_descriptor.is_choice, said
+
+
+@EVERY_COMMAND
+def test_the_shell_offers_each_option_with_help_on_one_line(run: Run, name: str) -> None:
+    here = context(name)
+    params = [param for param in here.command.get_params(here) if param.param_type_name == "option"]
+    flags = [one for param in params for one in param.opts + param.secondary_opts if one.startswith("--")]
+    for shell in ("fish", "zsh"):
+        asked = {
+            "_BUSPLAN_COMPLETE": f"complete_{shell}",
+            "_TYPER_COMPLETE_ARGS": f"busplan {name} --".replace("  ", " "),
+            "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        }
+        offers = run(inside={"variables": asked}).stdout.splitlines()
+        assert len(offers) == len(flags)
+        if shell == "fish":
+            assert sorted(offer.partition("\t")[0] for offer in offers) == sorted(flags)
