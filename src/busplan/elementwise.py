@@ -79,7 +79,7 @@ _Operator: TypeAlias = "Callable[[Traced, Any], Traced]"
 
 def _operators(name: str) -> tuple[_Operator, _Operator]:
     """An operator of traced numbers, and its form for a number on the left."""
-    return lambda own, operand: _computed(name, own, operand), lambda own, operand: _computed(name, operand, own)
+    return lambda left, right: _computed(name, left, right), lambda right, left: _computed(name, left, right)
 
 
 class Traced:

@@ -147,10 +147,10 @@ def latency(
 def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
     """Refuse payloads whose execution time is not known, all in one error."""
     unknown = dict.fromkeys(
-        f"payload {size} bytes: outside the execution table of {alike.name or profile.name}, {execution.range_bytes}; "
+        f"payload {size} bytes: outside the execution table of {group.name or profile.name}, {execution.range_bytes}; "
         "nothing is extrapolated"
-        for alike in profile.node_groups
-        if isinstance(execution := alike.node.execution, TableExecution)
+        for group in profile.node_groups
+        if isinstance(execution := group.node.execution, TableExecution)
         for size in payloads_bytes
         if not execution.covers(size)
     )

@@ -85,8 +85,8 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
         yield ProfileLine("bus", "pipeline_cycles", assumed(1, "the host computes in the next cycle"))
         yield ProfileLine("cycle", "period_us", _period(machine))
         taken: set[str] = set()
-        for _, alike in groupby(enumerate(nodes), lambda item: _looks(item[0], item[1])):
-            yield from _group([node for _, node in alike], taken)
+        for _, run in groupby(enumerate(nodes), lambda item: _looks(item[0], item[1])):
+            yield from _group([node for _, node in run], taken)
     else:
         machine.remarks.append(
             "Messages alone, without a cycle of SYNC and PDOs: the EDS or DCF of each node beside the file adds it"

@@ -82,18 +82,18 @@ def read_machine(argument: str, *, progress: Progress) -> Reading:
     """
     name = "<stdin>" if argument == "-" else argument
     content = read_bytes(Path(argument), name=name, limit=MOST_BYTES)
-    known = recognised(content, name=name)
-    if known.head:
+    machine_format = recognised(content, name=name)
+    if machine_format.head:
         if argument == "-":
             raise BusplanError(f"{name}: a recording is read from a file")
-        return known.read(Path(argument), name, progress=progress)
-    if known.roots:
-        return known.read(content, name)
+        return machine_format.read(Path(argument), name, progress=progress)
+    if machine_format.roots:
+        return machine_format.read(content, name)
     text = _text(content)
-    if not known.dialect:
+    if not machine_format.dialect:
         # Values stand further to the front, and patterns take long on endless lines.
         text = "\n".join(line[:_LONGEST_LINE] for line in text.split("\n"))
-    return known.read(text, name)
+    return machine_format.read(text, name)
 
 
 def recognised(content: bytes, *, name: str) -> Format:
@@ -104,9 +104,9 @@ def recognised(content: bytes, *, name: str) -> Format:
     BusplanError
         It is of no known format or of two, empty, too large or not valid XML.
     """
-    for known in FORMATS:
-        if known.head and re.match(known.head, content):
-            return known
+    for candidate in FORMATS:
+        if candidate.head and re.match(candidate.head, content):
+            return candidate
     if len(content) > MOST_BYTES:
         raise BusplanError(f"{name}: is larger than {MOST_BYTES:,} bytes; no file of one machine is")
     if not content.strip(b"\0 \t\r\n\xef\xbb\xbf\xff\xfe"):
@@ -115,18 +115,22 @@ def recognised(content: bytes, *, name: str) -> Format:
     start = content[:1000].decode("utf-16" if is_utf_16 else "utf-8", "ignore")
     if start.lstrip("\ufeff \t\r\n").startswith("<"):
         tag = root_tag(content, name=name)
-        matching = [known for known in FORMATS if tag in known.roots]
+        matching = [candidate for candidate in FORMATS if tag in candidate.roots]
         reason, what = _ELSEWHERE.get(tag, ""), f"XML with a root <{tag[:60]}>, which is "
     elif not is_utf_16 and b"\0" in content[:100_000]:
         matching, what = [], "binary data, "
     else:
         text, what = _text(content), ""
-        matching = [each for each in FORMATS if each.pattern and re.search(f"^(?:{each.pattern})", text, re.MULTILINE)]
+        matching = [
+            candidate
+            for candidate in FORMATS
+            if candidate.pattern and re.search(f"^(?:{candidate.pattern})", text, re.MULTILINE)
+        ]
     if len(matching) > 1:
-        titles = " and ".join(known.title for known in matching)
+        titles = " and ".join(candidate.title for candidate in matching)
         raise BusplanError(f"{name}: has lines of {titles}; give a file for each")
     if not matching:
-        titles = "; ".join(known.title for known in FORMATS)
+        titles = "; ".join(candidate.title for candidate in FORMATS)
         raise BusplanError(f"{name}: {reason or f'{what}none of what is looked for: {titles}'}")
     return matching[0]
 

@@ -162,7 +162,7 @@ def _record(plan: PlanAnswer, option: Option) -> Record:
         **{key: values[key] for key in option.network.bus.figures.planned},
         # Of the first nodes; a bus of messages alone has none.
         **{
-            f"{kind}_bytes": next((int(alike.bytes_of(kind)) for alike in profile.node_groups), None)
+            f"{kind}_bytes": next((int(group.bytes_of(kind)) for group in profile.node_groups), None)
             for kind in TRANSACTION_KINDS
         },
     }
@@ -224,10 +224,10 @@ def _short(network: Network, changes: NewValues) -> Cell:
     if not changes:
         return MISSING
     sizes = {key: value for key, value in changes.items() if key in _BOTH}
-    alike = len(sizes) == len(_BOTH) and len(set(sizes.values())) == 1
-    shown = {key: value for key, value in changes.items() if not alike or key != _BOTH[-1]}
+    is_same = len(sizes) == len(_BOTH) and len(set(sizes.values())) == 1
+    shown = {key: value for key, value in changes.items() if not is_same or key != _BOTH[-1]}
     of_bus = {name: key.short for name, key in network.bus.keys.items() if key.short}
-    words = {**_SHORT, **of_bus, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
+    words = {**_SHORT, **of_bus, **({_BOTH[0]: "payload {} bytes"} if is_same else {})}
     return joined(
         *(
             sentence(_counted(words[key], value), _short_value(key, value))

@@ -68,15 +68,15 @@ class Room(NamedTuple):
 def rooms(network: Network) -> Iterator[Room]:
     """The network with the nodes that [limits] asks the bus to carry: more of each group, the others as they are."""
     limits = network.profile.limits
-    for alike in network.profile.node_groups:
+    for group in network.profile.node_groups:
         more = {"limits.min_spare_nodes": limits.min_spare_nodes}
-        if limits.min_spare_axes is not None and alike.node.axes:
-            more["limits.min_spare_axes"] = ceil(limits.min_spare_axes / int(alike.node.axes))
+        if limits.min_spare_axes is not None and group.node.axes:
+            more["limits.min_spare_axes"] = ceil(limits.min_spare_axes / int(group.node.axes))
         for key, spare in more.items():
             if spare is not None:
-                nodes = int(alike.nodes) + spare
-                of = f" of {alike.name}" if alike.name else ""
-                yield Room(key, network.varying(alike.name).with_nodes(nodes), f"{nodes} nodes{of}")
+                nodes = int(group.nodes) + spare
+                of = f" of {group.name}" if group.name else ""
+                yield Room(key, network.varying(group.name).with_nodes(nodes), f"{nodes} nodes{of}")
 
 
 def to_be_shown(network: Network, *, is_safe: bool = True) -> Iterator[Need]:
@@ -349,7 +349,7 @@ def _needed(network: Network, changes: list[Changes]) -> list[Changes]:
     """The changes without those that are not needed beside the last, the dearest first."""
     left = list(changes)
     for change in changes[-2::-1]:
-        fewer = [other for other in left if other is not change]
+        fewer = [kept for kept in left if kept is not change]
         if not unmet(_with(network, fewer)):
             left = fewer
     return left
@@ -413,7 +413,7 @@ def _ratios(network: Network) -> Iterator[Changes]:
 def _payloads(network: Network, kept: Collection[str]) -> Iterator[Changes]:
     """The largest payload with which all constraints hold, or the smallest one: the larger of read and write is cut."""
     profile, payloads = network.profile, network.bus.payloads(network)
-    cuts = [_cut(alike, kind) for alike, kind in product(profile.node_groups, TRANSACTION_KINDS)]
+    cuts = [_cut(group, kind) for group, kind in product(profile.node_groups, TRANSACTION_KINDS)]
     step = max(payloads.step_bytes, min((size for key, size in cuts if key not in kept), default=1))
     most = min(int(network.largest_payload_bytes) - 1, payloads.most_bytes)
     sizes = [size for size in range(step, most + 1, step) if _within(profile, size, kept)]
@@ -434,16 +434,16 @@ def _holds(network: Network, change: Changes | None) -> bool:
 def _within(profile: Profile, most_bytes: int, kept: Collection[str]) -> Changes | None:
     """The change to payloads of so many bytes or less; empty where they are, None where no payload would be left."""
     changes: dict[str, Value] = {}
-    for alike, kind in product(profile.node_groups, TRANSACTION_KINDS):
-        over, (key, bytes_cut) = int(alike.bytes_of(kind)) - most_bytes, _cut(alike, kind)
+    for group, kind in product(profile.node_groups, TRANSACTION_KINDS):
+        over, (key, bytes_cut) = int(group.bytes_of(kind)) - most_bytes, _cut(group, kind)
         if over > 0 and key not in kept:
-            changes[key] = getattr(alike.payload, key.rpartition(".")[2]) - ceil(over / bytes_cut)
+            changes[key] = getattr(group.payload, key.rpartition(".")[2]) - ceil(over / bytes_cut)
     return changes if all(int(value) > 0 for value in changes.values()) else None
 
 
-def _cut(alike: ProfileGroup, kind: TransactionKind) -> tuple[str, int]:
+def _cut(group: ProfileGroup, kind: TransactionKind) -> tuple[str, int]:
     """The key that a payload is cut by, and what a byte of it takes away [bytes]; without axes it is the fixed part."""
-    key, axes = alike.payload_key(kind), int(alike.node.axes)
+    key, axes = group.payload_key(kind), int(group.node.axes)
     return (key, axes) if axes and key.endswith("_per_axis") else (key.removesuffix("_per_axis"), 1)
 
 
@@ -518,17 +518,17 @@ def nodes_for_axes(profile: Profile, axes: int) -> int:
         Nodes differ, so that axes do not say how many of which.
     """
     if profile.group:
-        now = {alike: int(alike.nodes) * int(alike.node.axes) for alike in profile.node_groups}
-        needed = {alike: axes - sum(now.values()) + now[alike] for alike in now if alike.node.axes}
+        now = {group: int(group.nodes) * int(group.node.axes) for group in profile.node_groups}
+        needed = {group: axes - sum(now.values()) + now[group] for group in now if group.node.axes}
         ways = ", or ".join(
-            f"set {alike.nodes_key}={ceil(of_group / int(alike.node.axes))}"
-            for alike, of_group in needed.items()
+            f"set {group.nodes_key}={ceil(of_group / int(group.node.axes))}"
+            for group, of_group in needed.items()
             if of_group > 0
         )
         instead = f"say instead: {ways}" if ways else "set the nodes of a group instead"
         raise BusplanError(f"axes {axes}: the nodes of {profile.name} differ; {instead}")
-    (alike,) = profile.node_groups
-    return ceil(axes / int(alike.node.axes))
+    (group,) = profile.node_groups
+    return ceil(axes / int(group.node.axes))
 
 
 def settings_to_be_carried(network: Network) -> Changes:

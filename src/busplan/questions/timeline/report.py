@@ -249,7 +249,7 @@ def _lanes(window: Schedule) -> tuple[Panel, str]:
         draw = _events
         if len(events) > _MOST_BARS:
             draw, legend = _transactions, "A bar is a whole transaction."
-        spans, is_merged = _few_bars([list(draw(window, own)) for own in of_lane], window.from_us, window.to_us)
+        spans, is_merged = _few_bars([list(draw(window, in_lane)) for in_lane in of_lane], window.from_us, window.to_us)
         if is_merged:
             legend = f"A bar is what takes most of a {_MOST_BARS}th of the scale."
         labels = ["bus", *(f"node {n[0]}" if len(n) == 1 else f"nodes {n[0]} to {n[-1]}" for n in shared)]
