@@ -536,9 +536,12 @@ def action_step(run: Busplan) -> Step:
     return call
 
 
-def test_the_action_is_one(run: Busplan, tmp_path: Path) -> None:
-    schema = ("--builtin-schema", "vendor.github-actions", str(ROOT / "action.yml"))
-    done = run(*schema, python=("-m", "check_jsonschema"), cwd=tmp_path)
+@pytest.mark.parametrize(
+    ("schema", "files"), [("github-actions", "action.yml"), ("github-workflows", ".github/workflows/*.yml")]
+)
+def test_the_action_and_the_workflows_are_valid(run: Busplan, tmp_path: Path, schema: str, files: str) -> None:
+    paths = map(str, ROOT.glob(files))
+    done = run("--builtin-schema", f"vendor.{schema}", *paths, python=("-m", "check_jsonschema"), cwd=tmp_path)
     assert done.returncode == 0, done.stdout
 
 

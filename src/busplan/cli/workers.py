@@ -87,6 +87,9 @@ class _Workers(ProcessPoolExecutor):
 @contextmanager
 def _signals_blocked() -> Iterator[None]:
     """Processes and threads that start meanwhile never get signals: those of a group are for this thread alone."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     try:
         yield
