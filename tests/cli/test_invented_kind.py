@@ -473,6 +473,7 @@ def test_a_name_is_registered_once_and_gone_afterwards(run: Run, ring_file: Path
 
 def test_one_schema_serves_all_kinds_and_names_the_key(run: Run, ring: Path) -> None:
     schema = Draft202012Validator(json.loads(run("schema", cwd=ring.parent).stdout))
+    assert schema.schema["$id"].startswith("https://")
     ours = busplan.load_profile(ring).model_dump(exclude_unset=True)
     paper = busplan.load_profile("paper-1ms").model_dump(mode="json", exclude_unset=True)
     assert not list(schema.iter_errors(ours))

@@ -322,6 +322,7 @@ def _words(annotation: Any) -> tuple[str, ...]:
 
 
 _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
+_SCHEMA_ID: Final = "https://json.schemastore.org/busplan.json"
 
 
 def profile_schema() -> dict[str, Any]:
@@ -346,7 +347,8 @@ def profile_schema() -> dict[str, Any]:
         {"if": _has_kind({"const": kind}), "then": references[model, "validation"]} for kind, model in kinds.items()
     ]
     any_kind = _has_kind({"description": "Kind of bus", "enum": list(kinds)}, description="The bus")
-    return {"$schema": _DIALECT, "type": "object", **any_kind, "allOf": chosen, **definitions}
+    head = {"$schema": _DIALECT, "$id": _SCHEMA_ID, "title": "busplan profile"}
+    return {**head, "type": "object", **any_kind, "allOf": chosen, **definitions}
 
 
 def _has_kind(allowed: dict[str, Any], **more: str) -> dict[str, Any]:
