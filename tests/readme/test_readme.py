@@ -26,7 +26,7 @@ from busplan.questions.explain.derivation import figures_of
 from busplan.questions.explain.report import constant_rows, equation_rows
 from busplan.sections.machine import AxisOverride
 from busplan.sourced import short
-from tests.registers import COMMANDS, shipped_names
+from tests.registers import COMMANDS
 
 Run = Callable[..., CompletedProcess[str]]
 
