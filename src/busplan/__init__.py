@@ -25,6 +25,7 @@ __all__ = [
     "DiffAnswer",
     "EvidenceAnswer",
     "ExplainAnswer",
+    "ExploreAnswer",
     "ImportAnswer",
     "LatencyAnswer",
     "MapAnswer",
@@ -43,6 +44,7 @@ __all__ = [
     "diff",
     "evidence",
     "explain",
+    "explore",
     "import_profile",
     "latency",
     "load_profile",
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
     from busplan.questions.diff import DiffAnswer, diff
     from busplan.questions.evidence import EvidenceAnswer, evidence
     from busplan.questions.explain import ExplainAnswer, explain
+    from busplan.questions.explore import ExploreAnswer, explore
     from busplan.questions.import_ import ImportAnswer, import_profile
     from busplan.questions.latency import LatencyAnswer, latency
     from busplan.questions.map import MapAnswer, map_

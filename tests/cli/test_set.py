@@ -52,6 +52,7 @@ EVERY = {
     "explain": ("mine.toml", "required_us"),
     "timeline": ("mine.toml",),
     "map": ("mine.toml",),
+    "explore": ("mine.toml", "--x", "axes=3,6", "--y", "cycle.period_us=500,1000"),
     "compare": ("mine.toml",),
     "report": ("mine.toml",),
     "plan": ("mine.toml",),

@@ -409,6 +409,46 @@ def map_command(
         give(trade_off)
 
 
+@takes_changes("For a key of a slider, it moves the first setting.", period=True)
+def explore_command(
+    profile: ProfileArgument,
+    x: Annotated[str | None, _direction("--x", default="as `busplan map`")] = None,
+    y: Annotated[str | None, _direction("--y", default="as `busplan map`")] = None,
+    over: Annotated[
+        str | None,
+        option("--over KEY=VALUES", f"A third key: {VALUES_HELP}  [default: the larger payload of a node]"),
+    ] = None,
+    changes: KeyChanges = NO_CHANGES,
+    circle: Annotated[bool, option("--circle", "Also run the circle test of every setting that fits.")] = False,
+    jobs: JobsOption = None,
+    format_: DrawnFormatOption = None,
+    output: DrawnOutputOption = None,
+) -> None:
+    """Write a page with sliders that shows what a change does: to the period, the nodes, the payload.
+
+    Every setting is computed now, and the page shows its card and its place on the map: one file to open in a browser
+    or to send, without a server. Other forms show the map of this design. Up to 32 values each, 5,000 settings in
+    all. Exits 0 with any verdict.
+
+    Example: busplan explore gantry-24 -o gantry-24.html
+    """
+    require_company("--circle", {"--jobs": jobs}, is_given=circle)
+    files = profile_files(profile)
+    with answer(format_, output, inputs=files, changes=changes, is_drawn=True) as give:
+        from busplan.cli.workers import available_processors, executor
+        from busplan.questions.explore import explore
+
+        axes = {
+            name: None if text is None else dict([parse_axis(text, option=f"--{name}")])
+            for name, text in (("x", x), ("y", y), ("over", over))
+        }
+        with (
+            progress_bar("explore") as progress,
+            executor((jobs or available_processors()) if circle else 1) as crew,
+        ):
+            give(explore(load_changed(profile, changes), **axes, circle=circle, progress=progress, executor=crew))
+
+
 def _complete_kinds(incomplete: str) -> list[str]:
     """Complete the last of several names of kinds for the shell."""
     from busplan.buses import kind_names

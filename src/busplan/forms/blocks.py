@@ -244,6 +244,31 @@ class Card(NamedTuple):
     lines: tuple[tuple[str, Sentence], ...]
 
 
+class Slider(NamedTuple):
+    """A choice of one value."""
+
+    title: str
+    values: tuple[str, ...]
+    place: int
+    """Index of the value at first."""
+
+
+class Explorer(NamedTuple):
+    """The answer at every setting of two or three sliders; a page shows that of the sliders, other forms the blocks."""
+
+    sliders: tuple[Slider, ...]
+    """Along the rows and the columns of each map, and along the maps."""
+    cards: tuple[tuple[Card | None, ...], ...]
+    """For each map, row by row, the card of each cell; None where nothing can be."""
+    first_card: Card
+    """That of the sliders' first places."""
+    maps: tuple[Drawing, ...]
+    """With a frame around the cell of the sliders."""
+    first_map: int
+    """Number of the map that is shown first."""
+    blocks: "tuple[Block, ...]"
+
+
 class Detail(NamedTuple):
     """Blocks that only a whole answer shows."""
 
@@ -263,7 +288,9 @@ class Chapter(NamedTuple):
     """Whether a screen shows its title alone until it is opened; print shows all."""
 
 
-Block = Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Card | Detail | Chapter
+Block = (
+    Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Card | Explorer | Detail | Chapter
+)
 
 
 class Report(NamedTuple):
@@ -293,7 +320,7 @@ def first_drawing(blocks: Sequence[Block]) -> Drawing | None:
     """The first drawing of an answer; None if it has none."""
     for block in blocks:
         drawing = block.drawing if isinstance(block, Chart) else None
-        if isinstance(block, Chapter):
+        if isinstance(block, Chapter | Explorer):
             drawing = first_drawing(block.blocks)
         if drawing is not None:
             return drawing

@@ -1,8 +1,14 @@
-"""An answer as one self-contained HTML file: no network, no script; light, dark, narrow and printed styles."""
+"""An answer as one self-contained HTML file without network; light, dark, narrow and printed styles.
 
+The sliders of an explorer are the only script.
+"""
+
+import json
 import re
+from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from functools import cache
+from hashlib import sha256
 from importlib.resources import files
 from itertools import groupby
 from typing import Final, get_args
@@ -13,7 +19,7 @@ from markupsafe import Markup
 from busplan import __version__
 from busplan.buses.figure import unit_of
 from busplan.english import json_text, printable_lines
-from busplan.forms.blocks import Bar, Block, Cell, Chapter, Command, Report, Sentence, Table
+from busplan.forms.blocks import Bar, Block, Card, Cell, Chapter, Command, Explorer, Gauge, Report, Sentence, Table
 from busplan.forms.charts import Drawing
 from busplan.forms.inks import DARK, fills
 from busplan.forms.numbers import cell_text, figure_text, sentence_text, shown_blocks, unit_text
@@ -38,6 +44,9 @@ def page(report: Report) -> str:
         The whole document. The same answer always gives the same document.
     """
     blocks = shown_blocks(report)
+    script = ""
+    if any(isinstance(block, Explorer) for block in blocks):
+        script = (files("busplan.forms") / "templates" / "explore.js").read_text(encoding="utf-8")
     return (
         _environment()
         .get_template("page.html.j2")
@@ -46,6 +55,8 @@ def page(report: Report) -> str:
             blocks=blocks,
             program=f"busplan {__version__}",
             colours=Markup(_colours()),  # noqa: S704 - our own constants
+            script=Markup(script),  # noqa: S704 - our own file
+            script_hash=f"sha256-{b64encode(sha256(script.encode()).digest()).decode()}",
         )
     )
 
@@ -58,7 +69,10 @@ def fragment(report: Report) -> str:
     report
         The answer.
     """
-    blocks = shown_blocks(report)
+    # A notebook runs no script of ours.
+    blocks = [
+        piece for block in shown_blocks(report) for piece in (block.blocks if isinstance(block, Explorer) else [block])
+    ]
     folder = files("busplan.forms") / "templates"
     chart, style = ((folder / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
     # The rules are nested in the fragment's own rule, where & stands for its outer element: that is its root.
@@ -93,6 +107,7 @@ def _environment() -> Environment:
         "words": cell_text,
         "bar": _bar,
         "drawn": _drawn,
+        "settings": _settings,
         "holds_sections": lambda section: any(isinstance(block, Chapter) for block in section.blocks),
     }
     return environment
@@ -130,6 +145,42 @@ def _groups(table: Table) -> list[tuple[str, int]]:
     """Group headings with the number of columns that each spans; empty if no column has a group."""
     groups = [(name, len(list(run))) for name, run in groupby(column.group for column in table.columns)]
     return groups if any(name for name, _ in groups) else []
+
+
+def _settings(explorer: Explorer) -> Markup:
+    """Every card of an explorer as JSON for its script; texts that return are numbered."""
+    labels: dict[str, int] = {}
+    texts: dict[str, int] = {}
+
+    def number(words: str, seen: dict[str, int]) -> int:
+        return seen.setdefault(printable_lines(words), len(seen))
+
+    def setting(card: Card | None) -> list[object] | None:
+        if card is None:
+            return None
+        lines = [
+            [number(label, labels), number(sentence_text(words), texts), words.state] for label, words in card.lines
+        ]
+        subject, word = number(sentence_text(card.subject), texts), number(card.verdict.text, texts)
+        return [subject, word, card.verdict.state, _shares(card.gauge), lines]
+
+    settings = [[setting(card) for card in cards] for cards in explorer.cards]
+    text = json.dumps({"labels": [*labels], "texts": [*texts], "settings": settings}, separators=(",", ":"))
+    # No text of a profile ends the element.
+    return Markup(text.replace("<", "\\u003c"))  # noqa: S704 - as above
+
+
+def _shares(gauge: Gauge | None) -> list[tuple[str, float, float]] | None:
+    """Class of each part of a bar, and its ends in percent."""
+    if gauge is None:
+        return None
+    parts = [
+        (f"{part.name} {part.state}", round(100 * part.start, 3), round(100 * part.end, 3))
+        for part in gauge.parts()
+        if part.end > part.start
+    ]
+    end = round(100 * gauge.most, 3)
+    return [*parts, *([("end", end, end)] if gauge.most < 1 else [])]
 
 
 def _drawn(drawing: Drawing) -> Markup:

@@ -15,6 +15,7 @@ from busplan.forms.blocks import (
     Chart,
     Code,
     Command,
+    Explorer,
     Facts,
     Part,
     Question,
@@ -159,6 +160,8 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
             yield from (f'<a id="{block.key}"></a>', "") if block.key else ()
             yield f"{'#' * level} {_sentence(block.title)}"
             yield from _blocks(block.blocks, level=level + 1)
+        case Explorer():
+            yield from _blocks(block.blocks, level=level)
         case Command():
             yield code(block.line)
 

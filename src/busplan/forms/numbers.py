@@ -12,6 +12,7 @@ from busplan.forms.blocks import (
     Cell,
     Chapter,
     Detail,
+    Explorer,
     Part,
     Report,
     Sentence,
@@ -190,7 +191,7 @@ def _with_details(blocks: Sequence[Block]) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, Detail):
             yield from _with_details(block.blocks)
-        elif isinstance(block, Chapter):
+        elif isinstance(block, Chapter | Explorer):
             yield block._replace(blocks=tuple(_with_details(block.blocks)))
         else:
             yield block
@@ -200,7 +201,7 @@ def _without_details(blocks: Sequence[Block], whole_by: str) -> Iterator[Block]:
     for block in blocks:
         if isinstance(block, Detail):
             continue
-        if isinstance(block, Chapter):
+        if isinstance(block, Chapter | Explorer):
             yield block._replace(blocks=tuple(_without_details(block.blocks, whole_by)))
         elif isinstance(block, Table):
             numbers = [number for number, column in enumerate(block.columns) if not column.is_detail]

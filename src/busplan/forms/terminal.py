@@ -14,6 +14,7 @@ from busplan.forms.blocks import (
     Chart,
     Command,
     Detail,
+    Explorer,
     Facts,
     Gauge,
     Question,
@@ -265,8 +266,8 @@ def _lines(block: Block, width: int | None, *, is_whole: bool, whole_by: str) ->
             return _card_lines(block, width)
         case Detail():
             return [*block_lines(block.blocks, width=width, is_whole=True)] if is_whole else []
-        case Chapter():
-            title = wrapped(sentence_line(block.title)._replace(tone="title"), width)
+        case Chapter() | Explorer():
+            title = _caption(block.title if isinstance(block, Chapter) else None, width)
             return [*title, *block_lines(block.blocks, width=width, is_whole=is_whole, whole_by=whole_by)]
 
 

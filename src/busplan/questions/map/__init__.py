@@ -88,6 +88,8 @@ class Cell(NamedTuple):
     is_safe: bool
     circle_passed: bool | None = None
     """None if no circle was run, or the circle is not judged."""
+    max_contour_error_mm: float | None = None
+    """None if no circle was run."""
 
 
 class NotDrawn(NamedTuple):
@@ -234,11 +236,11 @@ def map_(
         )
     across, up = _directions(network, x, y, with_circle=circle)
     settings = {
-        (row, column): _setting(network, {across.key: value_x, up.key: value_y})
+        (row, column): setting_at(network, {across.key: value_x, up.key: value_y})
         for row, value_y in enumerate(up.values)
         for column, value_x in enumerate(across.values)
     }
-    possible = {place: setting for place, setting in settings.items() if isinstance(setting, _Setting)}
+    possible = {place: setting for place, setting in settings.items() if isinstance(setting, Variant)}
     if not possible:
         raise BusplanError(f"no setting of this map can exist: {next(iter(settings.values()))}")
     cells = {
@@ -272,20 +274,20 @@ def _directions(
     # Messages alone have no nodes whose number could vary.
     nodes_key = varied_nodes(profile).nodes_key if network.groups else AXES
     across, up = (
-        None if along is None else _direction(profile, along, name=name, with_circle=with_circle)
+        None if along is None else direction(profile, along, name=name, with_circle=with_circle)
         for name, along in (("x", x), ("y", y))
     )
     if across is None:
-        across = _default_direction(PERIOD if up is not None and up.key in (AXES, nodes_key) else AXES, network)
+        across = _defaultdirection(PERIOD if up is not None and up.key in (AXES, nodes_key) else AXES, network)
     if up is None:
-        up = _default_direction(AXES if across.key == PERIOD else PERIOD, network)
+        up = _defaultdirection(AXES if across.key == PERIOD else PERIOD, network)
     key_x, key_y = (nodes_key if direction.key == AXES else direction.key for direction in (across, up))
     if key_x == key_y:
         raise BusplanError(f"x = {across.key} and y = {up.key} both vary {key_x}; give two keys")
     return across, up
 
 
-def _direction(profile: Profile, along: Along, *, name: str, with_circle: bool) -> Direction:
+def direction(profile: Profile, along: Along, *, name: str, with_circle: bool) -> Direction:
     """Check the key of a direction and the number of its values; values that the schema refuses are not drawn later."""
     if not isinstance(along, Mapping) or len(along) != 1 or not all(isinstance(key, str) for key in along):
         raise BusplanError(f'{name} {along!r}: expected one key and its values, as {{"bus.nodes": range(1, 17)}}')
@@ -309,7 +311,7 @@ _BEYOND: Final = 2
 """Nodes drawn beyond the most that fit."""
 
 
-def _default_direction(key: str, network: Network) -> Direction:
+def _defaultdirection(key: str, network: Network) -> Direction:
     """A direction along `AXES` or `PERIOD` that shows where the design stops fitting."""
     varied = varied_nodes(network.profile)
     design_us, design_nodes = network.profile.cycle.period_us, int(varied.nodes)
@@ -366,7 +368,7 @@ def design_value(key: str, network: Network) -> Any:
     return int(plain(network.axes)) if key == AXES else value_at(network.profile, key)
 
 
-class _Setting(NamedTuple):
+class Variant(NamedTuple):
     """One combination of values that a profile can have."""
 
     changes: Point
@@ -375,15 +377,15 @@ class _Setting(NamedTuple):
     """The network with them."""
 
 
-def _setting(network: Network, values: Mapping[str, Value]) -> _Setting | str:
-    """The network with the values of both directions, or why there is none."""
+def setting_at(network: Network, values: Mapping[str, Value]) -> Variant | str:
+    """The network with a value of each direction, or why there is none."""
     changes: Point = {key: value for key, value in values.items() if key != AXES}
     try:
         if AXES in values:
             # The other value may change how many nodes it takes for these axes.
             nodes_key = varied_nodes(network.profile).nodes_key
             changes[nodes_key] = _nodes_with(values[AXES], changed(network, changes), nodes_key=nodes_key)
-        return _Setting(changes, changed(network, changes))
+        return Variant(changes, changed(network, changes))
     except BusplanError as error:
         return error.problems[0]
 
@@ -438,7 +440,7 @@ _Place = tuple[int, int]
 
 def _with_circles(
     profile: Profile,
-    settings: Mapping[_Place, _Setting],
+    settings: Mapping[_Place, Variant],
     cells: Mapping[_Place, Cell],
     *,
     executor: Executor | None,
@@ -464,7 +466,7 @@ def _with_circles(
 
 
 def _judged(cell: Cell, result: CircleFigures) -> Cell:
-    cell = cell._replace(circle_passed=result.passed)
+    cell = cell._replace(circle_passed=result.passed, max_contour_error_mm=result.max_contour_error_mm)
     if result.passed is False:
         return cell._replace(state="circle fails", limited_by=tuple(failure.name for failure in result.failures))
     return cell if result.passed else cell._replace(state="circle not judged")

@@ -22,6 +22,7 @@ from busplan.forms.blocks import (
     Table,
     TableColumn,
     TableRow,
+    attribute_value,
     count_value,
     joined,
     sentence,
@@ -30,6 +31,7 @@ from busplan.forms.blocks import State as Tone
 from busplan.forms.charts import ChartCell, ChartGrid, Drawing, Entry, Panel, choices, letters
 from busplan.forms.numbers import period_value, sentence_text, with_unit
 from busplan.questions.base.sentences import document, fields, with_profile
+from busplan.questions.circle import CIRCLE_BY_KEY
 from busplan.questions.fit.certainty import FITS, TIME
 from busplan.questions.fit.network import PERIOD, varied_nodes
 from busplan.questions.map import AXES, Cell, Direction, MapAnswer, NotDrawn, Region, State
@@ -80,11 +82,11 @@ def _blocks(answer: MapAnswer) -> Iterator[Block]:
     headline, looks = _headline(answer), _looks(answer)
     yield headline
     yield from _remarks(answer)
-    title = " against ".join(_title(direction, answer.profile) for direction in (answer.y, answer.x))
+    title = " against ".join(title_of(direction, answer.profile) for direction in (answer.y, answer.x))
     steps = "" if _is_even(answer.y) and _is_even(answer.x) else ", in unequal steps"
     marked = "" if answer.design is None else ", this design marked"
     caption = sentence(f"{{}} of {{}} settings fit, {title}{steps}{marked}", *_counts(answer))
-    yield Chart(_drawing(answer, looks, title=sentence_text(headline)), caption)
+    yield Chart(map_drawing(answer), caption)
     yield _regions_table(answer, looks)
 
 
@@ -132,28 +134,37 @@ def _looks(answer: MapAnswer) -> _Looks:
     return looks | {("does not fit", limits): _BARRED._replace(mark=mark) for limits, mark in marks}
 
 
-def _drawing(answer: MapAnswer, looks: _Looks, *, title: str) -> Drawing:
-    """The verdict and its limit at each setting."""
-    legend = []
+def map_drawing(answer: MapAnswer, *, frame: tuple[int, int] | None = None) -> Drawing:
+    """Draw the verdict and its limit at each setting.
+
+    Parameters
+    ----------
+    answer
+        The map.
+    frame
+        Row and column of the setting to mark; by default those of this design.
+    """
+    looks, legend = _looks(answer), []
     for (state, limits), look in looks.items():
         limit = f": {' and '.join(limits)}" if look.ink == _BARRED.ink else ""
         legend.append(Entry(look.ink, f"{_state_words(answer, state)}{limit}", look.mark))
     design = None
-    if answer.design_place is not None:
-        row, column = answer.design_place
+    if frame is not None or answer.design_place is not None:
+        row, column = frame or answer.design_place or (0, 0)
         design = (column, row)
-        legend.append(Entry("frame", "this design"))
+        legend.append(Entry("frame", "this design" if frame is None else "this setting"))
     if answer.not_drawn:
         legend.append(Entry("blank", "blank: cannot exist"))
     across, up = (
         choices(
-            f"{_title(direction, answer.profile)}{'' if _is_even(direction) else ' in unequal steps'}",
-            (_value_text(direction, value) for value in direction.values),
+            f"{title_of(direction, answer.profile)}{'' if _is_even(direction) else ' in unequal steps'}",
+            (value_text(direction, value) for value in direction.values),
             own=place,
         )
         for direction, place in zip((answer.x, answer.y), design or (None, None), strict=True)
     )
     rows = tuple(tuple(_cell(answer, cell, looks) for cell in row) for row in answer.rows)
+    title = sentence_text(_headline(answer))
     return Drawing(title, (Panel(ChartGrid(across, up, rows, tuple(legend), design)),), has_characters=True)
 
 
@@ -179,12 +190,23 @@ def _regions_table(answer: MapAnswer, looks: _Looks) -> Table:
     return Table(columns, tuple(rows), Sentence(("What limits each region",)))
 
 
+def circle_words(answer: MapAnswer, cell: Cell) -> Sentence | None:
+    """Result of the circle test of a cell; None if none was asked for, or the cell does not fit."""
+    if not answer.with_circle or cell.verdict != FITS or cell.state == "unsafe":
+        return None
+    words = ", ".join(("passes" if cell.state == FITS else cell.state.removeprefix("circle "), *cell.limited_by))
+    if cell.max_contour_error_mm is None:
+        return Sentence((words,), LOOKS[cell.state].tone)
+    error = attribute_value(CIRCLE_BY_KEY["max_contour_error_mm"], cell)
+    return sentence(f"{words}; largest error {{}}", error, state=LOOKS[cell.state].tone)
+
+
 def _setting_words(answer: MapAnswer, cell: Cell) -> str:
     """The setting of a cell, as "8 axes, period 4 ms"."""
     words = []
     for direction, value in ((answer.x, cell.x), (answer.y, cell.y)):
-        text = _value_text(direction, value)
-        words.append(f"{text} axes" if direction.key == AXES else f"{_title(direction, answer.profile)} {text}")
+        text = value_text(direction, value)
+        words.append(f"{text} axes" if direction.key == AXES else f"{title_of(direction, answer.profile)} {text}")
     return ", ".join(words)
 
 
@@ -207,14 +229,14 @@ def _limit_words(answer: MapAnswer, region: Region | Cell) -> str:
     return f"{words}, largest term {answer.network.bus.figures.term_label(region.binding_term)}"
 
 
-def _title(direction: Direction, profile: Profile) -> str:
+def title_of(direction: Direction, profile: Profile) -> str:
     """Name of a direction in words."""
     if direction.key == AXES:
         return f"axes ({varied_nodes(profile).nodes_key})"
     return "period" if direction.key == PERIOD else direction.key
 
 
-def _value_text(direction: Direction, value: Value) -> str:
+def value_text(direction: Direction, value: Value) -> str:
     """Write a value of a direction in few characters: only a period has its unit, any other is in that of its key."""
     if isinstance(value, str | bool):
         return str(value).lower() if isinstance(value, bool) else value
@@ -256,5 +278,5 @@ def _record(answer: MapAnswer, cell: Cell) -> Record:
         **fields(cell, "nodes", "axes", "state", "limited_by", "binding_term", "verdict"),
         **fields(cell, "margin_corrected_us", "uncertainty_us"),
         **({} if safety is None else {safety.key: cell.is_safe}),
-        **fields(cell, "circle_passed"),
+        **fields(cell, "circle_passed", "max_contour_error_mm"),
     }
