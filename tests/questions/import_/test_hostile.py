@@ -41,7 +41,10 @@ REFUSED = {
         r": has lines of text of SOEM's .* and DBC \(BO_\); give a",
     ),
     "two masters": ("=== Master 0, Slave 0 ===\n=== Master 1, Slave 0 ===\n", ":2: a second master"),
-    "one device of a bus": ("SM2: PhysAddr 0x1100, DefaultSize    0\n", ":1: no line === Master 0, Slave 0 === before"),
+    "lines before the first device": (
+        "SM2: PhysAddr 0x1100, DefaultSize    0\n=== Master 0, Slave 1 ===\n",
+        ":1: no line === Master 0, Slave 0 === before",
+    ),
     "a slave left out": (
         "Slave:1\n Output size: 8bits\n Input size: 8bits\nSlave:3\n",
         ":4: slave 3 where slave 2 is due",

@@ -1,6 +1,7 @@
 """Scans of a bus, LinuxCNC's file, databases of messages, CANopen files: one of each dialect, of our own making."""
 
 import pickle
+import re
 from pathlib import Path
 from typing import Any, Final
 
@@ -202,10 +203,93 @@ def test_a_data_bit_rate_that_no_file_says_is_assumed(tmp_path: Path) -> None:
 
 def test_an_eds_has_defaults_and_says_so() -> None:
     answer = imported("node.eds")
-    assert any("an EDS has the defaults of a device" in remark for remark in answer.remarks)
+    assert any("read as an EDS, the defaults of a device, here as node 1" in remark for remark in answer.remarks)
     assert {"bus.bit_rate_kbit_s", "group.AX30.nodes", "cycle.period_us"} <= {
         row.dotted for row in answer.rows if row.fact.grade == "assumed"
     }
+
+
+def changed(tmp_path: Path, name: str, *pairs: tuple[str, str]) -> busplan.ImportAnswer:
+    """A file of ours with other words, imported."""
+    text = (FILES / name).read_text(encoding="utf-8")
+    for old, new in pairs:
+        assert old in text, old
+        text = text.replace(old, new)
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return busplan.import_profile(path)
+
+
+def test_a_bit_rate_of_zero_is_one_that_is_not_set(tmp_path: Path) -> None:
+    answer = changed(tmp_path, "axis-5.dcf", ("Baudrate=500", "Baudrate=0"))
+    profile: Any = answer.profile
+    assert profile.bus.bit_rate_kbit_s == 1000
+    assert {row.fact.grade for row in answer.rows if row.key == "bit_rate_kbit_s"} == {"assumed"}
+    assert any(remark.endswith("Baudrate = 0: not set") for remark in answer.remarks)
+
+
+@pytest.mark.parametrize(("period_us", "is_taken"), [(1, False), (93, False), (94, True), (2000, True)])
+def test_a_period_shorter_than_sync_itself_is_not_set(tmp_path: Path, period_us: int, is_taken: bool) -> None:
+    """SYNC has 47 bits at 500 kbit/s, 94 us."""
+    answer = changed(tmp_path, "axis-5.dcf", ("ParameterValue=4000", f"ParameterValue={period_us}"))
+    profile: Any = answer.profile
+    assert (profile.cycle.period_us == period_us) is is_taken
+    assert any("its frame takes 94: the period is taken as not set" in remark for remark in answer.remarks) != is_taken
+
+
+def test_mappings_in_the_compact_form_are_those_in_the_long_one(tmp_path: Path) -> None:
+    """CiA 306: CompactSubObj for the number, and the section [1A00Value] for the values."""
+    text = (FILES / "axis-5.dcf").read_text(encoding="utf-8")
+    compact = tmp_path / "axis-5.dcf"
+    for index in ("1A00", "1600"):
+        values = re.findall(rf"\[{index}sub([1-9])\]\n(?:\w+=.*\n)*?(?:DefaultValue|ParameterValue)=(\S+)\n", text)
+        assert values
+        text = re.sub(rf"\[{index}sub\d\]\n(?:\w+=.*\n)+\n?", "", text)
+        lines = "".join(f"{sub}={value}\n" for sub, value in values)
+        text += f"\n[{index}]\nCompactSubObj={len(values)}\n[{index}Value]\nNrOfEntries=9\n{lines}"
+    compact.write_text(text, encoding="utf-8")
+    shown = [(row.dotted, row.plain) for row in busplan.import_profile(compact).rows]
+    assert shown == [(row.dotted, row.plain) for row in imported("axis-5.dcf").rows]
+
+
+def test_identifiers_without_node_id_say_the_node(tmp_path: Path) -> None:
+    pairs = [(f"$NODEID+0x{start:x}", f"0x{start + 32:x}") for start in (0x180, 0x280, 0x200)]
+    text = (FILES / "node.eds").read_text(encoding="utf-8")
+    answer = changed(tmp_path, "node.eds", *(pair for pair in pairs if pair[0] in text))
+    assert "node-ID 32, no NodeID in the file, that of its identifiers" in answer.text
+
+
+def test_couplers_and_digital_terminals_are_known_by_their_type(tmp_path: Path) -> None:
+    answer = changed(tmp_path, "ethercat-conf.xml", ('type="CP10"', 'type="EK1100"'), ('type="DI04"', 'type="EL1859"'))
+    assert groups(answer) == [("EK1100", 1, 0, 0, 0), ("EL1859", 1, 1, 1, 0), *groups(answer)[2:]]
+    with pytest.raises(busplan.BusplanError, match=r"how many bytes device 1 \(EL3104\) has in a cycle is not known"):
+        changed(tmp_path, "ethercat-conf.xml", ('type="CP10"', 'type="EK1100"'), ('type="DI04"', 'type="EL3104"'))
+
+
+def test_a_bus_of_one_device_has_no_heading(tmp_path: Path) -> None:
+    text = (FILES / "pdos.txt").read_text(encoding="utf-8")
+    path = tmp_path / "pdos.txt"
+    path.write_text(text.partition("=== Master 0, Slave 3 ===\n")[2], encoding="utf-8")
+    assert groups(busplan.import_profile(path)) == [("device", 1, 8, 6, 1)]
+
+
+ENTRIES = {
+    "the control word of a third axis": ("0x7040:00, 16 bit", 2),
+    "a bit of a terminal": ("0x7040:01,  1 bit", 1),
+    "a part of an object": ("0x6840:01, 16 bit", 1),
+    "another width": ("0x6840:00, 32 bit", 1),
+}
+
+
+@pytest.mark.parametrize("case", ENTRIES)
+def test_a_control_word_is_an_output_of_16_bits_without_subindex(case: str, tmp_path: Path) -> None:
+    entry, axes = ENTRIES[case]
+    answer = changed(tmp_path, "pdos.txt", ("0x607a:00, 32 bit", entry), ("0x6064:00, 32 bit", "0x6840:00, 16 bit"))
+    assert groups(answer)[-1][-1] == axes
+    number, bits = (int(part) for part in re.findall(r":(\d+), +(\d+)", entry)[0])
+    mapped = f"0x{entry[2:6]}:0x{number:02x} 0x{bits:02x}"
+    answer = changed(tmp_path, "slaveinfo.txt", ("0x607A:0x00 0x20", mapped))
+    assert groups(answer)[-1][-1] == axes
 
 
 PDOS = {

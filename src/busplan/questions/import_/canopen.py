@@ -17,8 +17,13 @@ _EXTENDED: Final = 1 << 29
 _IDENTIFIER: Final = (1 << 11) - 1
 _EVERY_SYNC, _LAST_SYNC_TYPE = 1, 240
 _MOST_NODE: Final = 127
+_PREDEFINED_PDOS: Final = 4
+"""PDOs of a direction whose identifiers are 0x180 to 0x500 and the node-ID (CiA 301)."""
 _MOST_MAPPED: Final = 64
 _INHIBIT_US: Final = 100
+_SYNC_BITS: Final = 47
+"""Shortest frame without data, interframe space included (ISO 11898-1)."""
+_FASTEST_KBIT_S: Final = 1000
 
 _Section = dict[str, tuple[str, int]]
 """Text of each value, and its line."""
@@ -59,7 +64,7 @@ def read(text: str, name: str) -> Reading:
     is_set = "nodeid" in setup
     machine = Reading("can", "DCF" if is_set else "EDS", name, rank=0, lists_all=False)
     device = _Device(sections, machine)
-    node = device.number(setup, "nodeid") or _Number(1, 1)
+    node = device.number(setup, "nodeid") or device.node_of_identifiers() or _Number(1, 1)
     if not 1 <= node.value <= _MOST_NODE:
         raise machine.refusal(node.line, f"NodeID {node.value}: expected 1 to {_MOST_NODE}")
     device.node, words = node.value, ControlWords()
@@ -67,7 +72,9 @@ def read(text: str, name: str) -> Reading:
     machine.bus = _bus(device, setup)
     facts = machine.nodes[node.value] = {
         "name": machine.fact(title or "node", line),
-        "node_id": machine.fact(*node) if is_set else assumed(node.value, "an EDS has no node-ID"),
+        "node_id": machine.fact(*node)
+        if is_set
+        else assumed(node.value, "no NodeID in the file" + (", that of its identifiers" if node.line > 1 else "")),
         "feedback": machine.fact(tuple(device.pdos(_TPDO, ControlWords())), 1),
         "command": machine.fact(tuple(device.pdos(_RPDO, words)), 1),
         "axes": words.axes(machine, line=1),
@@ -77,17 +84,30 @@ def read(text: str, name: str) -> Reading:
     if (beat := device.value(_HEARTBEAT)) and beat.value:
         facts["heartbeat_us"] = machine.fact(beat.value * 1000, beat.line)
     if not is_set:
-        machine.remarks.append(f"{name}: an EDS has the defaults of a device, a DCF what it is set to")
+        machine.remarks.append(
+            f"{name}: without NodeID under [DeviceComissioning] it is read as an EDS, the defaults of a device, here "
+            f"as node {node.value}; give the DCF of the node, which the tool that configures it writes"
+        )
     return machine
 
 
 def _bus(device: "_Device", setup: _Section) -> Facts:
     """Bit rate, period and SYNC."""
     fact, facts = device.machine.fact, {}
-    if rate := device.number(setup, "baudrate"):
+    rate = device.number(setup, "baudrate")
+    if rate and rate.value:
         facts["bit_rate_kbit_s"] = fact(*rate)
+    elif rate:
+        device.machine.remarks.append(f"{device.machine.file}:{rate.line}: Baudrate = 0: not set")
     if (period := device.value(_SYNC_PERIOD)) and period.value:
-        facts["period_us"] = fact(*period)
+        sync_us = _SYNC_BITS * 1000 / (rate.value if rate and rate.value else _FASTEST_KBIT_S)
+        if period.value < sync_us:
+            device.machine.remarks.append(
+                f"{device.machine.file}:{period.line}: a SYNC every {period.value} us, and its frame takes "
+                f"{sync_us:.0f}: the period is taken as not set"
+            )
+        else:
+            facts["period_us"] = fact(*period)
     if sync := device.value(_SYNC_ID):
         facts["sync_identifier"] = fact(sync.value & _IDENTIFIER, sync.line)
     if (counter := device.value(_SYNC_COUNTER)) and counter.value > 1:
@@ -112,9 +132,29 @@ class _Device:
         return _Number(int(match[1], 0) + self.node * ("$nodeid" in text.lower()), line)
 
     def value(self, index: int, sub: int | None = None) -> _Number | None:
-        """Value that an object is set to, else its default."""
+        """Value that an object is set to, else its default; also of an object in the compact form of CiA 306."""
         section = self.sections.get(f"{index:x}" if sub is None else f"{index:x}sub{sub:x}", {})
-        return self.number(section, "parametervalue") or self.number(section, "defaultvalue")
+        value = self.number(section, "parametervalue") or self.number(section, "defaultvalue")
+        if value is not None or sub is None:
+            return value
+        whole = self.sections.get(f"{index:x}", {})
+        count = self.number(whole, "compactsubobj")
+        if count is None or not count.value or sub > count.value:
+            return None
+        if not sub:
+            return count
+        return self.number(self.sections.get(f"{index:x}value", {}), str(sub)) or self.number(whole, "defaultvalue")
+
+    def node_of_identifiers(self) -> _Number | None:
+        """The node-ID that all identifiers of PDOs without $NODEID are of, by the predefined connection set."""
+        texts = [
+            self.sections.get(f"{first + number:x}sub1", {}).get("defaultvalue", ("", 0))
+            for first in (_TPDO, _RPDO)
+            for number in range(_PREDEFINED_PDOS)
+        ]
+        fixed = [(int(text, 0), line) for text, line in texts if re.fullmatch("0x[0-9a-f]{1,8}", text, re.IGNORECASE)]
+        nodes = {identifier & _MOST_NODE for identifier, _ in fixed if not identifier & _INVALID}
+        return _Number(nodes.pop(), fixed[0][1]) if len(nodes) == 1 and nodes != {0} else None
 
     def pdos(self, first: int, words: ControlWords) -> Iterator[Pdo]:
         """The PDOs of a direction that are sent; control words that they have go into `words`."""
@@ -144,7 +184,7 @@ class _Device:
         for sub in range(1, count.value + 1):
             if entry := self.value(index, sub):
                 bits += entry.value & 0xFF
-                words.add(entry.value >> 16, entry.line)
+                words.add(entry.value >> 16, entry.value >> 8 & 0xFF, entry.value & 0xFF, entry.line)
         return ceil(bits / 8)
 
 

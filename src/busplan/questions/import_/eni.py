@@ -155,10 +155,10 @@ def _axes(slave: Element, sent: range | None, outputs: list[Element], machine: R
     """Axes of a device: the control words of CiA 402 in its PDOs, or among the names of its outputs."""
     words, pdos = ControlWords(), list(slave.all("ProcessData/RxPdo"))
     for pdo in [pdo for pdo in pdos if "Sm" in pdo.attributes] or pdos:
-        for entry in pdo.all("Entry/Index"):
-            index = whole_number(entry.text)
-            if index is not None:
-                words.add(index, entry.line)
+        for entry in pdo.all("Entry"):
+            parts = (entry.first(tag) for tag in ("Index", "SubIndex", "BitLen"))
+            index, sub, bits = (whole_number(part.text) if part else None for part in parts)
+            words.add(index, sub, bits, entry.line)
     if not words.lines and sent:
         for variable in outputs:
             title, offset = variable.first("Name"), _number(variable, "BitOffs", machine, most=_MOST_BITS)

@@ -18,7 +18,7 @@ _CLOCKS: Final = re.compile(r"\s+Distributed clocks: yes\b")
 _MAILBOX: Final = re.compile(r"\s+Standard +RX: 0x[0-9a-fA-F]+/\d+, +TX: 0x[0-9a-fA-F]+/(\d{1,5})")
 _SYNC_MANAGER: Final = re.compile(r"SM\d+: PhysAddr 0x[0-9a-fA-F]+, DefaultSize +(\d+)")
 _PDO: Final = re.compile(r"\s+(Rx|Tx)PDO 0x")
-_ENTRY: Final = re.compile(r"\s+PDO entry 0x([0-9a-fA-F]{4}):[0-9a-fA-F]+, +(\d{1,5}) bit")
+_ENTRY: Final = re.compile(r"\s+PDO entry 0x([0-9a-fA-F]{4}):([0-9a-fA-F]{1,4}), +(\d{1,5}) bit")
 _PORT_TYPES: Final = {"MII": "100BASE-TX", "EBUS": "E-bus"}
 _DIRECTIONS: Final = {"Rx": "write_bytes", "Tx": "read_bytes"}
 
@@ -57,6 +57,9 @@ def read(text: str, name: str) -> Reading:
 
 def _devices(text: str, machine: Reading) -> dict[int, list[tuple[int, str]]]:
     """The numbered lines of each device."""
+    if not _HEADER.search(text):
+        # The tool names the device only where there are several.
+        return {0: [*enumerate(text.split("\n"), start=1)]}
     devices: dict[int, list[tuple[int, str]]] = {}
     masters, device = set(), None
     for line, content in enumerate(text.split("\n"), start=1):
@@ -69,8 +72,6 @@ def _devices(text: str, machine: Reading) -> dict[int, list[tuple[int, str]]]:
             device.append((line, content))
         elif _SYNC_MANAGER.match(content):
             raise machine.refusal(line, f"no line === Master 0, Slave 0 === before it: give `{PDOS}` of the whole bus")
-    if not devices:
-        raise machine.refusal(1, "no line === Master 0, Slave 0 ===: cut off?")
     return devices
 
 
@@ -102,9 +103,9 @@ def _sizes(lines: list[tuple[int, str]], machine: Reading) -> Facts:
             if not bits[direction]:
                 places[direction] = line
         elif (match := _ENTRY.match(content)) and direction:
-            bits[direction] += int(match[2])
+            bits[direction] += int(match[3])
             if direction == "Rx":
-                words.add(int(match[1], 16), line)
+                words.add(int(match[1], 16), int(match[2], 16), int(match[3]), line)
     sizes = {key: machine.bytes_of(bits[direction], places[direction]) for direction, key in _DIRECTIONS.items()}
     return {**sizes, "axes": words.axes(machine, line=lines[0][0])}
 

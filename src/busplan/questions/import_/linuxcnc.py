@@ -1,7 +1,10 @@
 """LinuxCNC's ethercat-conf.xml: period, devices, bits of their PDOs, SYNC0's shift, and sync units."""
 
 import re
-from typing import Final
+import tomllib
+from functools import cache
+from importlib.resources import files
+from typing import Any, Final
 
 from busplan.questions.import_.reading import ControlWords, Fact, Line, Reading, whole_number
 from busplan.questions.import_.xml import Element, parsed
@@ -67,11 +70,17 @@ def _device(slave: Element, number: int, machine: Reading) -> None:
                     raise machine.refusal(manager.line, f"syncManager dir {direction[:20]!r}: expected in or out")
                 length = _number(entry, "bitLen", machine, most=_MOST_BITS)
                 bits[direction] += length.value if length else 0
-                index = whole_number(f"0x{entry.attributes.get('idx', '')}")
-                if direction == "out" and index is not None:
-                    words.add(index, entry.line)
+                index, sub = (whole_number(f"0x{entry.attributes.get(key, '')}") for key in ("idx", "subIdx"))
+                if direction == "out":
+                    words.add(index, sub, length and length.value, entry.line)
         facts |= {key: machine.bytes_of(bits[direction], line) for direction, key in _DIRECTIONS.items()}
         facts["axes"] = words.axes(machine, line=line)
+    elif kind in (known := _terminals())["inputs"] | known["outputs"]:
+        facts |= {
+            key: machine.bytes_of(known[way].get(kind, 0), slave.line)
+            for way, key in (("inputs", "read_bytes"), ("outputs", "write_bytes"))
+        }
+        facts["axes"] = machine.fact(0, slave.line, "derived", "a coupler or a digital terminal")
     clock = slave.first("dcConf")
     if clock:
         facts["clock_us"] = machine.fact(0.0, clock.line)
@@ -79,6 +88,13 @@ def _device(slave: Element, number: int, machine: Reading) -> None:
         if not re.fullmatch(r"-?\d{1,12}", shift):
             raise machine.refusal(clock.line, f"sync0Shift {shift[:40]!r}: expected whole nanoseconds")
         facts["shift_us"] = machine.fact(int(shift) / 1000, clock.line, "derived", "from the master's task on")
+
+
+@cache
+def _terminals() -> dict[str, dict[str, int]]:
+    """Bits of the inputs and of the outputs of devices by their type."""
+    table: dict[str, Any] = tomllib.loads((files(__package__) / "terminals.toml").read_text(encoding="utf-8"))
+    return {way: table[way] for way in ("inputs", "outputs")}
 
 
 def _number(element: Element, key: str, machine: Reading, *, most: int) -> Fact | None:

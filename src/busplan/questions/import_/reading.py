@@ -17,8 +17,9 @@ from busplan.sourced import Grade
 
 _MAY_DIFFER: Final = ("name", "master", "clock_us")
 """Facts that may differ from file to file."""
-_CONTROL_WORDS: Final = range(0x6040, 0x8000, 0x800)
-"""Index of the control word of each axis of a drive (CiA 402); one more for each further axis."""
+_CONTROL_WORDS: Final = range(0x6040, 0xA000, 0x800)
+"""Index of the control word of each axis of a drive (CiA 402), 0x800 apart; terminals have bits at 0x7040, too."""
+_CONTROL_WORD_BITS: Final = 16
 
 Line: TypeAlias = int | str
 """Number of a line, with ":" and the column where the file has long lines."""
@@ -125,9 +126,9 @@ class ControlWords:
         self.lines: dict[int, Line] = {}
         """Line of each, by the index of its object."""
 
-    def add(self, index: int, line: Line) -> None:
+    def add(self, index: int | None, sub: int | None, bits: int | None, line: Line) -> None:
         """Take an object that is mapped as an output, if it is a control word."""
-        if index in _CONTROL_WORDS:
+        if index is not None and index in _CONTROL_WORDS and not sub and bits == _CONTROL_WORD_BITS:
             self.lines.setdefault(index, line)
 
     def axes(self, machine: Reading, *, line: Line | None) -> Fact:

@@ -3,12 +3,13 @@
 import re
 from typing import Final
 
-from busplan.questions.import_.reading import ControlWords, Facts, Reading
+from busplan.questions.import_.reading import ControlWords, Fact, Facts, Reading
 
 _SLAVE: Final = re.compile(r"Slave:(\d{1,5})\s*$")
 _KEYS: Final = re.compile(r" (Name|Output size|Input size|Delay|Has DC|Activeports|MBX length wr): *(.*?)\s*$")
 _READ_LENGTH: Final = re.compile(r"rd: *(\d{1,5})")
-_MAPPED: Final = re.compile(r"\s+\[0x[0-9A-Fa-f]{4}\.\d\] 0x([0-9A-Fa-f]{4}):0x[0-9A-Fa-f]{2} 0x[0-9A-Fa-f]{2}")
+_MANAGER: Final = re.compile(r"\s+SM\d+ (inputs|outputs)\s*$")
+_MAPPED: Final = re.compile(r"\s+\[0x[0-9A-Fa-f]{4}\.\d\] 0x([0-9A-Fa-f]{4}):0x([0-9A-Fa-f]{2}) 0x([0-9A-Fa-f]{2})")
 _DELAY: Final = re.compile(r"(\d{1,9})\[ns\]")
 _SIZES: Final = {"Output size": "write_bytes", "Input size": "read_bytes"}
 _BRANCH, _END = 3, 1
@@ -27,12 +28,8 @@ def read(text: str, name: str) -> Reading:
     ports: dict[int, int] = {}
     for number, lines in enumerate(_slaves(text, machine)):
         facts = machine.nodes[number] = {}
-        words, mapped = ControlWords(), None
         for line, content in lines:
-            if match := _MAPPED.match(content):
-                mapped = mapped or line
-                words.add(int(match[1], 16), line)
-            elif match := _KEYS.match(content):
+            if match := _KEYS.match(content):
                 _describe(match[1], match[2], line, facts, machine)
                 if match[1] == "Delay" and (delay := _DELAY.match(match[2])):
                     totals_ns[number] = int(delay[1]), line
@@ -41,10 +38,23 @@ def read(text: str, name: str) -> Reading:
         for title, key in _SIZES.items():
             if key not in facts:
                 raise machine.refusal(lines[0][0], f"slave {number + 1} has no {title}: cut off?")
-        facts["axes"] = words.axes(machine, line=mapped)
+        facts["axes"] = _axes(lines, machine)
     _hops(totals_ns, ports, machine)
     machine.bus["master"] = machine.fact("SOEM", 1, "derived", "slaveinfo is of its tools")
     return machine
+
+
+def _axes(lines: list[tuple[int, str]], machine: Reading) -> Fact:
+    words, mapped, direction = ControlWords(), None, ""
+    for line, content in lines:
+        if match := _MANAGER.match(content):
+            direction = match[1]
+        elif match := _MAPPED.match(content):
+            mapped = mapped or line
+            if direction == "outputs":
+                index, sub, bits = (int(number, 16) for number in match.groups())
+                words.add(index, sub, bits, line)
+    return words.axes(machine, line=mapped)
 
 
 def _slaves(text: str, machine: Reading) -> list[list[tuple[int, str]]]:
