@@ -144,7 +144,15 @@ class Bus(ABC):
         """Functions by the name that a row of evidence has; each takes a cycle and the values of the row."""
         return {}
 
-    def recorded(self, network: Network, path: "Path", *, share: float, progress: Progress) -> Recorded:  # noqa: ARG002 - a kind may have none
+    def recorded(
+        self,
+        network: Network,  # noqa: ARG002 - a kind may have none
+        path: "Path",
+        *,
+        share: float,  # noqa: ARG002
+        channel: str | None,  # noqa: ARG002
+        progress: Progress,  # noqa: ARG002
+    ) -> Recorded:
         """Compare a recording of the machine with the plan.
 
         Parameters
@@ -155,6 +163,8 @@ class Bus(ABC):
             The recording.
         share
             Quantile of the events for worst cases, 0.5..1.
+        channel
+            Of a recording of several channels, the name of the one that is compared.
         progress
             Called with the bytes read and those of the file.
 

@@ -26,6 +26,7 @@ from busplan.cli.options import (
     parse_axis,
     require_company,
     takes_changes,
+    time_us,
 )
 from busplan.cli.output import PlanFailsError, message_width, progress_bar, say, write_document
 from busplan.cli.rewrite import apply_changes, require_own_file
@@ -310,7 +311,7 @@ def measured_command(
         str,
         typer.Argument(
             help="A recording of the machine: of EtherCAT a pcap or pcapng file, of CAN a log of candump, ASC, BLF or "
-            "TRC.",
+            "TRC, or a capture of SocketCAN.",
             show_default=False,
         ),
     ],
@@ -321,6 +322,10 @@ def measured_command(
             "Share of the cycles that jitter and times are to hold for, 0.5..1 [1].  [default: 1, the worst recorded]",
         ),
     ] = 1.0,
+    channel: Annotated[
+        str | None,
+        option("--channel NAME", "Channel of a CAN log.  [default: the only one]"),
+    ] = None,
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
@@ -352,7 +357,8 @@ def measured_command(
 
         loaded = load(profile)
         with progress_bar("recording") as progress:
-            seen = measured(changes.applied(loaded.profile), recording, quantile=quantile, progress=progress)
+            plan = changes.applied(loaded.profile)
+            seen = measured(plan, recording, quantile=quantile, channel=channel, progress=progress)
         if apply and not seen.edits:
             raise BusplanError(f"--apply: {recording} shows no value of a key")
         if apply:
@@ -503,6 +509,19 @@ def import_command(
         Path | None,
         option("--output,-o NEW.toml", "Write the profile to a new file.  [default: standard output]"),
     ] = None,
+    bus: Annotated[str | None, option("--bus NAME", "Bus of a database of messages.  [default: the only one]")] = None,
+    channel: Annotated[
+        str | None,
+        option("--channel NAME", "Channel of a CAN log.  [default: the only one]"),
+    ] = None,
+    period: Annotated[
+        str | None,
+        option(
+            "--period TIME",
+            "Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so the plan is "
+            "not shown to fit.  [default: such messages are left out]",
+        ),
+    ] = None,
     force: Annotated[bool, option("--force", "Let -o overwrite a file that is already there.")] = False,
 ) -> None:
     """Make a profile from the files of a machine: ENI, a scan of its bus, DBC, EDS, a CAN log and others.
@@ -530,7 +549,14 @@ def import_command(
         from busplan.questions.import_ import import_profile
 
         with progress_bar("recording") as progress:
-            imported = import_profile(paths, name=None if new is None else new.stem, progress=progress)
+            imported = import_profile(
+                paths,
+                name=None if new is None else new.stem,
+                bus=bus,
+                channel=channel,
+                period_us=None if period is None else time_us(period, option="--period"),
+                progress=progress,
+            )
         sentences = imported.sentences()
         write_document(imported.text, file)
     say(*([f"wrote {new}"] if new else []), *sentences)

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
 from busplan.files import is_unwritten_pipe
 from busplan.profile.kinds import holder, kind_of, named_path, profile_model
+from busplan.profile.machine_files import matching
 from busplan.profile.places import KeyPath, Lines, Place, comments, places
 from busplan.sections.profile import Profile
 from busplan.sourced import Grade
@@ -162,7 +163,7 @@ class Document:
             message = "nested too deeply; a profile needs no more than two brackets inside each other"
             raise self.syntax_error(_first_deep_bracket(self.text), message) from None
         except ValueError as error:
-            raise self._refusal(error) from None
+            raise _machine_file(self.text.encode("utf-8", "ignore"), self.name) or self._refusal(error) from None
 
     def _refusal(self, error: ValueError) -> PlacedError:
         match = re.match(_TOMLLIB_MESSAGE, str(error))
@@ -217,10 +218,22 @@ def decode(content: bytes, *, name: str) -> Document:
         Too large, or not UTF-8.
     """
     if len(content) > MAX_FILE_BYTES:
-        raise too_large(name)
-    text = text_of(content, name=name, wanted="a profile is TOML in UTF-8")
+        raise _machine_file(content, name) or too_large(name)
+    try:
+        text = text_of(content, name=name, wanted="a profile is TOML in UTF-8")
+    except PlacedError as error:
+        raise _machine_file(content, name) or error from None
     # With LF only, offsets of the parser and the scanner agree.
     return Document(name, text.replace("\r\n", "\n"))
+
+
+def _machine_file(content: bytes, name: str) -> PlacedError | None:
+    """The error for a file that is no profile, but that `import` makes one of; None for any other file."""
+    formats = matching(content)
+    if len(formats) != 1:
+        return None
+    message = f"is {formats[0].short}, and no profile: `busplan import {name}` makes one of it"
+    return PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
 
 
 def too_large(name: str) -> PlacedError:

@@ -132,7 +132,12 @@ class MeasuredAnswer(Answer):
 
 
 def measured(
-    profile: ProfileLike, recording: Path, *, quantile: float = 1.0, progress: Progress | None = None
+    profile: ProfileLike,
+    recording: Path,
+    *,
+    quantile: float = 1.0,
+    channel: str | None = None,
+    progress: Progress | None = None,
 ) -> MeasuredAnswer:
     """Compare a recording of a machine's bus with the plan.
 
@@ -142,9 +147,11 @@ def measured(
         The plan: a `Profile`, a path or a shipped name. It is not changed.
     recording
         A file of the profile's kind of bus. EtherCAT: a capture of the master's port, pcap or pcapng. CAN: a log of
-        `candump -l`, ASC, BLF or TRC (with the extra `import`).
+        `candump -l`, ASC, BLF or TRC (with the extra `import`), or a capture of SocketCAN.
     quantile
         Quantile of the events for jitter and times, 0.5..1; 1 is the worst one recorded.
+    channel
+        Of a log of several channels, the name of the one that is compared.
     progress
         Called with the bytes read and those of the file.
 
@@ -174,7 +181,11 @@ def measured(
     if source == "-" or "\0" in source:
         raise BusplanError(f"{source}: a recording is read from a file")
     recorded = bus_of(plan).recorded(
-        network_of(plan), FilePath(source), share=share, progress=progress or (lambda _done, _total: None)
+        network_of(plan),
+        FilePath(source),
+        share=share,
+        channel=channel,
+        progress=progress or (lambda _done, _total: None),
     )
     return MeasuredAnswer(plan, source, share, *recorded)
 

@@ -1,13 +1,14 @@
 """Frames of CAN logs as arrays, with the bits that each had on the wire."""
 
 import logging
+import re
 import zlib
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from pathlib import Path
 from struct import Struct
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,7 @@ from busplan.english import plural
 from busplan.errors import BusplanError
 from busplan.extras import require_extra
 from busplan.progress import Progress
+from busplan.recordings.capture import SOCKETCAN, CaptureNotes, is_capture, packets
 from busplan.recordings.statistics import Floats
 
 _EXTENDED, _REMOTE, _FD, _SWITCHED = 1, 2, 4, 8
@@ -24,9 +26,24 @@ _ROW_FIELDS: Final = np.dtype(
     [("stamp_s", "<f8"), ("identifier", "<u4"), ("data", "<u8"), ("dlc", "u1"), ("flags", "u1")]
 )
 """Row of a frame while a log is read."""
-_READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader", b"(": "CanutilsLogReader"}
-"""Readers of python-can, by the first bytes of a file."""
-_FORMATS: Final = "candump -l, Vector's ASC and BLF, PEAK's TRC"
+_READERS: Final = {b"LOGG": "BLFReader", b"date": "ASCReader", b";": "TRCReader"}
+"""Readers of python-can, by the first bytes of a file; any other text is taken for that of candump."""
+_FORMATS: Final = "text of candump, Vector's ASC and BLF, PEAK's TRC, captures of SocketCAN"
+_LINE: Final = re.compile(
+    r"(?:\([ \t]*(?P<stamp>[^\s)]+)\)[ \t]+)?(?P<channel>\S+)[ \t]+(?:(?P<frame>[0-9A-Fa-f]+#\S*)(?: [RT])?|"
+    r"(?:[RT]X (?P<switch>[B-]) [E-] +)?(?P<identifier>[0-9A-F]{3}|[0-9A-F]{8}) +\[(?P<size>\d{1,2})\] *"
+    r"(?P<data>(?:[0-9A-F]{2}(?: |$))*|remote request)(?: *'.*')?)"
+)
+"""A line of `candump -l`, or of what candump shows on a terminal."""
+_CLASSICAL_SIZE: Final = 1
+"""Digits of the size of a classical frame on a terminal; that of an FD frame has two."""
+_ERROR_FRAME: Final = "20000080"
+"""Identifier of an error frame in `candump -l`."""
+_PACKET: Final = Struct(">IBB2x")
+"""Identifier with its flags, size, and flags of CAN FD of a frame of SocketCAN."""
+_ERROR_FLAG, _REMOTE_FLAG, _EXTENDED_FLAG = 1 << 29, 1 << 30, 1 << 31
+_SWITCHED_FLAG, _FD_FLAG = 1, 4
+_FD_PACKET_BYTES: Final = 72
 _REPORT_EVERY: Final = 5000
 """Frames between two reports of progress."""
 _CRC_15: Final = 0x4599
@@ -76,21 +93,23 @@ class CanFrames(NamedTuple):
     """Why the log ends early; empty for a whole one."""
 
 
-def read_can(path: Path, *, progress: Progress) -> CanFrames:
+def read_can(path: Path, *, channel: str | None = None, progress: Progress) -> CanFrames:
     """Read a CAN log.
 
     Parameters
     ----------
     path
-        A log of `candump -l`, ASC, BLF or TRC.
+        A log of candump, ASC, BLF or TRC, or a capture of SocketCAN.
+    channel
+        Of several channels, the name of the one that is read.
     progress
         Called with the bytes read and those of the file.
 
     Raises
     ------
     BusplanError
-        The file cannot be read, is of no known format, has no frame or frames of several channels; or python-can is not
-        installed.
+        The file cannot be read, is of no known format, has no frame, has frames of several channels and none is named,
+        or none of the one that is named; or python-can is not installed.
     """
     if path.is_fifo():
         # A pipe may block for ever, and the file is opened twice.
@@ -101,28 +120,114 @@ def read_can(path: Path, *, progress: Progress) -> CanFrames:
         size = path.stat().st_size
     except OSError as error:
         raise BusplanError(f"{path}: cannot be read: {error.strerror}") from None
-    name = next((reader for start, reader in _READERS.items() if head.startswith(start)), None)
-    if name is None:
-        raise BusplanError(f"{path}: is no CAN log that is read: {_FORMATS}")
+    log = _Log(channel)
+    if is_capture(head):
+        try:
+            log.read(_captured(path, log, progress), lambda: None)
+        except _DamageError as error:
+            log.broken = str(error)
+        return log.frames(path)
     require_extra("can", extra="import", option=str(path), module="can")
     import can  # noqa: PLC0415 - an extra
 
     # Hide its warnings of frames that it skips: they are missing in the figures.
     logging.getLogger("can").addHandler(logging.NullHandler())
-    log = _Log()
+    name = next((reader for start, reader in _READERS.items() if head.startswith(start)), None)
     reader: Any = None
     try:
-        reader = (_bounded_blf() if name == "BLFReader" else getattr(can, name))(str(path))
+        if name is None:
+            reader = can.CanutilsLogReader(cast("Any", _CandumpText(path)))
+        else:
+            reader = (_bounded_blf() if name == "BLFReader" else getattr(can, name))(str(path))
         stream = getattr(reader, "file", None)
         log.read(reader, lambda: progress(min(stream.tell() if stream else 0, size), size))
     except _DamageError as error:
         log.broken = str(error)
+    except BusplanError:
+        raise
     except Exception as error:  # noqa: BLE001 - a damaged log fails in many ways
         log.broken = f"{type(error).__name__}: {error}"
     finally:
         with suppress(Exception):
             reader.stop()
     return log.frames(path)
+
+
+class _CandumpText:
+    """Lines of a text of candump as `candump -l` writes them; comments are left out."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._file = path, path.open("rb")
+        self._has_begun = False
+        self.tell, self.close = self._file.tell, self._file.close
+
+    def __iter__(self) -> Iterator[str]:
+        for number, content in enumerate(self._file, start=1):
+            line = content.decode("utf-8", "replace").strip()
+            if line and not line.startswith("#"):
+                yield self._frame(line, number)
+
+    def _frame(self, line: str, number: int) -> str:
+        match = _LINE.fullmatch(line)
+        if match is None:
+            if "ERRORFRAME" in line:
+                return f"(0.0) can {_ERROR_FRAME}#"
+            if not self._has_begun:
+                raise BusplanError(f"{self._path}: is no CAN log that is read: {_FORMATS}")
+            raise _DamageError(f"line {number} is none of candump: {line[:60]!r}")
+        self._has_begun = True
+        if match["stamp"] is None:
+            raise _DamageError(f"line {number} has no time; record with `candump -l`")
+        frame = match["frame"]
+        if frame is None:
+            is_fd, data = len(match["size"]) > _CLASSICAL_SIZE, match["data"].replace(" ", "")
+            mark = f"##{int(match['switch'] == 'B')}" if is_fd else "#"
+            content = f"R{match['size']}" if data.startswith("r") else data
+            frame = f"{match['identifier']}{mark}{content}"
+        return f"({match['stamp']}) {match['channel']} {frame}"
+
+
+class _CapturedFrame(NamedTuple):
+    """A frame of a capture, as python-can has them."""
+
+    timestamp: float
+    channel: int
+    arbitration_id: int
+    is_extended_id: bool
+    is_remote_frame: bool
+    is_error_frame: bool
+    is_fd: bool
+    bitrate_switch: bool
+    dlc: int
+    data: bytes
+
+
+def _captured(path: Path, log: "_Log", progress: Progress) -> Iterator[_CapturedFrame]:
+    """Frames of a capture of SocketCAN."""
+    notes = CaptureNotes()
+    for piece in packets(path, notes, link=SOCKETCAN, progress=progress):
+        content = piece.content.tobytes()
+        for start, size, stamp_ns in zip(piece.starts, piece.sizes, piece.times_ns, strict=True):
+            if size < _PACKET.size:
+                continue
+            flagged, length, flags = _PACKET.unpack_from(content, start)
+            is_extended = bool(flagged & _EXTENDED_FLAG)
+            yield _CapturedFrame(
+                int(stamp_ns) / 1e9,
+                0,
+                flagged & ((1 << 29 if is_extended else 1 << 11) - 1),
+                is_extended,
+                bool(flagged & _REMOTE_FLAG),
+                bool(flagged & _ERROR_FLAG),
+                bool(flags & _FD_FLAG) or size == _FD_PACKET_BYTES,
+                bool(flags & _SWITCHED_FLAG),
+                length,
+                content[start + _PACKET.size : start + min(size, _PACKET.size + length)],
+            )
+        if len(notes.interfaces) > 1:
+            raise BusplanError(f"{path}: has frames of {len(notes.interfaces)} interfaces; export those of one bus")
+    if notes.broken_at is not None:
+        log.broken = f"damaged at byte {notes.broken_at:,}"
 
 
 class _DamageError(Exception):
@@ -165,7 +270,8 @@ def _inflated(content: bytes, *, held: int) -> bytes:
 class _Log:
     """Frames read so far."""
 
-    def __init__(self) -> None:
+    def __init__(self, channel: str | None) -> None:
+        self._channel = channel
         self._rows = bytearray()
         self._channels: Counter[object] = Counter()
         self._errors = 0
@@ -185,6 +291,8 @@ class _Log:
             _require_frame(message, last_s)
             last_s = message.timestamp
             self._channels[message.channel] += 1
+            if self._channel not in (None, str(message.channel)):
+                continue
             is_fd = message.is_fd
             # CAN FD has no remote frames: one that a log marks so is a data frame whose data the log lost.
             is_remote = message.is_remote_frame and not is_fd
@@ -202,12 +310,17 @@ class _Log:
         if not self._rows:
             why = f" ({self.broken})" if self.broken else ""
             errors = f" but {plural(self._errors, 'error frame')}" if self._errors else ""
+            if self._channel is not None and self._channels:
+                names = ", ".join(map(str, self._channels))
+                raise BusplanError(f"{path}: channel {self._channel}: no such channel; there are {names}")
             raise BusplanError(f"{path}: has no CAN frame{errors}{why}")
-        if len(self._channels) > 1:
+        if len(self._channels) > 1 and self._channel is None:
             named = ", ".join(
                 f"{channel} ({plural(count, 'frame')})" for channel, count in self._channels.most_common()
             )
-            raise BusplanError(f"{path}: has frames of {len(self._channels)} channels: {named}; keep those of one bus")
+            raise BusplanError(
+                f"{path}: has frames of {len(self._channels)} channels: {named}; --channel NAME reads one"
+            )
         rows = np.frombuffer(self._rows, dtype=_ROW_FIELDS)
         stamps, flags = rows["stamp_s"], rows["flags"]
         identifiers, sizes = rows["identifier"].astype(np.int64), rows["dlc"].astype(np.int64)

@@ -6,7 +6,7 @@ master. So the few fields of a record are read here.
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from struct import Struct
 from typing import BinaryIO, Final, NamedTuple
@@ -22,7 +22,9 @@ Numbers = npt.NDArray[np.int64]
 _PIECE_BYTES: Final = 4_000_000
 _MOST_RECORD_BYTES: Final = 1_000_000
 """Longest undamaged record; a packet has 262,144 bytes at most."""
-_ETHERNET: Final = 1
+ETHERNET, SOCKETCAN = 1, 227
+_LINKS: Final = {ETHERNET: "Ethernet", SOCKETCAN: "SocketCAN"}
+"""Link types."""
 _NS: Final = 1_000_000_000
 _END_NS: Final = (1 << 33) * _NS
 """Stamps from here on, in the year 2242, are damage [ns]."""
@@ -64,9 +66,11 @@ class CaptureNotes:
 
     packets: int = 0
     left_out: int = 0
-    """Packets of interfaces other than Ethernet, without a stamp, or with a damaged one."""
+    """Packets of interfaces of another link type, without a stamp, or with a damaged one."""
     dropped: int = 0
     """Packets that the recorder says it dropped; a pcap file does not count them."""
+    interfaces: set[int] = field(default_factory=set)
+    """Numbers of the interfaces of a pcapng file that its packets are of."""
     broken_at: int | None = None
     """Offset of the damage in the file, from which nothing is read; None for a whole file."""
 
@@ -76,8 +80,8 @@ def is_capture(head: bytes) -> bool:
     return head[:4] in _PCAP or head[:4] == _SECTION
 
 
-def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[CapturedPackets]:
-    """Packets of a capture of Ethernet, in pieces.
+def packets(path: Path, notes: CaptureNotes, *, link: int = ETHERNET, progress: Progress) -> Iterator[CapturedPackets]:
+    """Packets of a capture, in pieces.
 
     Parameters
     ----------
@@ -85,6 +89,8 @@ def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[
         A pcap or pcapng file.
     notes
         Counts of what is left out, filled in as the file is read.
+    link
+        Link type of the packets that are read.
     progress
         Called with the bytes read and those of the file.
 
@@ -97,20 +103,22 @@ def packets(path: Path, notes: CaptureNotes, *, progress: Progress) -> Iterator[
         raise BusplanError(f"{path}: is a named pipe; give a regular file")
     try:
         with path.open("rb") as file:
-            yield from _pieces(file, path, notes, progress)
+            yield from _pieces(file, path, notes, link, progress)
     except OSError as error:
         raise BusplanError(f"{path}: cannot be read: {error.strerror}") from None
 
 
-def _pieces(file: BinaryIO, path: Path, notes: CaptureNotes, progress: Progress) -> Iterator[CapturedPackets]:
+def _pieces(
+    file: BinaryIO, path: Path, notes: CaptureNotes, link: int, progress: Progress
+) -> Iterator[CapturedPackets]:
     """Packets of each piece of the file, up to its end or to the first damage."""
     total = path.stat().st_size
     head = file.read(24)
     walker: _Walker
     if head[:4] in _PCAP:
-        walker, held, at = _Pcap(head, path), b"", len(head)
+        walker, held, at = _Pcap(head, path, link), b"", len(head)
     elif head[:4] == _SECTION:
-        walker, held, at = _PcapNg(notes), head, 0
+        walker, held, at = _PcapNg(notes, link), head, 0
     else:
         raise BusplanError(f"{path}: is no pcap or pcapng file")
     before: int | None = None
@@ -151,13 +159,13 @@ class _Walker(ABC):
 
 
 class _Pcap(_Walker):
-    def __init__(self, head: bytes, path: Path) -> None:
+    def __init__(self, head: bytes, path: Path, wanted: int) -> None:
         order, self._tick_ns = _PCAP[head[:4]]
         if len(head) < 24:  # noqa: PLR2004 - the header of the file
             raise BusplanError(f"{path}: ends within the header of a pcap file")
         link = Struct(f"{order}I").unpack_from(head, 20)[0] & 0xFFFF
-        if link != _ETHERNET:
-            raise BusplanError(f"{path}: is a capture of link type {link}, expected 1, Ethernet")
+        if link != wanted:
+            raise BusplanError(f"{path}: is a capture of link type {link}, expected {wanted}, {_LINKS[wanted]}")
         self._header = Struct(f"{order}IIII")
 
     def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
@@ -187,8 +195,8 @@ class _PcapNg(_Walker):
     _fields: Struct
     """Byte order of the section; in it, the head of a block (kind, size) and the fields of a packet."""
 
-    def __init__(self, notes: CaptureNotes) -> None:
-        self._notes = notes
+    def __init__(self, notes: CaptureNotes, link: int) -> None:
+        self._notes, self._link = notes, link
         self._interfaces: list[_Interface] = []
 
     def walk(self, content: bytes) -> tuple[list[tuple[int, int, int]], int]:
@@ -238,7 +246,8 @@ class _PcapNg(_Walker):
         if number < len(self._interfaces):
             interface = self._interfaces[number]
             time_ns = ticks * _NS // interface.ticks + interface.offset_ns
-            if interface.link == _ETHERNET and 0 <= time_ns < _END_NS:
+            if interface.link == self._link and 0 <= time_ns < _END_NS:
+                self._notes.interfaces.add(number)
                 rows.append((at, size, time_ns))
                 return
         self._notes.left_out += 1

@@ -382,7 +382,7 @@ REFUSED = {
     "errors alone": (LINE.format(0, "20000080#0000000000000000"), "has no CAN frame but 1 error frame"),
     "two channels": (
         LINES + LINES.replace("can0", "can1"),
-        "has frames of 2 channels: can0 (40 frames), can1 (40 frames); keep those of one bus",
+        "has frames of 2 channels: can0 (40 frames), can1 (40 frames); --channel NAME reads one",
     ),
     "cut at once": ("(1700000000.000000) can0 181#", "drive.log: 1 frame, none of an identifier that comes 10 times"),
 }
@@ -398,7 +398,7 @@ def test_a_log_without_periods_is_refused(case: str, tmp_path: Path) -> None:
 
 LAST = "".join(LINES.splitlines(keepends=True)[-9:])
 SAID = {
-    "cut": (LINES + "(17000", "The log is cut or damaged after frame 40, read up to there: ValueError"),
+    "cut": (LINES + "(17000", "The log is cut or damaged after frame 40, read up to there: line 41 is none of candump"),
     "clock": (
         LAST + LINES,
         "Its clock was set back 1 time: the longest stretch between is taken.",

@@ -168,7 +168,7 @@ def test_a_database_without_a_period_is_refused_with_what_was_left_out(tmp_path:
     with pytest.raises(busplan.BusplanError) as refused:
         imported(str(tmp_path / "none.dbc"))
     first, left_out = refused.value.problems
-    assert first.endswith("no message with a period, and no node with PDOs")
+    assert "no message with a period, and no node with PDOs; a log of the bus beside it shows it" in first
     assert "no file says its period" in left_out
 
 

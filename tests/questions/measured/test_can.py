@@ -279,12 +279,13 @@ def test_what_cannot_be_told_is_refused(tmp_path: Path, monkeypatch: pytest.Monk
         return str(caught.value).removeprefix(f"{tmp_path}/")
 
     two = candump(LOGGED[:30]) + candump(LOGGED[30:40], channel="can1")
-    assert (
-        refusal(two) == "bus.log: has frames of 2 channels: can0 (30 frames), can1 (10 frames); keep those of one bus"
+    named = "can0 (30 frames), can1 (10 frames); --channel NAME reads one"
+    assert refusal(two) == f"bus.log: has frames of 2 channels: {named}"
+    assert refusal("a,b\n") == (
+        "bus.log: is no CAN log that is read: text of candump, Vector's ASC and BLF, PEAK's TRC, captures of SocketCAN"
     )
-    assert refusal("a,b\n") == "bus.log: is no CAN log that is read: candump -l, Vector's ASC and BLF, PEAK's TRC"
-    assert refusal("(1700000000.000000) can0 \n").startswith("bus.log: has no CAN frame (")
-    assert refusal("") == "bus.log: is no CAN log that is read: candump -l, Vector's ASC and BLF, PEAK's TRC"
+    assert refusal("(1700000000.000000) can0 \n").startswith("bus.log: is no CAN log")
+    assert refusal("") == "bus.log: has no CAN frame"
     monkeypatch.setattr("busplan.extras.find_spec", lambda _name: None)
     assert "install it with the extra, as in pip install 'busplan[import]'" in refusal(candump(LOGGED[:3]))
 

@@ -140,7 +140,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "message.identifier": Key("id"),
     }
     term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0},)
-    recordings = "a log of candump, ASC, BLF or TRC"
+    recordings = "a log of candump, ASC, BLF or TRC, or a capture of SocketCAN,"
     evidence_data = ("can", "paper")
 
     def cycle(self, network: Network, *, model: str) -> CanCycle:
@@ -215,11 +215,13 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
 
         return FUNCTIONS
 
-    def recorded(self, network: Network, path: "Path", *, share: float, progress: Progress) -> Recorded:
+    def recorded(
+        self, network: Network, path: "Path", *, share: float, channel: str | None, progress: Progress
+    ) -> Recorded:
         """Compare a CAN log with the plan."""
         from busplan.buses.can.recorded import recorded  # a single command asks for it, and numpy loads
 
-        return recorded(network, path, share=share, progress=progress)
+        return recorded(network, path, share=share, channel=channel, progress=progress)
 
 
 BUS: Final = Can()

@@ -46,7 +46,7 @@ _CLASSICAL: Final = "classical CAN"
 _TOO_FEW: Final = f"fewer than {LEAST_EVENTS} frames"
 
 
-def recorded(network: Network, path: Path, *, share: float, progress: Progress) -> Recorded:
+def recorded(network: Network, path: Path, *, share: float, channel: str | None, progress: Progress) -> Recorded:
     """Compare a CAN log with the plan.
 
     Parameters
@@ -54,9 +54,11 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
     network
         The plan, of plain numbers.
     path
-        A log of `candump -l`, ASC, BLF or TRC.
+        A log of `candump -l`, ASC, BLF or TRC, or a capture of SocketCAN.
     share
         Share of the frames that jitter is to hold for, 0.5..1.
+    channel
+        Of several channels, the name of the one that is compared.
     progress
         Called with the bytes read and those of the file.
 
@@ -65,7 +67,7 @@ def recorded(network: Network, path: Path, *, share: float, progress: Progress) 
     BusplanError
         No log of a single channel with frames.
     """
-    frames = read_can(path, progress=progress)
+    frames = read_can(path, channel=channel, progress=progress)
     log = _Log(network, frames, share)
     day = day_of(int(frames.start_s * 1e9))
     return Recorded(tuple(log.figures()), tuple(log.remarks()), log.edits, day, tuple(log.shows_nothing()))

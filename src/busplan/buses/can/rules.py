@@ -177,6 +177,16 @@ def _pdos(network: Network) -> Number:
     return total(pdos.pdos for pdos in traffic_of(network).pdos if pdos.kind == "read")
 
 
+def _assumed_periods(network: Network) -> int:
+    """Messages whose period is assumed."""
+    return sum(message.period_grade == "assumed" for message in network.profile.message)
+
+
+def _periods_words(network: Network) -> str:
+    names = [message.name for message in network.profile.message if message.period_grade == "assumed"]
+    return f"the period of {first_of(names, 3)} is assumed: give what their specification or a log says"
+
+
 LIMITS: Final = (
     NODE_LIMIT,
     Limit(
@@ -218,6 +228,15 @@ LIMITS: Final = (
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         period=lambda _limit, network: CanCycle(network, WORST).load_period_us,
         has_rule=True,
+    ),
+    Limit(
+        "periods",
+        _periods_words,
+        _assumed_periods,
+        lambda _network: 0,
+        doubt=lambda _network: 0.0,
+        perhaps=_assumed_periods,
+        way_out="known periods have room",
     ),
     Limit(
         "deadline",

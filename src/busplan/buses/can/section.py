@@ -207,6 +207,11 @@ class CanMessage(Section):
     period_us: PeriodUs = Field(
         description="Shortest time from one to the next; with burst the mean time [us]", examples=[10_000]
     )
+    period_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
+        default=None,
+        description="How period_us is known; where one is assumed, no plan is shown to fit",
+        examples=["assumed"],
+    )
     burst: Count = Field(
         default=1, description="Frames that may come at once, with as many periods to the next burst", examples=[5]
     )

@@ -44,6 +44,7 @@ from busplan.buses.network import Network
 from busplan.buses.rule import Recorded, RuleProblem, RuleSubject, read_rules
 from busplan.elementwise import Number, larger, plain
 from busplan.english import plural
+from busplan.errors import BusplanError
 from busplan.progress import Progress
 
 if TYPE_CHECKING:
@@ -270,8 +271,12 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
 
         return FUNCTIONS
 
-    def recorded(self, network: Network, path: "Path", *, share: float, progress: Progress) -> Recorded:
+    def recorded(
+        self, network: Network, path: "Path", *, share: float, channel: str | None, progress: Progress
+    ) -> Recorded:
         """Compare a capture of the master's port with the plan."""
+        if channel is not None:
+            raise BusplanError(f"channel {channel}: a capture of EtherCAT is of one port; only CAN logs have channels")
         from busplan.buses.ethercat.recorded import recorded  # a single command asks for it, and numpy loads
 
         return recorded(network, path, share=share, progress=progress)

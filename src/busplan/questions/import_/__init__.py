@@ -13,7 +13,7 @@ from busplan.profile.document import decode, validate
 from busplan.profile.edit import short_text
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Path, one_or_several
+from busplan.questions.base.inputs import Path, finite, one_or_several
 from busplan.questions.base.sentences import document
 from busplan.questions.fit.certainty import deciding_cycle
 from busplan.questions.fit.network import PERIOD, network_of
@@ -87,7 +87,7 @@ class ImportAnswer(Answer):
         """Values that nobody has measured or configured, those of groups and of messages together."""
         unknown: dict[str, dict[str, None]] = {}
         for row in self.rows:
-            if row.fact.grade == "assumed" and row.key not in ("grade", "kind", "master_grade"):
+            if row.fact.grade == "assumed" and row.key not in ("grade", "kind", "master_grade", "period_grade"):
                 first, *rest = row.section.split(".")
                 section = ".".join((first, *(["*", *rest[1:]] if rest else [])))
                 unknown.setdefault(f"{section}.{row.key}", {})[short_text(row.fact.value)] = None
@@ -103,6 +103,9 @@ def import_profile(
     paths: Path | Iterable[Path],
     *,
     name: str | None = None,
+    bus: str | None = None,
+    channel: str | None = None,
+    period_us: float | None = None,
     progress: Progress | None = None,
 ) -> ImportAnswer:
     """Make a profile of the files of one machine.
@@ -112,9 +115,15 @@ def import_profile(
     paths
         The files, each recognised by its content: ENI, text of `ethercat slaves -v` or `ethercat pdos`, LinuxCNC's
         ethercat-conf.xml, text of SOEM's slaveinfo, EDS, DCF; with the extra `import` DBC, KCD, SYM, ARXML, and a log
-        of the CAN bus: `candump -l`, ASC, BLF, TRC.
+        of the CAN bus: `candump -l`, ASC, BLF, TRC, or a capture of SocketCAN.
     name
         Name of the profile; by default that of the first file.
+    bus
+        Of a database of several buses, the name of one.
+    channel
+        Of a log of several channels, the name of one.
+    period_us
+        Period of every message that no file gives one; it is assumed, so the plan is not shown to fit [us].
     progress
         Called with the bytes read of a log and those of the file.
 
@@ -142,12 +151,19 @@ def import_profile(
     names = [os.fspath(path) for path in one_or_several(paths, name="paths")]
     if not names or len(set(names)) < len(names):
         raise BusplanError(f"paths {names!r}: expected files of one machine, each once")
-    readings = [read_machine(each, progress=progress or (lambda _done, _total: None)) for each in names]
+    none = progress or (lambda _done, _total: None)
+    readings = [read_machine(each, bus=bus, channel=channel, progress=none) for each in names]
     logs = [reading.file for reading in readings if reading.is_log]
+    if channel is not None and not logs:
+        raise BusplanError(f"channel {channel}: none of the files is a CAN log")
+    if bus is not None and not any(reading.is_database for reading in readings):
+        raise BusplanError(f"bus {bus}: none of the files is a database of messages")
     if len(logs) > 1:
         raise BusplanError(f"{logs[0]} and {logs[1]} are both logs; give the longer one")
     can.settle(readings)
     machine = merged(readings)
+    if period_us is not None:
+        can.assume_periods(machine, finite(period_us, name="period_us"))
     title = name or ("machine" if names[0] == "-" else FilePath(names[0]).stem)
     rows = list(_ROWS[machine.kind](machine))
     text = profile_text(rows, name=title, readings=readings)

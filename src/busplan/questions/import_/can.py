@@ -26,6 +26,7 @@ _FD_BYTES: Final = 64
 _PDO_STEP: Final = 0x100
 _MOST_PDOS: Final = 4
 _SYNC_ID: Final = 0x80
+_MOST_NODE: Final = 127
 _HEARTBEAT_ID: Final = 0x700
 BIT_RATE: Final = "bit_rate_kbit_s"
 LEAST, SHOWN = "least_bit_rate", "shown_bit_rate"
@@ -38,6 +39,9 @@ _USUAL_BIT_RATE: Final = 1000
 _USUAL_OF_CARS: Final = 500
 """Of networks of messages alone [kbit/s]."""
 _LISTED: Final = 8
+_NAMES_OF_CYCLE: Final = ("SYNC", "loop", "feedback", "command")
+_OF_A_MESSAGE: Final = ("payload_bytes", "period_us", "period_grade", "jitter_us", "burst", "deadline_us")
+_ASSUME: Final = "a log of the bus beside it shows it, and --period 100ms takes one for all such messages, as assumed"
 _BASE_BITS: Final = 11
 _EXTENDED_BITS: Final = 29
 
@@ -69,7 +73,8 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
     bits = _EXTENDED_BITS if not nodes and 2 * extended > len(machine.messages) else _BASE_BITS
     messages = list(_messages(machine, nodes, usual_bits=bits))
     if not (nodes or messages):
-        raise BusplanError(f"{machine.file}: no message with a period, and no node with PDOs", *machine.remarks)
+        reason = "no message with a period, and no node with PDOs"
+        raise BusplanError(f"{machine.file}: {reason}; {_ASSUME}", *machine.remarks)
     yield ProfileLine("bus", "kind", machine.fact("can", 1))
     usual = assumed(_USUAL_OF_CARS, "no file says it, and all times follow from it")
     if nodes:
@@ -89,9 +94,19 @@ def rows(machine: Reading) -> Iterator[ProfileLine]:
             yield from _group([node for _, node in run], taken)
     else:
         machine.remarks.append(
-            "Messages alone, without a cycle of SYNC and PDOs: the EDS or DCF of each node beside the file adds it"
+            f"Messages alone, {_cycle_words(machine)}: the EDS or DCF of each node beside the file adds the cycle"
         )
     yield from messages
+
+
+def _cycle_words(machine: Reading) -> str:
+    """What of a cycle of SYNC and PDOs messages have, by the identifiers of CANopen's predefined set (CiA 301)."""
+    feedback, command = ({number - start for number in machine.messages} for start in (0x180, 0x200))
+    nodes = sorted(number for number in feedback & command if 1 <= number <= _MOST_NODE)
+    if _SYNC_ID not in machine.messages or not nodes:
+        return "without a cycle of SYNC and PDOs"
+    numbers = first_of([*map(str, nodes)], _LISTED)
+    return f"though 0x080, 0x180 + n and 0x200 + n are SYNC and PDOs of CANopen's nodes n = {numbers}"
 
 
 def _period(machine: Reading) -> Fact:
@@ -160,7 +175,7 @@ def _messages(machine: Reading, nodes: Sequence[_Node], *, usual_bits: int) -> I
     usual_bits
         Length of identifiers that a message need not say [bits].
     """
-    taken: set[str] = set()
+    taken = set(_NAMES_OF_CYCLE)
     cycle = {node.number: [pdo for pdos in node.sent.values() for pdo in pdos] for node in nodes}
     used = {pdo.identifier for pdos in cycle.values() for pdo in pdos}
     if nodes:
@@ -185,7 +200,10 @@ def _messages(machine: Reading, nodes: Sequence[_Node], *, usual_bits: int) -> I
             left_out.setdefault(reason, []).append(name)
         else:
             used.add(facts["identifier"].value)
-            yield from lines(f"message.{group_name(name, taken)}", _message(facts, usual_bits))
+            free = group_name(name, taken)
+            if name in _NAMES_OF_CYCLE:
+                machine.remarks.append(f"{name} is {free} in the profile, where {name} is a frame of the cycle")
+            yield from lines(f"message.{free}", _message(facts, usual_bits))
     machine.remarks += [_left_out(reason, names) for reason, names in left_out.items()]
 
 
@@ -223,7 +241,7 @@ def _obstacle(facts: Facts) -> str:
     most_bytes, why = (_FD_BYTES, "") if _is_fd(facts) else (_FRAME_BYTES, ", and no file says that it is CAN FD")
     if facts["payload_bytes"].value > most_bytes:
         return f"over the {most_bytes} bytes of a frame{why}"
-    return "" if "period_us" in facts else "no file says its period; give one that does, or add it by hand"
+    return "" if "period_us" in facts else f"no file says its period; {_ASSUME}"
 
 
 def _message(facts: Facts, usual_bits: int) -> dict[str, Fact | None]:
@@ -237,7 +255,7 @@ def _message(facts: Facts, usual_bits: int) -> dict[str, Fact | None]:
         "identifier_bits": None if bits == usual_bits else identifier._replace(value=bits, note=""),
         "fd": facts["is_fd"] if _is_fd(facts) else None,
         "brs": switches if _is_fd(facts) and switches and not switches.value else None,
-        **{key: facts.get(key) for key in ("payload_bytes", "period_us", "jitter_us", "burst", "deadline_us")},
+        **{key: facts.get(key) for key in _OF_A_MESSAGE},
     }
 
 
@@ -261,6 +279,14 @@ def settle(readings: Sequence[Reading]) -> None:
                 _settle_message(log.messages[number], facts, log)
             if BIT_RATE in database.bus:
                 _settle_bit_rate(log, database)
+
+
+def assume_periods(machine: Reading, period_us: float) -> None:
+    """Give every message without a period one that is assumed [us]."""
+    for facts in machine.messages.values():
+        if "period_us" not in facts:
+            facts["period_us"] = assumed(period_us, "no file says it; --period gives it to all such messages")
+            facts["period_grade"] = assumed("assumed", "so the plan is not shown to fit")
 
 
 def _settle_message(recorded: Facts, stated: Facts, log: Reading) -> None:

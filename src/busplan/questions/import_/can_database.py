@@ -4,6 +4,7 @@ import logging
 import re
 from typing import Any, Final
 
+from busplan.english import first_of
 from busplan.errors import BusplanError
 from busplan.extras import require_extra
 from busplan.questions.import_.reading import Reading
@@ -19,10 +20,21 @@ _NAMED: Final = {
     "arxml": r".*<SHORT-NAME>([^<]*)</SHORT-NAME>",
 }
 """Where a message's name stands."""
-_SIGNALS: Final = re.compile(r"^[ \t]*(?:SG_|VAL_|SIG_VALTYPE_|SG_MUL_VAL_) .*$", re.MULTILINE)
+_TEXT: Final = r"\"(?:[^\"\\]|\\.)*\""
+_SIGNALS: Final = re.compile(
+    rf"^[ \t]*(?:SG_ [^\n]*$|(?:VAL_|SIG_VALTYPE_|SG_MUL_VAL_) (?:[^\";]|{_TEXT})*;)", re.MULTILINE | re.DOTALL
+)
+_ATTRIBUTE: Final = re.compile(
+    rf"^[ \t]*BA_(?:DEF_DEF_)? +\"([^\"\n]*)\"(?:[^\";]|{_TEXT})*;", re.MULTILINE | re.DOTALL
+)
+_DEFINED: Final = re.compile(r"^[ \t]*BA_DEF_(?:REL_)? +(?:\w+_ +)?\"([^\"\n]*)\"", re.MULTILINE)
+_NUMBERED: Final = re.compile(r"\b(BO_|SG_|BO_TX_BU_|SIG_GROUP_) +(\d{4,9})\b")
+"""A message's number where it is 4 to 9 digits long: without bit 31, which makes it 10."""
+_MOST_STANDARD: Final = (1 << 11) - 1
 _WHOLE_SIGNAL: Final = re.compile(r"\s*SG_ .*\[.*\].*\"\s*\S")
 _LINE: Final = re.compile(r"Invalid syntax at line (\d+), column (\d+)")
 _KILO: Final = 1000
+_LISTED: Final = 8
 _LARGEST_IN_KILO: Final = {"bit_rate_kbit_s": 1000, "data_bit_rate_kbit_s": 8000}
 """Numbers up to these are in kbit/s, larger ones in bit/s."""
 _RATES: Final = (
@@ -33,7 +45,7 @@ _RATES: Final = (
 _MOST_BIT_RATE: Final = 10_000_000
 
 
-def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
+def read(given: str | bytes, name: str, *, dialect: str, bus: str | None = None) -> Reading:
     """Read a database.
 
     Parameters
@@ -44,6 +56,8 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
         Name of the file in messages.
     dialect
         dbc, sym, kcd or arxml.
+    bus
+        Of several buses, the name of the one that is read.
 
     Raises
     ------
@@ -51,22 +65,23 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
         The extra is not installed, the database is not valid, it is of several buses, or it has no messages.
     """
     title = dialect.upper()
-    machine = Reading("can", title, name, rank=1, lists_all=False)
+    machine = Reading("can", title, name, rank=1, lists_all=False, is_database=True)
     if len(given) > _MOST_BYTES:
         raise BusplanError(f"{name}: is larger than {_MOST_BYTES:,} bytes; no {title} of one machine is")
     text = given if isinstance(given, str) else given.decode("utf-8", "replace")
     if isinstance(given, bytes):
         parsed(given, name=name, skipped=("NetworkDefinition", "AUTOSAR"))
     require_extra("cantools", extra="import", option=f"{name}: {title}", module="cantools.database")
-    database = _loaded(text, name, title, dialect)
+    database = _loaded(text, machine, dialect)
     lines: dict[str, int] = {}
     for line, content in enumerate(text.split("\n"), start=1):
         if match := re.match(_NAMED[dialect], content):
             lines.setdefault(match[1], line)
     if not database.messages:
         raise machine.refusal(1, f"a {title} without messages")
-    _bit_rates(database, machine)
-    for message in database.messages:
+    messages = _of_one_bus(database, machine, bus)
+    _bit_rates(database, messages, machine)
+    for message in messages:
         line, number = lines.get(message.name, 1), message.frame_id + EXTENDED * bool(message.is_extended_frame)
         if number in machine.messages:
             owner = machine.messages[number]["name"].value
@@ -82,7 +97,8 @@ def read(given: str | bytes, name: str, *, dialect: str) -> Reading:
     return machine
 
 
-def _loaded(text: str, name: str, title: str, dialect: str) -> Any:
+def _loaded(text: str, machine: Reading, dialect: str) -> Any:
+    name, title = machine.file, machine.title
     from cantools.database import load_string
 
     # Its warnings are refused here, or do not matter.
@@ -91,12 +107,13 @@ def _loaded(text: str, name: str, title: str, dialect: str) -> Any:
         last = text.rstrip().rpartition("\n")[2]
         if last.lstrip().startswith("SG_ ") and not _WHOLE_SIGNAL.match(last):
             raise BusplanError(f"{name}:{text.rstrip().count(chr(10)) + 1}: ends within a signal: cut off?")
-        # Signals do not matter here, and take most of the time.
-        text = _SIGNALS.sub("", text)
+        text = _mended(text, machine)
     try:
         return load_string(text, dialect, strict=False)
     except Exception as error:  # noqa: BLE001 - the readers of formats fail in many ways
         message = " ".join(str(error).removeprefix(f"{title}: ").split())[:200]
+        if type(error).__module__.partition(".")[0] != "cantools":
+            message = f"cantools cannot read it ({type(error).__name__}: {message})"
         position = _LINE.search(message)
         place = f"{position[1]}:{position[2]}" if position else "1"
         raise BusplanError(
@@ -104,12 +121,47 @@ def _loaded(text: str, name: str, title: str, dialect: str) -> Any:
         ) from None
 
 
-def _bit_rates(database: Any, machine: Reading) -> None:
-    """The bit rates, where the database says them; refuse several buses."""
-    used = {message.bus_name for message in database.messages}
-    if len(used) > 1:
-        names = ", ".join(sorted(map(str, used)))
-        raise machine.refusal(1, f"messages of {len(used)} buses, {names}: a profile is one bus; export one")
+def _mended(text: str, machine: Reading) -> str:
+    """A DBC as cantools takes it, with the same lines: without signals, undefined attributes, or a missing bit 31."""
+    # Signals do not matter here, and take most of the time.
+    text = _SIGNALS.sub(_blank, text)
+    defined = set(_DEFINED.findall(text))
+    undefined = sorted({name for name in _ATTRIBUTE.findall(text) if name not in defined})
+    if undefined:
+        text = _ATTRIBUTE.sub(lambda match: match[0] if match[1] in defined else _blank(match), text)
+        machine.remarks.append(
+            f"{machine.file}: attributes that it does not define are left out: {', '.join(undefined)}"
+        )
+    short = {int(match[2]) for match in _NUMBERED.finditer(text) if int(match[2]) > _MOST_STANDARD}
+    if short:
+        text = _NUMBERED.sub(
+            lambda match: f"{match[1]} {int(match[2]) + EXTENDED * (int(match[2]) > _MOST_STANDARD)}", text
+        )
+        machine.remarks.append(
+            f"{machine.file}: identifiers over 11 bits without bit 31 are taken for 29 bits: "
+            f"{first_of([f'0x{number:08X}' for number in sorted(short)], _LISTED)}"
+        )
+    return text
+
+
+def _blank(match: re.Match[str]) -> str:
+    return "\n" * match[0].count("\n")
+
+
+def _of_one_bus(database: Any, machine: Reading, bus: str | None) -> list[Any]:
+    """Messages of the bus that is asked for, or of the only one."""
+    buses = sorted({str(message.bus_name or "") for message in database.messages})
+    if bus is None and len(buses) > 1:
+        names = ", ".join(buses)
+        raise machine.refusal(1, f"messages of {len(buses)} buses, {names}: a profile is one bus; --bus NAME reads one")
+    if bus is not None and bus not in buses:
+        raise machine.refusal(1, f"bus {bus}: no messages of such a bus; there are {', '.join(buses) or 'none'}")
+    return [message for message in database.messages if bus is None or message.bus_name == bus]
+
+
+def _bit_rates(database: Any, messages: list[Any], machine: Reading) -> None:
+    """The bit rates, where the database says them."""
+    used = {message.bus_name for message in messages}
     attributes = getattr(database.dbc, "attributes", None) or {}
     for key, of_bus, attribute_names in _RATES:
         rates = [getattr(bus, of_bus) for bus in database.buses if bus.name in used and getattr(bus, of_bus)]

@@ -60,7 +60,7 @@ class _Timing(NamedTuple):
         return self.uncertainty_us is not None
 
 
-def read(path: Path, name: str, *, progress: Progress) -> Reading:
+def read(path: Path, name: str, *, channel: str | None, progress: Progress) -> Reading:
     """Read a log.
 
     Parameters
@@ -69,6 +69,8 @@ def read(path: Path, name: str, *, progress: Progress) -> Reading:
         The file.
     name
         Its name in messages.
+    channel
+        Of several channels, the name of the one that is read.
     progress
         Called with the bytes read and those of the file.
 
@@ -77,7 +79,7 @@ def read(path: Path, name: str, *, progress: Progress) -> Reading:
     BusplanError
         The extra is not installed, or it is no log of one channel that shows when frames come.
     """
-    frames = read_can(path, progress=progress)
+    frames = read_can(path, channel=channel, progress=progress)
     stretch = longest_stretch(frames)
     messages = frames_by_identifier(frames, stretch).values()
     least = least_bit_rate(frames, stretch).likely

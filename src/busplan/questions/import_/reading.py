@@ -79,6 +79,8 @@ class Reading:
     """Whether the file lists all devices of the machine."""
     is_log: bool = False
     """Whether the file is a recording of the bus."""
+    is_database: bool = False
+    """Whether the file is a database of messages."""
     remarks: list[str] = field(default_factory=list)
     """Sentences on what the file says and a profile cannot, or what the file leaves open."""
 
@@ -175,7 +177,10 @@ def merged(readings: Iterable[Reading]) -> Reading:
         for number, facts in reading.nodes.items():
             _add(machine.nodes.setdefault(number, {}), facts, f"node {number}: ", differences)
         for number, facts in reading.messages.items():
-            _add(machine.messages.setdefault(number, {}), facts, f"message {number}: ", differences)
+            known = machine.messages.setdefault(number, {})
+            # Bit 31 is that of identifiers of 29 bits.
+            shown = f"0x{number % (1 << 31):0{8 if number >> 31 else 3}X}"
+            _add(known, facts, f"{(known | facts)['name'].value} ({shown}): ", differences)
         machine.remarks += reading.remarks
     if machine.kind == "ethercat":
         _require_one_machine(ranked)

@@ -9,7 +9,6 @@ from busplan.errors import BusplanError
 
 _MOST_DEPTH: Final = 64
 _MOST_ELEMENTS: Final = 1_000_000
-_CHUNK_BYTES: Final = 4096
 _FAR: Final = 300
 """Columns that a person counts; some tools write all in one line."""
 
@@ -62,22 +61,6 @@ def parsed(content: bytes, *, name: str, skipped: Collection[str] = ()) -> Eleme
     return next(iter(reader.root.children), reader.root)
 
 
-def root_tag(content: bytes, *, name: str) -> str:
-    """Tag of the root element of an XML file, without reading the rest.
-
-    Raises
-    ------
-    BusplanError
-        As `parsed`.
-    """
-    reader = _Reader(name, frozenset())
-    for start in range(0, len(content), _CHUNK_BYTES):
-        reader.read(content[start : start + _CHUNK_BYTES], is_last=start + _CHUNK_BYTES >= len(content))
-        if reader.root.children:
-            break
-    return reader.root.children[0].tag
-
-
 class _Reader:
     def __init__(self, name: str, skipped: frozenset[str]) -> None:
         self.name, self.skipped = name, skipped
@@ -92,10 +75,10 @@ class _Reader:
         self.parser.EndElementHandler = self._end
         self.parser.CharacterDataHandler = self._text
 
-    def read(self, content: bytes, *, is_last: bool = True) -> None:
-        """Read the file, or the next part of it."""
+    def read(self, content: bytes) -> None:
+        """Read the file."""
         try:
-            self.parser.Parse(content, is_last)
+            self.parser.Parse(content, True)
         except expat.ExpatError as error:
             what = expat.ErrorString(error.code)
             raise BusplanError(f"{self.name}:{error.lineno}:{error.offset + 1}: not valid XML: {what}") from None
