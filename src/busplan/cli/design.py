@@ -518,8 +518,8 @@ def import_command(
         str | None,
         option(
             "--period TIME",
-            "Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so the plan is "
-            "not shown to fit.  [default: such messages are left out]",
+            "Period of every CAN message that no file gives one, with its unit, as 100ms. It is assumed, so the plan "
+            "is not shown to fit.  [default: such messages are left out]",
         ),
     ] = None,
     force: Annotated[bool, option("--force", "Let -o overwrite a file that is already there.")] = False,
