@@ -68,7 +68,7 @@ REFUSED = {
     "no PDO": ("[DeviceInfo]\nProductName=x\n", ":1: no PDO that is sent"),
     "no number": (
         "[DeviceInfo]\n[1800sub1]\nDefaultValue=soon\n",
-        ":3: defaultvalue 'soon': expected a number, as 0x180",
+        ":3: defaultvalue 'soon': expected a number, as 384, 0x180",
     ),
 }
 

@@ -9,7 +9,7 @@ from busplan.questions.import_.reading import ControlWords, Facts, Reading, assu
 
 _SECTION: Final = re.compile(r"\s*\[([^\]\n]{1,100})\]\s*$")
 _VALUE: Final = re.compile(r"\s*([^=;\n]{1,100}?)\s*=\s*(.*?)\s*$")
-_NUMBER: Final = re.compile(r"(?:\$NODEID\s*\+\s*)?(0x[0-9a-f]{1,8}|[0-9]{1,10})(?:\s*\+\s*\$NODEID)?", re.IGNORECASE)
+_NUMBER: Final = re.compile(r"(?:\$NODEID\s*\+\s*)?(0x[0-9a-f]{1,8}|0+|[1-9][0-9]{0,9})(?:\s*\+\s*\$NODEID)?", re.IGNORECASE)
 _TPDO, _RPDO, _MAPPING, _MOST_PDOS = 0x1800, 0x1400, 0x200, 512
 _SYNC_ID, _SYNC_PERIOD, _HEARTBEAT, _SYNC_COUNTER = 0x1005, 0x1006, 0x1017, 0x1019
 _INVALID: Final = 1 << 31
@@ -128,7 +128,7 @@ class _Device:
             return None
         match = _NUMBER.fullmatch(text)
         if match is None:
-            raise self.machine.refusal(line, f"{key} {text[:40]!r}: expected a number, as 0x180 or $NODEID+0x180")
+            raise self.machine.refusal(line, f"{key} {text[:40]!r}: expected a number, as 384, 0x180 or $NODEID+0x180")
         return _Number(int(match[1], 0) + self.node * ("$nodeid" in text.lower()), line)
 
     def value(self, index: int, sub: int | None = None) -> _Number | None:
