@@ -1,5 +1,6 @@
 """`--set KEY=VALUE`: how it is read, which two options exclude each other, and what a refusal names."""
 
+import re
 from functools import cache
 from typing import Any
 
@@ -39,11 +40,50 @@ def test_a_value_is_toml_and_a_word_is_text() -> None:
         assert type(change.value) is type(value)
 
 
-@pytest.mark.parametrize("written", ["4ms", "S200 S400", "[1, 2", "{a = 1", "4\nbus.nodes = 3", "3\n[bus]", "-", "µ"])
+@pytest.mark.parametrize("written", ["S200 S400", "[1, 2", "{a = 1", "4\nbus.nodes = 3", "3\n[bus]", "-", "µ"])
 def test_what_is_neither_toml_nor_a_word_is_refused(written: str) -> None:
     with pytest.raises(BusplanError) as caught:
         parse_set([f"bus.key={written}"])
     assert str(caught.value).startswith(f"--set bus.key={written}: {written} is not a TOML value; expected a number")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("cycle.period_us=250us", 250),
+        ("cycle.period_us=0.0003s", 300),
+        ("cycle.period_us = 0.1 ms", 100),
+        ("delivery.jitter_us=.5us", 0.5),
+        ("bus.bit_rate_kbit_s=1Mbit/s", 1000),
+        ("servo.lever_mm=20um", 0.02),
+        ("bus.cable_length_m=300mm", 0.3),
+    ],
+)
+def test_a_number_may_have_its_unit(text: str, value: float) -> None:
+    (change,) = parse_set([text])
+    assert (change.value, type(change.value)) == (value, type(value))
+    assert f"in {change.key.rpartition('_')[2] if 'kbit' not in text else 'kbit_s'} {value:g}" in change.note
+
+
+def test_a_unit_of_another_quantity_is_refused() -> None:
+    with pytest.raises(BusplanError, match=r"--set cycle.period_us=3mm: expected a number in us, ms or s"):
+        parse_set(["cycle.period_us=3mm"])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("period=250us", "unknown key; did you mean cycle.period_us?"),
+        ("kind=can", "unknown key; did you mean bus.kind?"),
+        ("bus.period_us=250", "unknown key; did you mean cycle.period_us?"),
+        ("bus.nods=3", "unknown key; did you mean nodes?"),
+        ("bus.gap_count=5us", "expected a whole number from 0 to 63"),
+        ("node.execution.base_us=3", 'unknown key where kind is "table"; it is a key of kind = "linear"'),
+    ],
+)
+def test_a_key_that_is_not_there_is_told_where_it_is(text: str, words: str) -> None:
+    with pytest.raises(BusplanError, match=re.escape(words)):
+        KeyChanges(parse_set([text])).applied(busplan.load_profile("paper-4ms"))
 
 
 @pytest.mark.parametrize(

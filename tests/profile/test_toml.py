@@ -173,8 +173,7 @@ FAULTS = {
     ),
     "unknown key of the table": (
         *('kind = "table"', 'kind = "table"\nbase_us = 1'),
-        ("20:1: node.execution.base_us: unknown key; known here: residual, measured_gap_count, grade, uncertainty_us, "
-        "worst_extra_us, kind, payload_bytes, time_us"),
+        '20:1: node.execution.base_us: unknown key where kind is "table"; it is a key of kind = "linear"',
     ),
     "missing key": (
         *("nodes = 2\n", ""),

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from decimal import Decimal
 from functools import wraps
 from inspect import Parameter, signature
 from itertools import product
@@ -16,7 +15,7 @@ import typer
 from busplan.errors import BusplanError
 from busplan.extras import require_resvg
 from busplan.forms import ENDINGS, PICTURES, Form, Picture, ending_expected
-from busplan.profile.changes import SET, KeyChange, KeyChanges, parse_set, require_separate
+from busplan.profile.changes import SET, KeyChange, KeyChanges, in_unit, parse_set, require_separate
 
 if TYPE_CHECKING:
     from busplan.sections.profile import Profile
@@ -27,7 +26,6 @@ AnyForm = TypeVar("AnyForm", bound=str)
 _TIME: Final = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?|\.[0-9]+)\s*(?P<unit>us|ms|s)")
 MAX_BYTES: Final = 1_000_000
 _SIZE: Final = r"\s*[0-9]{1,12}\s*"
-_EXPONENT: Final = {"us": 0, "ms": 3, "s": 6}
 
 
 def complete_profile(incomplete: str) -> list[str]:
@@ -71,8 +69,7 @@ def time_us(text: str, *, option: str) -> float:
     match = _TIME.fullmatch(text.strip())
     if match is None:
         raise BusplanError(f"{option} {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
-    # With Decimal, 0.0003 s is exactly 300 us.
-    duration_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
+    duration_us = in_unit(match["value"], match["unit"], "us") or 0.0
     if isinf(duration_us):
         raise BusplanError(f"{option} {text}: is too long; expected a time with its unit, as 4ms, 250us or 0.001s")
     return duration_us
@@ -293,9 +290,9 @@ def _period_change(text: str) -> KeyChange:
 def _set_option(words: str) -> Any:
     usage = (
         "Compute with another value of a key of the profile, as cycle.nonperiodic_us=50, bus.speed=S200 or "
-        "node.execution.time_us=[30,40]. VALUE is TOML, a number without its unit, and is checked like the file; a "
-        f"table replaces the whole section. May be given several times.{words and ' '}{words}  [default: the profile "
-        "as it is]"
+        "node.execution.time_us=[30,40]. VALUE is TOML, a number in the unit of its key or with one, as 250us; it is "
+        "checked like the file; a table replaces the whole section. May be given several times."
+        f"{words and ' '}{words}  [default: the profile as it is]"
     )
     return Annotated[list[str] | None, option(f"{SET} KEY=VALUE", usage)]
 

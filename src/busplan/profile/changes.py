@@ -5,11 +5,12 @@ import re
 import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from itertools import combinations
 from string import ascii_letters, digits
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from busplan.english import has_controls
+from busplan.english import has_controls, listed
 from busplan.errors import BusplanError, PlacedError
 
 if TYPE_CHECKING:
@@ -19,6 +20,16 @@ SET: Final = "--set"
 _KEY: Final = re.compile(r"[A-Za-z0-9_-]{1,100}(?:\.[A-Za-z0-9_-]{1,100}){0,9}")
 _WORD: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _VALUE: Final = "value"
+UNITS: Final = {
+    "us": {"us": 0, "ms": 3, "s": 6},
+    "mm": {"um": -3, "mm": 0, "m": 3},
+    "m": {"mm": -3, "m": 0},
+    "kbit_s": {"kbit/s": 0, "Mbit/s": 3},
+}
+"""Units that a value may be written in, by the unit at the end of its key: the power of ten of each."""
+_WITH_UNIT: Final = re.compile(
+    r"(?P<number>-?(?:[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?|\.[0-9]+))\s*(?P<unit>[a-zA-Z][a-zA-Z/]*)"
+)
 _MOST_SHOWN: Final = 100
 """Longest option repeated in full in a message."""
 
@@ -150,7 +161,38 @@ def _parsed(text: str) -> KeyChange:
     key, equals, written = (part.strip() for part in text.partition("="))
     if not equals or not written or not _KEY.fullmatch(key):
         raise BusplanError(f"{SET} {text}: expected KEY=VALUE with a dotted key of the profile, as cycle.period_us=500")
+    if with_unit := _WITH_UNIT.fullmatch(written):
+        unit = next((unit for unit in UNITS if key.endswith(f"_{unit}")), "")
+        value = in_unit(with_unit["number"], with_unit["unit"], unit)
+        if value is not None:
+            return KeyChange(key, value, text=f"{key}={written}", note=f", in {unit} {value:g}")
+        if unit:
+            raise BusplanError(f"{SET} {text}: expected a number in {listed([*UNITS[unit]], 'or')}")
+        # The schema says what is right: another key, or a number alone.
+        return KeyChange(key, written, text=f"{key}={written}")
     return KeyChange(key, _value(written, name=f"{SET} {text}"), text=f"{key}={written}")
+
+
+def in_unit(number: str, written: str, unit: str) -> float | None:
+    """Convert a number with its unit, exactly; None for a unit that is not one of the quantity.
+
+    Parameters
+    ----------
+    number, written
+        The number and its unit, as typed.
+    unit
+        Unit of the value, a key of `UNITS`.
+
+    Examples
+    --------
+    >>> in_unit("0.0003", "s", "us"), in_unit("1", "Mbit/s", "kbit_s"), in_unit("1", "m", "us")
+    (300, 1000, None)
+    """
+    exponent = UNITS.get(unit, {}).get(written)
+    if exponent is None:
+        return None
+    value = float(Decimal(number).scaleb(exponent))
+    return int(value) if value.is_integer() else value
 
 
 def _value(written: str, *, name: str) -> object:
@@ -166,7 +208,7 @@ def _value(written: str, *, name: str) -> object:
     if _WORD.fullmatch(written):
         return written
     raise BusplanError(
-        f"{name}: {written} is not a TOML value; expected a number without its unit, true or false, a word, "
+        f"{name}: {written} is not a TOML value; expected a number with or without its unit, true or false, a word, "
         'text in quotes, as "two words", an array, as [4, 16], or a table, as {kind = "linear", base_us = 30}'
     )
 

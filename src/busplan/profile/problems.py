@@ -13,7 +13,7 @@ from busplan.english import printable
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.profile.document import Document
 from busplan.profile.edit import value_text
-from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, named_path, path_of, profile_model
+from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, named_path, path_of, profile_model, value_keys
 from busplan.profile.places import KeyPath
 from busplan.sections.base import MISSING, Problem
 
@@ -119,7 +119,7 @@ def _validated(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFind
             yield KeyFinding(path, _missing(path, section), "missing-key", shows_value=False)
         elif details["type"] == "extra_forbidden":
             if kind_of(data) is not None or not is_of_a_kind(path):
-                yield KeyFinding(path, _unknown(path, section), "unknown-key", shows_value=False)
+                yield KeyFinding(path, _unknown(path, section, model), "unknown-key", shows_value=False)
         elif details["type"] == "union_tag_not_found":
             tags = [f"{_TAG} = {tag}" for tag in _tags(path, section)]
             yield KeyFinding(
@@ -208,12 +208,39 @@ def _example(model: type[BaseModel]) -> str:
     return f"{{{', '.join(keys)}}}"
 
 
-def _unknown(path: KeyPath, section: type[BaseModel]) -> str:
-    names = list(section.model_fields)
-    close = get_close_matches(str(path[-1]), names, n=1)
-    if close:
-        return f"unknown key; did you mean {close[0]}?"
-    return f"unknown key; known here: {', '.join(names)}"
+def _unknown(path: KeyPath, section: type[BaseModel], model: type[BaseModel]) -> str:
+    name, names = str(path[-1]), list(section.model_fields)
+    for kind, table in _kinds_beside(model, section).items():
+        if name in table.model_fields:
+            own = _word_of_kind(section)
+            return f'unknown key where kind is "{own}"; it is a key of kind = "{kind}"'
+    parts_of_keys = [key.split(".") for key in value_keys(model, {})]
+    elsewhere = [
+        ".".join(parts[: number + 1])
+        for parts in parts_of_keys
+        for number, part in enumerate(parts)
+        if number and (part == name or part.startswith(f"{name}_"))
+    ]
+    close = get_close_matches(name, names, n=1)
+    # A name at the top is more likely one of a section than a misspelt other.
+    meant = [*elsewhere, *close] if len(path) == 1 else [*close, *elsewhere]
+    return f"unknown key; did you mean {meant[0]}?" if meant else f"unknown key; known here: {', '.join(names)}"
+
+
+def _kinds_beside(model: type[BaseModel], section: type[BaseModel]) -> dict[str, type[BaseModel]]:
+    """Other models that a table may have instead of this one, by the word of their `kind`."""
+    for field in model.model_fields.values():
+        models = models_of(field.annotation)
+        if section in models:
+            return {_word_of_kind(each): each for each in models if each is not section and "kind" in each.model_fields}
+        for inner in models:
+            if found := _kinds_beside(inner, section):
+                return found
+    return {}
+
+
+def _word_of_kind(section: type[BaseModel]) -> str:
+    return str(get_args(section.model_fields["kind"].annotation)[0]) if "kind" in section.model_fields else ""
 
 
 def refusal(error: ValidationError | None, data: dict[str, Any], document: Document) -> PlacedError:

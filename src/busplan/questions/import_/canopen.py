@@ -9,7 +9,9 @@ from busplan.questions.import_.reading import ControlWords, Facts, Reading, assu
 
 _SECTION: Final = re.compile(r"\s*\[([^\]\n]{1,100})\]\s*$")
 _VALUE: Final = re.compile(r"\s*([^=;\n]{1,100}?)\s*=\s*(.*?)\s*$")
-_NUMBER: Final = re.compile(r"(?:\$NODEID\s*\+\s*)?(0x[0-9a-f]{1,8}|0+|[1-9][0-9]{0,9})(?:\s*\+\s*\$NODEID)?", re.IGNORECASE)
+_NUMBER: Final = re.compile(
+    r"(?:\$NODEID\s*\+\s*)?(0x[0-9a-f]{1,8}|0+|[1-9][0-9]{0,9})(?:\s*\+\s*\$NODEID)?", re.IGNORECASE
+)
 _TPDO, _RPDO, _MAPPING, _MOST_PDOS = 0x1800, 0x1400, 0x200, 512
 _SYNC_ID, _SYNC_PERIOD, _HEARTBEAT, _SYNC_COUNTER = 0x1005, 0x1006, 0x1017, 0x1019
 _INVALID: Final = 1 << 31
