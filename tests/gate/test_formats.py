@@ -121,7 +121,7 @@ def test_json_holds_the_contract(mixed: Answer) -> None:
     document = json.loads(render(mixed, file_format="json"))
     assert list(document) == ["schema", "command", "files", "summary"]
     assert (document["schema"], document["command"]) == (1, "check")
-    assert document["summary"] == {"files": 4, "errors": 2, "warnings": 1, "circles_not_run": 0}
+    assert document["summary"] == {"files": 4, "errors": 2, "warnings": 1, "circles_not_run": 0, "suppressed": 0}
     assert [(one["path"], one["profile"], one["status"]) for one in document["files"]] == [
         ("p/clean.toml", "example", "ok"),
         ("p/fails.toml", "example", "findings"),
@@ -129,7 +129,16 @@ def test_json_holds_the_contract(mixed: Answer) -> None:
         ("gone.toml", None, "error"),
     ]
     for one in document["files"]:
-        own = {"path", "profile", "status", "verdict", "margin_corrected_us", "uncertainty_us", "findings"}
+        own = {
+            "path",
+            "profile",
+            "status",
+            "verdict",
+            "margin_corrected_us",
+            "uncertainty_us",
+            "findings",
+            "suppressed",
+        }
         assert set(one) - {"failure"} == own
         assert (one["verdict"] is None) == (one["profile"] is None) == (one["uncertainty_us"] is None)
     assert [one["verdict"] for one in document["files"][:2]] == ["fits", "does not fit"]

@@ -230,7 +230,7 @@ def test_severities_decide_what_fails(clean: str, changed: Changed, gate: Check)
     failed = gate(changed(('"optimal"', "63"), ("period_us = 4000", "period_us = 300")))
     found = [(answer.has_findings("warning"), answer.has_findings("error")) for answer in (gate(clean), warned, failed)]
     assert found == [(False, False), (True, False), (True, True)]
-    assert (warned.summary, failed.summary) == ((1, 0, 1, 0), (1, 1, 1, 0))
+    assert (warned.summary, failed.summary) == ((1, 0, 1, 0, 0), (1, 1, 1, 0, 0))
     assert (warned.passed, failed.passed) == (True, False)
 
 

@@ -24,18 +24,20 @@ from busplan.cli.options import (
 )
 from busplan.cli.output import PlanFailsError, emit_document, emit_text, is_styled, say, terminal_size
 from busplan.cli.rewrite import changing, require_changeable, rewrite
-from busplan.english import plural
+from busplan.english import first_of, plural
 from busplan.errors import BusplanError
 from busplan.files import document_bytes, write_file
 from busplan.gate.formats import FORMATS
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from concurrent.futures import Executor
     from contextlib import AbstractContextManager
 
+    from busplan.buses.rule import Severity
     from busplan.gate.baseline import Baseline
+    from busplan.gate.gate import FileResult
     from busplan.gate.report import CheckReport
     from busplan.profile.sources import ProfileSource
 
@@ -76,14 +78,29 @@ def check_command(
         ),
     ] = None,
     output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
+    select: Annotated[
+        str | None, option("--select CODES", "Rules that count, as BP1,BP301: beginnings of codes.  [default: all]")
+    ] = None,
+    ignore: Annotated[
+        str | None,
+        option("--ignore CODES", "Rules that do not count, as BP112; the longest beginning decides.  [default: none]"),
+    ] = None,
+    show_suppressed: Annotated[
+        bool, option("--show-suppressed", "Also name suppressed findings, each with its reason.")
+    ] = False,
     fail_on: Annotated[
-        Literal["error", "warning"], option("--fail-on", "Least severity that fails the check.", show_default=True)
-    ] = "error",
+        Literal["error", "warning"] | None,
+        option("--fail-on", "Least severity that fails the check.  [default: error]"),
+    ] = None,
     exit_zero: Annotated[bool, option("--exit-zero", "Exit 0 even with findings; 2 stays 2.")] = False,
     circle: Annotated[
-        bool,
-        typer.Option("--circle/--no-circle", help="Run the circle test of profiles that ask for one, or leave it out."),
-    ] = True,
+        bool | None,
+        typer.Option(
+            "--circle/--no-circle",
+            help="Run the circle test of profiles that ask for one, or leave it out.  [default: run it]",
+            show_default=False,
+        ),
+    ] = None,
     circle_steps: Annotated[
         int | None,
         option(
@@ -101,7 +118,8 @@ def check_command(
         bool,
         option(
             "--update-baseline",
-            "Record the present axes and margins in the --baseline file, and drop records without a profile.",
+            "Record the present axes, margins and findings in the --baseline file, and drop records without a profile. "
+            "Findings that are recorded count no more. Exits 0 when it is written.",
         ),
     ] = False,
     pass_on_unmatched: Annotated[
@@ -130,7 +148,9 @@ def check_command(
     skip_others: Annotated[
         bool, option("--skip-others", "Skip named files without a `schema_version`, and count them.")
     ] = False,
-    jobs: Annotated[int, option("--jobs,-j N", "Number of processes to check with.", min=1, show_default=True)] = 1,
+    jobs: Annotated[
+        int | None, option("--jobs,-j N", "Number of processes to check with.  [default: 1]", min=1)
+    ] = None,
     stdin_filename: Annotated[
         str, option("--stdin-filename NAME", "Name of standard input in the report.", show_default=True)
     ] = "<stdin>",
@@ -141,12 +161,20 @@ def check_command(
 
     Each finding is a line: `path:line:column: CODE severity: message`. `busplan rule CODE` explains it. A comment `#
     busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. A file that is not TOML or not
-    a profile is a finding, too. Exits 0 when clean, 1 with findings at or above --fail-on, 2 when it could not do the
-    job, as with a missing file; the other files are still checked.
+    a profile is a finding, too. Options that are not given come from the nearest busplan.toml, or else from
+    [tool.busplan] of pyproject.toml. Exits 0 when clean, 1 with findings at or above --fail-on, 2 when it could not do
+    the job, as with a missing file; the other files are still checked.
 
     Example: busplan check paper-1ms paper-4ms --format github
     """
+    from busplan.gate.selection import nearest_settings
+
+    option_of = nearest_settings(Path.cwd()).option
+    circle, fail_on = option_of("circle", circle, True), option_of("fail-on", fail_on, "error")
     require_company("--circle", {"--circle-steps": circle_steps}, is_given=circle)
+    circle_steps = option_of("circle-steps", circle_steps, None) if circle else None
+    baseline = option_of("baseline", baseline, None)
+    skip_others = option_of("skip-others", skip_others or None, False)
     require_company("--recording FILE", {"--quantile": quantile != 1}, is_given=recording)
     of_baseline = {"--update-baseline": update_baseline, "--pass-on-unmatched": pass_on_unmatched}
     require_company("--baseline FILE", of_baseline, is_given=baseline)
@@ -165,7 +193,7 @@ def check_command(
     read += [path for path in (recording, baseline) if path is not None and path != updated]
     require_apart({"--output": output, "--baseline": updated}, inputs=read)
     recorded = None if baseline is None else _read_baseline(baseline, needed=not update_baseline)
-    with _crew(min(jobs, len(collection.sources))) as crew:
+    with _crew(min(option_of("jobs", jobs, 1), len(collection.sources))) as crew:
         report = check(
             collection,
             circle=circle,
@@ -176,9 +204,13 @@ def check_command(
             recording=recording,
             quantile=quantile,
             skip_others=skip_others,
+            select=option_of("select", _codes(select), ()),
+            ignore=option_of("ignore", _codes(ignore), ()),
+            per_file_ignores=option_of("per-file-ignores", None, {}),
             executor=crew,
             **({} if circle_steps is None else {"circle_steps": circle_steps}),
         )
+    report = report._replace(lists_all=verbose)
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
     if pass_on_unmatched and report.unmatched:
@@ -186,17 +218,40 @@ def check_command(
     if verbose:
         say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
         say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
+    say(*(line for file in report.files for line in _suppressed_lines(file) if show_suppressed))
     if updated is not None:
         _update_baseline(updated, collection.sources, report, quiet=quiet)
     if not quiet:
         from busplan.forms.numbers import sentence_text
         from busplan.questions.base.sentences import changes_sentences
 
-        say(*map(sentence_text, changes_sentences(changes)), report.headline)
+        say(*map(sentence_text, changes_sentences(changes)), *_mended(report), report.headline)
+    _exit(report, least=None if exit_zero or update_baseline else fail_on)
+
+
+def _exit(report: "CheckReport", *, least: "Severity | None") -> None:
+    """Exit with the code of the check; None for one that no finding fails."""
     if report.failed:
         raise typer.Exit(2)
-    if not exit_zero and report.has_findings(fail_on):
+    if least is not None and report.has_findings(least):
         raise PlanFailsError
+
+
+def _codes(text: str | None) -> list[str] | None:
+    return None if text is None else [code.strip() for code in text.split(",")]
+
+
+def _mended(report: "CheckReport") -> list[str]:
+    """Findings that the baseline knows and that are no more."""
+    names = [f"{known} in {file.path}" for file in report.files for known in file.mended]
+    return [f"mended since the baseline: {first_of(names, 3)}; --update-baseline drops them"] if names else []
+
+
+def _suppressed_lines(file: "FileResult") -> "Iterator[str]":
+    from busplan.gate.finding import finding_line
+
+    for each in file.suppressed:
+        yield f"{finding_line(file.path, each.finding)} (suppressed: {each.reason or 'without a reason'})"
 
 
 def _crew(jobs: int) -> "AbstractContextManager[Executor | None]":
@@ -217,12 +272,16 @@ def _read_baseline(path: Path, *, needed: bool) -> "Baseline | None":
 
 def _update_baseline(path: Path, sources: "Sequence[ProfileSource]", report: "CheckReport", *, quiet: bool) -> None:
     """Record the checked profiles; others that are still there keep their record."""
-    from busplan.gate.baseline import MODELS, Baseline, Record, write_baseline
+    from busplan.gate.baseline import MODELS, Baseline, Record, known_as, write_baseline
 
     new = Baseline({}, MODELS, path)
     names = [new.name_of(source) for source in sources]
     checked = zip(names, report.files, strict=True)
-    now = {name: Record(file.figures, file.keys) for name, file in checked if file.fit is not None}
+    now = {
+        name: Record(file.figures, file.keys, tuple(sorted({known_as(one.code, one.key) for one in file.findings})))
+        for name, file in checked
+        if file.fit is not None
+    }
     with changing(path):
         # Read again: another run may have changed it since the check began.
         old = _read_baseline(path, needed=False) or new
@@ -230,7 +289,9 @@ def _update_baseline(path: Path, sources: "Sequence[ProfileSource]", report: "Ch
         kept = {name: record for name, record in old.profiles.items() if old.is_current and name not in gone}
         rewrite(path, write_baseline({**kept, **now}).encode())
     if not quiet:
-        say(f"recorded {plural(len(now), 'profile')} in {path}")
+        findings = sum(len(record.findings) for record in now.values())
+        known = f" with {plural(findings, 'known finding')}" if findings else ""
+        say(f"recorded {plural(len(now), 'profile')}{known} in {path}")
     if gone:
         say(f"warning: {path}: dropped {', '.join(gone)}: no such profile any more")
     left = [name for name in old.profiles if not old.is_current and name not in (*now, *gone)]

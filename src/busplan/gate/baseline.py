@@ -52,6 +52,13 @@ class Record(NamedTuple):
     """By name: "paper.max_axes"."""
     keys: Mapping[str, object] | None = None
     """Values in the file, by dotted key; None in a baseline that does not record them."""
+    findings: tuple[str, ...] = ()
+    """Findings that are known, as `known_as` names them: they count no more."""
+
+
+def known_as(code: str, key: str) -> str:
+    """How a baseline names a finding: by its rule and its key, whatever the line."""
+    return f"{code} {key}"
 
 
 def figures_of(subject: Subject) -> dict[str, float]:
@@ -180,7 +187,15 @@ def read_baseline(text: str, *, name: str) -> Baseline:
     models, keys = document.get("models", 1), document.get("keys", {})
     if not isinstance(models, int) or isinstance(models, bool) or not _are_keys(keys):
         raise BusplanError(f"{name}: a damaged baseline; {_REMEDY}")
-    return Baseline({path: Record(figures, keys.get(path)) for path, figures in profiles.items()}, models)
+    known = document.get("findings", {})
+    if not isinstance(known, dict) or not all(_are_words(names) for names in known.values()):
+        raise BusplanError(f"{name}: a damaged baseline; {_REMEDY}")
+    records = {path: Record(each, keys.get(path), tuple(known.get(path, ()))) for path, each in profiles.items()}
+    return Baseline(records, models)
+
+
+def _are_words(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(word, str) for word in value)
 
 
 def _are_keys(value: object) -> bool:
@@ -213,6 +228,7 @@ def write_baseline(recorded: Mapping[str, Record]) -> str:
         "models": MODELS,
         "profiles": {path: dict(record.figures) for path, record in by_path.items()},
         "keys": {path: dict(record.keys) for path, record in by_path.items() if record.keys is not None},
+        "findings": {path: list(record.findings) for path, record in by_path.items() if record.findings},
     }
     return to_json(document)
 

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path as FilePath
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
@@ -14,6 +15,7 @@ from busplan.gate.baseline import Baseline, load_baseline
 from busplan.gate.finding import MOST_STEPS, Recording
 from busplan.gate.gate import FileResult, check_source
 from busplan.gate.report import CheckReport, Located, check_report, summary_sentence
+from busplan.gate.selection import Selection, checked_codes
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import Document
 from busplan.profile.edit import profile_text
@@ -21,6 +23,8 @@ from busplan.profile.sources import Collection, ProfileSource, collect
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, argument, items, key_changes
 from busplan.sections.profile import Profile
+
+NO_FILES: Final[Mapping[str, Sequence[str]]] = MappingProxyType({})
 
 
 class CheckAnswer(Answer, CheckReport):
@@ -63,6 +67,9 @@ def check(
     recording: Path | None = None,
     quantile: float = 1.0,
     skip_others: bool = False,
+    select: Sequence[str] = (),
+    ignore: Sequence[str] = (),
+    per_file_ignores: Mapping[str, Sequence[str]] = NO_FILES,
     executor: Executor | None = None,
 ) -> CheckAnswer:
     """Check whether profiles fit their bus and hold their circle.
@@ -93,6 +100,11 @@ def check(
         Share of the events that worst cases of the recording hold for, 0.5..1.
     skip_others
         Skip named files without a `schema_version`, and count them.
+    select, ignore
+        Rules that count, and others that do not, by the beginning of their code: the longest that fits decides. By
+        default all count. What does not is among the `suppressed` of its file.
+    per_file_ignores
+        Rules that do not count by the pattern of a path: {"old/*.toml": ["BP112"]}.
     executor
         Where the files are checked; by default in this thread. Any `concurrent.futures.Executor` gives the same answer,
         and is not shut down. Worker processes must have this version of busplan.
@@ -115,7 +127,7 @@ def check(
     >>> import busplan
     >>> answer = busplan.check(["paper-4ms", "paper-dma"])
     >>> answer.passed, answer.summary
-    (True, Summary(files=2, errors=0, warnings=0, circles_not_run=0))
+    (True, Summary(files=2, errors=0, warnings=0, circles_not_run=0, suppressed=0))
     """
     changed = changes if isinstance(changes, KeyChanges) else key_changes(changes)
     recorded = None if baseline is None else _recorded(baseline)
@@ -128,6 +140,11 @@ def check(
         "circle_steps": circle_steps,
         "changes": changed,
         "record": record,
+        "selection": Selection(
+            checked_codes(select, name="select"),
+            checked_codes(ignore, name="ignore"),
+            tuple((pattern, checked_codes(codes, name="ignore")) for pattern, codes in per_file_ignores.items()),
+        ),
     }
     check_file = partial(check_source, options=options)
     in_memory = [Document(f"{profile.name}.toml", profile_text(profile)) for profile in profiles]

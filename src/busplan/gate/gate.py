@@ -6,7 +6,7 @@ from typing import Any, Final, Literal, NamedTuple
 
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
-from busplan.gate.baseline import Record, figures_of, keys_of, regression
+from busplan.gate.baseline import Record, figures_of, keys_of, known_as, regression
 from busplan.gate.finding import (
     MOST_STEPS,
     Finding,
@@ -28,6 +28,7 @@ from busplan.gate.rules import (
     all_rules,
     cycle_rules,
 )
+from busplan.gate.selection import EVERY_RULE, Selection
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.document import Document, LoadedProfile, Spot, decode, read_bytes, validate
 from busplan.profile.kinds import path_of
@@ -69,8 +70,8 @@ def suppressions(document: Document) -> Iterator[Suppression]:
 
 def suppress(
     violations: Iterable[Violation], document: Document, *, ran: set[str]
-) -> tuple[list[Violation], list[Finding]]:
-    """Remove suppressed problems, and find what is wrong with the suppressing comments themselves.
+) -> tuple[list[Violation], list[tuple[Violation, str]], list[Finding]]:
+    """Tell suppressed problems apart, and find what is wrong with the suppressing comments themselves.
 
     Parameters
     ----------
@@ -80,8 +81,14 @@ def suppress(
         The document.
     ran
         Codes of the rules that were checked; only for these can a suppression be without effect.
+
+    Returns
+    -------
+    tuple
+        Problems that are left, suppressed ones with the reason of their comment, and findings on comments.
     """
     left = list(violations)
+    suppressed: list[tuple[Violation, str]] = []
     findings: list[Finding] = []
     for comment in suppressions(document):
         if not comment.codes:
@@ -93,6 +100,7 @@ def suppress(
         for code in comment.codes:
             hit = [broken for broken in left if broken.rule.code == code and broken.spot.line == comment.of_line]
             left = [broken for broken in left if broken not in hit]
+            suppressed += ((broken, comment.reason) for broken in hit)
             if code not in all_rules():
                 message = f"{code or 'nothing'} is not the code of a rule"
             elif code in NEVER_SUPPRESSED:
@@ -102,7 +110,7 @@ def suppress(
             else:
                 continue
             findings.append(_comment_finding(SUPPRESSION_WITHOUT_EFFECT, comment, message))
-    return left, findings
+    return left, suppressed, findings
 
 
 def _comment_finding(rule: Rule, suppression: Suppression, words: str, way_out: str = "") -> Finding:
@@ -110,6 +118,7 @@ def _comment_finding(rule: Rule, suppression: Suppression, words: str, way_out: 
 
 
 Status = Literal["ok", "findings", "error"]
+SuppressedBy = Literal["comment", "selection", "baseline"]
 
 
 class Fit(NamedTuple):
@@ -123,6 +132,14 @@ class Fit(NamedTuple):
     """Expanded uncertainty of the corrected margin [us]."""
 
 
+class Suppressed(NamedTuple):
+    """A finding that does not count."""
+
+    finding: Finding
+    by: SuppressedBy
+    reason: str
+
+
 class FileResult(NamedTuple):
     """Result of one file."""
 
@@ -130,7 +147,7 @@ class FileResult(NamedTuple):
     profile: str | None
     """Name of the profile; None if it cannot be read."""
     findings: tuple[Finding, ...]
-    """In the order of their places."""
+    """Those that count, in the order of their places."""
     figures: dict[str, float]
     """Figures for a baseline; empty if the profile cannot be read or they were not requested."""
     source: tuple[str, ...] = ()
@@ -143,6 +160,10 @@ class FileResult(NamedTuple):
     """How the cycle fits; None if the profile cannot be read."""
     circle_not_run: bool = False
     """If True, the profile asks for a circle test, which the check left out."""
+    suppressed: tuple[Suppressed, ...] = ()
+    """Findings that a comment, the selection of rules or the baseline suppresses."""
+    mended: tuple[str, ...] = ()
+    """Findings that the baseline knows, and that are no more."""
 
     @property
     def status(self) -> Status:
@@ -190,6 +211,7 @@ def check_document(
     baseline: Record | None = None,
     record: bool = True,
     recording: Recording | None = None,
+    selection: Selection = EVERY_RULE,
 ) -> FileResult:
     """Check one document against all rules.
 
@@ -209,11 +231,13 @@ def check_document(
         Whether to give the figures that a baseline records.
     recording
         Recording of its machine, or None; if it cannot be compared, the result has a failure.
+    selection
+        Rules that count.
 
     Returns
     -------
     FileResult
-        Findings in the order of their places, without suppressed ones.
+        Findings in the order of their places, and suppressed ones apart.
     """
     try:
         profile = validate(document)
@@ -244,12 +268,26 @@ def check_document(
     if changes.entries:
         # Comments were written for the file as it is; with changes, a suppression without effect is no fault.
         ran = set()
-    left, of_comments = suppress(violations, document, ran=ran)
-    findings = [*(_finding_of(violation, subject) for violation in left), *of_comments]
+    left, commented, of_comments = suppress(violations, document, ran=ran)
+    found = [*(_finding_of(violation, subject) for violation in left), *of_comments]
+    suppressed = [Suppressed(_finding_of(violation, subject), "comment", reason) for violation, reason in commented]
+    known = set() if baseline is None else set(baseline.findings)
+    findings = []
+    for finding in found:
+        reason = selection.reason(finding.code, document.name)
+        if reason:
+            suppressed.append(Suppressed(finding, "selection", reason))
+        elif known_as(finding.code, finding.key) in known:
+            suppressed.append(Suppressed(finding, "baseline", "known in the baseline"))
+        else:
+            findings.append(finding)
+    here = {known_as(finding.code, finding.key) for finding in (*found, *(each.finding for each in suppressed))}
     deciding = subject.deciding
     fit = Fit(deciding.verdict, deciding.margin_corrected_us, deciding.uncertainty_us)
     not_run = profile.asks_for_circle and not with_circle
-    result = _result(document, profile.name, findings)._replace(fit=fit, circle_not_run=not_run)
+    result = _result(document, profile.name, findings)._replace(
+        fit=fit, circle_not_run=not_run, suppressed=tuple(suppressed), mended=tuple(sorted(known - here))
+    )
     return result._replace(figures=figures_of(subject), keys=keys_of(profile)) if record else result
 
 

@@ -20,7 +20,7 @@ from busplan.forms.lines import BLANK, Line, Mark, Tone, plain_text, styled_text
 from busplan.forms.markdown import code, escaped, table
 from busplan.forms.numbers import MISSING, sentence_text
 from busplan.gate.finding import Finding, finding_line, finding_parts
-from busplan.gate.gate import FileResult, Fit
+from busplan.gate.gate import FileResult, Fit, Suppressed
 from busplan.gate.rules import all_rules, rule_report
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.questions.base.sentences import changed_document, changes_sentences, document
@@ -33,6 +33,7 @@ class Summary(NamedTuple):
     errors: int
     warnings: int
     circles_not_run: int = 0
+    suppressed: int = 0
 
 
 class Located(NamedTuple):
@@ -55,13 +56,16 @@ class CheckReport(NamedTuple):
     """Number of files that were skipped because they are no profiles."""
     unmatched: str = ""
     """Which profiles have no record in the baseline, and which records no profile; empty where there is none."""
+    lists_all: bool = False
+    """If True, people read each finding of a rule that is told once a run, too."""
 
     @property
     def summary(self) -> Summary:
-        """Number of files, errors, warnings, and circle tests that were not run."""
+        """Number of files, errors, warnings, circle tests that were not run, and suppressed findings."""
         severities = [finding.severity for file in self.files for finding in file.findings]
         not_run = sum(file.circle_not_run for file in self.files)
-        return Summary(len(self.files), severities.count("error"), severities.count("warning"), not_run)
+        suppressed = sum(len(file.suppressed) for file in self.files)
+        return Summary(len(self.files), severities.count("error"), severities.count("warning"), not_run, suppressed)
 
     @property
     def failed(self) -> bool:
@@ -81,11 +85,29 @@ class CheckReport(NamedTuple):
             for finding, source in zip(file.findings, file.source, strict=True):
                 same = (finding.code, finding.key)
                 number = seen[same] = seen.get(same, -1) + 1
-                mark = "\0".join((file.path, *same, str(number)))
-                located.append(
-                    Located(file.path, finding, source, sha256(mark.encode("utf-8", "surrogatepass")).hexdigest())
-                )
+                located.append(Located(file.path, finding, source, _fingerprint(file.path, finding, str(number))))
         return tuple(located)
+
+    @property
+    def told(self) -> tuple[Located, ...]:
+        """Findings for people: of a rule that is told once a run, the first alone."""
+        seen: set[str] = set()
+        told = []
+        for located in self.located:
+            code = located.finding.code
+            if self.lists_all or code not in _TOLD_ONCE or code not in seen:
+                told.append(located)
+            seen.add(code)
+        return tuple(told)
+
+
+def _fingerprint(path: str, finding: Finding, number: str) -> str:
+    mark = f"{path}\0{finding.code}\0{finding.key}\0{number}"
+    return sha256(mark.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+_TOLD_ONCE: Final = ("BP112",)
+"""Rules whose findings are alike in every profile."""
 
 
 def check_report(report: CheckReport) -> Report:
@@ -100,7 +122,7 @@ def check_report(report: CheckReport) -> Report:
 
 def _sentences(report: CheckReport) -> Iterator[Sentence]:
     """Each finding, each file that could not be checked, and the summary."""
-    for located in report.located:
+    for located in report.told:
         place, words = finding_parts(located.path, located.finding)
         yield Sentence((Code(place), f" {words}"), "fails" if located.finding.severity == "error" else "warns")
     yield from (Sentence((file.failure,), "fails") for file in report.files if file.failure is not None)
@@ -123,6 +145,8 @@ def summary_sentence(report: CheckReport) -> Sentence:
     parts = (
         (failed, "{} could not be checked"),
         (counts.circles_not_run, f"{{}} {nouns(counts.circles_not_run, 'circle test')} not run"),
+        (counts.suppressed, f"{{}} {nouns(counts.suppressed, 'finding')} suppressed"),
+        (len(report.located) - len(report.told), "{} more alike (--verbose)"),
         (report.others, f"skipped {{}} {nouns(report.others, 'file')} without a schema_version"),
     )
     return joined(summary, *(sentence(words, count_value(number)) for number, words in parts if number), by="; ")
@@ -149,6 +173,9 @@ def check_document(report: CheckReport) -> JsonDocument:
             "status": file.status,
             **(file.fit or Fit())._asdict(),
             "findings": [finding._asdict() for finding in file.findings],
+            "suppressed": [
+                {**each.finding._asdict(), "by": each.by, "reason": each.reason} for each in file.suppressed
+            ],
         }
         files.append(content if file.failure is None else {**content, "failure": file.failure})
     return changed_document(document("check", files=files, summary=report.summary._asdict()), report.changes)
@@ -170,7 +197,7 @@ def concise(report: CheckReport, *, width: int | None = None) -> str:
     """One line for each finding; in colours if there is a width, at which the terminal breaks the lines itself."""
     lines = [
         marked_line(finding_line(located.path, located.finding), located.path, located.finding)
-        for located in report.located
+        for located in report.told
     ]
     return plain_text(lines) if width is None else styled_text(lines)
 
@@ -190,7 +217,7 @@ def full(report: CheckReport, *, width: int | None = None) -> str:
 
 
 def _lines(report: CheckReport, width: int) -> Iterator[Line]:
-    for located in report.located:
+    for located in report.told:
         yield from _heading(located, width)
         yield from _source(located, width)
         yield from _mending(located, width)
@@ -318,7 +345,10 @@ def sarif(report: CheckReport) -> str:
                 ],
             }
         ],
-        "results": [_result(located) for located in report.located],
+        "results": [
+            *(_result(located) for located in report.located),
+            *(_suppressed_result(file.path, each) for file in report.files for each in file.suppressed),
+        ],
     }
     document = {"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}
     return to_json(document)
@@ -359,6 +389,13 @@ def _result(located: Located) -> JsonDocument:
         # SARIF's own fixes are edits of a file, and a cure may be a key that the file does not have.
         **({"properties": {"cure": finding.cure}} if finding.cure else {}),
     }
+
+
+def _suppressed_result(path: str, suppressed: Suppressed) -> JsonDocument:
+    kind = "inSource" if suppressed.by == "comment" else "external"
+    located = Located(path, suppressed.finding, "", _fingerprint(path, suppressed.finding, "suppressed"))
+    why = {"justification": suppressed.reason} if suppressed.reason else {}
+    return {**_result(located), "suppressions": [{"kind": kind, **why}]}
 
 
 def _artifact(path: str) -> dict[str, str]:
@@ -424,8 +461,8 @@ def markdown_report(report: CheckReport) -> str:
     lines = ["### Check of profiles", "", escaped(" ".join(map(sentence_text, sentences)))]
     if report.files:
         lines += ["", *table(_PROFILES, map(_profile, report.files), left=3)]
-    if report.located:
-        lines += ["", *table(_FINDINGS, map(_finding_row, report.located), left=len(_FINDINGS))]
+    if report.told:
+        lines += ["", *table(_FINDINGS, map(_finding_row, report.told), left=len(_FINDINGS))]
     return "".join(f"{line}\n" for line in lines)
 
 

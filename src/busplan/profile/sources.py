@@ -125,6 +125,8 @@ def load(argument: str) -> LoadedProfile:
     return LoadedProfile(validate(document), document)
 
 
+SETTINGS_FILE: Final = "busplan.toml"
+"""Settings of `busplan check`; a file of this name is never a profile."""
 TIMEOUT_S: Final = 10.0
 """Longest wait for git, which only reads a short file."""
 
@@ -287,7 +289,9 @@ def _meant(argument: str, *, stdin_name: str, skipped: list[str], skip_others: b
             yield ProfileSource(path, name, is_shipped=True)
         elif path.is_dir():
             yield from _below(path, skipped)
-        elif skip_others and path.is_file() and not claims(path):
+        elif path.name == SETTINGS_FILE and not skip_others:
+            yield ProfileSource(path, name, f"{name}: has settings of `busplan check`, and no profile")
+        elif skip_others and path.is_file() and (path.name == SETTINGS_FILE or not claims(path)):
             skipped.append(_name(path))
         else:
             yield ProfileSource(path, _name(path))
@@ -317,7 +321,7 @@ def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
     for root, folders, files in os.walk(folder, onerror=unreadable.append):
         folders[:] = sorted(name for name in folders if not name.startswith(".") and name not in _SKIPPED_FOLDERS)
         for name in sorted(files):
-            if not name.endswith(".toml"):
+            if not name.endswith(".toml") or name == SETTINGS_FILE:
                 continue
             path = Path(root) / name
             if claims(path):

@@ -1,0 +1,189 @@
+"""Which rules of the gate count where, and the settings of the nearest busplan.toml or pyproject.toml."""
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fnmatch import fnmatch
+from pathlib import Path, PurePath
+from typing import Any, Final, NamedTuple, NoReturn
+
+from busplan.english import did_you_mean
+from busplan.errors import BusplanError
+from busplan.gate.rules import NEVER_SUPPRESSED, all_rules
+from busplan.profile.document import Document, decode, read_bytes
+from busplan.profile.sources import SETTINGS_FILE
+
+_PYPROJECT: Final = "pyproject.toml"
+Refuse = Callable[[str], NoReturn]
+
+
+class Selection(NamedTuple):
+    """Rules that count, by the beginning of their code: the longest that fits decides, and `ignore` in a tie."""
+
+    select: tuple[str, ...] = ()
+    """Empty for all rules."""
+    ignore: tuple[str, ...] = ()
+    per_file_ignores: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    """Beginnings of codes by the pattern of a path."""
+
+    def reason(self, code: str, path: str) -> str:
+        """Why a finding does not count; empty where it does.
+
+        Parameters
+        ----------
+        code
+            Code of its rule.
+        path
+            The profile.
+        """
+        if code in NEVER_SUPPRESSED:
+            return ""
+        chosen, ignored = (
+            max((len(start) for start in starts if code.startswith(start)), default=-1)
+            for starts in (self.select, self.ignore)
+        )
+        if self.select and chosen < 0:
+            return f"not selected by {', '.join(self.select)}"
+        if ignored >= 0 and ignored >= chosen:
+            return f"ignored by {', '.join(self.ignore)}"
+        for pattern, starts in self.per_file_ignores:
+            if any(map(code.startswith, starts)) and _matches(path, pattern):
+                return f"ignored for {pattern}"
+        return ""
+
+
+def _relative(path: Path, folder: Path) -> str:
+    return Path(os.path.relpath(path, folder)).as_posix()
+
+
+def _matches(path: str, pattern: str) -> bool:
+    """Whether a pattern is that of a path, or of its name alone, as in ruff."""
+    return fnmatch(_relative(Path(path), Path.cwd()), pattern) or fnmatch(PurePath(path).name, pattern)
+
+
+EVERY_RULE: Final = Selection()
+
+
+def checked_codes(starts: Iterable[str], *, name: str) -> tuple[str, ...]:
+    """Beginnings of codes, each of some rule that can be ignored.
+
+    Raises
+    ------
+    BusplanError
+        No rule begins so, or all that do cannot be suppressed.
+    """
+    codes = tuple(starts)
+    for start in codes:
+        rules = [code for code in all_rules() if code.startswith(start)] if start else []
+        if not rules:
+            hint = "; ".join(filter(None, (did_you_mean(start, all_rules()), "`busplan rule` lists them")))
+            raise BusplanError(f"{name} {start or repr(start)}: no rule has a code that begins so; {hint}")
+        if all(code in NEVER_SUPPRESSED for code in rules):
+            raise BusplanError(f"{name} {start}: {', '.join(rules)} cannot be left out, what they find must be mended")
+    return codes
+
+
+class Settings(NamedTuple):
+    """Settings of a file, by the name of their option."""
+
+    values: Mapping[str, Any]
+    folder: Path
+    """Folder of the file."""
+
+    def option(self, name: str, given: Any, default: Any) -> Any:
+        """Value of an option: as given, or else that of the settings, or else the default; a path is made relative."""
+        if given is not None or name not in self.values:
+            return default if given is None else given
+        value = self.values[name]
+        if name == "baseline":
+            return Path(self._path(value))
+        if name == "per-file-ignores":
+            # A name alone is that of a file in any folder.
+            return {self._path(pattern) if "/" in pattern else pattern: codes for pattern, codes in value.items()}
+        return value
+
+    def _path(self, written: str) -> str:
+        return _relative(self.folder / written, Path.cwd())
+
+
+def _codes(value: Any, refuse: Refuse) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(start, str) for start in value):
+        refuse('expected a list of rule codes or their beginnings, as ["BP112", "BP3"]')
+    return tuple(value)
+
+
+def _codes_by_pattern(value: Any, refuse: Refuse) -> dict[str, tuple[str, ...]]:
+    if not isinstance(value, dict):
+        refuse('expected lists of rule codes by pattern of the path, as {"old/*.toml" = ["BP112"]}')
+    return {pattern: _codes(starts, refuse) for pattern, starts in value.items()}
+
+
+def _of_type(kind: type, words: str) -> Callable[[Any, Refuse], Any]:
+    def checked(value: Any, refuse: Refuse) -> Any:
+        return value if type(value) is kind else refuse(f"expected {words}")
+
+    return checked
+
+
+def _severity(value: Any, refuse: Refuse) -> str:
+    return str(value) if value in ("error", "warning") else refuse('expected "error" or "warning"')
+
+
+_CHECKS: Final[Mapping[str, Callable[[Any, Refuse], Any]]] = {
+    "select": _codes,
+    "ignore": _codes,
+    "per-file-ignores": _codes_by_pattern,
+    "fail-on": _severity,
+    "baseline": _of_type(str, "a path"),
+    "circle": _of_type(bool, "true or false"),
+    "circle-steps": _of_type(int, "a whole number"),
+    "skip-others": _of_type(bool, "true or false"),
+    "jobs": _of_type(int, "a whole number"),
+}
+"""How the value of each key is checked; keys are named as the options of `check`."""
+
+
+def nearest_settings(folder: Path) -> Settings:
+    """Settings of a folder or of the nearest one above it: of its busplan.toml, or else of its pyproject.toml.
+
+    Raises
+    ------
+    BusplanError
+        The file is not TOML, or has an unknown key or a wrong value, with its place.
+    """
+    for place in (folder, *folder.parents):
+        for name, sections in ((SETTINGS_FILE, ()), (_PYPROJECT, ("tool", "busplan"))):
+            path = place / name
+            if not path.is_file():
+                continue
+            shown = _relative(path, folder)
+            document = decode(read_bytes(path, name=shown), name=shown)
+            table: Any = document.data()
+            for section in sections:
+                table = table.get(section, {}) if isinstance(table, dict) else {}
+            if table or not sections:
+                return Settings(_checked(table, sections, document), place)
+    return Settings({}, folder)
+
+
+def _checked(table: Any, sections: Sequence[str], document: Document) -> dict[str, Any]:
+    def refuse_at(key: str) -> Refuse:
+        spot = document.spot((*sections, key))
+
+        def refuse(words: str) -> NoReturn:
+            raise BusplanError(f"{document.name}:{spot.line}:{spot.column}: {key}: {words}")
+
+        return refuse
+
+    values = {}
+    for key, value in table.items():
+        if key not in _CHECKS:
+            hint = did_you_mean(key, _CHECKS) or f"known here: {', '.join(_CHECKS)}"
+            refuse_at(key)(f"unknown key; {hint}")
+        values[key] = _CHECKS[key](value, refuse_at(key))
+        starts = values[key].values() if key == "per-file-ignores" else [values[key]]
+        for codes in starts if key in ("select", "ignore", "per-file-ignores") else ():
+            try:
+                checked_codes(codes, name=key)
+            except BusplanError as error:
+                refuse_at(key)(error.problems[0].removeprefix(f"{key} "))
+    return values
